@@ -15,8 +15,13 @@ from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.runs import Catalog
 
-from .browser import browser, open_page  # noqa: F401 - fixtures
-from .plans.cut import MUG, cut, write
+from .helpers.browser import browser, open_page  # noqa: F401 - fixtures
+from .helpers.command_line import (
+    option_words,
+    run_cli,  # noqa: F401 - a fixture
+)
+from .helpers.simulators import simulator  # noqa: F401 - a fixture
+from .helpers.trajectories import MUG, cut_trajectory, write_trajectories
 from .processor_times import read_slow_tests
 
 # Before torch is imported, here and in processes that tests start: on a busy machine two threads
@@ -88,38 +93,19 @@ def make_nieh_set(tmp_path: Path) -> Callable[..., Path]:
     return make
 
 
-@pytest.fixture
-def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """Runs our command in this process; gives its exit code, standard output and standard error."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as ended:
-            main([str(argument) for argument in arguments])
-        return ended.value.code, *capfd.readouterr()
-
-    return run
-
-
 @pytest.fixture(scope="session")
 def scripted_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the trajectory of `scripted_run`, of twelve plans."""
-    return write(tmp_path_factory.mktemp("trajectories") / "data", cut(MUG, 12))
+    return write_trajectories(
+        tmp_path_factory.mktemp("trajectories") / "data", cut_trajectory(MUG, 12)
+    )
 
 
 @pytest.fixture(scope="session")
 def scripted_run(tmp_path_factory: pytest.TempPathFactory, scripted_data: Path) -> Path:
     """The folder of a run of plans: the baseline `scripted` in one trajectory."""
     output = tmp_path_factory.mktemp("scripted")
-    words = (
-        "--model",
-        "scripted",
-        "--tasks",
-        "infthor_plans",
-        "--data",
-        scripted_data,
-        "--output",
-        output,
-    )
+    words = option_words(model="scripted", tasks="infthor_plans", data=scripted_data, output=output)
     with pytest.raises(SystemExit) as ended:
         main([str(word) for word in words])
     assert ended.value.code == 0

@@ -20,9 +20,10 @@ from infthor_eval.report.sample_table import encode_samples, sample_table
 from infthor_eval.report.suites.episode_columns import ARM_COLUMNS, PLAN_COLUMNS
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
 from infthor_eval.runs import UnitRecord
-from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.stored.search import read_results
-from tests.nieh.made import header, identity, record
+from tests.helpers.command_line import option_words
+from tests.helpers.journals import write_journal
+from tests.helpers.nieh_runs import make_config, make_header, make_record
 
 ROOT = Path(__file__).parents[1]
 TASKS = {
@@ -40,18 +41,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folders = {}
     for suite, (model, task, limit) in TASKS.items():
         with pytest.raises(SystemExit) as ended:
-            main(
-                [
-                    "--model",
-                    model,
-                    "--tasks",
-                    task,
-                    "--limit",
-                    limit,
-                    "--output",
-                    str(output / suite),
-                ]
-            )
+            main(option_words(model=model, tasks=task, limit=limit, output=str(output / suite)))
         assert ended.value.code == 0
         (folders[suite],) = (output / suite / model).iterdir()
     return folders
@@ -86,9 +76,8 @@ def test_every_column_is_documented() -> None:
     page = (ROOT / "docs/formats.md").read_text()
     documented = page[page.index("## Samples as a table") :]
     names = {column.name for columns in (ENVELOPE, *COLUMNS.values()) for column in columns}
-    guesses = {
-        name for name in names if name.startswith(("guess_", "above_guessing_"))
-    }  # one for each scorer
+    # One for each scorer.
+    guesses = {name for name in names if name.startswith(("guess_", "above_guessing_"))}
     wanted = {
         "run",
         "suite",
@@ -105,22 +94,21 @@ def make_run(tmp_path: Path):
     """Writes the journal of a run of NIEH."""
 
     def make_run(*records: UnitRecord) -> Path:
-        config = identity(model="m", checkpoint=None, n_parameters=None)
-        with Journal(tmp_path / "run", header(config, "m"), RECORDS) as journal:
-            for item in records:
-                journal.append(item)
-        return tmp_path / "run"
+        config = make_config(model="m", checkpoint=None, n_parameters=None)
+        return write_journal(tmp_path / "run", make_header(config, "m"), records, RECORDS)
 
     return make_run
 
 
 def test_a_failed_sample_counts_as_wrong_and_an_excluded_one_not_at_all(make_run) -> None:
     excluded = msgspec.structs.replace(
-        record(2, None, ("Bed",), failure="x"), failure=None, excluded="no frame"
+        make_record(2, None, ("Bed",), failure="x"), failure=None, excluded="no frame"
     )
     frame = infthor_eval.load_run(
         make_run(
-            record(0, "Bed", ("Bed",)), record(1, None, ("Bed",), failure="it fails"), excluded
+            make_record(0, "Bed", ("Bed",)),
+            make_record(1, None, ("Bed",), failure="it fails"),
+            excluded,
         )
     )
     frame = frame.set_index("id").sort_index()
@@ -144,14 +132,21 @@ def test_csv_is_safe_to_open_and_parquet_is_exact(make_run) -> None:
         "'",
         "naïve ∞",
     ]
-    folder = make_run(*(record(place, reply, ("Bed",)) for place, reply in enumerate(replies)))
+    folder = make_run(*(make_record(place, reply, ("Bed",)) for place, reply in enumerate(replies)))
     table = sample_table(read_report_runs([folder]))
     exact = pandas.read_parquet(io.BytesIO(encode_samples(table, "parquet")))
     assert sorted(exact["reply"]) == sorted(replies)
     text = encode_samples(table, "csv")
     safe = pandas.read_csv(io.BytesIO(text))
-    shown = ['\'=HYPERLINK("http://x")', "\\x1b[31mred\\x07", replies[2], "'-1", "''", "naïve ∞"]
-    assert sorted(safe["reply"]) == sorted(shown)
+    safe_replies = [
+        '\'=HYPERLINK("http://x")',
+        "\\x1b[31mred\\x07",
+        replies[2],
+        "'-1",
+        "''",
+        "naïve ∞",
+    ]
+    assert sorted(safe["reply"]) == sorted(safe_replies)
     assert b"\x1b" not in text
     assert safe["score_strict"].tolist() == exact["score_strict"].tolist()
 

@@ -56,7 +56,7 @@ def test_what_is_made_after_an_import_is_collected(own_module: str) -> None:
     loop.itself = loop
     del loop
     gc.collect()
-    assert not any(type(found) is loop_class for found in gc.get_objects())
+    assert not any(type(item) is loop_class for item in gc.get_objects())
 
 
 def test_a_command_collects_seldom_while_it_imports_and_then_as_before(

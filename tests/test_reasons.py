@@ -2,16 +2,16 @@ from infthor_eval.reasons import count_reasons
 
 
 def test_reasons_that_differ_in_their_numbers_alone_are_one():
-    said = (
+    template = (
         "a context of {} tokens and 50 new ones is beyond the 32,768 tokens of qwen2.5-vl-7b; use "
         "fewer frames"
     )
-    reasons = [("nieh_full", said.format(n)) for n in (203_456, 147_123, 150_000)] + [
-        ("nieh_gt", said.format(9))
+    reasons = [("nieh_full", template.format(n)) for n in (203_456, 147_123, 150_000)] + [
+        ("nieh_gt", template.format(9))
     ]
     assert count_reasons(reasons) == [
-        ("nieh_full", said.format("147123 to 203456"), 3),
-        ("nieh_gt", said.format("9"), 1),
+        ("nieh_full", template.format("147123 to 203456"), 3),
+        ("nieh_gt", template.format("9"), 1),
     ]
 
 

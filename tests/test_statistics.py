@@ -13,7 +13,7 @@ from infthor_eval.statistics import (
     paired_difference,
 )
 
-from .benchmarks import load_benchmark
+from .helpers.benchmarks import load_benchmark
 
 scores = st.lists(
     st.tuples(st.sampled_from([0.0, 0.5, 1.0]), st.integers(0, 6)), min_size=2, max_size=60
@@ -100,15 +100,15 @@ def test_one_trajectory_gives_no_interval():
 
 
 @pytest.mark.parametrize(
-    ("values", "clusters", "said"),
+    ("values", "clusters", "expected"),
     [
         ([], [], "no score"),
         ([1.0], [], "1 scores but 0"),
         ([1.0, 0.0], ["t", ""], "score 1 has no trajectory"),
     ],
 )
-def test_scores_that_cannot_be_clustered_are_refused(values, clusters, said):
-    with pytest.raises(DataError, match=said):
+def test_scores_that_cannot_be_clustered_are_refused(values, clusters, expected):
+    with pytest.raises(DataError, match=expected):
         clustered_mean(values, clusters)
 
 

@@ -13,12 +13,13 @@ from infthor_eval.errors import InfthorError, UsageError
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.runs import Catalog
 from infthor_eval.suites import find_presenter, find_suite, options_class, suite_code, suite_names
+from tests.helpers.command_line import option_words
 
 ROOT = Path(__file__).parents[1]
 SUITE = """
 from dataclasses import dataclass, field
 from infthor_eval.report.plain import PlainPresenter
-from tests.runs.toy import ToySuite
+from tests.helpers.toy_suite import ToySuite
 
 @dataclass(frozen=True)
 class Options:
@@ -52,8 +53,10 @@ def package(tmp_path, monkeypatch):
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: Sums\nVersion: 1.0\n")
     points = (
-        "[infthor_eval.suites]\nsums = sums_suite:SumsSuite\n[infthor_eval.tasks]\nsums = "
-        "sums_tasks.here\n"
+        "[infthor_eval.suites]\n"
+        "sums = sums_suite:SumsSuite\n"
+        "[infthor_eval.tasks]\n"
+        "sums = sums_tasks.here\n"
     )
     (info / "entry_points.txt").write_text(points)
     monkeypatch.syspath_prepend(tmp_path)
@@ -70,15 +73,7 @@ def command(package, *arguments):
 
 def test_a_suite_of_another_package_runs_with_its_task_and_its_options(package):
     done = command(
-        package,
-        "--model",
-        "adder",
-        "--tasks",
-        "sums",
-        "--abacus",
-        "bone",
-        "--output",
-        package / "out",
+        package, *option_words(model="adder", tasks="sums", abacus="bone", output=package / "out")
     )
     assert done.returncode == 1, done.stderr  # two of its sums cannot be done
     assert "the abacus is broken" in done.stderr
@@ -118,17 +113,18 @@ def point(package, monkeypatch):
     """Makes another target the suite `sums`, or the folder of the tasks."""
 
     def point(target, group="infthor_eval.suites"):
-        found = [EntryPoint("sums", target, group)]
+        entry_points_of_test = [EntryPoint("sums", target, group)]
         for module in ("infthor_eval.plugins", "infthor_eval.runs.catalog"):
             monkeypatch.setattr(
-                f"{module}.entry_points", lambda group: [one for one in found if one.group == group]
+                f"{module}.entry_points",
+                lambda group: [one for one in entry_points_of_test if one.group == group],
             )
 
     return point
 
 
 @pytest.mark.parametrize(
-    ("target", "said"),
+    ("target", "expected"),
     [
         ("no_such_module:A", "the suite sums cannot be imported from no_such_module:A"),
         ("sums_suite:Nothing", "the suite sums cannot be imported"),
@@ -136,9 +132,9 @@ def point(package, monkeypatch):
         ("sums_suite:Renamed", "calls itself 'other'; give it one name"),
     ],
 )
-def test_what_is_no_suite_is_refused_in_one_line(point, target, said):
+def test_what_is_no_suite_is_refused_in_one_line(point, target, expected):
     point(target)
-    with pytest.raises(InfthorError, match=said) as caught:
+    with pytest.raises(InfthorError, match=expected) as caught:
         find_suite("sums")
     assert "\n" not in str(caught.value)
 
@@ -165,15 +161,15 @@ def test_a_suite_without_a_presenter_has_the_plain_one_and_a_package_may_bring_o
 
 
 @pytest.mark.parametrize(
-    ("target", "said"),
+    ("target", "expected"),
     [
         ("sums_suite:Nothing", "the presenter sums cannot be imported from sums_suite:Nothing"),
         ("sums_suite:Options", "the presenter sums of another package lacks title, measure"),
     ],
 )
-def test_what_is_no_presenter_is_refused_in_one_line(package, add_presenter, target, said):
+def test_what_is_no_presenter_is_refused_in_one_line(package, add_presenter, target, expected):
     add_presenter(target)
-    with pytest.raises(InfthorError, match=said) as caught:
+    with pytest.raises(InfthorError, match=expected) as caught:
         find_presenter("sums")
     assert "\n" not in str(caught.value)
 

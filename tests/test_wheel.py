@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from .benchmarks import load_benchmark
+from .helpers.benchmarks import load_benchmark
+from .helpers.command_line import option_words
 
 BUILDING = load_benchmark("wheel_size")
 
@@ -66,28 +67,22 @@ def test_what_runs_is_the_installed_code(installed, tmp_path):
         "print(infthor_eval.__file__, infthor_sim.__file__, other.__file__)"
     )
     env = {**os.environ, "PYTHONPATH": str(installed)}
-    found = subprocess.check_output(
+    module_paths = subprocess.check_output(
         [sys.executable, "-c", code], cwd=tmp_path, env=env, text=True
     ).split()
-    assert all(Path(path).is_relative_to(installed) for path in found)
+    assert all(Path(path).is_relative_to(installed) for path in module_paths)
 
 
 def test_it_runs_in_an_empty_folder(command, tmp_path):
     assert "nieh_haystack_{8k,...,1m}" in command("ls", "tasks")
-    asked = (
-        "--model",
-        "blind,oracle,qwen2.5-vl-nano",
-        "--tasks",
-        "nieh_mini_gt",
-        "--limit",
-        "20",
+    words = (
+        *option_words(model="blind,oracle,qwen2.5-vl-nano", tasks="nieh_mini_gt", limit="20"),
         "--full",
     )
-    table = command(*asked)
+    table = command(*words)
     assert "Qwen2.5-VL 7B" in table  # the published numbers came with it
-    assert {path.name for path in tmp_path.iterdir()} - {"cache"} == {
-        "results"
-    }  # the first: $XDG_CACHE_HOME
+    # The first: $XDG_CACHE_HOME.
+    assert {path.name for path in tmp_path.iterdir()} - {"cache"} == {"results"}
 
 
 def test_the_simulator_runs_by_itself(installed, tmp_path):

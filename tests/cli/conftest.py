@@ -8,22 +8,11 @@ import pytest
 
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.nieh.scoring import SCORERS
-from infthor_eval.runs import UnitRecord, read_run
-from infthor_eval.runs.journals.journal import Journal
+from infthor_eval.runs import UnitRecord
 
-from ..nieh.made import header, identity
+from ..helpers.journals import write_journal
+from ..helpers.nieh_runs import make_config, make_header
 from .commands.rescored import REPLIES
-
-
-@pytest.fixture
-def records_in() -> Callable[[Path], list[UnitRecord[NiehAnswer]]]:
-    """Gives the records of the one run below a folder."""
-
-    def records_in(folder: Path) -> list[UnitRecord[NiehAnswer]]:
-        (journal,) = folder.rglob("journal")
-        return read_run(journal.parent, RECORDS)[1]
-
-    return records_in
 
 
 @pytest.fixture
@@ -37,27 +26,26 @@ def source(tmp_path: Path) -> Callable[..., Path]:
         metrics: tuple[str, ...] = SCORERS,
         **changes: object,
     ) -> Path:
-        config = identity(model="m", checkpoint=None, n_parameters=None, metrics=metrics) | changes
+        config = (
+            make_config(model="m", checkpoint=None, n_parameters=None, metrics=metrics) | changes
+        )
         config["tasks"]["nieh_gt"]["n_samples"] = n_samples
         folder = tmp_path / "elsewhere" / "a run"
-        head = msgspec.structs.replace(header(config, "m"), suite=suite)
-        with Journal(folder, head, RECORDS) as journal:
-            for item in records:
-                journal.append(item)
-        return folder
+        header = msgspec.structs.replace(make_header(config, "m"), suite=suite)
+        return write_journal(folder, header, records, RECORDS)
 
     return source
 
 
 @pytest.fixture
 def rescore(
-    tmp_path: Path, run: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, run_cli: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., tuple[int, str, Path | None]]:
     """Scores a run again; returns exit code, what was said, and the folder of the new run."""
     monkeypatch.chdir(tmp_path)
 
     def rescore(folder: Path, *options: object) -> tuple[int, str, Path | None]:
-        code, out, err = run("rescore", folder, "--output", tmp_path / "out", *options)
+        code, out, err = run_cli("rescore", folder, "--output", tmp_path / "out", *options)
         folders = sorted((tmp_path / "out").glob("*/*"), key=lambda path: path.stat().st_mtime)
         return code, out + err, folders[-1] if folders else None
 

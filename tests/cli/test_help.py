@@ -48,8 +48,8 @@ def test_help_begins_with_an_example_that_the_command_takes(context, monkeypatch
         command.make_context(str(context.info_name), words[len(typed) :])
 
 
-def test_the_overview_has_commands_in_groups(run):
-    code, out, _ = run("--help")
+def test_the_overview_has_commands_in_groups(run_cli):
+    code, out, _ = run_cli("--help")
     assert code == 0
     assert out.startswith("Example:\n  infthor-eval --model ")
     headings = re.findall(r"^(\w[\w ]*):$", out, re.MULTILINE)

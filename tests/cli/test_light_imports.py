@@ -130,9 +130,12 @@ def test_the_first_question_is_asked_without_what_it_does_not_need(
 )
 def test_making_data_loads_nothing_of_runs(typed: str, tmp_path: Path) -> None:
     code = (
-        "import sys\nfrom infthor_eval.cli import main\ntry:\n    main(sys.argv[1:])\n"
-        "except SystemExit:\n    print(*(name for name in sys.modules if "
-        "name.startswith('infthor_eval')))"
+        "import sys\n"
+        "from infthor_eval.cli import main\n"
+        "try:\n"
+        "    main(sys.argv[1:])\n"
+        "except SystemExit:\n"
+        "    print(*(name for name in sys.modules if name.startswith('infthor_eval')))"
     )
     done = subprocess.run(
         [sys.executable, "-c", code, *typed.split()],

@@ -56,13 +56,15 @@ def folder_of(tmp_path_factory):
 
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize(("page", "block"), BLOCKS)
-def test_the_commands_of_a_page_run_one_after_the_other(page, block, folder_of, run, monkeypatch):
+def test_the_commands_of_a_page_run_one_after_the_other(
+    page, block, folder_of, run_cli, monkeypatch
+):
     monkeypatch.chdir(folder_of(page))
     for command in block:
         if command.reason == FLOOR_PLANS:
             break  # what follows asks about what it makes
         if command.reason is None:
-            code, _, err = (_apart if "lm-eval" in command.words else run)(
+            code, _, err = (_apart if "lm-eval" in command.words else run_cli)(
                 *_with_globs(command.words[1:])
             )
             assert code == 0, f"{page}: {command.text}\n{err}"

@@ -10,7 +10,7 @@ import pytest
 
 from infthor_eval.storage.folders import packaged_folder
 
-from ..bundled import BUNDLED
+from ..helpers.bundled import BUNDLED
 from .blocks import ROOT
 
 PAGES = sorted(

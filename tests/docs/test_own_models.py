@@ -20,7 +20,7 @@ from model_adapters import (
 from model_adapters.check.clauses import start_conversation
 from model_adapters.check.contract import model_checks
 from model_adapters.check.policy import policy_checks
-from tests.model_adapters.test_check_policy import Scripted
+from tests.model_adapters.check.test_policy import Scripted
 
 from .blocks import ROOT, written_files
 
@@ -45,27 +45,27 @@ def rows(heading):
     ]
 
 
-def test_the_pages_adapter_keeps_the_contract(folder, run):
-    code, out, err = run("check-adapter", NAME)
+def test_the_pages_adapter_keeps_the_contract(folder, run_cli):
+    code, out, err = run_cli("check-adapter", NAME)
     assert (code, err) == (0, "")
     assert out.splitlines()[-1] == f"{NAME}: keeps the contract"
     assert [line.split()[0] for line in out.splitlines()[:-1]] == ["holds"] * 14
 
 
-def test_it_is_evaluated_and_a_run_of_its_own_when_it_is_edited(folder, run):
+def test_it_is_evaluated_and_a_run_of_its_own_when_it_is_edited(folder, run_cli):
     typed = ("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 5)
-    assert run(*typed)[0] == 0
+    assert run_cli(*typed)[0] == 0
     source = folder / "my_adapter.py"
     source.write_text(source.read_text().replace('"yes" if', '"maybe" if'))
-    assert run(*typed)[0] == 0
+    assert run_cli(*typed)[0] == 0
     assert len(list((folder / "results" / "Brightness").iterdir())) == 2
     identities = [json.loads(path.read_text())["config"] for path in folder.rglob("results.json")]
     assert {identity["adapter"]["file"] for identity in identities} == {"my_adapter.py"}
     assert {identity["model"]["name"] for identity in identities} == {"Brightness"}
 
 
-def test_workers_find_it(folder, run):
-    code, _, err = run("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 3, "--workers", 2)
+def test_workers_find_it(folder, run_cli):
+    code, _, err = run_cli("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 3, "--workers", 2)
     assert code == 0, err
 
 
@@ -100,24 +100,24 @@ def test_the_table_of_capabilities_has_all_of_them_with_their_defaults():
 )
 @pytest.mark.parametrize("command", [("check-adapter",), ("--tasks", "nieh_mini_gt", "--model")])
 def test_a_file_that_is_no_adapter_is_refused_in_one_line(
-    tmp_path, run, monkeypatch, command, source, name, said
+    tmp_path, run_cli, monkeypatch, command, source, name, said
 ):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own.py").write_text(source)
-    code, _, err = run(*command, name)
+    code, _, err = run_cli(*command, name)
     assert (code, len(err.splitlines())) == (2, 1), err
     assert said in err
     assert "Traceback" not in err
 
 
-def test_a_broken_clause_and_an_exception_are_reported_with_the_others(folder, run):
+def test_a_broken_clause_and_an_exception_are_reported_with_the_others(folder, run_cli):
     source = folder / "my_adapter.py"
     source.write_text(
         source.read_text()
         .replace("return Reply(text if", "return Reply('same' if")
         .replace('question = "".join(', 'question = None + "".join(')
     )
-    code, out, err = run("check-adapter", NAME)
+    code, out, err = run_cli("check-adapter", NAME)
     assert (code, err) == (1, "")
     clauses = {
         line.split()[1]: line for line in out.splitlines() if line.startswith(("holds", "broken"))
@@ -127,7 +127,7 @@ def test_a_broken_clause_and_an_exception_are_reported_with_the_others(folder, r
     assert "it raises TypeError in my_adapter.py:" in clauses["reply"]
     assert out.splitlines()[-1].endswith("broken")
     source.write_text(source.read_text().replace("def close", "def shut"))
-    code, out, err = run("check-adapter", NAME)
+    code, out, err = run_cli("check-adapter", NAME)
     assert (code, out.splitlines()[0]) == (
         1,
         "broken  members         Brightness lacks a member of Model: close",
@@ -150,22 +150,22 @@ def test_a_broken_clause_and_an_exception_are_reported_with_the_others(folder, r
         (("return cls(name", "return clas(name"), "build() fails (NameError in my_adapter.py:"),
     ],
 )
-def test_an_incomplete_adapter_is_refused_by_a_run_in_one_line(folder, run, edit, said):
+def test_an_incomplete_adapter_is_refused_by_a_run_in_one_line(folder, run_cli, edit, said):
     source = folder / "my_adapter.py"
     assert edit[0] in source.read_text()
     source.write_text(source.read_text().replace(*edit))
-    code, _, err = run("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 2)
+    code, _, err = run_cli("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 2)
     assert (code, len(err.splitlines())) == (2, 1), err
     assert f"model {NAME}: {said}" in err
     assert "docs/own-models.md" in err or "fix the adapter" in err
 
 
-def test_an_error_in_an_adapter_says_where_and_keeps_its_traceback(folder, run):
+def test_an_error_in_an_adapter_says_where_and_keeps_its_traceback(folder, run_cli):
     source = folder / "my_adapter.py"
     source.write_text(
         source.read_text().replace('question = "".join(', 'question = None + "".join(')
     )
-    code, _, err = run("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 2)
+    code, _, err = run_cli("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 2)
     assert code == 1
     assert "Brightness fails on the request (TypeError in my_adapter.py:" in err
     model = load(NAME, {}, seed=0)
@@ -175,8 +175,8 @@ def test_an_error_in_an_adapter_says_where_and_keeps_its_traceback(folder, run):
     assert "my_adapter.py" in "".join(traceback.format_exception(raised.value))
 
 
-def test_a_policy_is_checked_by_the_same_command(run):
-    code, out, err = run("check-adapter", "openvla-tiny")
+def test_a_policy_is_checked_by_the_same_command(run_cli):
+    code, out, err = run_cli("check-adapter", "openvla-tiny")
     assert (code, err) == (0, "")
     assert [line.split()[1] for line in out.splitlines()[:-1]] == [
         "members",

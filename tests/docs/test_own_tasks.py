@@ -25,11 +25,11 @@ def test_all_contexts_are_named():
     assert re.findall(r"`(\w+)`", said) == list(CONTEXTS)
 
 
-def test_own_tasks_run_with_the_shared_files_of_this_package(tmp_path, run, monkeypatch):
+def test_own_tasks_run_with_the_shared_files_of_this_package(tmp_path, run_cli, monkeypatch):
     written_files("docs/own-tasks.md", tmp_path)
     monkeypatch.chdir(tmp_path)
     options = ("--include-path", "my_tasks", "--limit", 3)
-    code, _, err = run("--model", "oracle", "--tasks", "nieh_mini_words,nieh_mini_gt", *options)
+    code, _, err = run_cli("--model", "oracle", "--tasks", "nieh_mini_words,nieh_mini_gt", *options)
     assert code == 0, err
     (results,) = tmp_path.rglob("results.json")
     tasks = json.loads(results.read_text())["summary"]["tasks"]
@@ -39,14 +39,14 @@ def test_own_tasks_run_with_the_shared_files_of_this_package(tmp_path, run, monk
     }
 
 
-def test_own_tasks_are_refused_in_one_line(tmp_path, run, monkeypatch):
+def test_own_tasks_are_refused_in_one_line(tmp_path, run_cli, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "task.yaml").write_text("include: _nieh.yaml\ntask: nieh_gt\n")
     typed = ("--model", "oracle", "--tasks", "nieh_gt")
-    code, _, err = run(*typed, "--include-path", "a")
+    code, _, err = run_cli(*typed, "--include-path", "a")
     assert (code, len(err.splitlines())) == (2, 1)
     assert "'nieh_gt' is the name of another task file too" in err
     (tmp_path / "a" / "task.yaml").write_text("include: _none.yaml\ntask: own\n")
-    assert "_none.yaml: cannot be read" in run(*typed, "--include-path", "a")[2]
-    assert "Directory 'b' does not exist" in run(*typed, "--include-path", "b")[2]
+    assert "_none.yaml: cannot be read" in run_cli(*typed, "--include-path", "a")[2]
+    assert "Directory 'b' does not exist" in run_cli(*typed, "--include-path", "b")[2]

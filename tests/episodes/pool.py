@@ -7,8 +7,12 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
+import pytest
+
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
+
+__all__ = ["Pool", "pool", "shared_simulators"]
 
 Options = tuple[tuple[str, Any], ...]
 
@@ -51,3 +55,17 @@ class Pool:
                 """Leave them to other tests."""
 
         return Shared
+
+
+@pytest.fixture(scope="session")
+def pool() -> Iterator[Pool]:
+    """The pool of a package's tests."""
+    pool = Pool()
+    with pool.open:
+        yield pool
+
+
+@pytest.fixture
+def shared_simulators(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Has runs of episodes use the shared processes instead of starting their own."""
+    monkeypatch.setattr("infthor_eval.episodes.evaluation.Simulators", pool.simulators_type())

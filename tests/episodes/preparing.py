@@ -10,7 +10,7 @@ from infthor_eval.runs import PreparedRun, prepare
 _OF_RUNS = ("tasks", "data", "output", "seed", "limit", "fresh", "recover")
 
 
-def preparer(default_model: str, **defaults: Any) -> Callable[..., PreparedRun]:
+def make_preparer(default_model: str, **defaults: Any) -> Callable[..., PreparedRun]:
     """Return a function that prepares a run.
 
     Its keyword arguments are the model, its options, those of `RunOptions`, which have these

@@ -13,7 +13,7 @@ from infthor_eval.plans.evaluation import PlansEvaluation
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.runs import TaskFile, TaskRequest
 
-from ..plans.cut import CANDLE, MUG, cut, write
+from ..helpers.trajectories import CANDLE, MUG, cut_trajectory, write_trajectories
 
 KWARGS = {"dataset_kwargs": {}, "generation_kwargs": {"max_gen_toks": 1}}
 
@@ -28,7 +28,7 @@ KWARGS = {"dataset_kwargs": {}, "generation_kwargs": {"max_gen_toks": 1}}
 def test_a_limit_changes_neither_floor_plans_nor_what_baselines_learn_from(
     tmp_path, suite, evaluation, options
 ):
-    data = write(tmp_path / "data", cut(CANDLE), cut(MUG))
+    data = write_trajectories(tmp_path / "data", cut_trajectory(CANDLE), cut_trajectory(MUG))
     file = TaskFile("a_task", suite, Path("a_task.yaml"), KWARGS)
     limited, unlimited = (
         evaluation(TaskRequest([file], options, data, limit)) for limit in (1, None)
@@ -42,7 +42,7 @@ def test_a_limit_changes_neither_floor_plans_nor_what_baselines_learn_from(
 
 
 def test_an_action_without_an_object_is_named_with_its_file(tmp_path):
-    data = write(tmp_path / "data", cut(MUG))
+    data = write_trajectories(tmp_path / "data", cut_trajectory(MUG))
     (path,) = data.iterdir()
     text = path.read_text()
     assert '"objectId"' in text

@@ -28,10 +28,10 @@ def kill(simulator):
 
 def test_what_goes_well_is_done_once(simulator):
     anew = []
-    made = with_retries(
+    result = with_retries(
         simulator, lambda: simulator.step("RotateLeft").success, lambda: anew.append(1)
     )
-    assert made == (True, ())
+    assert result == (True, ())
     assert anew == []
 
 
@@ -44,8 +44,8 @@ def test_what_the_simulator_mends_by_itself_is_told(simulator):
         return simulator.step("RotateLeft").agent.rotation
 
     anew = []
-    made, faults = with_retries(simulator, turn, lambda: anew.append(1))
-    assert made == (before - 90) % 360
+    result, faults = with_retries(simulator, turn, lambda: anew.append(1))
+    assert result == (before - 90) % 360
     assert faults == ("simulator started again: 1",)
     assert anew == []
 
@@ -61,8 +61,8 @@ def test_a_failure_for_good_is_tried_again_twice(simulator, n_failures):
         return "made"
 
     if n_failures < 3:
-        told = tuple(f"it hangs ({number + 1})" for number in range(n_failures))
-        assert with_retries(simulator, fails, lambda: anew.append(1)) == ("made", told)
+        faults = tuple(f"it hangs ({number + 1})" for number in range(n_failures))
+        assert with_retries(simulator, fails, lambda: anew.append(1)) == ("made", faults)
     else:
         with pytest.raises(SimulatorError, match=r"it hangs \(3\)"):
             with_retries(simulator, fails, lambda: anew.append(1))

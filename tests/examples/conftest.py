@@ -16,9 +16,8 @@ def install(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Installs an example and gives the folder to import it from; nothing is downloaded."""
 
     def install(name: str) -> Path:
-        source = shutil.copytree(
-            EXAMPLES / name, tmp_path_factory.mktemp("source") / name
-        )  # setuptools writes into it
+        # Setuptools writes into it.
+        source = shutil.copytree(EXAMPLES / name, tmp_path_factory.mktemp("source") / name)
         target = tmp_path_factory.mktemp("installed")
         quietly = (
             "--quiet",

@@ -9,6 +9,8 @@ from infthor_eval.cli import main
 from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
 
+from ..helpers.command_line import option_words
+
 MODELS = ("calculator", "qwen2.5-vl-tiny")
 
 
@@ -21,16 +23,9 @@ def folders(install, tmp_path_factory):
         patched.syspath_prepend(install("sums"))
         with pytest.raises(SystemExit) as ended:
             main(
-                [
-                    "--model",
-                    ",".join(MODELS),
-                    "--tasks",
-                    "sums_small",
-                    "--limit",
-                    "8",
-                    "--output",
-                    str(output),
-                ]
+                option_words(
+                    model=",".join(MODELS), tasks="sums_small", limit="8", output=str(output)
+                )
             )
         assert ended.value.code == 0
         yield [next((output / model).iterdir()) for model in MODELS]
@@ -41,8 +36,8 @@ def page(folders):
     return build_page(read_report_runs(folders), PageRequest())
 
 
-def test_its_results_are_shown_and_exported(folders, run):
-    code, out, _ = run("show", *folders)
+def test_its_results_are_shown_and_exported(folders, run_cli):
+    code, out, _ = run_cli("show", *folders)
     rows = {
         line.split()[0]: line.split()
         for line in out.splitlines()
@@ -57,24 +52,19 @@ def test_its_results_are_shown_and_exported(folders, run):
         line["target"] == str(line["doc"]["a"] + line["doc"]["b"]) == line["resps"][0][0]
         for line in lines
     )
-    assert "sums_small right % 100.00 0.00 -100.00" in " ".join(run("compare", *folders)[1].split())
+    assert "sums_small right % 100.00 0.00 -100.00" in " ".join(
+        run_cli("compare", *folders)[1].split()
+    )
 
 
-def test_a_stopped_run_goes_on(folders, run):
+def test_a_stopped_run_goes_on(folders, run_cli):
     (journal,) = (folders[0] / "journal").glob("*.jsonl")
     lines = journal.read_text().splitlines()
     journal.write_text("\n".join(lines[:-3]) + "\n")
-    words = (
-        "--model",
-        "calculator",
-        "--tasks",
-        "sums_small",
-        "--limit",
-        8,
-        "--output",
-        folders[0].parents[1],
+    words = option_words(
+        model="calculator", tasks="sums_small", limit=8, output=folders[0].parents[1]
     )
-    code, _, err = run(*words)
+    code, _, err = run_cli(*words)
     assert (code, "3 evaluated now, 5 resumed from the journal" in err) == (0, True)
 
 

@@ -7,6 +7,8 @@ import pytest
 from infthor_eval.errors import UsageError
 from model_adapters import adapter_identity, check_adapter, load, names
 
+from ..helpers.command_line import option_words
+
 
 @pytest.fixture(scope="module")
 def target(install):
@@ -19,51 +21,37 @@ def installed(target, monkeypatch):
     monkeypatch.syspath_prepend(target)
 
 
-def test_its_model_keeps_the_contract_and_refuses_what_cannot_be(run):
+def test_its_model_keeps_the_contract_and_refuses_what_cannot_be(run_cli):
     assert "thumbnails" in names()
     check_adapter(load("thumbnails", {"side": "2"}, 0))
-    assert run("check-adapter", "thumbnails", "--model-args", "side=3")[0] == 0
+    assert run_cli("check-adapter", "thumbnails", "--model-args", "side=3")[0] == 0
     with pytest.raises(UsageError, match="side=0: a thumbnail has one colour at least"):
         load("thumbnails", {"side": "0"}, 0)
     assert adapter_identity("thumbnails").keys() == {"package", "version", "source"}
 
 
-def test_its_model_is_evaluated_and_answers_from_the_frames(tmp_path, run):
-    asked = (
-        "--model",
-        "thumbnails",
-        "--frames",
-        "shown,blank",
-        "--tasks",
-        "nieh_mini_gt",
-        "--output",
-        tmp_path,
+def test_its_model_is_evaluated_and_answers_from_the_frames(tmp_path, run_cli):
+    words = option_words(
+        model="thumbnails", frames="shown,blank", tasks="nieh_mini_gt", output=tmp_path
     )
-    code, out, err = run(*asked)
+    code, out, err = run_cli(*words)
     assert (code, "thumbnails" in out) == (0, True), err
-    shown, blank = sorted(
+    on_true_frames, on_blank_frames = sorted(
         json.loads(path.read_text())["summary"]["tasks"]["nieh_mini_gt"]["by_clues"]["total"][
             "scores"
         ]["strict"]["mean"]
         for path in tmp_path.rglob("results.json")
     )
-    assert shown != blank
+    assert on_true_frames != on_blank_frames
 
 
-def test_its_task_runs_beside_ours(tmp_path, run):
-    asked = (
-        "--model",
-        "thumbnails",
-        "--tasks",
-        "nieh_mini_last,nieh_mini_gt",
-        "--limit",
-        4,
-        "--output",
-        tmp_path,
+def test_its_task_runs_beside_ours(tmp_path, run_cli):
+    words = option_words(
+        model="thumbnails", tasks="nieh_mini_last,nieh_mini_gt", limit=4, output=tmp_path
     )
-    assert run(*asked)[0] == 0
+    assert run_cli(*words)[0] == 0
     (samples,) = tmp_path.rglob("samples_nieh_mini_last_*.jsonl")
     assert {
         len(json.loads(line)["doc"]["frames"]) for line in samples.read_text().splitlines()
     } == {16}
-    assert "nieh_mini_last" in run("ls", "tasks")[1]
+    assert "nieh_mini_last" in run_cli("ls", "tasks")[1]

@@ -12,8 +12,8 @@ from safetensors.torch import load_file, save_file
 
 from model_adapters import load
 
+from ..helpers.refusals import assert_raises_one_line
 from ..model_adapters.checkpoints import save
-from .told import refused
 
 
 @pytest.fixture(scope="module")
@@ -82,10 +82,13 @@ DAMAGES = {
     "weights are text": (_content("model.safetensors", b"text"), "cannot be loaded"),
     "weights are empty": (_content("model.safetensors", b""), "cannot be loaded"),
     "weights of another shape": (
-        _weights(lambda found: {name: tensor.new_zeros(3) for name, tensor in found.items()}),
+        _weights(lambda weights: {name: tensor.new_zeros(3) for name, tensor in weights.items()}),
         "cannot be loaded",
     ),
-    "weights that are missing": (_weights(lambda found: dict(list(found.items())[:3])), "lacks"),
+    "weights that are missing": (
+        _weights(lambda weights: dict(list(weights.items())[:3])),
+        "lacks",
+    ),
     "config is empty": (_content("config.json", b""), "cannot be loaded"),
     "config is a list": (_content("config.json", b"[]"), "cannot be loaded"),
     "config is deep": (_content("config.json", DEEP), "cannot be loaded"),
@@ -187,7 +190,7 @@ def test_a_damaged_checkpoint(whole, tmp_path, monkeypatch, name):
     monkeypatch.setenv("INFTHOR_EVAL_MAX_TEMPLATE_MB", "512")
     folder = shutil.copytree(whole, tmp_path / "damaged")
     Image.new("RGB", (56, 56)).save(tmp_path / "a.png")
-    damage, said = DAMAGES[name]
+    damage, expected = DAMAGES[name]
     damage(folder)
 
     def ask():
@@ -196,5 +199,5 @@ def test_a_damaged_checkpoint(whole, tmp_path, monkeypatch, name):
         conversation.append(FrameRef(tmp_path / "a.png"), "What is it?")
         return conversation.n_tokens
 
-    refused(ask, said)
+    assert_raises_one_line(ask, expected)
     assert not (tmp_path / "evil").exists()

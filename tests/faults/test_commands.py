@@ -7,29 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from .told import said_in_one_line
+from ..helpers.command_line import assert_refused, option_words
 
 RUN = ["--model", "oracle", "--tasks", "nieh_gt", "--data", "SET"]
 VIDEO = ["--model", "oracle", "--tasks", "nieh_video", "--data", "SET", "--output", "OUT"]
-PUBLISHED = [
-    "--model",
-    "oracle",
-    "--tasks",
-    "nieh_published_full",
-    "--data",
-    "SET",
-    "--output",
-    "OUT",
-]
+PUBLISHED = option_words(model="oracle", tasks="nieh_published_full", data="SET", output="OUT")
 TINY = [
-    "--model",
-    "qwen2.5-vl-tiny",
-    "--tasks",
-    "nieh_gt",
-    "--data",
-    "SET",
-    "--output",
-    "OUT",
+    *option_words(model="qwen2.5-vl-tiny", tasks="nieh_gt", data="SET", output="OUT"),
     "--model-args",
 ]
 GENERATE = ["generate", "--scene", "kitchen-1", "--min-steps", 1]
@@ -37,7 +21,7 @@ MANIFEST = {"name": "x", "trajectories": [{"scene": "kitchen-1", "seed": 0, "min
 
 
 @pytest.fixture
-def typed(make_nieh_set, tmp_path, run, monkeypatch):
+def typed(make_nieh_set, tmp_path, run_cli, monkeypatch):
     """Runs a command with SET, OUT and FILE put in, in an empty folder that has a set and a
     file."""
     monkeypatch.chdir(tmp_path)
@@ -47,7 +31,7 @@ def typed(make_nieh_set, tmp_path, run, monkeypatch):
 
     def typed(*arguments: object) -> tuple[int, str, str]:
         places = {"SET": data, "OUT": tmp_path / "out"}
-        return run(*(places.get(argument, argument) for argument in arguments))
+        return run_cli(*(places.get(argument, argument) for argument in arguments))
 
     return typed
 
@@ -71,33 +55,31 @@ PLACES = {
 }
 
 
+def _begin_work(*_: object, **__: object) -> None:
+    raise AssertionError("work was begun")
+
+
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("command", OUTPUTS)
 def test_a_folder_that_cannot_be_written_is_told_before_the_work(
     typed, tmp_path, monkeypatch, command, place
 ):
-    def work(*_: object, **__: object) -> None:
-        raise AssertionError("work was begun")
-
     for begins in (
         "thor.simulator.Simulator.__init__",
         "runs.work.binding._load_subject",
         "nieh.published.hub_data._download",
     ):
-        monkeypatch.setattr(f"infthor_eval.{begins}", work)
+        monkeypatch.setattr(f"infthor_eval.{begins}", _begin_work)
     (tmp_path / "file.json").write_text("{}")
-    where, said = PLACES[place]
-    said_in_one_line(typed(*OUTPUTS[command], where), said)
+    where, expected = PLACES[place]
+    assert_refused(typed(*OUTPUTS[command], where), expected)
     assert (tmp_path / "file").read_text() == "of somebody's"
 
 
 @pytest.mark.parametrize("where", ["/dev/full", "SET", "file/below.csv", "/proc/x/y.csv"])
 @pytest.mark.parametrize("command", ["questions", "scenes show"])
 def test_a_file_that_cannot_be_written_is_told_before_the_work(typed, monkeypatch, command, where):
-    def work(*_: object, **__: object) -> None:
-        raise AssertionError("work was begun")
-
-    monkeypatch.setattr("infthor_eval.thor.simulator.Simulator.__init__", work)
+    monkeypatch.setattr("infthor_eval.thor.simulator.Simulator.__init__", _begin_work)
     arguments = ["questions", "SET"] if command == "questions" else ["scenes", "show", "kitchen-1"]
     code, _, err = typed(*arguments, "--out", where)
     assert code == 2
@@ -120,12 +102,7 @@ TYPED = [
         [
             "validate",
             "SET",
-            "--models",
-            "oracle",
-            "--out",
-            "OUT",
-            "--scorer",
-            "strict",
+            *option_words(models="oracle", out="OUT", scorer="strict"),
             "--scorer",
             "strict",
         ],
@@ -181,17 +158,7 @@ TYPED = [
         "share the generation of data, which only the recipe tiny without --data does",
     ),
     (
-        [
-            "train",
-            "--recipe",
-            "final_text",
-            "--data",
-            "SET",
-            "--out",
-            "OUT",
-            "--set",
-            "prompt=plain",
-        ],
+        ["train", *option_words(recipe="final_text", data="SET", out="OUT", set="prompt=plain")],
         "final_text.yaml: not a recipe (actions of the form text follow a system prompt; set "
         "prompt to chat); fix the",
     ),
@@ -231,10 +198,12 @@ TYPED = [
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"), TYPED, ids=[f"{n}: {said}" for n, (_, said) in enumerate(TYPED)]
+    ("arguments", "expected"),
+    TYPED,
+    ids=[f"{n}: {expected}" for n, (_, expected) in enumerate(TYPED)],
 )
-def test_what_cannot_be_meant_is_refused(typed, arguments, said):
-    said_in_one_line(typed(*arguments), said)
+def test_what_cannot_be_meant_is_refused(typed, arguments, expected):
+    assert_refused(typed(*arguments), expected, after_notes=True)
 
 
 @pytest.mark.parametrize("arguments", [["ls", "models"], ["ls", "tasks"], RUN, ["--version"]])
@@ -257,7 +226,7 @@ def test_a_full_disk_behind_standard_output_is_one_line(
     assert "Traceback" not in err
 
 
-def test_questions_do_not_replace_what_somebody_edited(tmp_path, run, monkeypatch):
+def test_questions_do_not_replace_what_somebody_edited(tmp_path, run_cli, monkeypatch):
     from infthor_eval.generation.questions.generate import GeneratedQuestions
 
     from ..conftest import QUESTIONS
@@ -267,14 +236,14 @@ def test_questions_do_not_replace_what_somebody_edited(tmp_path, run, monkeypatc
         lambda *_, **__: GeneratedQuestions(list(QUESTIONS)),
     )
     arguments = ["questions", tmp_path, "--out", tmp_path / "qa.csv"]
-    assert run(*arguments)[0] == 0
-    assert run(*arguments)[0] == 0
-    made = (tmp_path / "qa.csv").read_bytes()
-    (tmp_path / "qa.csv").write_bytes(made.replace(b"mug", b"cup"))
-    said_in_one_line(run(*arguments), "exists already with different content")
+    assert run_cli(*arguments)[0] == 0
+    assert run_cli(*arguments)[0] == 0
+    generated = (tmp_path / "qa.csv").read_bytes()
+    (tmp_path / "qa.csv").write_bytes(generated.replace(b"mug", b"cup"))
+    assert_refused(run_cli(*arguments), "exists already with different content")
     assert b"cup" in (tmp_path / "qa.csv").read_bytes()
-    assert run(*arguments, "--overwrite")[0] == 0
-    assert (tmp_path / "qa.csv").read_bytes() == made
+    assert run_cli(*arguments, "--overwrite")[0] == 0
+    assert (tmp_path / "qa.csv").read_bytes() == generated
 
 
 # What a command writes, and one of the files that somebody may have edited since.
@@ -297,15 +266,15 @@ def test_a_scene_does_not_replace_what_somebody_edited(typed, tmp_path, name):
     arguments, edited = REPLACES[name]
     assert typed(*arguments)[0] == 0
     assert typed(*arguments)[0] == 0
-    made = (tmp_path / edited).read_bytes()
+    generated = (tmp_path / edited).read_bytes()
     (tmp_path / edited).write_text("of somebody's")
-    said_in_one_line(
+    assert_refused(
         typed(*arguments),
         f"{edited}: exists already with different content; give another --out, or --overwrite",
     )
     assert (tmp_path / edited).read_text() == "of somebody's"
     assert typed(*arguments, "--overwrite")[0] == 0
-    assert (tmp_path / edited).read_bytes() == made
+    assert (tmp_path / edited).read_bytes() == generated
 
 
 def test_a_dump_does_not_replace_another_recording_of_its_scene(typed, tmp_path):
@@ -314,7 +283,7 @@ def test_a_dump_does_not_replace_another_recording_of_its_scene(typed, tmp_path)
     others = '{"scene": "bedroom-1", "objects": []}\n'
     path.write_bytes(gzip.compress(f'{{"scene": "kitchen-1", "objects": []}}\n{others}'.encode()))
     arguments = [*OUTPUTS["scenes dump"], "d"]
-    said_in_one_line(
+    assert_refused(
         typed(*arguments), "has a different recording of kitchen-1 already; give another --out"
     )
     assert not (tmp_path / "d" / "alfred").exists()

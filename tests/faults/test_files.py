@@ -27,7 +27,7 @@ from infthor_eval.nieh.validation.cross_validation import read_decisions
 from infthor_eval.runs import Catalog, read_run
 from model_adapters import load
 
-from .told import refused
+from ..helpers.refusals import assert_raises_one_line
 
 # Readers by what they read: the file's place in a folder, and the reading of the folder.
 READERS = {
@@ -68,13 +68,17 @@ def place(tmp_path):
 @pytest.mark.parametrize("reader", READERS)
 def test_a_pipe_is_not_waited_for(place, tmp_path, reader):
     os.mkfifo(place(reader))
-    refused(lambda: READERS[reader][1](tmp_path), "is a pipe or a device, not a file")
+    assert_raises_one_line(
+        lambda: READERS[reader][1](tmp_path), "is a pipe or a device, not a file"
+    )
 
 
 @pytest.mark.parametrize("reader", READERS)
 def test_a_device_is_no_file(place, tmp_path, reader):
     place(reader).symlink_to("/dev/null")
-    refused(lambda: READERS[reader][1](tmp_path), "is a pipe or a device, not a file")
+    assert_raises_one_line(
+        lambda: READERS[reader][1](tmp_path), "is a pipe or a device, not a file"
+    )
 
 
 @pytest.mark.parametrize(
@@ -83,7 +87,7 @@ def test_a_device_is_no_file(place, tmp_path, reader):
 )
 def test_a_folder_is_no_file(place, tmp_path, reader):
     place(reader).mkdir()
-    refused(lambda: READERS[reader][1](tmp_path), "is a folder, not a file")
+    assert_raises_one_line(lambda: READERS[reader][1](tmp_path), "is a folder, not a file")
 
 
 DEEP = b"[" * 200_000
@@ -173,11 +177,11 @@ CONTENTS = [
 
 
 @pytest.mark.parametrize(
-    ("reader", "content", "said"), CONTENTS, ids=[f"{r}: {s}" for r, _, s in CONTENTS]
+    ("reader", "content", "expected"), CONTENTS, ids=[f"{r}: {s}" for r, _, s in CONTENTS]
 )
-def test_content_that_is_not_what_it_should_be(place, tmp_path, reader, content, said):
+def test_content_that_is_not_what_it_should_be(place, tmp_path, reader, content, expected):
     place(reader).write_bytes(content)
-    refused(lambda: READERS[reader][1](tmp_path), said)
+    assert_raises_one_line(lambda: READERS[reader][1](tmp_path), expected)
 
 
 @pytest.mark.parametrize("reader", ["packed trajectories", "floor plans"])
@@ -186,17 +190,21 @@ def test_what_unpacks_to_more_than_the_limit_is_refused_and_the_limit_is_named(
 ):
     place(reader).write_bytes(_bomb())
     monkeypatch.setenv("INFTHOR_EVAL_MAX_LINE_MB", "2")
-    refused(lambda: READERS[reader][1](tmp_path), "set INFTHOR_EVAL_MAX_LINE_MB to more than 2")
+    assert_raises_one_line(
+        lambda: READERS[reader][1](tmp_path), "set INFTHOR_EVAL_MAX_LINE_MB to more than 2"
+    )
 
 
 def test_a_large_file_is_read_where_the_limit_is_raised(place, tmp_path, monkeypatch):
     place("step log").write_bytes(b"[" + b" " * 2**20 + b"]")
     monkeypatch.setenv("INFTHOR_EVAL_MAX_FILE_MB", "1")
-    refused(lambda: read_steps(tmp_path), "set INFTHOR_EVAL_MAX_FILE_MB to more than 1")
+    assert_raises_one_line(
+        lambda: read_steps(tmp_path), "set INFTHOR_EVAL_MAX_FILE_MB to more than 1"
+    )
     monkeypatch.setenv("INFTHOR_EVAL_MAX_FILE_MB", "2")
     assert read_steps(tmp_path) == []
     monkeypatch.setenv("INFTHOR_EVAL_MAX_FILE_MB", "much")
-    refused(lambda: read_steps(tmp_path), "not a whole number above 0")
+    assert_raises_one_line(lambda: read_steps(tmp_path), "not a whole number above 0")
 
 
 def _png(width: int, height: int, body: bytes = b"") -> bytes:
@@ -240,19 +248,20 @@ IMAGES = {
 
 @pytest.mark.parametrize("name", IMAGES)
 def test_an_image_that_is_no_frame(tmp_path, name):
-    content, said = IMAGES[name]
+    content, expected = IMAGES[name]
     (tmp_path / "a.png").write_bytes(content)
-    refused(FrameRef(tmp_path / "a.png").load, said)
+    assert_raises_one_line(FrameRef(tmp_path / "a.png").load, expected)
 
 
 @pytest.mark.parametrize(
-    ("name", "said"), [("bomb", "too large"), ("sliver", "too narrow"), ("no width", "0x7 pixels")]
+    ("name", "expected"),
+    [("bomb", "too large"), ("sliver", "too narrow"), ("no width", "0x7 pixels")],
 )
-def test_the_header_tells_before_a_model_is_asked(tmp_path, name, said):
+def test_the_header_tells_before_a_model_is_asked(tmp_path, name, expected):
     (tmp_path / "a.png").write_bytes(IMAGES[name][0])
     problem = FrameRef(tmp_path / "a.png").problem()
     assert problem is not None
-    assert said in problem
+    assert expected in problem
 
 
 def test_archive_members_that_stand_twice_are_refused(tmp_path):
@@ -261,7 +270,7 @@ def test_archive_members_that_stand_twice_are_refused(tmp_path):
             info = tarfile.TarInfo("metadata/x")
             info.size = len(content)
             tar.addfile(info, io.BytesIO(content))
-    refused(
+    assert_raises_one_line(
         lambda: unpack_tar(tmp_path / "a.tar", tmp_path / "metadata"), "contains 'metadata/x' twice"
     )
     assert not (tmp_path / "metadata").exists()
@@ -274,7 +283,7 @@ def test_a_deep_object_in_a_trajectory_is_one_line(tmp_path):
     }
     text = json.dumps(deep)[:-1] + ', "gen_info": {"a": ' + "[" * 100_000 + "]" * 100_000 + "}}"
     (tmp_path / "a.json").write_text(text)
-    refused(lambda: list(iter_trajectories(tmp_path / "a.json")), "not a trajectory")
+    assert_raises_one_line(lambda: list(iter_trajectories(tmp_path / "a.json")), "not a trajectory")
 
 
 def _packed(path, **headers):
@@ -309,7 +318,7 @@ def _packed(path, **headers):
 def test_half_of_an_archive_is_not_taken_for_the_whole(tmp_path, damage, problem):
     path = _packed(tmp_path / "a.tar.gz")
     path.write_bytes(gzip.compress(damage(gzip.decompress(path.read_bytes()))))
-    refused(lambda: unpack_tar(path, tmp_path / "metadata"), problem)
+    assert_raises_one_line(lambda: unpack_tar(path, tmp_path / "metadata"), problem)
     assert not (tmp_path / "metadata").exists()
 
 
@@ -317,12 +326,12 @@ def test_a_checksum_that_is_wrong_is_noticed(tmp_path):
     path = _packed(tmp_path / "a.tar.gz")
     content = path.read_bytes()
     path.write_bytes(content[:-8] + bytes([content[-8] ^ 1]) + content[-7:])
-    refused(lambda: unpack_tar(path, tmp_path / "metadata"), "a damaged archive")
+    assert_raises_one_line(lambda: unpack_tar(path, tmp_path / "metadata"), "a damaged archive")
     unpack_tar(_packed(path), tmp_path / "metadata")
     assert len(list((tmp_path / "metadata").iterdir())) == 10
 
 
 def test_a_header_that_would_fill_the_memory_is_not_read(tmp_path):
     path = _packed(tmp_path / "a.tar.gz", comment="a" * 2**22)
-    refused(lambda: unpack_tar(path, tmp_path / "metadata"), "a header of 4,194,")
+    assert_raises_one_line(lambda: unpack_tar(path, tmp_path / "metadata"), "a header of 4,194,")
     unpack_tar(_packed(path, comment="a" * 2**10), tmp_path / "metadata")

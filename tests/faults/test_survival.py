@@ -30,8 +30,10 @@ from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.protocols import Decoding
 
 from ..conftest import QUESTIONS
+from ..helpers.command_line import assert_refused, option_words
+from ..helpers.questions import make_question
+from ..helpers.refusals import assert_raises_one_line
 from .test_files import IMAGES
-from .told import refused, said_in_one_line
 
 SOUND = QUESTIONS
 
@@ -146,21 +148,12 @@ def _ask(data, traj_id):
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_what_is_damaged_in_a_set_costs_its_own_questions(make_nieh_set, tmp_path, run, name):
+def test_what_is_damaged_in_a_set_costs_its_own_questions(make_nieh_set, tmp_path, run_cli, name):
     damage, n_answered, n_skipped = SETS[name]
     data = make_nieh_set(size=56)
     damage(data)
-    arguments = [
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
-    code, _, err = run(*arguments)
+    arguments = option_words(model="oracle", tasks="nieh_gt", data=data, output=tmp_path / "out")
+    code, _, err = run_cli(*arguments)
     assert code == 0, err
     assert f"{n_answered} evaluated now" in err
     skipped = [line for line in err.splitlines() if "sample(s) skipped: " in line]
@@ -185,18 +178,15 @@ def _sliver(path):
 
 @pytest.mark.parametrize("batch_size", [1, 4])
 @pytest.mark.parametrize("name", LATE)
-def test_a_frame_that_no_model_can_take_fails_alone(make_nieh_set, tmp_path, run, name, batch_size):
+def test_a_frame_that_no_model_can_take_fails_alone(
+    make_nieh_set, tmp_path, run_cli, name, batch_size
+):
     data = make_nieh_set(size=56)
     LATE[name](data)
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--model-args",
-        f"batch_size={batch_size}",
-        "--tasks",
-        "nieh_gt",
-    ]
-    code, _, err = run(*arguments, "--data", data, "--output", tmp_path / "out")
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", model_args=f"batch_size={batch_size}", tasks="nieh_gt"
+    )
+    code, _, err = run_cli(*arguments, "--data", data, "--output", tmp_path / "out")
     assert code == 1
     assert "5 evaluated now" in err
     assert "nieh_gt: 1 sample(s) failed, counted as wrong: " in err
@@ -207,7 +197,7 @@ def test_a_frame_that_no_model_can_take_fails_alone(make_nieh_set, tmp_path, run
     "error", [RuntimeError, ValueError, KeyError, ZeroDivisionError, OSError, MemoryError]
 )
 def test_what_an_adapter_raises_on_one_question_fails_alone(
-    make_nieh_set, tmp_path, run, monkeypatch, error
+    make_nieh_set, tmp_path, run_cli, monkeypatch, error
 ):
     reply = TransformersModel.answer_each
 
@@ -218,7 +208,9 @@ def test_what_an_adapter_raises_on_one_question_fails_alone(
 
     monkeypatch.setattr(TransformersModel, "answer_each", answer_each)
     arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", "batch_size=4", "--tasks", "nieh_gt"]
-    code, _, err = run(*arguments, "--data", make_nieh_set(size=56), "--output", tmp_path / "out")
+    code, _, err = run_cli(
+        *arguments, "--data", make_nieh_set(size=56), "--output", tmp_path / "out"
+    )
     assert code == 1
     assert (
         "nieh_gt: 1 sample(s) failed, counted as wrong: qwen2.5-vl-tiny fails on the request" in err
@@ -226,57 +218,46 @@ def test_what_an_adapter_raises_on_one_question_fails_alone(
 
 
 @pytest.mark.parametrize("batch_size", [1, 4])
-def test_a_question_that_is_too_long_fails_alone(make_nieh_set, tmp_path, run, batch_size):
+def test_a_question_that_is_too_long_fails_alone(make_nieh_set, tmp_path, run_cli, batch_size):
     long = Question("traj_b", "Is there " + "a very large " * 2000 + "sink?", (0,), ("no",))
     data = make_nieh_set([*SOUND, long], size=56)
     model_args = f"batch_size={batch_size},max_tokens=1000"
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--model-args",
-        model_args,
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-    ]
-    code, _, err = run(*arguments, "--output", tmp_path / "out")
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", model_args=model_args, tasks="nieh_gt", data=data
+    )
+    code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
     assert code == 1
     assert "nieh_gt: 1 sample(s) failed" in err
 
 
 @pytest.mark.parametrize("model", ["oracle", "qwen2.5-vl-tiny"])
 def test_a_haystack_without_a_usable_question_ends_the_same_way(
-    make_nieh_set, tmp_path, run, model
+    make_nieh_set, tmp_path, run_cli, model
 ):
-    data = make_nieh_set([Question("t", "q", (99,), ("a",))], size=56)
-    arguments = [
-        "--model",
-        model,
-        "--tasks",
-        "nieh_haystack_8k",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
-    said_in_one_line(run(*arguments), "can be asked (clue 99 is outside trajectory t (6 frames))")
+    data = make_nieh_set([make_question(clues=(99,))], size=56)
+    arguments = option_words(
+        model=model, tasks="nieh_haystack_8k", data=data, output=tmp_path / "out"
+    )
+    assert_refused(
+        run_cli(*arguments),
+        "can be asked (clue 99 is outside trajectory t (6 frames))",
+        after_notes=True,
+    )
 
 
-def test_a_context_is_measured_by_a_frame_that_can_be_read(make_nieh_set, tmp_path, run):
-    asked = [
-        Question("t", "Is there a mug?", (1,), ("yes",)),
-        Question("u", "Is there a mug?", (1,), ("yes",)),
-    ]
-    data = make_nieh_set(asked, size=56)
+def test_a_context_is_measured_by_a_frame_that_can_be_read(make_nieh_set, tmp_path, run_cli):
+    questions = [make_question(), make_question("u")]
+    data = make_nieh_set(questions, size=56)
     _frame(data, "t", 1).write_bytes(b"\xff\xd8\xff\xe0")
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_truncate_head_8k", "--data", data]
-    code, _, err = run(*arguments, "--output", tmp_path / "out")
+    code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
     assert code == 1
     assert "nieh_truncate_head_8k: 1 sample(s) failed" in err
 
 
-def test_a_run_whose_folder_is_deleted_does_not_end_well(make_nieh_set, tmp_path, run, monkeypatch):
+def test_a_run_whose_folder_is_deleted_does_not_end_well(
+    make_nieh_set, tmp_path, run_cli, monkeypatch
+):
     append = Journal.append
 
     def append_and_delete(self, record):
@@ -285,13 +266,13 @@ def test_a_run_whose_folder_is_deleted_does_not_end_well(make_nieh_set, tmp_path
 
     monkeypatch.setattr(Journal, "append", append_and_delete)
     arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56)]
-    code, out, err = run(*arguments, "--output", tmp_path / "out")
+    code, out, err = run_cli(*arguments, "--output", tmp_path / "out")
     assert (code, out) == (2, "")
     assert "was deleted or replaced while the run wrote it" in err
 
 
 def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(
-    make_nieh_set, tmp_path, run, monkeypatch
+    make_nieh_set, tmp_path, run_cli, monkeypatch
 ):
     arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56)]
     n_synced = []
@@ -305,11 +286,11 @@ def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(
 
     with monkeypatch.context() as patched:
         patched.setattr("infthor_eval.runs.journals.journal.os.fsync", full)
-        code, out, err = run(*arguments, "--output", tmp_path / "out")
+        code, out, err = run_cli(*arguments, "--output", tmp_path / "out")
     assert (code, out) == (2, "")
     assert "cannot be written (No space left on device); make room" in err
     assert "Traceback" not in err
-    code, _, err = run(*arguments, "--output", tmp_path / "out")
+    code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
     assert code == 0
     (journal,) = (tmp_path / "out").rglob("journal")
     assert len(read_run(journal.parent, RECORDS)[1]) == 5
@@ -317,20 +298,13 @@ def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(
 
 @pytest.mark.parametrize("full_at", ["kitchen-1-seed1.json", "task-000.pddl"])
 def test_a_disk_that_is_full_while_trajectories_are_made_keeps_those_that_are(
-    tmp_path, run, monkeypatch, full_at
+    tmp_path, run_cli, monkeypatch, full_at
 ):
     arguments = [
         "generate",
-        "--scene",
-        "kitchen-1",
-        "--min-steps",
-        1,
-        "--min-subgoals",
-        1,
-        "--out",
-        tmp_path,
+        *option_words(scene="kitchen-1", min_steps=1, min_subgoals=1, out=tmp_path),
     ]
-    assert run(*arguments)[0] == 0
+    assert run_cli(*arguments)[0] == 0
     first = (tmp_path / "kitchen-1-seed0.json").read_bytes()
     makes_more = [*arguments, "--count", 3]
 
@@ -346,13 +320,13 @@ def test_a_disk_that_is_full_while_trajectories_are_made_keeps_those_that_are(
     with monkeypatch.context() as patched:
         for name in ("write_bytes", "write_text"):
             patched.setattr(f"pathlib.Path.{name}", full(getattr(Path, name)))
-        said_in_one_line(
-            run(*makes_more),
+        assert_refused(
+            run_cli(*makes_more),
             "kitchen-1-seed1.json: cannot be written (No space left on device); make room and run",
         )
     assert [path.name for path in tmp_path.glob("*.json")] == ["kitchen-1-seed0.json"]
     assert [path.name for path in tmp_path.glob(".*partial")] == []
-    code, out, err = run(*makes_more)
+    code, out, err = run_cli(*makes_more)
     assert (code, "3 trajectories (1 generated earlier)" in out) == (0, True), err
     assert (tmp_path / "kitchen-1-seed0.json").read_bytes() == first
 
@@ -364,7 +338,9 @@ def test_scores_that_are_no_numbers_are_no_answer(scores, temperature):
     writing = ReplyState(
         Generation(frozenset()), decoding, context=(), choices=None, finished=lambda _: False
     )
-    refused(lambda: extend_replies([(writing, torch.tensor(scores))]), "no token has a score")
+    assert_raises_one_line(
+        lambda: extend_replies([(writing, torch.tensor(scores))]), "no token has a score"
+    )
 
 
 def _trajectory(**changes):
@@ -402,10 +378,10 @@ MALFORMED = {
 def test_a_malformed_trajectory_leaves_the_others_to_be_replayed(tmp_path, name):
     (tmp_path / "a.json").write_bytes(MALFORMED[name])
     (tmp_path / "b.json").write_text(json.dumps(_trajectory()))
-    found = select([tmp_path])
-    assert [trajectory.traj_id for _, trajectory in found.items] == ["sound"]
-    assert [failure.place for failure in found.failures] == [str(tmp_path / "a.json")]
-    assert found.failures[0].message.count(str(tmp_path)) == 1
+    selected = select([tmp_path])
+    assert [trajectory.traj_id for _, trajectory in selected.items] == ["sound"]
+    assert [failure.place for failure in selected.failures] == [str(tmp_path / "a.json")]
+    assert selected.failures[0].message.count(str(tmp_path)) == 1
 
 
 def test_as_many_poses_as_the_limit_are_read(tmp_path, monkeypatch):
@@ -424,9 +400,9 @@ def test_as_many_poses_as_the_limit_are_read(tmp_path, monkeypatch):
 def test_a_file_that_cannot_be_read_leaves_the_others_to_be_replayed(tmp_path, damage):
     damage(tmp_path / "a.jsonl.gz")
     (tmp_path / "b.json").write_text(json.dumps(_trajectory()))
-    found = select([tmp_path])
-    assert len(found.items) == 1
-    assert [failure.place for failure in found.failures] == [str(tmp_path / "a.jsonl.gz")]
+    selected = select([tmp_path])
+    assert len(selected.items) == 1
+    assert [failure.place for failure in selected.failures] == [str(tmp_path / "a.jsonl.gz")]
 
 
 @pytest.mark.parametrize("action", ["{0.__class__}", "{", "{0:>9999999999}", "{missing}", "%s{}"])

@@ -5,7 +5,7 @@ import pytest
 from infthor_eval.runs import Catalog
 from infthor_eval.suites import find_suite
 
-from .told import said_in_one_line
+from ..helpers.command_line import assert_refused, option_words
 
 SETTING = "own.yaml: dataset_kwargs:"
 HEAD = "include: _nieh.yaml\ntask: own\n"
@@ -113,58 +113,57 @@ FILES = [
 
 
 @pytest.mark.parametrize(
-    ("content", "said"), FILES, ids=[f"{n}: {said}" for n, (_, said) in enumerate(FILES)]
+    ("content", "expected"),
+    FILES,
+    ids=[f"{n}: {expected}" for n, (_, expected) in enumerate(FILES)],
 )
 def test_a_task_file_that_is_not_what_it_should_be(
-    make_nieh_set, tmp_path, run, task_files, content, said
+    make_nieh_set, tmp_path, run_cli, task_files, content, expected
 ):
     (task_files / "nieh" / "own.yaml").write_text(content)
     data = make_nieh_set(size=56)
-    ended = run("--model", "oracle", "--tasks", "own", "--data", data, "--output", tmp_path / "out")
-    said_in_one_line(ended, said)
+    ended = run_cli(
+        "--model", "oracle", "--tasks", "own", "--data", data, "--output", tmp_path / "out"
+    )
+    assert_refused(ended, expected)
 
 
-def test_groups_in_a_circle_are_told(tmp_path, run, task_files):
+def test_groups_in_a_circle_are_told(tmp_path, run_cli, task_files):
     (task_files / "nieh" / "one.yaml").write_text("group: one\ntask: [other]")
     (task_files / "nieh" / "other.yaml").write_text("group: other\ntask: [one]")
-    said_in_one_line(
-        run("--model", "oracle", "--tasks", "one", "--output", tmp_path), "is in itself"
+    assert_refused(
+        run_cli("--model", "oracle", "--tasks", "one", "--output", tmp_path), "is in itself"
     )
 
 
 def test_a_larger_document_is_read_where_the_limit_is_raised(
-    make_nieh_set, tmp_path, run, task_files, monkeypatch
+    make_nieh_set, tmp_path, run_cli, task_files, monkeypatch
 ):
     (task_files / "nieh" / "own.yaml").write_text(CLUES + "}\na: &a [1, 1, 1, 1]\nb: [*a, *a]\n")
-    arguments = [
-        "--model",
-        "oracle",
-        "--tasks",
-        "own",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(
+        model="oracle", tasks="own", data=make_nieh_set(size=56), output=tmp_path / "out"
+    )
     monkeypatch.setenv("INFTHOR_EVAL_MAX_YAML_NODES", "10")
-    said_in_one_line(run(*arguments), "has more than 10 values")
+    assert_refused(run_cli(*arguments), "has more than 10 values")
     monkeypatch.delenv("INFTHOR_EVAL_MAX_YAML_NODES")
-    assert run(*arguments)[0] == 0
+    assert run_cli(*arguments)[0] == 0
 
 
 @pytest.mark.parametrize(
     "settings", ["null", "[context]", "{context: trajctory}", "{context: clues, depthz: [0.2]}"]
 )
-def test_a_task_that_cannot_be_run_is_not_listed_as_if_it_could(tmp_path, run, settings):
+def test_a_task_that_cannot_be_run_is_not_listed_as_if_it_could(tmp_path, run_cli, settings):
     (tmp_path / "own.yaml").write_text(f"{HEAD}dataset_kwargs: {settings}\n")
     (tmp_path / "good.yaml").write_text(
         "include: _nieh.yaml\ntask: good\ndataset_kwargs: {context: clues}\n"
     )
-    code, out, err = run("ls", "tasks", "--include-path", tmp_path)
+    code, out, err = run_cli("ls", "tasks", "--include-path", tmp_path)
     assert (code, err) == (0, "")
-    said = " ".join(out.split())
+    listing = " ".join(out.split())
     assert (
-        said.count("not usable: ") == 1 and "good context clues" in said and "nieh_mini_gt" in said
+        listing.count("not usable: ") == 1
+        and "good context clues" in listing
+        and "nieh_mini_gt" in listing
     )
 
 

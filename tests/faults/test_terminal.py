@@ -2,9 +2,11 @@
 
 import pytest
 
-from infthor_eval.formats.question import Question
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.tables import Column, Row, Table
+
+from ..helpers.command_line import option_words
+from ..helpers.questions import make_question
 
 NASTY = {
     "closing markup": "a[/b]c",
@@ -48,13 +50,13 @@ def test_a_table_shows_text_as_text(capfd, name):
 
 
 @pytest.mark.parametrize("name", NASTY)
-def test_what_is_said_of_a_skipped_question_is_text(make_nieh_set, tmp_path, run, name):
+def test_what_is_said_of_a_skipped_question_is_text(make_nieh_set, tmp_path, run_cli, name):
     data = make_nieh_set(size=56)
     extra = NASTY[name].replace("\r", "").replace("/", "|")
     (data / "qa_set_more.csv").write_text(
         f"traj_id,question,gt_img_idx,answer\n{extra},q,[1],['a']\n"
     )
-    code, out, err = run(
+    code, out, err = run_cli(
         "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
     )
     assert code == 0
@@ -63,14 +65,11 @@ def test_what_is_said_of_a_skipped_question_is_text(make_nieh_set, tmp_path, run
 
 
 @pytest.mark.parametrize("name", NASTY)
-def test_an_error_is_text(tmp_path, run, name):
-    code, out, err = run(
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        tmp_path / NASTY[name].replace("/", "|"),
+def test_an_error_is_text(tmp_path, run_cli, name):
+    code, out, err = run_cli(
+        *option_words(
+            model="oracle", tasks="nieh_gt", data=tmp_path / NASTY[name].replace("/", "|")
+        )
     )
     assert (code, out) == (2, "")
     assert _is_clean(err)
@@ -78,10 +77,10 @@ def test_an_error_is_text(tmp_path, run, name):
 
 
 @pytest.mark.parametrize("name", ["closing markup", "escape", "an emoji", "markup"])
-def test_a_folder_of_results_is_text(make_nieh_set, tmp_path, run, name):
+def test_a_folder_of_results_is_text(make_nieh_set, tmp_path, run_cli, name):
     data = make_nieh_set(size=56)
     output = tmp_path / NASTY[name].replace("/", "|")
-    code, out, err = run(
+    code, out, err = run_cli(
         "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", output
     )
     assert code == 0, err
@@ -90,21 +89,21 @@ def test_a_folder_of_results_is_text(make_nieh_set, tmp_path, run, name):
 
 
 @pytest.mark.parametrize("name", ["closing markup", "escape", "an emoji", "markup"])
-def test_ls_shows_names_as_text(tmp_path, run, task_files, name):
+def test_ls_shows_names_as_text(tmp_path, run_cli, task_files, name):
     text = NASTY[name].replace("\x1b", "\\e")
     (task_files / "nieh" / "own.yaml").write_text(
         f'include: _nieh.yaml\ntask: "{text}"\ndataset_kwargs: {{context: clues}}'
     )
-    code, out, err = run("ls", "tasks")
+    code, out, err = run_cli("ls", "tasks")
     assert code == 0, err
     assert _as_shown(NASTY[name]) in "".join(out.split())
     assert _is_clean(out)
 
 
-def test_a_name_that_is_no_unicode_ends_nothing(make_nieh_set, tmp_path, run):
-    data = make_nieh_set([Question("t", "q", (1,), ("a",))], size=56)
+def test_a_name_that_is_no_unicode_ends_nothing(make_nieh_set, tmp_path, run_cli):
+    data = make_nieh_set([make_question(clues=(1,))], size=56)
     output = tmp_path / "\udcff"
-    code, out, err = run(
+    code, out, err = run_cli(
         "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", output
     )
     assert code == 0, err

@@ -9,7 +9,7 @@ from infthor_eval.nieh.asking.baselines import BASELINES
 from infthor_eval.nieh.suite import NiehSuite
 from model_adapters import Capabilities
 
-from .told import said_in_one_line
+from ..helpers.command_line import assert_refused
 
 ASKED = [
     Question("t", "Which two?", (1, 3), ("shelf",)),
@@ -40,14 +40,14 @@ class Silent:
 
 
 @pytest.fixture
-def validate(make_nieh_set, tmp_path, run, monkeypatch):
+def validate(make_nieh_set, tmp_path, run_cli, monkeypatch):
     """Validates a set of one trajectory with a model that answers nothing right."""
     monkeypatch.setattr(NiehSuite, "baselines", {**BASELINES, "silent": lambda _: Silent()})
     monkeypatch.setattr(Silent, "n_asked", 0)
     data = make_nieh_set(ASKED, size=56)
 
     def validate(*options, data=data):
-        return run("validate", data, "--models", "silent", "--out", tmp_path / "v", *options)
+        return run_cli("validate", data, "--models", "silent", "--out", tmp_path / "v", *options)
 
     return validate
 
@@ -99,13 +99,13 @@ def test_no_cell_of_the_list_is_a_formula_and_the_list_reads_back(validate, tmp_
 def test_a_damaged_list_is_told_before_a_model_is_asked(validate, tmp_path):
     (tmp_path / "v").mkdir()
     (tmp_path / "v" / "inspection.csv").write_text('question_id,decision\n"a,keep\n')
-    said_in_one_line(validate(), "inspection.csv: not a UTF-8 CSV file")
+    assert_refused(validate(), "inspection.csv: not a UTF-8 CSV file")
     assert Silent.n_asked == 0
 
 
 def test_decisions_on_another_set_are_told_before_a_model_is_asked(validate, tmp_path):
     (tmp_path / "d.csv").write_text("question_id,decision\nother/1,keep\n")
-    said_in_one_line(
+    assert_refused(
         validate("--decisions", tmp_path / "d.csv"), "about other/1, which is not in the set"
     )
     assert Silent.n_asked == 0
@@ -114,10 +114,10 @@ def test_decisions_on_another_set_are_told_before_a_model_is_asked(validate, tmp
 def test_the_frames_of_another_set_are_no_place(validate, make_nieh_set, tmp_path):
     assert validate()[0] == 0
     other = make_nieh_set(ASKED, size=56, name="other")
-    said_in_one_line(validate(data=other), "holds the frames of another set")
+    assert_refused(validate(data=other), "holds the frames of another set")
 
 
 def test_a_link_that_leads_nowhere_is_no_place(validate, tmp_path):
     (tmp_path / "v").mkdir()
     (tmp_path / "v" / "metadata").symlink_to(tmp_path / "gone")
-    said_in_one_line(validate(), "holds the frames of another set")
+    assert_refused(validate(), "holds the frames of another set")

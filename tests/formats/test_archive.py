@@ -27,7 +27,7 @@ def test_a_sound_archive_is_unpacked(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("member", "said"),
+    ("member", "expected"),
     [
         (("../evil", b"x"), "points outside"),
         (("metadata/../../evil", b"x"), "points outside"),
@@ -39,9 +39,9 @@ def test_a_sound_archive_is_unpacked(tmp_path):
         (("metadata/big", b"x" * 2000), "more than the limit"),
     ],
 )
-def test_a_member_that_is_refused_leaves_nothing_behind(tmp_path, member, said):
+def test_a_member_that_is_refused_leaves_nothing_behind(tmp_path, member, expected):
     archive = tar_of(tmp_path / "a.tar", ("metadata/good", b"x"), member)
-    with pytest.raises(DataError, match=said):
+    with pytest.raises(DataError, match=expected):
         unpack_tar(archive, tmp_path / "out" / "metadata", max_bytes=1000)
     assert list((tmp_path / "out").iterdir()) == []
     assert not (tmp_path / "evil").exists()

@@ -88,11 +88,11 @@ def test_a_frame_without_an_entry_leaves_the_questions_of_its_trajectory_out(mak
     root = make_nieh_set([SOUND, Question("u", "Is there a mug?", (1,), ("yes",))])
     images = root / "metadata" / "t" / "img"
     (images / "000000006.png").write_bytes((images / "000000005.png").read_bytes())
-    said = (
+    reason = (
         "trajectory t: 7 frames but 6 entries in metadata.json (none for 000000006); unpack the "
         "trajectory again"
     )
-    assert reasons(root) == [said]
+    assert reasons(root) == [reason]
     assert [question.traj_id for question in NiehSet(root).questions] == ["u"]
 
 

@@ -1,13 +1,13 @@
 """Published numbers against the published files that they are from, counted without our readers."""
 
-import gzip
-import json
 from collections import Counter
 from pathlib import Path
 
 import pytest
 
 from infthor_eval.formats.published import published_tables
+
+from ..helpers.files import read_json_lines
 
 PUBLISHED = Path(__file__).parents[2] / "../shared/data/published_sets"
 needs_logs = pytest.mark.skipif(
@@ -16,14 +16,9 @@ needs_logs = pytest.mark.skipif(
 REPLIES = "eval_qa_set_{}_clue_Qwen2.5-VL-7B-Instruct_full_traj{}.log.gz"
 
 
-def rows_of(path):
-    with gzip.open(path) as lines:
-        return [json.loads(line) for line in lines]
-
-
 def table(suite, title):
-    (found,) = [table for table in published_tables(suite) if table.title == title]
-    return found
+    (matching,) = [table for table in published_tables(suite) if table.title == title]
+    return matching
 
 
 @pytest.mark.parametrize("suite", ["nieh", "plans", "manipulation", "training"])
@@ -45,12 +40,18 @@ def test_every_table_has_a_source_and_a_title_of_its_own(suite):
 def test_means_of_replies_are_those_of_the_logs(title, row, mode):
     published = table("nieh", title)
     scores = [
-        [reply["score"] for reply in rows_of(PUBLISHED / "replies" / REPLIES.format(file, mode))]
+        [
+            reply["score"]
+            for reply in read_json_lines(PUBLISHED / "replies" / REPLIES.format(file, mode))
+        ]
         for file in ("nieh_single", "nsieh_multi")
     ]
     assert published.columns == ("nieh_single_clue", "nsieh_multi_clue")
     assert (
-        tuple(round(100 * sum(given) / len(given), 2) for given in scores)
+        tuple(
+            round(100 * sum(scores_of_scorer) / len(scores_of_scorer), 2)
+            for scores_of_scorer in scores
+        )
         == published.rows[row].values
     )
 
@@ -72,7 +73,7 @@ def test_rates_of_plans_are_those_of_the_logs():
             log.name.removeprefix("eval_longhrz_checkpoints_").removesuffix(".log.gz").rstrip("_")
         )
         counts = Counter()
-        for row in rows_of(log):
+        for row in read_json_lines(log):
             counts.update(row["metric"])
         rates = [
             counts[f"{kind}_success"] / counts[f"{kind}_count"] for kind in ("goto", "pick", "put")

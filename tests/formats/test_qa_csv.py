@@ -58,7 +58,7 @@ def test_all_columns_of_the_published_files_are_kept(tmp_path_factory, file, pub
 
 
 @pytest.mark.parametrize(
-    ("column", "cell", "said"),
+    ("column", "cell", "expected"),
     [
         ("match2", "half", "num_evidence or one of match1 to match4 is not a number"),
         ("match2", "nan", "one of match1 to match4 is not finite"),
@@ -66,13 +66,13 @@ def test_all_columns_of_the_published_files_are_kept(tmp_path_factory, file, pub
         ("gt_steps", "7", "gt_steps is not a list"),
     ],
 )
-def test_a_bad_cell_of_a_published_column_is_named(tmp_path, column, cell, said):
+def test_a_bad_cell_of_a_published_column_is_named(tmp_path, column, cell, expected):
     path = tmp_path / "qa_set_nieh_single_clue.csv"
     path.write_text(f"traj_id,question,gt_img_idx,answer,{column}\nt,q,[1],['a'],{cell}\n")
     with path.open("a") as file:
         file.write("t,q,[1],['a'],\n")
     bad, good = read_questions(path)
-    assert f"qa_set_nieh_single_clue.csv, line 2: {said}" in bad.reason
+    assert f"qa_set_nieh_single_clue.csv, line 2: {expected}" in bad.reason
     assert good.answers == ("a",)
 
 
@@ -83,7 +83,7 @@ def test_the_published_columns_suffice_and_others_are_left_unread(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "expected"),
     [
         ("traj_id,question,answer\nt,q,['a']\n", "no column gt_img_idx"),
         ("", "no column traj_id"),
@@ -113,12 +113,12 @@ def test_the_published_columns_suffice_and_others_are_left_unread(tmp_path):
         ),
     ],
 )
-def test_a_malformed_file_is_refused_in_one_line(tmp_path, content, said):
+def test_a_malformed_file_is_refused_in_one_line(tmp_path, content, expected):
     path = tmp_path / "qa_set.csv"
     path.write_text(content)
     with pytest.raises(DataError) as caught:
         read_questions(path)
-    assert said in str(caught.value)
+    assert expected in str(caught.value)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < len(str(path)) + 200
@@ -140,12 +140,12 @@ def test_a_bad_row_costs_itself_alone_and_names_its_line(tmp_path):
     path, good = tmp_path / "qa_set.csv", "t,q,[1],['a'],"
     lines = [line for row in ROWS for line in (row, good)]
     path.write_text("\n".join(["traj_id,question,gt_img_idx,answer,absence", *lines]) + "\n")
-    found = read_questions(path)
-    assert [isinstance(item, Question) for item in found] == [False, True] * len(ROWS)
+    items = read_questions(path)
+    assert [isinstance(item, Question) for item in items] == [False, True] * len(ROWS)
     line = 2
-    for item, (row, said) in zip(found[::2], ROWS.items(), strict=True):
+    for item, (row, expected) in zip(items[::2], ROWS.items(), strict=True):
         line += row.count("\n")
-        assert item.reason.startswith(f"qa_set.csv, line {line}: {said}")
+        assert item.reason.startswith(f"qa_set.csv, line {line}: {expected}")
         line += 2
 
 

@@ -86,7 +86,7 @@ def damaged(content):
 
 
 @pytest.mark.parametrize(
-    ("spoil", "said"),
+    ("spoil", "expected"),
     [
         (lambda content: b"no video", "not a video that OpenCV can decode"),
         (lambda content: content[: len(content) // 2], "not a video that OpenCV can decode"),
@@ -94,12 +94,12 @@ def damaged(content):
     ],
 )
 def test_a_broken_video_is_one_line_and_leaves_nothing_behind(
-    write_video, tmp_path, capfd, spoil, said
+    write_video, tmp_path, capfd, spoil, expected
 ):
     path = tmp_path / "a.mp4"
     write_video(path, [4 * index for index in range(60)])
     path.write_bytes(spoil(path.read_bytes()))
-    with pytest.raises(DataError, match=f"a.mp4: {said}.*delete it to show the frames instead"):
+    with pytest.raises(DataError, match=f"a.mp4: {expected}.*delete it to show the frames instead"):
         read_video(path, 1)
     assert capfd.readouterr() == ("", "")
     assert list(user_cache("video_frames").iterdir()) == []

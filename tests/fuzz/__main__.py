@@ -45,11 +45,11 @@ def main() -> int:
         return 0
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
     warnings.simplefilter("ignore")
-    found = [
+    problems = [
         _campaign(READERS[name], options.minutes, options.seed)
         for name in options.reader or READERS
     ]
-    return int(any(found))
+    return int(any(problems))
 
 
 def _campaign(reader: Reader, minutes: float, first_seed: int) -> int:

@@ -26,13 +26,13 @@ def test_the_bundled_set_is_small_and_has_every_type_and_number_of_clues():
 
 def test_the_bundled_questions_follow_from_the_bundled_logs():
     manifest = read_manifest(BUNDLED / MANIFEST)
-    made = generate_questions(
+    generated = generate_questions(
         BUNDLED,
         seed=manifest.question_seed,
         per_trajectory=manifest.per_trajectory,
         further=manifest.further,
     )
-    assert made.questions == list(NiehSet(BUNDLED).questions)
+    assert generated.questions == list(NiehSet(BUNDLED).questions)
 
 
 def test_bundled_trajectories_come_out_again_bit_for_bit(tmp_path):

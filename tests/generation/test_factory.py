@@ -27,21 +27,17 @@ from infthor_eval.thor.recorder import object_log
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 
+from ..helpers.command_line import option_words
+
 SHARED = Path(__file__).parents[2] / "../shared/data"
-
-
-@pytest.fixture(scope="module")
-def simulator():
-    with Simulator(embedded_launch()) as simulator:
-        yield simulator
 
 
 def test_every_task_begins_with_an_empty_hand(simulator):
     # What was looked at is still in the hand, and is put down between the tasks.
-    made = generate(
+    generated = generate(
         TrajectorySettings("bedroom-3", 0, 60, 3, task_types=(TaskType.EXAMINE,)), simulator
     )
-    trajectory = made.trajectory
+    trajectory = generated.trajectory
     assert [entry["step"] for entry in trajectory.object_log] == list(
         range(len(trajectory.plan.low_actions) + 1)
     )
@@ -52,9 +48,9 @@ def test_every_task_begins_with_an_empty_hand(simulator):
         len(range(*part.high_pddl_idx)) for part in trajectory.sub_trajs
     )
     assert (
-        sum(made.statistics.tried.values())
-        >= sum(made.statistics.accepted.values())
-        == len(made.problems)
+        sum(generated.statistics.tried.values())
+        >= sum(generated.statistics.accepted.values())
+        == len(generated.problems)
         >= 3
     )
 
@@ -104,19 +100,19 @@ def test_looking_for_places_leaves_no_trace(scene, seed, tmp_path):
         summary = summarise(replay_set(select([path]), simulator, tmp_path / "set"))
     assert summary.complete == 1, summary.diverged
     trajectory = next(iter_trajectories(path))
-    made = [
+    object_logs = [
         {key: value for key, value in entry.items() if key != "step"}
         for entry in trajectory.object_log
     ]
     steps = read_steps(tmp_path / "set" / "metadata" / trajectory.traj_id)
-    assert made == [msgspec.to_builtins(step.object_log) for step in steps]
+    assert object_logs == [msgspec.to_builtins(step.object_log) for step in steps]
 
 
 def test_the_lengths_are_in_steps_and_subgoals_with_put_downs(simulator):
-    made = generate(
+    generated = generate(
         TrajectorySettings("living-room-2", 1, 1, 3, task_types=(TaskType.PLACE,)), simulator
     )
-    assert len(made.trajectory.sub_tasks) == len(made.trajectory.sub_trajs) == 3
+    assert len(generated.trajectory.sub_tasks) == len(generated.trajectory.sub_trajs) == 3
     looks = generate(
         TrajectorySettings("bedroom-3", 0, 1, 4, task_types=(TaskType.EXAMINE,)), simulator
     )
@@ -124,16 +120,16 @@ def test_the_lengths_are_in_steps_and_subgoals_with_put_downs(simulator):
 
 
 def test_a_thousand_steps_are_made_with_the_defaults(simulator):
-    made = generate(TrajectorySettings("bathroom-4", 4, 1000), simulator)
-    assert len(made.trajectory.plan.low_actions) >= 1000
-    assert made.statistics.accepted.total() >= 0.65 * made.statistics.tried.total()
-    assert _refused(made.trajectory, simulator) == []
+    generated = generate(TrajectorySettings("bathroom-4", 4, 1000), simulator)
+    assert len(generated.trajectory.plan.low_actions) >= 1000
+    assert generated.statistics.accepted.total() >= 0.65 * generated.statistics.tried.total()
+    assert _refused(generated.trajectory, simulator) == []
 
 
 def test_five_thousand_steps_are_made_and_replayed(simulator):
-    made = generate(TrajectorySettings("living-room-1", 1, 5000), simulator)
-    assert len(made.trajectory.plan.low_actions) >= 5000
-    assert _refused(made.trajectory, simulator) == []
+    generated = generate(TrajectorySettings("living-room-1", 1, 5000), simulator)
+    assert len(generated.trajectory.plan.low_actions) >= 5000
+    assert _refused(generated.trajectory, simulator) == []
 
 
 def _refused(trajectory, simulator):
@@ -169,41 +165,42 @@ def test_at_dead_ends_1_2_and_4_subgoals_are_dropped(simulator, monkeypatch):
     tries = iter(range(10_000))
     started = []
 
-    def while_(made):
-        if made._draft.n_tasks >= 8:
+    def while_(generated):
+        if generated._draft.n_tasks >= 8:
             started.append(True)
         return bool(started) and next(tries) < 9
 
     _Failing(monkeypatch, while_)
     kinds = (TaskType.PLACE, TaskType.PLACE_TWO)  # which leave nothing in the hand
-    made = generate(
+    generated = generate(
         TrajectorySettings("living-room-2", 5, 150, 9, task_types=kinds, max_fail=2), simulator
     )
-    assert [item.subgoals for item in made.statistics.roll_backs] == [1, 2, 4]
-    went_back = made.trajectory.gen_info["roll_backs"]
+    assert [item.subgoals for item in generated.statistics.roll_backs] == [1, 2, 4]
+    went_back = generated.trajectory.gen_info["roll_backs"]
     assert [item["from_step"] for item in went_back[1:]] == [
         item["to_step"] for item in went_back[:-1]
     ]
-    assert len(made.trajectory.sub_tasks) == len(made.problems) >= 9
-    assert made.statistics.reasons["made to fail"] == 9
-    assert _refused(made.trajectory, simulator) == []
+    assert len(generated.trajectory.sub_tasks) == len(generated.problems) >= 9
+    assert generated.statistics.reasons["made to fail"] == 9
+    assert _refused(generated.trajectory, simulator) == []
 
 
 def test_an_accepted_task_ends_the_row_of_failures(simulator, monkeypatch):
     tries = iter(range(10_000))
-    _Failing(
-        monkeypatch, lambda _: next(tries) % 4 < 2
-    )  # what fails of itself is among the other two
-    made = generate(TrajectorySettings("living-room-2", 5, 60, 6, max_fail=4), simulator)
-    assert made.statistics.roll_backs == [] and made.statistics.reasons["made to fail"] >= 6
+    # What fails of itself is among the other two.
+    _Failing(monkeypatch, lambda _: next(tries) % 4 < 2)
+    generated = generate(TrajectorySettings("living-room-2", 5, 60, 6, max_fail=4), simulator)
+    assert (
+        generated.statistics.roll_backs == [] and generated.statistics.reasons["made to fail"] >= 6
+    )
 
 
 @pytest.mark.parametrize("floor", [0, 40, 10_000])
 def test_what_gives_up_is_kept_from_a_floor_on(simulator, monkeypatch, floor):
     reached = []
 
-    def while_(made):
-        reached.append(made._draft.n_tasks)
+    def while_(generated):
+        reached.append(generated._draft.n_tasks)
         return max(reached) >= 4
 
     _Failing(monkeypatch, while_)
@@ -214,39 +211,35 @@ def test_what_gives_up_is_kept_from_a_floor_on(simulator, monkeypatch, floor):
         ):
             generate(settings, simulator)
         return
-    made = generate(settings, simulator)
-    assert len(made.trajectory.plan.low_actions) >= 40 and len(made.trajectory.sub_tasks) == 4
+    generated = generate(settings, simulator)
     assert (
-        made.trajectory.gen_info["banked_on_giveup"] is True
-        and made.trajectory.long_horizon_task is None
+        len(generated.trajectory.plan.low_actions) >= 40
+        and len(generated.trajectory.sub_tasks) == 4
     )
-    assert len(made.problems) == len(made.trajectory.sub_tasks)
-    assert _refused(made.trajectory, simulator) == []
+    assert (
+        generated.trajectory.gen_info["banked_on_giveup"] is True
+        and generated.trajectory.long_horizon_task is None
+    )
+    assert len(generated.problems) == len(generated.trajectory.sub_tasks)
+    assert _refused(generated.trajectory, simulator) == []
 
 
 def test_a_pool_of_tasks_that_is_exhausted_begins_again(simulator):
     settings = TrajectorySettings("bathroom-4", 2, 700, 1, task_types=(TaskType.CLEAN,))
-    made = generate(settings, simulator)
+    generated = generate(settings, simulator)
     assert (
-        made.statistics.pool_restarts
-        and made.trajectory.gen_info["pool_restarts"] == made.statistics.pool_restarts
+        generated.statistics.pool_restarts
+        and generated.trajectory.gen_info["pool_restarts"] == generated.statistics.pool_restarts
     )
 
 
-def test_the_same_bytes_come_out_after_a_kill_with_roll_backs(run, tmp_path):
+def test_the_same_bytes_come_out_after_a_kill_with_roll_backs(run_cli, tmp_path):
     words = [
         "generate",
-        "--scene",
-        "kitchen-5",
-        "--seed",
-        "5",
-        "--min-steps",
-        "150",
-        "--min-subgoals",
-        "1",
+        *option_words(scene="kitchen-5", seed="5", min_steps="150", min_subgoals="1"),
     ]
     words += ["--max-fail", "1"]
-    assert run(*words, "--out", tmp_path / "whole")[0] == 0
+    assert run_cli(*words, "--out", tmp_path / "whole")[0] == 0
     command = [
         sys.executable,
         "-c",
@@ -257,7 +250,7 @@ def test_the_same_bytes_come_out_after_a_kill_with_roll_backs(run, tmp_path):
     time.sleep(6)
     killed.kill()
     killed.wait()
-    assert run(*words, "--out", tmp_path / "killed")[0] == 0
+    assert run_cli(*words, "--out", tmp_path / "killed")[0] == 0
     name = "kitchen-5-seed5.json"
     assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "killed" / name).read_bytes()
 

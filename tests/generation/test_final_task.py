@@ -15,8 +15,8 @@ from infthor_eval.generation.final_task import end_types, violation
 def log(*types):
     """Entries in which upper-case types can be picked up and all are visible."""
     return [
-        {"visible": list(shown), "pickupable": [name for name in shown if name.isupper()]}
-        for shown in types
+        {"visible": list(visible), "pickupable": [name for name in visible if name.isupper()]}
+        for visible in types
     ]
 
 

@@ -149,15 +149,19 @@ def test_what_the_published_saver_writes_is_replayed_asked_about_and_evaluated(t
         == test.sub_tasks[-1].task_desc
         == test.sub_trajs[-1].subgoal
     )
-    made = generate_questions(tmp_path / "set", per_trajectory=20)
-    assert 30 < len(made.questions) <= 40 and not made.unconfirmed
+    generated = generate_questions(tmp_path / "set", per_trajectory=20)
+    assert 30 < len(generated.questions) <= 40 and not generated.unconfirmed
     assert (
         "put a cold apple in the microwave"
         in (tmp_path / "set/metadata/floorplan28_test/traj.txt").read_text()
     )
-    predict = BASELINES["oracle"](0).fit(made.questions)
-    said = {question: predict(Sample(question, question.clues)) for question in made.questions}
-    assert all(score(reply, question.answers, "strict") == 1.0 for question, reply in said.items())
+    predict = BASELINES["oracle"](0).fit(generated.questions)
+    replies = {
+        question: predict(Sample(question, question.clues)) for question in generated.questions
+    }
+    assert all(
+        score(reply, question.answers, "strict") == 1.0 for question, reply in replies.items()
+    )
 
 
 def test_selection_limits(tmp_path):

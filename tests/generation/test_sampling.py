@@ -78,14 +78,13 @@ _PUBLISHED = {
     "Drawer": 2.3,
 }
 _OBJECTS = (
-    "Apple AppleSliced Bowl Bread BreadSliced ButterKnife Cup DishSponge Egg Fork Knife Lettuce "
-    "LettuceSliced Mug Pan"
-    " PepperShaker Plate Pot Potato PotatoSliced SaltShaker SoapBottle Spatula Spoon Tomato "
-    "TomatoSliced"
+    "Apple AppleSliced Bowl Bread BreadSliced ButterKnife Cup DishSponge Egg Fork Knife "
+    "Lettuce LettuceSliced Mug Pan PepperShaker Plate Pot Potato PotatoSliced SaltShaker "
+    "SoapBottle Spatula Spoon Tomato TomatoSliced"
 )
 _RECEPTACLES = (
-    "Cabinet CoffeeMachine CounterTop DiningTable Drawer Fridge GarbageCan Microwave SinkBasin "
-    "StoveBurner"
+    "Cabinet CoffeeMachine CounterTop DiningTable Drawer Fridge GarbageCan Microwave "
+    "SinkBasin StoveBurner"
 )
 
 

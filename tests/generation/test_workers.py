@@ -2,6 +2,8 @@
 
 from infthor_eval.storage.digests import digest_of_file
 
+from ..helpers.command_line import option_words
+
 SCENES = ("--scene", "kitchen-1", "--scene", "bedroom-2", "--min-steps", 20, "--min-subgoals", 1)
 
 
@@ -13,32 +15,34 @@ def files(folder):
     }
 
 
-def test_the_files_are_the_same_whoever_makes_them(run, tmp_path):
+def test_the_files_are_the_same_whoever_makes_them(run_cli, tmp_path):
     for workers in (1, 2):
         out = tmp_path / str(workers)
-        code, said, err = run("generate", *SCENES, "--out", out / "made", "--workers", workers)
+        code, output, err = run_cli(
+            "generate", *SCENES, "--out", out / "made", "--workers", workers
+        )
         assert code == 0, err
-        assert said.startswith("2 trajectories (0 generated earlier)")
-        assert run("replay", out / "made", "--out", out / "set", "--workers", workers)[0] == 0
+        assert output.startswith("2 trajectories (0 generated earlier)")
+        assert run_cli("replay", out / "made", "--out", out / "set", "--workers", workers)[0] == 0
         assert (
-            run(
+            run_cli(
                 "questions",
                 out / "set",
-                "--out",
-                out / "set" / "qa_set_q.csv",
-                "--workers",
-                workers,
+                *option_words(out=out / "set" / "qa_set_q.csv", workers=workers),
             )[0]
             == 0
         )
     assert files(tmp_path / "1") == files(tmp_path / "2")
     assert len(files(tmp_path / "2")) > 40
-    code, said, _ = run("generate", *SCENES, "--out", tmp_path / "2" / "made", "--workers", 2)
-    assert (code, said.splitlines()[0].split(",")[0]) == (0, "2 trajectories (2 generated earlier)")
+    code, output, _ = run_cli("generate", *SCENES, "--out", tmp_path / "2" / "made", "--workers", 2)
+    assert (code, output.splitlines()[0].split(",")[0]) == (
+        0,
+        "2 trajectories (2 generated earlier)",
+    )
 
 
-def test_gpus_are_shared_out_by_a_cluster_alone(run, tmp_path):
-    code, _, err = run(
+def test_gpus_are_shared_out_by_a_cluster_alone(run_cli, tmp_path):
+    code, _, err = run_cli(
         "--model", "blind", "--tasks", "nieh_mini_gt", "--gpus-per-worker", 1, "--output", tmp_path
     )
     assert (code, "--gpus-per-worker is for --ray-address" in err) == (2, True)

@@ -40,15 +40,10 @@ def start() -> Callable[..., str]:
     return start
 
 
-def samples(folder: Path) -> dict[str, list[dict]]:
+def read_samples(folder: Path) -> dict[str, list[dict]]:
     """The samples files of a folder, by task."""
-    found = {}
+    by_task = {}
     for path in sorted(folder.rglob("samples_*.jsonl")):
         task = path.name.removeprefix("samples_").rpartition("_")[0]
-        found[task] = [json.loads(line) for line in path.read_text().splitlines()]
-    return found
-
-
-def only(folder: Path, pattern: str) -> Path:
-    (path,) = folder.rglob(pattern)
-    return path
+        by_task[task] = [json.loads(line) for line in path.read_text().splitlines()]
+    return by_task

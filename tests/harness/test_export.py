@@ -9,22 +9,17 @@ from lm_eval.utils import (
     make_table,
 )
 
-from tests.harness.conftest import only, samples
+from tests.harness.conftest import read_samples
+from tests.helpers.command_line import option_words
+from tests.helpers.files import find_one
 
 
-def test_lm_evals_readers_take_the_files(make_nieh_set, tmp_path, run):
-    arguments = [
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path,
-    ]
-    assert run(*arguments)[0] == 0
-    names = [str(path) for path in only(tmp_path, "lm_eval").rglob("*.json*")]
+def test_lm_evals_readers_take_the_files(make_nieh_set, tmp_path, run_cli):
+    arguments = option_words(
+        model="oracle", tasks="nieh", data=make_nieh_set(size=56), output=tmp_path
+    )
+    assert run_cli(*arguments)[0] == 0
+    names = [str(path) for path in find_one(tmp_path, "lm_eval").rglob("*.json*")]
     (results,) = get_results_filenames(names)
     assert len(get_sample_results_filenames(names)) == 2
     with open(results) as file:  # noqa: PTH123
@@ -36,25 +31,20 @@ def test_lm_evals_readers_take_the_files(make_nieh_set, tmp_path, run):
     assert document["n-samples"]["nieh_gt"] == {"original": 5, "effective": 5}
     hashes = "".join(
         row["doc_hash"] + row["prompt_hash"] + row["target_hash"]
-        for row in samples(tmp_path)["nieh_gt"]
+        for row in read_samples(tmp_path)["nieh_gt"]
     )
     assert document["task_hashes"]["nieh_gt"] == hash_string(hashes)
 
 
-def test_datasets_reads_the_samples(make_nieh_set, tmp_path, run):
+def test_datasets_reads_the_samples(make_nieh_set, tmp_path, run_cli):
     from datasets import load_dataset
 
-    run(
-        "--model",
-        "blind",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path,
+    run_cli(
+        *option_words(model="blind", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path)
     )
-    rows = load_dataset("json", data_files=str(only(tmp_path, "samples_*.jsonl")), split="train")
+    rows = load_dataset(
+        "json", data_files=str(find_one(tmp_path, "samples_*.jsonl")), split="train"
+    )
     assert len(rows) == 5
     assert rows[0]["metrics"] == ["reference", "strict"]
     assert set(rows[0]) >= {
@@ -69,21 +59,12 @@ def test_datasets_reads_the_samples(make_nieh_set, tmp_path, run):
     }
 
 
-def test_a_failed_sample_is_exported_as_wrong(make_nieh_set, tmp_path, run):
+def test_a_failed_sample_is_exported_as_wrong(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path,
-    ]
-    assert run(*arguments)[0] == 1
-    rows = samples(tmp_path)["nieh_gt"]
+    arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path)
+    assert run_cli(*arguments)[0] == 1
+    rows = read_samples(tmp_path)["nieh_gt"]
     assert len(rows) == 5
     assert [row["strict"] for row in rows if row["resps"] == [[""]]] == [0.0, 0.0]

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.storage.folders import packaged_folder
-from tests.harness.conftest import LM_EVAL, OURS_WITH_ALL_TASKS, samples
+from tests.harness.conftest import LM_EVAL, OURS_WITH_ALL_TASKS, read_samples
+from tests.helpers.command_line import option_words
 
 PEERS = Path(sys.prefix) / "test-peers"
 SHIM = Path(__file__).parents[1] / "peers"
@@ -15,24 +16,17 @@ TASKS = packaged_folder("tasks")
 
 
 @pytest.fixture
-def ours(make_nieh_set, tmp_path, run):
+def ours(make_nieh_set, tmp_path, run_cli):
     """The set, and the samples that our own command exports of a model on it."""
 
     def ours(model, *options):
         data = make_nieh_set()
-        arguments = [
-            "--model",
-            model,
-            "--tasks",
-            "nieh_gt,nieh_full",
-            "--data",
-            data,
-            "--output",
-            tmp_path / "ours",
-        ]
-        code, _, err = run(*arguments, *options)
+        arguments = option_words(
+            model=model, tasks="nieh_gt,nieh_full", data=data, output=tmp_path / "ours"
+        )
+        code, _, err = run_cli(*arguments, *options)
         assert code == 0, err
-        return data, samples(tmp_path / "ours")
+        return data, read_samples(tmp_path / "ours")
 
     return ours
 
@@ -45,7 +39,7 @@ def test_hf_multimodal_runs_the_tasks_and_says_what_our_model_says(tmp_path, our
 
     checkpoint = tmp_path / "checkpoint"
     save_tiny_checkpoint(checkpoint, seed=0)
-    data, found = ours(
+    data, our_samples = ours(
         "qwen2.5-vl", "--model-args", f"pretrained={checkpoint},dtype=float32,device=cpu"
     )
     arguments = [
@@ -80,22 +74,22 @@ def test_hf_multimodal_runs_the_tasks_and_says_what_our_model_says(tmp_path, our
             for row in rows
         }
 
-    theirs = replies(samples(tmp_path / "theirs"))
+    theirs = replies(read_samples(tmp_path / "theirs"))
     assert len(theirs) == 10
-    assert replies(found) == theirs
+    assert replies(our_samples) == theirs
 
 
 def test_our_model_under_lm_evals_own_command_gives_the_samples_of_our_own(tmp_path, ours, start):
-    data, found = ours("qwen2.5-vl-tiny")
+    data, our_samples = ours("qwen2.5-vl-tiny")
     # Named by their files, as lm-eval 0.4.13 imports a task's functions, and so ours, before it
     # looks for the model.
     tasks = f"{TASKS / 'nieh' / 'nieh_gt.yaml'},{TASKS / 'nieh' / 'nieh_full.yaml'}"
     arguments = ["--model", "infthor", "--model_args", "adapter=qwen2.5-vl-tiny", "--tasks", tasks]
     arguments += ["--metadata", json.dumps({"data": str(data)})]
     start(LM_EVAL, "run", *arguments, "--log_samples", "--output_path", tmp_path / "theirs")
-    theirs = samples(tmp_path / "theirs")
+    theirs = read_samples(tmp_path / "theirs")
     assert {task: len(rows) for task, rows in theirs.items()} == {"nieh_gt": 5, "nieh_full": 5}
-    assert found == theirs
+    assert our_samples == theirs
 
 
 def test_our_command_starts_lm_evals_with_any_adapter_and_tasks_by_name(
@@ -124,7 +118,7 @@ def test_our_command_starts_lm_evals_with_any_adapter_and_tasks_by_name(
         out,
         path=[package],
     )
-    (rows,) = samples(out).values()
+    (rows,) = read_samples(out).values()
     assert [row["resps"][0][0] for row in rows] == ["mug"] * 5
 
 

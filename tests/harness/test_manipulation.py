@@ -10,13 +10,15 @@ import pytest
 
 from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.runs import read_run
-from tests.harness.conftest import OURS, only, samples
-from tests.plans.cut import MUG, cut, write
+from tests.harness.conftest import OURS, read_samples
+from tests.helpers.command_line import option_words
+from tests.helpers.journals import read_records
+from tests.helpers.trajectories import MUG, cut_trajectory, write_trajectories
 
 TINY = "openvla-tiny"
 
 
-def asked(folder, data, out, adapter, *more):
+def lm_eval_words(folder, data, out, adapter, *more):
     return [
         *(
             "lm-eval",
@@ -50,25 +52,18 @@ def short(task_files):
     return task_files
 
 
-def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run, start):
-    data = write(tmp_path / "data", cut(MUG, 6))
-    arguments = [
-        "--model",
-        TINY,
-        "--tasks",
-        "manipulathor_pickup",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "ours",
-    ]
-    code, _, err = run(*arguments)
+def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run_cli, start):
+    data = write_trajectories(tmp_path / "data", cut_trajectory(MUG, 6))
+    arguments = option_words(
+        model=TINY, tasks="manipulathor_pickup", data=data, output=tmp_path / "ours"
+    )
+    code, _, err = run_cli(*arguments)
     assert code == 0, err
-    _, records = read_run(only(tmp_path / "ours", "journal").parent, RECORDS)
+    records = read_records(tmp_path / "ours")
     assert len(records) > 1
     out, journal = tmp_path / "theirs", tmp_path / "journal"
-    start(OURS, *asked(short, data, out, TINY, f"journal={journal}"))
-    (rows,) = samples(out).values()
+    start(OURS, *lm_eval_words(short, data, out, TINY, f"journal={journal}"))
+    (rows,) = read_samples(out).values()
     assert [row["doc"]["arm_episode"] for row in rows] == [record.id for record in records]
     for row, record in zip(rows, records, strict=True):
         assert row["success"] == float(record.payload.done)
@@ -80,7 +75,7 @@ def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run,
 
 
 @pytest.mark.parametrize(
-    ("adapter", "task", "said"),
+    ("adapter", "task", "expected"),
     [
         (
             "qwen2.5-vl-tiny",
@@ -94,9 +89,9 @@ def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run,
         ),
     ],
 )
-def test_what_a_model_cannot_do_is_refused_in_one_line(tmp_path, short, adapter, task, said):
-    data = write(tmp_path / "data", cut(MUG, 2))
-    arguments = asked(short, data, tmp_path / "out", adapter)
+def test_what_a_model_cannot_do_is_refused_in_one_line(tmp_path, short, adapter, task, expected):
+    data = write_trajectories(tmp_path / "data", cut_trajectory(MUG, 2))
+    arguments = lm_eval_words(short, data, tmp_path / "out", adapter)
     arguments[arguments.index("manipulathor_pickup")] = task
     done = subprocess.run(
         [sys.executable, "-c", OURS, *map(str, arguments), "--limit", "1"],
@@ -106,4 +101,4 @@ def test_what_a_model_cannot_do_is_refused_in_one_line(tmp_path, short, adapter,
         check=False,
     )
     assert done.returncode == 2
-    assert said in done.stderr.strip().splitlines()[-1]
+    assert expected in done.stderr.strip().splitlines()[-1]

@@ -12,7 +12,7 @@ from infthor_eval.harness.model import InfthorLM
 from infthor_eval.runs import read_run
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.options.checkpoints import HfOptions
-from tests.runs.toy import Prepared, Sums, ToySuite
+from tests.helpers.toy_suite import Prepared, Sums, ToySuite
 
 KWARGS = {"until": [], "max_gen_toks": 6, "do_sample": False, "temperature": 0.0}
 
@@ -117,7 +117,7 @@ def install(monkeypatch):
     module, or none."""
 
     def install(adapter):
-        points = [EntryPoint("toy", "tests.runs.toy:ToySuite", "infthor_eval.suites")]
+        points = [EntryPoint("toy", "tests.helpers.toy_suite:ToySuite", "infthor_eval.suites")]
         if adapter is not None:
             points.append(EntryPoint("toy", f"{__name__}:{adapter}", "infthor_eval.lm_eval"))
         monkeypatch.setattr(
@@ -143,7 +143,7 @@ def test_a_suite_of_another_package_answers_its_docs_and_no_others(install, requ
 
 
 @pytest.mark.parametrize(
-    ("adapter", "said"),
+    ("adapter", "expected"),
     [
         (None, "unknown lm-eval adapter of suite 'toy'; there are manipulation, nieh, plans"),
         (
@@ -153,9 +153,9 @@ def test_a_suite_of_another_package_answers_its_docs_and_no_others(install, requ
         ),
     ],
 )
-def test_a_suite_that_lm_eval_cannot_reach_is_refused_in_one_line(install, adapter, said):
+def test_a_suite_that_lm_eval_cannot_reach_is_refused_in_one_line(install, adapter, expected):
     install(adapter)
     with pytest.raises(UsageError) as caught:
         InfthorLM("qwen2.5-vl-tiny").generate_until(sum_requests((1, 3)))
-    assert said in str(caught.value)
+    assert expected in str(caught.value)
     assert "\n" not in str(caught.value)

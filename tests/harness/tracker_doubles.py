@@ -42,7 +42,7 @@ class Double:
 
     def of(self, name):
         """What a function was called with, each time."""
-        return [given for called, given in self.calls if called == name]
+        return [arguments for called, arguments in self.calls if called == name]
 
 
 def wandb():

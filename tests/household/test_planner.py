@@ -42,9 +42,9 @@ def names(task):
     ],
 )
 def test_plans_of_every_type(task, steps):
-    found = names(task)
-    assert sorted(found) == sorted(steps.split())
-    assert found[-1] == steps.split()[-1]
+    action_names = names(task)
+    assert sorted(action_names) == sorted(steps.split())
+    assert action_names[-1] == steps.split()[-1]
 
 
 def test_nothing_to_do_and_nothing_to_be_done():
@@ -63,9 +63,9 @@ PUT_AWAY = [Task(TaskType.PUT_AWAY, item, "DiningTable") for item in ("Mug", "Ap
 @pytest.mark.parametrize("task", [*tasks_of(ROOM, EXTRA), *PUT_AWAY], ids=str)
 def test_no_shorter_plan_exists(task):
     """Against plain breadth-first search, and the bound never exceeds what is left."""
-    found = plan(task, ROOM)
-    assert found is not None
-    assert len(found) == shortest(task, len(found))
+    actions = plan(task, ROOM)
+    assert actions is not None
+    assert len(actions) == shortest(task, len(actions))
 
 
 def shortest(task, limit):

@@ -84,7 +84,7 @@ def test_what_is_put_away_is_the_movable_object_whatever_the_parameters_say():
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("task", "words"),
     [
         (recorded(""), "a task has no goal; give one of pick_and_place_simple, "),
         (
@@ -125,6 +125,6 @@ def test_what_is_put_away_is_the_movable_object_whatever_the_parameters_say():
         ),
     ],
 )
-def test_what_a_task_lacks_is_named(given, words):
+def test_what_a_task_lacks_is_named(task, words):
     with pytest.raises(DataError, match=words):
-        task_of(given)
+        task_of(task)

@@ -43,9 +43,4 @@ def test_plurals(object_type, words):
 def test_prepositions():
     assert [
         preposition(object_type) for object_type in ("Fridge", "CounterTop", "Plate", "Mug")
-    ] == [
-        "in",
-        "on",
-        "on",
-        "in",
-    ]
+    ] == ["in", "on", "on", "in"]

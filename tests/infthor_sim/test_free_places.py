@@ -11,7 +11,7 @@ from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.solids import Wall, opening_space, part_boxes
 from infthor_sim.scenes.catalogue import Catalogue
 
-from ..benchmarks import load_benchmark
+from ..helpers.benchmarks import load_benchmark
 from .harness import Bench
 
 ROOMS = ("kitchen", "living-room", "bedroom", "bathroom")

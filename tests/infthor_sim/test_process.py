@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 import pytest
 
-from ..waiting import PATIENCE_S, wait_until
+from ..helpers.waiting import PATIENCE_S, wait_until
 
 COMMAND = [sys.executable, "-m", "infthor_sim.player"]
 

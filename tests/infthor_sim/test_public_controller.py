@@ -13,7 +13,7 @@ from infthor_sim import Controller, player_command
 from infthor_sim.errors import SimulatorError
 
 from ..docs.blocks import ROOT, blocks_of
-from ..waiting import PATIENCE_S, wait_until
+from ..helpers.waiting import PATIENCE_S, wait_until
 from .conftest import need_data
 
 EXAMPLES = [

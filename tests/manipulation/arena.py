@@ -64,9 +64,8 @@ class Arena:
         """Run an episode."""
         episode = self.episodes[index]
         if seed not in self._runners:
-            self._runners = {
-                seed: self._runner(seed)
-            }  # one world at a time: they share the simulator
+            # One world at a time: they share the simulator.
+            self._runners = {seed: self._runner(seed)}
             self._environment = None
         self._any_actor.actor = actor
         task = task_of(self._data, **{"kind": str(episode.kind), **settings})

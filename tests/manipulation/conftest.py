@@ -11,41 +11,34 @@ from infthor_eval.runs import PreparedRun
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
-from ..episodes.pool import Pool
-from ..episodes.preparing import preparer
-from ..plans.cut import MUG, cut, write
+from ..episodes.interrupted import simulator_calls  # noqa: F401 - a fixture
+from ..episodes.pool import Pool, pool, shared_simulators  # noqa: F401 - fixtures
+from ..episodes.preparing import make_preparer
+from ..helpers.trajectories import MUG, cut_trajectory, write_trajectories
 from .arena import Arena
 
 
 @pytest.fixture(scope="session")
-def pool() -> Iterator[Pool]:
-    pool = Pool()
-    with pool.open:
-        yield pool
-
-
-@pytest.fixture
-def shared_simulators(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Has runs of manipulation use the shared processes instead of starting their own."""
-    monkeypatch.setattr("infthor_eval.episodes.evaluation.Simulators", pool.simulators_type())
-
-
-@pytest.fixture(scope="session")
-def arena(pool: Pool, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Arena]]:
+def arena(
+    pool: Pool,  # noqa: F811 - the fixture
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[Callable[..., Arena]]:
     """Makes the arena of a bundled trajectory, cut to so many plans; each has an arm's simulator of
     its own."""
-    made: dict[tuple[str, int], Arena] = {}
+    arenas: dict[tuple[str, int], Arena] = {}
     with ExitStack() as opened:
 
         def make(name: str, n_plans: int) -> Arena:
-            if (name, n_plans) not in made:
-                data = write(tmp_path_factory.mktemp("arena") / "data", cut(name, n_plans))
+            if (name, n_plans) not in arenas:
+                data = write_trajectories(
+                    tmp_path_factory.mktemp("arena") / "data", cut_trajectory(name, n_plans)
+                )
                 options = {"image": False, "instances": False}
                 arm = Simulator(embedded_launch(), max_copies=64, agentMode="arm", **options)  # type: ignore[arg-type]
                 opened.enter_context(arm)
                 with pool.one(**options) as expert:
-                    made[name, n_plans] = Arena(data, expert, arm)
-            return made[name, n_plans]
+                    arenas[name, n_plans] = Arena(data, expert, arm)
+            return arenas[name, n_plans]
 
         yield make
 
@@ -53,13 +46,13 @@ def arena(pool: Pool, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Call
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
     """A folder with a pick-up and a put of a mug."""
-    return write(tmp_path / "data", cut(MUG))
+    return write_trajectories(tmp_path / "data", cut_trajectory(MUG))
 
 
 @pytest.fixture
-def prepared(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
-    """Prepares a run on that, see `preparer`."""
-    return preparer("planner-arm", tasks=("manipulathor",), data=data, output=tmp_path / "out")
+def prepare_run(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
+    """Prepares a run on that, see `make_preparer`."""
+    return make_preparer("planner-arm", tasks=("manipulathor",), data=data, output=tmp_path / "out")
 
 
 @pytest.fixture

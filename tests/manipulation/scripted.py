@@ -22,19 +22,19 @@ class ScriptedPolicy:
     def __init__(self, gives: Callable[[int], Any]) -> None:
         self._gives = gives
         self.seen: list[bytes] = []
-        self.told: list[str] = []
+        self.instructions: list[str] = []
         self.resets: list[int] = []
 
     def identity(self) -> dict[str, Any]:
         return {"name": self.name}
 
     def reset(self) -> None:
-        self.resets.append(len(self.told))
+        self.resets.append(len(self.instructions))
 
     def act(self, frame: FrameRef, instruction: str) -> Any:
         self.seen.append(frame.path.read_bytes())
-        self.told.append(instruction)
-        return self._gives(len(self.told) - 1 - self.resets[-1])
+        self.instructions.append(instruction)
+        return self._gives(len(self.instructions) - 1 - self.resets[-1])
 
     def close(self) -> None:
         """Nothing is held."""

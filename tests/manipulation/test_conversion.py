@@ -100,11 +100,11 @@ MOVES = [
 ]
 
 
-@pytest.mark.parametrize(("facing", "asked", "moved"), MOVES)
-def test_a_unit_move_moves_the_hand_along_its_axis_by_its_length(arm, facing, asked, moved):
+@pytest.mark.parametrize(("facing", "direction", "moved"), MOVES)
+def test_a_unit_move_moves_the_hand_along_its_axis_by_its_length(arm, facing, direction, moved):
     length = 0.08
     before, looking = arm.face(facing)
-    after, still_looking = arm.does(step(tuple(length * part for part in asked)))
+    after, still_looking = arm.does(step(tuple(length * part for part in direction)))
     assert tuple(b - a for a, b in zip(before, after, strict=True)) == pytest.approx(
         tuple(length * part for part in moved), abs=1e-4
     )
@@ -133,16 +133,16 @@ def in_world(shares, facing):
 
 @pytest.mark.parametrize("facing", [0, 90])
 @pytest.mark.parametrize(
-    ("asked", "looks"), [turn[1:] for turn in TURNS], ids=[turn[0] for turn in TURNS]
+    ("rotation", "looks"), [turn[1:] for turn in TURNS], ids=[turn[0] for turn in TURNS]
 )
-def test_a_unit_turn_turns_the_hand_about_its_axis_by_its_angle(arm, facing, asked, looks):
+def test_a_unit_turn_turns_the_hand_about_its_axis_by_its_angle(arm, facing, rotation, looks):
     wrist, looking = arm.face(facing)
     length = math.hypot(*looking)
     assert length == pytest.approx(0.07, abs=1e-4)  # the palm, and the radius of 0.06 m
     assert looking == pytest.approx(
         tuple(length * part for part in in_world((1, 0, 0), facing)), abs=1e-3
     )
-    after, now = arm.does(step(rotation=asked))
+    after, now = arm.does(step(rotation=rotation))
     assert now == pytest.approx(tuple(length * part for part in in_world(looks, facing)), abs=1e-4)
     assert after == pytest.approx(wrist, abs=1e-3)  # it turns on the spot
 
@@ -177,17 +177,16 @@ def test_a_short_step_is_not_cut_and_the_scale_comes_before_the_cut():
     assert call["offset"] == pytest.approx({"x": -0.02, "y": 0.02, "z": 0.01})
     (call,) = Conversion(translation_scale=2.0, max_step=0.1).calls(step((0.01, 0.02, 0.02)))
     assert call["offset"] == pytest.approx({"x": -0.04, "y": 0.04, "z": 0.02})
-    (call,) = Conversion(translation_scale=10.0, max_step=0.06).calls(
-        step((0.01, 0.02, 0.02))
-    )  # 0.3 m cut to 0.06
+    # 0.3 m cut to 0.06.
+    (call,) = Conversion(translation_scale=10.0, max_step=0.06).calls(step((0.01, 0.02, 0.02)))
     assert call["offset"] == pytest.approx({"x": -0.04, "y": 0.04, "z": 0.02})
 
 
 def test_the_scale_is_of_lengths_alone_and_turns_are_told_in_degrees():
     move, turn = Conversion(translation_scale=3.0).calls(step((0.01, 0, 0), (0.1, 0.2, 0.3)))
     assert move["action"] == "MoveArmRelative" and move["offset"]["z"] == pytest.approx(0.03)
-    told = [turn[name] for name in ("roll", "pitch", "yaw")]
-    assert told == pytest.approx([math.degrees(0.1), math.degrees(0.2), -math.degrees(0.3)])
+    angles = [turn[name] for name in ("roll", "pitch", "yaw")]
+    assert angles == pytest.approx([math.degrees(0.1), math.degrees(0.2), -math.degrees(0.3)])
 
 
 def test_a_turn_is_left_out_where_rotation_is_off():

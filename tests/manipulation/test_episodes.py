@@ -17,11 +17,8 @@ from infthor_eval.manipulation.records import ArmEnded
 from infthor_eval.thor.frames import NoFrames
 from model_adapters import ArmDelta
 
-BOOK, PEN, AGAIN = (
-    7,
-    100,
-    27,
-)  # pick-ups: out of the sphere's reach; in the sphere at the start; the book once more
+# Pick-ups: out of the sphere's reach; in the sphere at the start; the book once more.
+BOOK, PEN, AGAIN = (7, 100, 27)
 ON_TABLE, ON_BED, INTO_DRAWER = 106, 53, 23  # puts of the pen, and of the book
 
 
@@ -50,11 +47,8 @@ def test_who_stands_still_gets_just_what_lies_in_the_sphere_at_the_start(room):
     assert [record.starts_inside for record in played] == [
         record.start_distance <= 0.5 for record in played
     ]
-    assert [record.index for record in played if record.done] == [
-        51,
-        67,
-        100,
-    ]  # the book, a ball and a pen before it
+    # The book, a ball and a pen before it.
+    assert [record.index for record in played if record.done] == [51, 67, 100]
     assert all(len(record.steps) == 1 for record in played)
     assert {record.ended for record in played} == {"done", "gave up"}
     (refused,) = room.play(actor("still"), BOOK).steps[0].refusals
@@ -86,12 +80,12 @@ def test_the_planner_puts_into_open_drawers(arena):
 
 def test_a_larger_sphere_takes_no_success_from_the_planner(room):
     radii = (0.06, 0.1, 0.2, 0.35, 0.5)
-    found = {
+    successes = {
         radius: [room.play(actor("planner-arm"), episode.index, radius=radius).done
                  for episode in room.of(ManipulationKind.PICKUP)]
         for radius in radii
     }  # fmt: skip
-    rates = [sum(found[radius]) for radius in radii]
+    rates = [sum(successes[radius]) for radius in radii]
     assert rates == sorted(rates)
     assert rates[0] > 0 and rates[-1] == 5
 
@@ -139,9 +133,8 @@ def test_of_a_put_the_wrist_is_as_high_as_the_experts_hand(room, index):
     _, begun = room.begin(index)
     start = room.states.starts[index]
     hand = start.view.objects[start.object_id].position.y
-    assert begun.view.arm.wrist.y == pytest.approx(
-        hand, abs=0.01
-    )  # the range of 1.35 m, halved eight times
+    # The range of 1.35 m, halved eight times.
+    assert begun.view.arm.wrist.y == pytest.approx(hand, abs=0.01)
 
 
 def test_an_episode_begins_alike_whatever_was_done_before(room):
@@ -161,9 +154,8 @@ def test_what_is_held_before_the_palm_is_nearer_to_it_than_in_the_middle(room, i
         held = begun.view.objects[room.states.starts[index].object_id]
         return math.dist(middle_of(held), point_of(begun.view.arm.wrist))
 
-    assert (
-        distance(at_palm=True) < distance(at_palm=False) <= 0.51 + 0.01
-    )  # the middle is radius and palm away
+    # The middle is radius and palm away.
+    assert distance(at_palm=True) < distance(at_palm=False) <= 0.51 + 0.01
 
 
 def test_the_agent_needs_an_arm(room, pool):
@@ -229,7 +221,7 @@ def test_a_hand_takes_the_target_alone_or_all_that_is_in_the_sphere(room):
 
 def test_other_things_in_the_hand_are_no_success(room):
     """The sphere holds something, but not the target."""
-    found = 0
+    n_others = 0
     for episode in room.of(ManipulationKind.PICKUP):
         environment, begun = room.begin(episode.index, Grasp(takes_all=True))
         if environment.starts_inside or not begun.view.arm.pickupable:
@@ -237,8 +229,8 @@ def test_other_things_in_the_hand_are_no_success(room):
         outcome = environment.step(gripper(0.0))
         assert outcome.view.inventory and outcome.ended is None
         assert environment.step(gripper(1.0)).view.inventory == ()  # and it lets go of them again
-        found += 1
-    assert found
+        n_others += 1
+    assert n_others
 
 
 # -- what counts
@@ -271,9 +263,8 @@ def test_released_over_the_receptacle_counts(room):
     outcome = environment.step([{"action": "ReleaseObject"}])
     assert outcome.ended == ArmEnded.DONE
     assert is_in(target, box, outcome.view)
-    assert (
-        middle_of(outcome.view.objects[target])[1] < middle_of(moved.view.objects[target])[1]
-    )  # it fell
+    # It fell.
+    assert middle_of(outcome.view.objects[target])[1] < middle_of(moved.view.objects[target])[1]
 
 
 def test_released_elsewhere_does_not_count(room):

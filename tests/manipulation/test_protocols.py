@@ -5,7 +5,7 @@ import pytest
 from infthor_eval.runs import execute
 from model_adapters import ArmDelta
 
-from ..plans.cut import MUG, cut, write
+from ..helpers.trajectories import MUG, cut_trajectory, write_trajectories
 from .scripted import ScriptedPolicy
 
 pytestmark = pytest.mark.usefixtures("shared_simulators")
@@ -16,17 +16,17 @@ OPEN = ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.9)
 
 
 @pytest.fixture
-def picking(prepared, monkeypatch, tmp_path):
+def picking(prepare_run, monkeypatch, tmp_path):
     """The record of a pick-up of a clock beside the expert, by a policy that holds its hand still
     and open."""
-    data = write(tmp_path / "clock", cut(MUG, 6))
+    data = write_trajectories(tmp_path / "clock", cut_trajectory(MUG, 6))
 
     def picking(model=TWIN, **changes):
         if model == TWIN:
             monkeypatch.setattr(
                 "infthor_eval.runs.work.binding.load", lambda *_: ScriptedPolicy(lambda _: [OPEN])
             )
-        *_, record = execute(prepared(model, tasks=(PICK,), data=data, **changes)).records
+        *_, record = execute(prepare_run(model, tasks=(PICK,), data=data, **changes)).records
         assert not record.failure and not record.excluded
         return record.payload
 
@@ -34,9 +34,9 @@ def picking(prepared, monkeypatch, tmp_path):
 
 
 def test_a_hand_closes_when_it_is_asked_always_or_at_the_end(picking):
-    asked, always, end = (picking(closing=closing) for closing in ("asked", "always", "end"))
-    assert asked.starts_inside  # with a sphere of half a metre
-    assert (asked.ended, len(asked.steps)) == ("step limit", 60)
+    when_asked, always, end = (picking(closing=closing) for closing in ("asked", "always", "end"))
+    assert when_asked.starts_inside  # with a sphere of half a metre
+    assert (when_asked.ended, len(when_asked.steps)) == ("step limit", 60)
     assert (always.ended, len(always.steps)) == ("done", 1)
     assert (end.ended, len(end.steps)) == ("done", 61)
     assert [call["action"] for call in end.steps[-1].calls] == ["PickupObject"]
@@ -62,9 +62,9 @@ def test_the_hand_begins_at_rest_low_or_high(picking):
 
 
 @pytest.mark.parametrize("changes", [{"stand": "before"}, {"hand": "high"}, {"closing": "end"}])
-def test_each_is_another_run(prepared, changes):
+def test_each_is_another_run(prepare_run, changes):
     def config(**changes):
-        run = prepared("still", **changes)
+        run = prepare_run("still", **changes)
         return run.evaluation.bind(run.suite.baselines["still"](0)).workload.config
 
     assert config() != config(**changes)

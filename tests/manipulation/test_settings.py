@@ -8,21 +8,17 @@ from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.trajectories import ArmEpisode
 
+from ..helpers.refusals import read_one_line
 from .arena import task_of
 
 PICK = ArmEpisode(4, ManipulationKind.PICKUP, "AppleSliced")
 PUT = ArmEpisode(9, ManipulationKind.PUT, "ButterKnife", "SinkBasin")
 
 
-def one_line(caught):
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
-
-
 # -- what a policy is told
 
 
-@pytest.mark.parametrize(("kind", "template", "episode", "said"), [
+@pytest.mark.parametrize(("kind", "template", "episode", "expected"), [
     ("pickup", None, PICK, "pick up the sliced apple"),
     ("put", None, PUT, "put the butter knife in the sink"),
     ("pickup", "short", PICK, "Pick-up"),
@@ -32,12 +28,12 @@ def one_line(caught):
     ("put", "put the {object} down", PUT, "put the butter knife down"),
     ("pickup", "{{{object}}}", PICK, "{sliced apple}"),
 ])  # fmt: skip
-def test_what_a_policy_is_told(data, kind, template, episode, said):
-    given = {} if template is None else {"instruction": template}
-    assert task_of(data, kind=kind, **given).instruction(episode) == said
+def test_what_a_policy_is_told(data, kind, template, episode, expected):
+    settings = {} if template is None else {"instruction": template}
+    assert task_of(data, kind=kind, **settings).instruction(episode) == expected
     assert (
         task_of(data, ManipulationOptions(instruction=template), kind=kind).instruction(episode)
-        == said
+        == expected
     )
 
 
@@ -49,11 +45,11 @@ def test_what_a_policy_is_told(data, kind, template, episode, said):
 ])  # fmt: skip
 @pytest.mark.parametrize("by", ["file", "option"])
 def test_words_that_do_not_tell_the_object_are_refused(data, template, by):
-    given = {"instruction": template} if by == "file" else {}
+    settings = {"instruction": template} if by == "file" else {}
     options = ManipulationOptions(instruction=template if by == "option" else None)
     with pytest.raises(UsageError, match="a_task: the instruction ") as caught:
-        task_of(data, options, kind="pickup", **given)
-    assert "must have {object}, and nothing else in braces" in one_line(caught)
+        task_of(data, options, kind="pickup", **settings)
+    assert "must have {object}, and nothing else in braces" in read_one_line(caught)
 
 
 def test_words_of_puts_may_have_a_receptacle_and_must_have_an_object(data):
@@ -72,7 +68,7 @@ def test_a_radius_that_no_hand_has_is_refused(radius):
         UsageError, match=r"--radius .*: is a length of 0\.04 to 0\.5 metres"
     ) as caught:
         ManipulationOptions(radius=radius)
-    one_line(caught)
+    read_one_line(caught)
 
 
 @pytest.mark.parametrize("radius", [0.039, 0.6, 5])
@@ -129,7 +125,7 @@ def test_settings_have_defaults_and_all_of_them_act(data):
     assert (changed.settings.max_steps, changed.settings.reward) == (9, 1)
 
 
-@pytest.mark.parametrize(("settings", "said"), [
+@pytest.mark.parametrize(("settings", "expected"), [
     ({"kind": "throw"}, "kind is 'throw'; there are pickup, put"),
     ({"radios": 0.5}, "radios is not known; did you mean radius?"),
     ({"colour": "red"}, "colour is not known; there are kind, bundled"),
@@ -148,10 +144,10 @@ def test_settings_have_defaults_and_all_of_them_act(data):
     ({"gripper_threshold": 1.5}, "gripper_threshold 1.5 is above 1"),
     ({"bundled": "nothing"}, "the installation lacks its data folder 'sets/nothing'"),
 ])  # fmt: skip
-def test_a_setting_that_would_not_act_is_refused(data, settings, said):
+def test_a_setting_that_would_not_act_is_refused(data, settings, expected):
     with pytest.raises((DataError, UsageError)) as caught:
         task_of(data, **settings)
-    assert said in one_line(caught)
+    assert expected in read_one_line(caught)
 
 
 # -- trajectories
@@ -167,11 +163,11 @@ def test_a_tasks_episodes_are_of_its_kind(data):
 def test_no_trajectories_are_refused(data, tmp_path):
     empty = tmp_path / "empty"
     empty.mkdir()
-    for place, error, said in (
+    for place, error, expected in (
         (None, UsageError, "this task has no trajectories of its own; give them as --data"),
         (tmp_path / "nowhere", UsageError, "there is no such file or folder"),
         (empty, DataError, "no .json, .jsonl, .jsonl.gz file"),
     ):
-        with pytest.raises(error, match=said) as caught:
+        with pytest.raises(error, match=expected) as caught:
             task_of(place)
-        one_line(caught)
+        read_one_line(caught)

@@ -15,7 +15,8 @@ from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.runs import execute, prepare, read_run
 from model_adapters import ArmDelta, load
 
-from ..plans.cut import CANDLE, FORK, MUG, cut, write
+from ..helpers.refusals import read_one_line
+from ..helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 from .scripted import ScriptedPolicy
 
 pytestmark = pytest.mark.usefixtures("shared_simulators")
@@ -30,19 +31,14 @@ def by_key(outcome):
     }
 
 
-def one_line(caught):
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
-
-
 @pytest.fixture
 def policy(monkeypatch):
     """Has runs load a scripted policy."""
 
     def make(gives):
-        made = ScriptedPolicy(gives)
-        monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: made)
-        return made
+        policy = ScriptedPolicy(gives)
+        monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: policy)
+        return policy
 
     return make
 
@@ -50,11 +46,11 @@ def policy(monkeypatch):
 # -- a run
 
 
-def test_the_planner_does_what_the_expert_did(prepared, data):
-    write(data / "more", cut(CANDLE))
-    outcome = execute(prepared())
-    found = by_key(outcome)
-    assert {key: record.payload.instruction for key, record in found.items()} == {
+def test_the_planner_does_what_the_expert_did(prepare_run, data):
+    write_trajectories(data / "more", cut_trajectory(CANDLE))
+    outcome = execute(prepare_run())
+    records = by_key(outcome)
+    assert {key: record.payload.instruction for key, record in records.items()} == {
         (PICK, MUG, 9): "pick up the mug",
         (PUT, MUG, 21): "put the mug in the desk",
         (PICK, CANDLE, 6): "pick up the candle",
@@ -65,7 +61,7 @@ def test_the_planner_does_what_the_expert_did(prepared, data):
         record.key: sample.number
         for record, sample in zip(outcome.records, outcome.samples, strict=True)
     }
-    assert numbers[found[PUT, MUG, 21].key] == 0
+    assert numbers[records[PUT, MUG, 21].key] == 0
     (table, *_) = outcome.run.suite.tables([outcome.summary])
     (row,) = [row for row in table.rows if not row.is_published]
     assert [cell.partition(" ")[0] for cell in row.cells] == [
@@ -73,8 +69,8 @@ def test_the_planner_does_what_the_expert_did(prepared, data):
     ]  # fmt: skip
 
 
-def test_the_journal_reads_back(prepared):
-    outcome = execute(prepared("random-arm"))
+def test_the_journal_reads_back(prepare_run):
+    outcome = execute(prepare_run("random-arm"))
     header, records = read_run(outcome.folder, RECORDS)[:2]
     assert list(records) == list(outcome.records)
     assert outcome.run.suite.summarise(header, records) == outcome.summary.summary
@@ -86,17 +82,17 @@ def test_the_journal_reads_back(prepared):
     }
 
 
-def test_the_limit_is_of_episodes(prepared):
-    outcome = execute(prepared("still", limit=1))
+def test_the_limit_is_of_episodes(prepare_run):
+    outcome = execute(prepare_run("still", limit=1))
     assert sorted(by_key(outcome)) == [(PICK, MUG, 9), (PUT, MUG, 21)]
     assert outcome.summary.header.config.limit == 1
 
 
-def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, task_file, tmp_path):
+def test_equal_seeds_act_alike_and_other_seeds_do_not(prepare_run, task_file, tmp_path):
     task_file("max_steps: 3")
 
     def moved(seed, folder):
-        outcome = execute(prepared("random-arm", seed=seed, output=tmp_path / folder))
+        outcome = execute(prepare_run("random-arm", seed=seed, output=tmp_path / folder))
         return [[step.delta for step in record.payload.steps] for record in outcome.records]
 
     first = moved(7, "a")
@@ -116,9 +112,9 @@ def test_several_radii_are_runs_of_their_own(data, tmp_path):
     assert [row.cells[1] for row in table.rows if not row.is_published] == ["0.06", "0.5"]
 
 
-def test_all_that_changes_a_number_is_part_of_a_runs_identity(prepared, task_file, data):
+def test_all_that_changes_a_number_is_part_of_a_runs_identity(prepare_run, task_file, data):
     def prints(**changes):
-        run = prepared("still", **changes)
+        run = prepare_run("still", **changes)
         bound = run.evaluation.bind(run.suite.baselines["still"](0))
         bound.close()
         return [bound._fingerprint(unit) for unit in bound.workload.groups[0].units]
@@ -141,7 +137,7 @@ def test_all_that_changes_a_number_is_part_of_a_runs_identity(prepared, task_fil
     ):
         task_file(settings)
         changed.append(prints())
-    assert all(not set(found) & set(plain) for found in changed)
+    assert all(not set(fingerprints) & set(plain) for fingerprints in changed)
 
 
 # -- policies
@@ -153,11 +149,11 @@ def twins():
 
 
 @pytest.mark.parametrize("name", ["openvla-tiny", "spatialvla-tiny"])
-def test_tiny_policies_run_both_tasks(prepared, task_file, twins, monkeypatch, name):
+def test_tiny_policies_run_both_tasks(prepare_run, task_file, twins, monkeypatch, name):
     task_file("max_steps: 5")
     monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: twins[name])
     monkeypatch.setattr(twins[name], "close", lambda: None)
-    outcome = execute(prepared(name))
+    outcome = execute(prepare_run(name))
     assert sorted(by_key(outcome)) == [(PICK, MUG, 9), (PUT, MUG, 21)]
     for record in outcome.records:
         assert record.failure is record.excluded is None
@@ -167,21 +163,21 @@ def test_tiny_policies_run_both_tasks(prepared, task_file, twins, monkeypatch, n
     assert outcome.summary.summary.tasks[PICK].success.n == 1
     (table, *_) = outcome.run.suite.tables([outcome.summary])
     assert [row.cells[0] for row in table.rows if not row.is_published] == [name]
-    again = execute(prepared(name, output=outcome.folder.parents[1] / "again"))
+    again = execute(prepare_run(name, output=outcome.folder.parents[1] / "again"))
     assert [record.payload for record in again.records] == [
         record.payload for record in outcome.records
     ]
 
 
 def test_a_policy_sees_the_present_frame_once_per_chunk_and_is_told_what_to_do(
-    prepared, task_file, policy
+    prepare_run, task_file, policy
 ):
     task_file("max_steps: 4, image_size: 96")
     move = ArmDelta((0.0, 0.05, 0.0), (0.0, 0.0, 0.2), 0.49)
     scripted = policy(lambda number: (move, STILL))
-    outcome = execute(prepared("openvla-tiny", instruction="please: {object}"))
+    outcome = execute(prepare_run("openvla-tiny", instruction="please: {object}"))
     assert [len(record.payload.steps) for record in outcome.records] == [4, 4]
-    assert scripted.told == ["please: mug"] * 4
+    assert scripted.instructions == ["please: mug"] * 4
     assert scripted.resets == [0, 2]
     with Image.open(io.BytesIO(scripted.seen[0])) as image:
         assert image.size == (96, 96)
@@ -190,17 +186,17 @@ def test_a_policy_sees_the_present_frame_once_per_chunk_and_is_told_what_to_do(
         assert [bool(step.calls) for step in record.payload.steps] == [True, False] * 2
 
 
-def test_blank_frames_are_plain_and_change_nothing_else(prepared, task_file, policy, tmp_path):
+def test_blank_frames_are_plain_and_change_nothing_else(prepare_run, task_file, policy, tmp_path):
     task_file("max_steps: 2, image_size: 64")
-    shown = policy(lambda number: (STILL,))
-    plain = execute(prepared("openvla-tiny"))
+    on_true_frames = policy(lambda number: (STILL,))
+    plain = execute(prepare_run("openvla-tiny"))
     blank = policy(lambda number: (STILL,))
-    outcome = execute(prepared("openvla-tiny", frames="blank", output=tmp_path / "blank"))
-    assert len(set(blank.seen)) == 1 and not set(blank.seen) & set(shown.seen)
+    outcome = execute(prepare_run("openvla-tiny", frames="blank", output=tmp_path / "blank"))
+    assert len(set(blank.seen)) == 1 and not set(blank.seen) & set(on_true_frames.seen)
     with Image.open(io.BytesIO(blank.seen[0])) as image:
         pixels = np.asarray(image)
     assert pixels.shape[:2] == (64, 64) and (pixels == 128).all()
-    assert blank.told == shown.told
+    assert blank.instructions == on_true_frames.instructions
     assert [record.payload for record in outcome.records] == [
         record.payload for record in plain.records
     ]
@@ -226,13 +222,13 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_what_is_no_movement_is_a_failure_of_the_policy(prepared, task_file, policy, name):
+def test_what_is_no_movement_is_a_failure_of_the_policy(prepare_run, task_file, policy, name):
     task_file("max_steps: 3, image_size: 32")
-    chunk, said = BAD[name]
+    chunk, expected = BAD[name]
     policy(lambda number: chunk)
-    outcome = execute(prepared("openvla-tiny", tasks=(PICK,)))
+    outcome = execute(prepare_run("openvla-tiny", tasks=(PICK,)))
     (record,) = outcome.records
-    assert said in record.failure and "\n" not in record.failure
+    assert expected in record.failure and "\n" not in record.failure
     assert (record.payload.ended, record.payload.done, record.excluded) == ("", False, None)
     task = outcome.summary.summary.tasks[PICK]
     assert (task.n_failed, task.success.mean, task.endings) == (1, 0, {"failed": 1})
@@ -241,15 +237,19 @@ def test_what_is_no_movement_is_a_failure_of_the_policy(prepared, task_file, pol
 # -- what cannot be evaluated
 
 
-def test_a_trajectory_whose_expert_is_refused_counts_up_to_there(prepared, tmp_path):
-    document = cut(MUG)
+def test_a_trajectory_whose_expert_is_refused_counts_up_to_there(prepare_run, tmp_path):
+    document = cut_trajectory(MUG)
     document["plan"]["low_actions"][12]["api_action"] = {
         "action": "OpenObject",
         "objectId": "Desk|+9.99|+0.00|+0.00",
     }
     for model in ("planner-arm", "still"):
         outcome = execute(
-            prepared(model, data=write(tmp_path / model, document), output=tmp_path / "out" / model)
+            prepare_run(
+                model,
+                data=write_trajectories(tmp_path / model, document),
+                output=tmp_path / "out" / model,
+            )
         )
         pick, put = by_key(outcome)[PICK, MUG, 9], by_key(outcome)[PUT, MUG, 21]
         assert pick.excluded is None
@@ -260,23 +260,24 @@ def test_a_trajectory_whose_expert_is_refused_counts_up_to_there(prepared, tmp_p
         assert f"1 left out: {put.excluded}" in table.notes
 
 
-def test_an_episode_whose_object_is_missing_counts_for_nobody(prepared, tmp_path):
-    document = cut(MUG)
+def test_an_episode_whose_object_is_missing_counts_for_nobody(prepare_run, tmp_path):
+    document = cut_trajectory(MUG)
     recorded = document["plan"]["low_actions"][9]["api_action"]
     recorded["objectId"] = "Elephant|+00.00|+00.00|+00.00"
-    outcome = execute(prepared("still", data=write(tmp_path / "elephant", document)))
-    assert all(
-        "Elephant" in record.excluded for record in outcome.records
-    )  # what comes after is not known either
+    outcome = execute(
+        prepare_run("still", data=write_trajectories(tmp_path / "elephant", document))
+    )
+    # What comes after is not known either.
+    assert all("Elephant" in record.excluded for record in outcome.records)
     assert by_key(outcome)[PICK, MUG, 9].payload.instruction == "pick up the elephant"
     assert outcome.summary.summary.tasks[PICK].success is None
 
 
-def test_a_scene_that_is_not_here_counts_for_nobody(prepared, data):
-    document = cut(FORK, called="elsewhere")
+def test_a_scene_that_is_not_here_counts_for_nobody(prepare_run, data):
+    document = cut_trajectory(FORK, called="elsewhere")
     document["scene"]["floor_plan"] = "FloorPlan7"
     (data / "elsewhere.json").write_text(json.dumps(document))
-    outcome = execute(prepared("still"))
+    outcome = execute(prepare_run("still"))
     left_out = [record for record in outcome.records if record.excluded is not None]
     assert [record.cluster for record in left_out] == ["elsewhere"] * 2
     assert all(
@@ -301,48 +302,50 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
-    damage, said = BROKEN[name]
+def test_a_broken_trajectory_is_skipped_named_and_counted(prepare_run, data, name):
+    damage, expected = BROKEN[name]
     if isinstance(damage, str):
         (data / "broken.json").write_text(damage)
     else:
-        document = cut(MUG, called="broken")
+        document = cut_trajectory(MUG, called="broken")
         damage(document)
         (data / "broken.json").write_text(json.dumps(document))
-    outcome = execute(prepared("still", tasks=(PICK,)))
+    outcome = execute(prepare_run("still", tasks=(PICK,)))
     ((reason, number),) = outcome.summary.summary.tasks[PICK].skipped.items()
-    assert number == 1 and reason.startswith("broken.json") and said in reason
+    assert number == 1 and reason.startswith("broken.json") and expected in reason
     assert "\n" not in reason and str(data) not in reason
     (table, *_) = outcome.run.suite.tables([outcome.summary])
     assert f"1 left out: {reason}" in table.notes
     assert len(outcome.records) == 1
 
 
-def test_where_no_trajectory_has_such_an_action_that_is_said(prepared, tmp_path):
-    data = write(tmp_path / "walks", cut(MUG, 1))
+def test_where_no_trajectory_has_such_an_action_that_is_said(prepare_run, tmp_path):
+    data = write_trajectories(tmp_path / "walks", cut_trajectory(MUG, 1))
     with pytest.raises(
         UsageError, match="manipulathor_pickup: no trajectory there has a Pick-up"
     ) as caught:
-        prepared(data=data)
-    one_line(caught)
+        prepare_run(data=data)
+    read_one_line(caught)
     with pytest.raises(UsageError, match="manipulathor_put: no trajectory there has a Put"):
-        prepared(data=write(tmp_path / "picks", cut(MUG, 2)), tasks=(PUT,))
+        prepare_run(
+            data=write_trajectories(tmp_path / "picks", cut_trajectory(MUG, 2)), tasks=(PUT,)
+        )
 
 
-def test_nothing_to_evaluate_is_refused_in_one_line(prepared, tmp_path):
+def test_nothing_to_evaluate_is_refused_in_one_line(prepare_run, tmp_path):
     broken = tmp_path / "broken"
     broken.mkdir()
     (broken / "a.json").write_text("{")
-    for place, error, said in (
+    for place, error, expected in (
         (None, UsageError, "no trajectories of its own; give them as --data"),
         (broken, DataError, "nothing to evaluate"),
     ):
-        with pytest.raises(error, match=said) as caught:
-            prepared(data=place)
-        one_line(caught)
+        with pytest.raises(error, match=expected) as caught:
+            prepare_run(data=place)
+        read_one_line(caught)
 
 
-@pytest.mark.parametrize(("option", "value", "said"), [
+@pytest.mark.parametrize(("option", "value", "expected"), [
     ("radius", "0.7", "--radius 0.7: is a length of 0.04 to 0.5 metres"),
     ("radius", "wide", "--radius wide: is a length"),
     ("frames", "black", "--frames black: tasks in a simulator have shown, blank"),
@@ -350,28 +353,31 @@ def test_nothing_to_evaluate_is_refused_in_one_line(prepared, tmp_path):
     ("scenes", "/nowhere/at/all", "/nowhere/at/all"),
 ])  # fmt: skip
 def test_an_option_that_does_not_fit_ends_the_command_in_one_line(
-    run, data, tmp_path, option, value, said
+    run_cli, data, tmp_path, option, value, expected
 ):
     words = ("run", "--model", "still", "--tasks", PICK, "--data", data, "--output", tmp_path / "o")
-    code, out, err = run(*words, f"--{option}", value)
+    code, out, err = run_cli(*words, f"--{option}", value)
     assert (code, out) == (2, "")
-    assert said in " ".join(err.split()) and "Traceback" not in err
+    assert expected in " ".join(err.split()) and "Traceback" not in err
 
 
-def test_two_tasks_about_the_same_episodes_run_together(prepared, task_files):
+def test_two_tasks_about_the_same_episodes_run_together(prepare_run, task_files):
     """They share the expert's history; each has its own frames' size and radius."""
     for name, settings in (("near", "radius: 0.06, image_size: 64"), ("far", "radius: 0.5")):
         (task_files / "manipulation" / f"{name}.yaml").write_text(
-            f"include: _manipulation.yaml\ntask: {name}\ndataset_kwargs: {{kind: pickup, "
-            f"{settings}}}\n"
+            "include: _manipulation.yaml\n"
+            f"task: {name}\n"
+            f"dataset_kwargs: {{kind: pickup, {settings}}}\n"
         )
-    outcome = execute(prepared("planner-arm", tasks=("near", "far")))
-    found = by_key(outcome)
-    assert sorted(found) == [("far", MUG, 9), ("near", MUG, 9)]
-    assert found["far", MUG, 9].payload.done
+    outcome = execute(prepare_run("planner-arm", tasks=("near", "far")))
+    records = by_key(outcome)
+    assert sorted(records) == [("far", MUG, 9), ("near", MUG, 9)]
+    assert records["far", MUG, 9].payload.done
+    # A small sphere.
     assert (
-        found["near", MUG, 9].payload.start_distance > found["far", MUG, 9].payload.start_distance
-    )  # a small sphere
+        records["near", MUG, 9].payload.start_distance
+        > records["far", MUG, 9].payload.start_distance
+    )
     rows = [
         row for row in outcome.run.suite.tables([outcome.summary])[0].rows if not row.is_published
     ]

@@ -84,32 +84,28 @@ def run(name="a policy", records=RECORDS, **changes):
 
 
 def table(title, *runs):
-    (found,) = [
+    (matching,) = [
         table for table in ManipulationSuite().tables(runs) if table.title.startswith(title)
     ]
-    return found
+    return matching
 
 
-def cells(row, found):
-    return dict(zip((column.name for column in found.columns), row.cells, strict=False))
+def cells(row, printed_table):
+    return dict(zip((column.name for column in printed_table.columns), row.cells, strict=False))
 
 
-def own(found):
-    return [cells(row, found) for row in found.rows if not row.is_published]
+def own(printed_table):
+    return [cells(row, printed_table) for row in printed_table.rows if not row.is_published]
 
 
 def test_the_numbers_of_pick_ups():
     task = summed().tasks[PICK]
     assert (task.kind, task.radius, task.n_trajectories, task.n_failed) == ("pickup", 0.5, 2, 1)
     assert task.excluded == {"no such scene": 1}
-    assert (task.success.mean, task.success.n) == (
-        0.25,
-        4,
-    )  # a failure of the policy's is no success
-    assert (task.inside.mean, task.inside.n) == (
-        pytest.approx(2 / 3),
-        3,
-    )  # it is not known of the failed one
+    # A failure of the policy's is no success.
+    assert (task.success.mean, task.success.n) == (0.25, 4)
+    # It is not known of the failed one.
+    assert (task.inside.mean, task.inside.n) == (pytest.approx(2 / 3), 3)
     assert task.closest == pytest.approx((0.1 + 0.4 + 0.7) / 3)
     assert task.steps == pytest.approx((2 + 4 + 0) / 3)
     assert task.collisions == pytest.approx((2 + 4 + 0) / 3)  # an empty grasp is none
@@ -140,17 +136,17 @@ def test_nothing_counts_where_all_is_left_out():
 
 
 def test_table_6_has_the_published_columns_and_rows():
-    found = table("Low-level manipulation, success %", run())
-    names = [column.name for column in found.columns]
+    printed_table = table("Low-level manipulation, success %", run())
+    names = [column.name for column in printed_table.columns]
     assert names == ["model", "radius, m", "Pick-up", "Put", "pick-ups", "puts", "trajectories",
                      "excluded", "skipped",
                      "failed", "Pick-up above still", "Put above still"]  # fmt: skip
-    published = [cells(row, found) for row in found.rows if row.is_published]
+    published = [cells(row, printed_table) for row in printed_table.rows if row.is_published]
     assert [(row["model"], row["radius, m"], row["Pick-up"], row["Put"]) for row in published] == [
         ("OpenVLA 7B", "published, Table 6", "3.82", "6.38"),
         ("SpatialVLA 4B", "published, Table 6", "4.68", "9.14"),
     ]
-    (row,) = own(found)
+    (row,) = own(printed_table)
     assert (row["model"], row["radius, m"]) == ("a policy", "0.5")
     assert row["Pick-up"].startswith("25.0 [") and row["Put"].startswith("50.0 [")
     assert [row[name] for name in ("pick-ups", "puts", "trajectories", "excluded", "skipped",
@@ -189,8 +185,8 @@ def test_tasks_of_one_run_with_several_radii_have_a_row_each():
 
 
 def test_episodes_and_endings_have_a_row_per_task():
-    found = table("Episodes", run())
-    pick, put = own(found)
+    printed_table = table("Episodes", run())
+    pick, put = own(printed_table)
     assert (pick["model"], pick["task"], pick["radius, m"]) == ("a policy", PICK, "0.5")
     assert pick["in the sphere at the start, %"].startswith("66.7 [")
     assert put["in the sphere at the start, %"] == "-"  # it is in the hand
@@ -212,9 +208,8 @@ def test_success_above_the_floor_is_that_of_the_same_episodes():
         episode("b", 7),
     ]
     own_row, floor = own(table("Low-level", run(records=policy), run("still", still)))
-    assert own_row["Pick-up above still"].startswith(
-        "33.3 ["
-    )  # of the three that both have: 2 against 1
+    # Of the three that both have: 2 against 1.
+    assert own_row["Pick-up above still"].startswith("33.3 [")
     assert (own_row["Put above still"], floor["Pick-up above still"]) == ("-", "-")
     (alone,) = own(table("Low-level", run(records=policy)))
     assert alone["Pick-up above still"] == "-"
@@ -224,14 +219,17 @@ def test_success_above_the_floor_is_that_of_the_same_episodes():
 
 def test_what_is_left_out_is_told_with_its_reason():
     broken = [("b.json", "b.json: not a trajectory"), ("c.json", "c.json: not a trajectory")]
-    found = table("Low-level", run(broken=broken))
-    assert found.notes[1:-1] == (
+    printed_table = table("Low-level", run(broken=broken))
+    assert printed_table.notes[1:-1] == (
         "1 left out: b.json: not a trajectory",  # once, though both tasks read the file
         "1 left out: c.json: not a trajectory",
         "2 left out: no such scene",  # a pick-up and a put
     )
-    assert own(found)[0]["skipped"] == "2"
-    assert table("Low-level", run(broken=broken), run("other", broken=broken)).notes == found.notes
+    assert own(printed_table)[0]["skipped"] == "2"
+    assert (
+        table("Low-level", run(broken=broken), run("other", broken=broken)).notes
+        == printed_table.notes
+    )
 
 
 def test_many_reasons_are_counted_at_the_end():

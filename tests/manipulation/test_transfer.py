@@ -41,22 +41,24 @@ def start_of(arena):
 def differences(here, wanted, held):
     """What is otherwise than wanted, of all things; where a hand holds something it lies
     nowhere."""
-    found = []
+    otherwise = []
     for key in here.objects.keys() ^ wanted.objects.keys():
-        found.append((key, "is there in one alone"))
+        otherwise.append((key, "is there in one alone"))
     for key in here.objects.keys() & wanted.objects.keys():
         item, there = here.objects[key], wanted.objects[key]
-        found += [(key, state) for state in STATES if getattr(item, state) != getattr(there, state)]
+        otherwise += [
+            (key, state) for state in STATES if getattr(item, state) != getattr(there, state)
+        ]
         apart = math.dist(
             msgspec.structs.astuple(item.position), msgspec.structs.astuple(there.position)
         )
         if there.pickupable and apart > 0.01:
-            found.append((key, f"{apart} m away"))
+            otherwise.append((key, f"{apart} m away"))
         if key not in held and sorted(item.parent_receptacles or ()) != sorted(
             there.parent_receptacles or ()
         ):
-            found.append((key, f"in {item.parent_receptacles}, not {there.parent_receptacles}"))
-    return found
+            otherwise.append((key, f"in {item.parent_receptacles}, not {there.parent_receptacles}"))
+    return otherwise
 
 
 @pytest.mark.parametrize("name", ["kitchen", "drawers"])
@@ -133,9 +135,8 @@ def test_states_are_set_either_way(drawers):
     cooked = {
         key for key, item in changed.items() if item.is_cooked and not view.objects[key].is_cooked
     }
-    back = {
-        key: value for key, value in states(view).items() if key not in cooked
-    }  # nobody uncooks a potato
+    # Nobody uncooks a potato.
+    back = {key: value for key, value in states(view).items() if key not in cooked}
     assert {
         key: value for key, value in states(drawers.simulator.view).items() if key not in cooked
     } == back

@@ -27,18 +27,18 @@ def test_frames_are_distinct_in_time_order_and_as_many_as_there_is_room_for(
 ):
     clues = tuple(sorted(data.draw(st.sets(st.integers(0, max(0, n_past)), max_size=5))))
     recalled = observed(kind(k=k), n_past)(budget=budget, clues=clues)
-    found = numbers(recalled)
-    assert found == sorted(set(found))
-    assert set(found) <= set(range(n_past))
-    assert len(found) == min(n_past, k if budget is None else budget // 10)
+    frame_numbers = numbers(recalled)
+    assert frame_numbers == sorted(set(frame_numbers))
+    assert set(frame_numbers) <= set(range(n_past))
+    assert len(frame_numbers) == min(n_past, k if budget is None else budget // 10)
     assert budget is None or tokens_of(recalled, 10) <= budget
 
 
 @given(n_past=st.integers(1, 40), k=st.integers(1, 12), data=st.data())
 def test_the_oracle_recalls_all_clues_that_there_is_room_for(observed, n_past, k, data):
     clues = set(data.draw(st.sets(st.integers(0, n_past - 1), max_size=8)))
-    found = set(numbers(observed(Oracle(k=k), n_past)(clues=tuple(sorted(clues)))))
-    assert len(found & clues) == min(k, len(clues))
+    frame_numbers = set(numbers(observed(Oracle(k=k), n_past)(clues=tuple(sorted(clues)))))
+    assert len(frame_numbers & clues) == min(k, len(clues))
 
 
 def test_by_hand(observed):

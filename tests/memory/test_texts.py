@@ -45,19 +45,19 @@ def test_the_last_lines_that_fit_the_budget_are_recalled(observed, budget):
 
 
 def test_notes_are_written_on_every_window_with_the_current_view_in_the_last(observed):
-    asked = []
+    requests = []
 
     def write(parts, max_new_tokens):
-        asked.append(([part.path.stem for part in parts[:-1]], parts[-1], max_new_tokens))
+        requests.append(([part.path.stem for part in parts[:-1]], parts[-1], max_new_tokens))
         return " a mug\non the  table"
 
     (text,) = observed(Notes(window=2, tokens=7), 4, write=write)()
     assert text == "".join(
         f"{at}: a mug on the table\n" for at in ("Steps 0-1", "Steps 2-3", "Step 4")
     )
-    assert [frames for frames, _, _ in asked] == [["0", "1"], ["2", "3"], ["4"]]
-    assert {limit for _, _, limit in asked} == {7}
-    assert asked[0][1].startswith("\nSteps 0-1 of an embodied agent's trajectory")
+    assert [frames for frames, _, _ in requests] == [["0", "1"], ["2", "3"], ["4"]]
+    assert {limit for _, _, limit in requests} == {7}
+    assert requests[0][1].startswith("\nSteps 0-1 of an embodied agent's trajectory")
 
 
 def test_of_notes_beyond_the_budget_the_last_are_recalled(observed):

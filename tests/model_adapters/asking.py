@@ -34,6 +34,6 @@ def require_same(
     talk = talk_of(model, turns)
     assert talk.n_tokens == len(ids)
     assert not hasattr(model, "pieces") or list(token_ids(model.pieces(turns))) == ids
-    got = list(talk.reply(up_to(n_new)).token_ids)
-    assert got == reply[: len(got)]
-    assert reply[len(got) :] == [] or reply[len(got)] in model._loaded.generation.end_ids
+    answer = list(talk.reply(up_to(n_new)).token_ids)
+    assert answer == reply[: len(answer)]
+    assert reply[len(answer) :] == [] or reply[len(answer)] in model._loaded.generation.end_ids

@@ -38,8 +38,9 @@ __all__ = ["FAMILIES", "OTHERS", "save", "twin"]
 TEMPLATE = """\
 {%- for message in messages -%}
 {{- message.role + ': ' -}}
-{%- for part in message.content -%}{{- 'IMAGE' if part.type == 'image' else part.text -}}{%- \
-endfor -%}
+{%- for part in message.content -%}
+{{- 'IMAGE' if part.type == 'image' else part.text -}}
+{%- endfor -%}
 {{- '\\n' -}}
 {%- endfor -%}
 {%- if add_generation_prompt -%}{{- 'assistant:' -}}{%- endif -%}

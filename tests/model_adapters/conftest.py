@@ -33,50 +33,57 @@ from transformers import AutoImageProcessor, AutoModelForImageTextToText, AutoPr
 
 def content(processor, model, parts):
     types = [type for type, value in parts]
-    if model.config.model_type == "llava_onevision" and types != sorted(types, key=("image", \
-"video", "text").index):
-        # Its template writes images and videos before texts; in between, their token is written \
-into the text.
+    in_template_order = sorted(types, key=("image", "video", "text").index)
+    if model.config.model_type == "llava_onevision" and types != in_template_order:
+        # Its template writes images and videos before texts; in between, their token is written
+        # into the text.
         tokens = {"image": processor.image_token, "video": processor.video_token}
         inline = "".join(tokens.get(type, value) for type, value in parts)
         return [{"type": "text", "text": inline}]
-    return [{"type": type, "text": value} if type == "text" else {"type": type} for type, value \
-in parts]
+    return [
+        {"type": type, "text": value} if type == "text" else {"type": type}
+        for type, value in parts
+    ]
 
 def answer(processor, model, turns, new):
-    messages = [{"role": role, "content": content(processor, model, parts)} for role, parts in \
-turns]
+    messages = [
+        {"role": role, "content": content(processor, model, parts)} for role, parts in turns
+    ]
     text = processor.apply_chat_template(messages, add_generation_prompt=True)
-    images = [Image.open(value) for role, parts in turns for type, value in parts if type == \
-"image"]
-    videos = [value for role, parts in turns for type, value in parts if type == "video"]
+    typed = [part for role, parts in turns for part in parts]
+    images = [Image.open(value) for type, value in typed if type == "image"]
+    videos = [value for type, value in typed if type == "video"]
     if videos:
         # No frame is sampled: the metadata say at which rate those that are given were.
         settings = {
             "videos": [[Image.open(path) for path in video["frames"]] for video in videos],
-            "video_metadata": [{"fps": video["fps"], "total_num_frames": len(video["frames"])} \
-for video in videos],
+            "video_metadata": [
+                {"fps": video["fps"], "total_num_frames": len(video["frames"])} for video in videos
+            ],
         }
     else:
         settings = {}
     begin = processor.tokenizer.bos_token
     begun = begin is not None and text.startswith(begin)
     inputs = processor(
-        text=[text], images=images or None, add_special_tokens=not begun, return_tensors="pt", \
-**settings
+        text=[text],
+        images=images or None,
+        add_special_tokens=not begun,
+        return_tensors="pt",
+        **settings,
     )
     output = model.generate(**inputs, do_sample=False, max_new_tokens=new)
     ids = inputs["input_ids"][0].tolist()
     return ids, output[0, len(ids):].tolist()
 
-asked, found = json.load(sys.stdin), {}
-for folder, prompts in asked["prompts"].items():
+work, answers = json.load(sys.stdin), {}
+for folder, prompts in work["prompts"].items():
     processor = AutoProcessor.from_pretrained(folder)
     processor.image_processor = AutoImageProcessor.from_pretrained(folder, backend="pil")
     assert type(processor).__name__.endswith("Processor")
     model = AutoModelForImageTextToText.from_pretrained(folder)
-    found[folder] = [answer(processor, model, turns, asked["new"]) for turns in prompts]
-print(json.dumps(found))
+    answers[folder] = [answer(processor, model, turns, work["new"]) for turns in prompts]
+print(json.dumps(answers))
 """
 
 Answers = Callable[
@@ -145,19 +152,19 @@ def answer_plainly() -> Answers:
     def answer(prompts: Mapping[Path, Sequence[Sequence[Turn]]], new: int) -> dict[Path, list[Any]]:
         if not PEERS.is_dir():
             pytest.skip("torchvision is not set aside in test-peers (make test does it)")
-        asked = {
+        prompts_as_json = {
             str(folder): [_as_json(turns) for turns in listed] for folder, listed in prompts.items()
         }
         run = subprocess.run(
             [sys.executable, "-c", PLAINLY],
-            input=json.dumps({"new": new, "prompts": asked}),
+            input=json.dumps({"new": new, "prompts": prompts_as_json}),
             check=True,
             capture_output=True,
             text=True,
             env=os.environ | {"PYTHONPATH": str(PEERS)},
         )
-        found = json.loads(run.stdout.splitlines()[-1])
-        return {folder: found[str(folder)] for folder in prompts}
+        answers = json.loads(run.stdout.splitlines()[-1])
+        return {folder: answers[str(folder)] for folder in prompts}
 
     return answer
 

@@ -6,14 +6,10 @@ import time
 import urllib.error
 import urllib.request
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from infthor_eval.runs import UnitRecord, read_header, read_run
-from infthor_eval.suites import find_suite
-
-__all__ = ["free_port", "records_in", "wait_for_server"]
+__all__ = ["free_port", "wait_for_server"]
 
 START_S = 600
 
@@ -37,9 +33,3 @@ def wait_for_server(url: str, server: "subprocess.Popen[bytes]", log: Path) -> N
         except (urllib.error.URLError, ConnectionError):
             time.sleep(0.2)
     pytest.fail(f"the server does not come up: {log.read_text()[-2000:]}")
-
-
-def records_in(output: Path) -> list[UnitRecord[Any]]:
-    """The records of the one run in a folder of results."""
-    (results,) = output.rglob("results.json")
-    return read_run(results.parent, find_suite(read_header(results.parent).suite).records)[1]

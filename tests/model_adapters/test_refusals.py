@@ -11,7 +11,7 @@ from .asking import up_to, user
 
 
 @pytest.mark.parametrize(
-    ("able", "asked"),
+    ("able", "settings"),
     [
         ({}, {}),
         ({}, {"top_p": 0.5, "seed": 3, "stop": ("x",)}),  # greedy all the same
@@ -19,12 +19,12 @@ from .asking import up_to, user
         ({"choices": True}, {"choices": ("yes", "no")}),
     ],
 )
-def test_what_a_model_can_do_is_let_through(able: dict[str, Any], asked: dict[str, Any]) -> None:
-    check_decoding("m", Capabilities(**able), up_to(3, **asked))
+def test_what_a_model_can_do_is_let_through(able: dict[str, Any], settings: dict[str, Any]) -> None:
+    check_decoding("m", Capabilities(**able), up_to(3, **settings))
 
 
 @pytest.mark.parametrize(
-    ("able", "asked", "complaint"),
+    ("able", "settings", "complaint"),
     [
         (
             {"choices": True},
@@ -39,10 +39,10 @@ def test_what_a_model_can_do_is_let_through(able: dict[str, Any], asked: dict[st
     ],
 )
 def test_what_it_cannot_do_is_refused(
-    able: dict[str, Any], asked: dict[str, Any], complaint: str
+    able: dict[str, Any], settings: dict[str, Any], complaint: str
 ) -> None:
     with pytest.raises(ModelError, match=complaint):
-        check_decoding("m", Capabilities(**able), up_to(3, **asked))
+        check_decoding("m", Capabilities(**able), up_to(3, **settings))
 
 
 def test_only_a_users_turn_can_be_replied_to() -> None:

@@ -162,8 +162,10 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: Dummy-Robot\nVersion: 1.2\n")
     (info / "entry_points.txt").write_text(
-        f"[{registry.ENTRY_POINTS}]\ndummy = dummy_robot.arms.left:Arm\nsingle = "
-        "dummy_module:A\nlost = no_such:A\n"
+        f"[{registry.ENTRY_POINTS}]\n"
+        "dummy = dummy_robot.arms.left:Arm\n"
+        "single = dummy_module:A\n"
+        "lost = no_such:A\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     return tmp_path
@@ -204,7 +206,7 @@ def test_the_source_of_an_adapter_that_is_not_there_is_one_line(installed: Path)
 
 
 @pytest.mark.parametrize(
-    ("given", "expected"),
+    ("model_options", "expected"),
     [
         ({}, "qwen2.5-vl"),
         ({"dtype": "float32"}, "qwen2.5-vl"),
@@ -220,8 +222,8 @@ def test_the_source_of_an_adapter_that_is_not_there_is_one_line(installed: Path)
         ({"pretrained": "runs/nano/checkpoint-500"}, "checkpoint-500"),
     ],
 )
-def test_a_run_is_called_by_its_checkpoint(given: dict[str, str], expected: str) -> None:
-    assert label("qwen2.5-vl", given) == expected
+def test_a_run_is_called_by_its_checkpoint(model_options: dict[str, str], expected: str) -> None:
+    assert label("qwen2.5-vl", model_options) == expected
 
 
 @pytest.mark.parametrize("pretrained", [".", "..", "/", "./", "../.."])

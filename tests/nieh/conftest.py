@@ -17,7 +17,7 @@ def data(make_nieh_set: Callable[..., Path]) -> Path:
 
 
 @pytest.fixture
-def prepared(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
+def prepare_run(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
     """A run on that set, ready to be executed; keyword arguments are the model's and those of
     `RunOptions`."""
 

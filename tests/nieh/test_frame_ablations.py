@@ -22,15 +22,15 @@ def requests(make_nieh_set):
     root = make_nieh_set(QUESTIONS, n_frames=6, size=24)
 
     def find(frames, context="trajectory", seed=0):
-        found = find_samples(
+        task_samples = find_samples(
             {"context": context, "data": str(root), "frames": frames, "seed": seed}
         )
-        made = []
-        for sample in found.samples:
-            parts, text = found.request(sample)
-            assert doc_parts(json.loads(json.dumps(doc_of(found, sample)))) == [*parts, text]
-            made.append((sample.question.traj_id, parts, text))
-        return made
+        requests_sent = []
+        for sample in task_samples.samples:
+            parts, text = task_samples.request(sample)
+            assert doc_parts(json.loads(json.dumps(doc_of(task_samples, sample)))) == [*parts, text]
+            requests_sent.append((sample.question.traj_id, parts, text))
+        return requests_sent
 
     return find
 
@@ -40,8 +40,8 @@ def names(parts):
 
 
 def test_blank_frames_have_the_size_of_those_they_stand_for(requests):
-    shown, blank = requests("shown"), requests("blank")
-    assert [text for *_, text in blank] == [text for *_, text in shown]
+    plain, blank = requests("shown"), requests("blank")
+    assert [text for *_, text in blank] == [text for *_, text in plain]
     frames = {frame for _, parts, _ in blank for frame in parts}
     (frame,) = frames
     image = frame.load()
@@ -64,8 +64,8 @@ def test_a_frame_that_cannot_be_read_stands_for_itself(requests):
 
 
 def test_shuffled_frames_are_the_same_in_another_order_for_every_question(requests):
-    shown, shuffled = requests("shown"), requests("shuffled")
-    for (_, parts, _), (_, others, _) in zip(shown, shuffled, strict=True):
+    plain, shuffled = requests("shown"), requests("shuffled")
+    for (_, parts, _), (_, others, _) in zip(plain, shuffled, strict=True):
         assert sorted(names(others)) == names(parts) != names(others)
     assert shuffled[0][1] == shuffled[1][1]
     assert shuffled == requests("shuffled")

@@ -40,9 +40,9 @@ def task():
     return Catalog.find_packaged().tasks["nieh_own"]
 
 
-def test_the_files_function_makes_the_scores_and_the_published_scorers_stay_out(prepared, own):
+def test_the_files_function_makes_the_scores_and_the_published_scorers_stay_out(prepare_run, own):
     own()
-    outcome = execute(prepared(tasks=("nieh_own",)))
+    outcome = execute(prepare_run(tasks=("nieh_own",)))
     assert {record.payload.question: record.payload.scores for record in outcome.records} == {
         "Is there a mug?": {"letters": 3 / 20, "plain": 1.0},
         "Where was the mug before you put it?": {"letters": 10 / 20, "plain": 0.0},
@@ -51,18 +51,18 @@ def test_the_files_function_makes_the_scores_and_the_published_scorers_stay_out(
         "Is there a sink?": {"letters": 2 / 20, "plain": 1.0},
     }
     document = json.loads((outcome.folder / "results.json").read_text())
-    found = document["summary"]["tasks"]["nieh_own"]
-    assert found["metrics"] == ["letters", "plain"]
-    scores = found["by_clues"]["total"]["scores"]
+    summary = document["summary"]["tasks"]["nieh_own"]
+    assert summary["metrics"] == ["letters", "plain"]
+    scores = summary["by_clues"]["total"]["scores"]
     assert {name: score["mean"] for name, score in scores.items()} == {
         "letters": pytest.approx(0.27),
         "plain": 0.6,
     }
 
 
-def test_tasks_with_and_without_metrics_of_their_own_run_together(prepared, own):
+def test_tasks_with_and_without_metrics_of_their_own_run_together(prepare_run, own):
     own()
-    tasks = execute(prepared(tasks=("nieh_gt", "nieh_own"))).summary.summary.tasks
+    tasks = execute(prepare_run(tasks=("nieh_gt", "nieh_own"))).summary.summary.tasks
     assert {name: task.metrics for name, task in tasks.items()} == {
         "nieh_gt": ["reference", "strict"],
         "nieh_own": ["letters", "plain"],
@@ -70,11 +70,11 @@ def test_tasks_with_and_without_metrics_of_their_own_run_together(prepared, own)
     assert tasks["nieh_gt"].by_clues["total"].scores["strict"].mean == 1.0
 
 
-def test_another_source_of_the_function_is_another_run(prepared, own):
+def test_another_source_of_the_function_is_another_run(prepare_run, own):
     folders = []
     for function in (MEASURE, MEASURE.replace("20", "40"), MEASURE):
         own(function)
-        folders.append(execute(prepared(tasks=("nieh_own",))).folder)
+        folders.append(execute(prepare_run(tasks=("nieh_own",))).folder)
     assert folders[0] == folders[2] != folders[1]
 
 
@@ -105,30 +105,32 @@ BAD_REPLIES = [
 
 
 @pytest.mark.parametrize(
-    ("body", "place", "said"), BAD_REPLIES, ids=[said for _, _, said in BAD_REPLIES]
+    ("body", "place", "expected"), BAD_REPLIES, ids=[expected for _, _, expected in BAD_REPLIES]
 )
-def test_a_function_that_fails_fails_the_sample_by_name_and_place(prepared, own, body, place, said):
+def test_a_function_that_fails_fails_the_sample_by_name_and_place(
+    prepare_run, own, body, place, expected
+):
     own(f"def measure(doc, results):\n{body}")
-    outcome = execute(prepared(tasks=("nieh_own",)))
+    outcome = execute(prepare_run(tasks=("nieh_own",)))
     assert len(outcome.records) == 5
     for record in outcome.records:
         assert record.failure.startswith(f"process_results fails on {record.id}: {place}")
-        assert record.failure.endswith(f": {said}; traceback in journal/tracebacks.txt")
+        assert record.failure.endswith(f": {expected}; traceback in journal/tracebacks.txt")
         assert "\n" not in record.failure
     assert (outcome.folder / "journal" / "tracebacks.txt").read_text().count(
         "attempt 1\nTraceback (most"
     ) == 1
-    again = execute(prepared(tasks=("nieh_own",)))  # its journal can be read
+    again = execute(prepare_run(tasks=("nieh_own",)))  # its journal can be read
     assert {record.attempt for record in again.records} == {2}
 
 
-def test_a_function_that_fails_on_one_reply_costs_one_sample(prepared, own):
+def test_a_function_that_fails_on_one_reply_costs_one_sample(prepare_run, own):
     own(
         MEASURE.replace(
             "    said,", "    assert 'sink' not in doc['question'], 'no\\nsink'\n    said,"
         )
     )
-    outcome = execute(prepared(tasks=("nieh_own",)))
+    outcome = execute(prepare_run(tasks=("nieh_own",)))
     (failed,) = [record for record in outcome.records if record.failure]
     assert failed.payload.question == "Is there a sink?"
     assert "AssertionError in own.py:" in failed.failure
@@ -176,14 +178,14 @@ BAD_FILES = [
 
 
 @pytest.mark.parametrize(
-    ("content", "function", "said"), BAD_FILES, ids=[said for *_, said in BAD_FILES]
+    ("content", "function", "expected"), BAD_FILES, ids=[expected for *_, expected in BAD_FILES]
 )
 def test_a_file_whose_metrics_cannot_be_had_is_refused_in_one_line(
-    prepared, own, content, function, said
+    prepare_run, own, content, function, expected
 ):
     own(function, content)
-    with pytest.raises(DataError, match=said) as caught:
-        prepared(tasks=("nieh_own",))
+    with pytest.raises(DataError, match=expected) as caught:
+        prepare_run(tasks=("nieh_own",))
     assert "nieh_own.yaml" in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -207,11 +209,13 @@ def test_of_our_scorers_a_task_has_those_that_it_lists(own):
         metrics_of(task())
 
 
-def test_baselines_are_measured_by_the_files_function_too(prepared, own):
+def test_baselines_are_measured_by_the_files_function_too(prepare_run, own):
     own(
-        "def measure(doc, results):\n    return {'letters': results[0] == doc['question'], "
-        "'plain': True}\n"
+        "def measure(doc, results):\n"
+        "    return {'letters': results[0] == doc['question'], 'plain': True}\n"
     )
-    (found,) = execute(prepared(Oracle.name, tasks=("nieh_own",))).summary.summary.tasks.values()
-    assert found.by_clues["total"].scores["letters"].mean == 0.0
-    assert found.by_clues["total"].scores["plain"].mean == 1.0
+    (summary,) = execute(
+        prepare_run(Oracle.name, tasks=("nieh_own",))
+    ).summary.summary.tasks.values()
+    assert summary.by_clues["total"].scores["letters"].mean == 0.0
+    assert summary.by_clues["total"].scores["plain"].mean == 1.0

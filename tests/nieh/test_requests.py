@@ -57,13 +57,15 @@ def as_text(part):
 @pytest.mark.parametrize("task", EXPECTED)
 def test_requests_are_what_they_were(task):
     settings = Catalog.find_packaged().tasks[task].settings["dataset_kwargs"]
-    found = find_samples({"bundled": "nieh_mini", "tokens_per_frame": 121, "seed": 0, **settings})
+    task_samples = find_samples(
+        {"bundled": "nieh_mini", "tokens_per_frame": 121, "seed": 0, **settings}
+    )
     rows = []
-    for sample in found.samples:
-        context, text = found.request(sample)
+    for sample in task_samples.samples:
+        context, text = task_samples.request(sample)
         rows.append([sample.question.id, sample.variant, *map(as_text, context), text])
     requests = digest(json.dumps(rows, ensure_ascii=False))
-    assert (len(found.samples), len(found.skipped), requests) == EXPECTED[task]
+    assert (len(task_samples.samples), len(task_samples.skipped), requests) == EXPECTED[task]
 
 
 def test_every_task_is_among_them():

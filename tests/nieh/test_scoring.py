@@ -80,7 +80,7 @@ EXACT = {
 
 @pytest.mark.parametrize("rule", EXACT)
 def test_reference_keeps_each_rule_of_the_published_scorer(rule):
-    assert [(said, gold, score(said, gold)) for said, gold, _ in EXACT[rule]] == EXACT[rule]
+    assert [(reply, gold, score(reply, gold)) for reply, gold, _ in EXACT[rule]] == EXACT[rule]
 
 
 @pytest.mark.parametrize(
@@ -136,19 +136,19 @@ def test_one_answer_more_than_there_are_costs_something(gold, more):
 
 
 @given(st.lists(names, max_size=5), answers, names)
-def test_a_wrong_answer_more_never_gains(said, gold, wrong):
+def test_a_wrong_answer_more_never_gains(replied, gold, wrong):
     if score(wrong, [gold[0]], "strict") or any(score(wrong, [item], "strict") for item in gold):
         return
-    assert score(", ".join([*said, wrong]), gold, "strict") <= score(
-        ", ".join(said), gold, "strict"
+    assert score(", ".join([*replied, wrong]), gold, "strict") <= score(
+        ", ".join(replied), gold, "strict"
     )
 
 
 @given(answers, st.randoms())
 def test_strict_does_not_depend_on_the_order_of_the_answers(gold, random):
-    said = list(gold)
-    random.shuffle(said)
-    assert score(", ".join(said), gold, "strict") == 1.0
+    replied = list(gold)
+    random.shuffle(replied)
+    assert score(", ".join(replied), gold, "strict") == 1.0
 
 
 @given(st.text(max_size=40))

@@ -13,18 +13,18 @@ from infthor_eval.nieh.shown_clues import shown_clues
 
 
 @pytest.fixture
-def shown(make_nieh_set):
+def clues_shown_by(make_nieh_set):
     """Asks a question with these clues; returns what each sample shows of them, and the samples."""
 
-    def shown(context, clues, n_frames=10, prepare=lambda root: None, **settings):
+    def clues_shown_by(context, clues, n_frames=10, prepare=lambda root: None, **settings):
         question = Question("t", "Where was the mug?", clues, ("Shelf",))
         root = make_nieh_set([question], n_frames=n_frames, size=8)
         prepare(root)
         open_set.cache_clear()
-        found = find_samples({"context": context, "data": str(root), **settings})
-        return [shown_clues(found, sample) for sample in found.samples]
+        task_samples = find_samples({"context": context, "data": str(root), **settings})
+        return [shown_clues(task_samples, sample) for sample in task_samples.samples]
 
-    return shown
+    return clues_shown_by
 
 
 def clues(n_shown, n_clues, n_after):
@@ -41,26 +41,26 @@ def clues(n_shown, n_clues, n_after):
     ],
     ids=["all", "some", "none", "a clue twice"],
 )
-def test_the_end_of_a_trajectory_shows_late_clues(shown, numbers, expected):
+def test_the_end_of_a_trajectory_shows_late_clues(clues_shown_by, numbers, expected):
     # 2 * 1024 tokens hold four frames of 512: the last four of ten are 6 to 9.
-    assert shown("truncate_head", numbers, ctx_size=2, tokens_per_frame=512) == [expected]
+    assert clues_shown_by("truncate_head", numbers, ctx_size=2, tokens_per_frame=512) == [expected]
 
 
 @pytest.mark.parametrize("context", ["clues", "trajectory"])
-def test_clue_frames_and_whole_trajectories_show_all(shown, context):
-    assert shown(context, (5, 2)) == [clues(2, 2, 4)]
+def test_clue_frames_and_whole_trajectories_show_all(clues_shown_by, context):
+    assert clues_shown_by(context, (5, 2)) == [clues(2, 2, 4)]
 
 
-def test_the_haystack_shows_its_needle_at_every_depth(shown):
+def test_the_haystack_shows_its_needle_at_every_depth(clues_shown_by):
     settings = {"n_frames": 30, "ctx_size": 10, "tokens_per_frame": 1000}
-    assert shown("haystack", (12,), **settings) == [clues(1, 1, 17)] * 5
+    assert clues_shown_by("haystack", (12,), **settings) == [clues(1, 1, 17)] * 5
 
 
-def test_clues_that_follow_each_other_can_reach_out_of_the_haystack(shown):
+def test_clues_that_follow_each_other_can_reach_out_of_the_haystack(clues_shown_by):
     # Three and more lie at the last depth: a window of five frames starts four before the first of
     # five clues.
     settings = {"ctx_size": 5, "tokens_per_frame": 1000, "depths": [0.0]}
-    assert shown("haystack", (4, 5, 6, 7, 8), **settings) == [clues(1, 5, 1)]
+    assert clues_shown_by("haystack", (4, 5, 6, 7, 8), **settings) == [clues(1, 5, 1)]
 
 
 def test_retrieved_frames_show_the_clues_among_them(make_nieh_set):
@@ -81,26 +81,23 @@ def test_retrieved_frames_show_the_clues_among_them(make_nieh_set):
     ("fps", "numbers", "expected"),
     [
         (1, (16, 17, 33), clues(2, 3, 16)),
-        (
-            1,
-            (1, 2, 3),
-            clues(0, 3, 46),
-        ),  # positions in the film that is shown, not in the trajectory
+        # Positions in the film that is shown, not in the trajectory.
+        (1, (1, 2, 3), clues(0, 3, 46)),
         (10, (16, 17, 33), clues(3, 3, 16)),
     ],
 )
 @pytest.mark.parametrize("has_film", [True, False])
 def test_a_video_shows_the_frames_sampled_from_it(
-    shown, write_video, has_film, fps, numbers, expected
+    clues_shown_by, write_video, has_film, fps, numbers, expected
 ):
     def prepare(root):
         if has_film:
             write_video(root / "metadata" / "t" / "t_10fps.mp4", range(0, 250, 5))
 
-    assert shown("video", numbers, n_frames=50, prepare=prepare, fps=fps) == [expected]
+    assert clues_shown_by("video", numbers, n_frames=50, prepare=prepare, fps=fps) == [expected]
 
 
-def test_frames_are_counted_by_their_place_not_their_number(shown):
+def test_frames_are_counted_by_their_place_not_their_number(clues_shown_by):
     def number_by_tens(root):
         path = root / "metadata" / "t" / "metadata.json"
         entries = [
@@ -109,7 +106,7 @@ def test_frames_are_counted_by_their_place_not_their_number(shown):
         path.write_text(json.dumps(entries))
 
     settings = {"ctx_size": 2, "tokens_per_frame": 512, "prepare": number_by_tens}
-    assert shown("truncate_head", (50, 70), **settings) == [clues(1, 2, 2)]
+    assert clues_shown_by("truncate_head", (50, 70), **settings) == [clues(1, 2, 2)]
 
 
 def test_an_absence_has_no_evidence(make_nieh_set):
@@ -125,5 +122,5 @@ def test_a_set_without_frames_does_not_tell(make_nieh_set, tmp_path):
     alone = tmp_path / "alone"
     alone.mkdir()
     (root / "qa_set_test.csv").rename(alone / "qa_set_test.csv")
-    found = find_samples({"context": "clues", "data": str(alone)})
-    assert [shown_clues(found, sample) for sample in found.samples] == [None] * 5
+    task_samples = find_samples({"context": "clues", "data": str(alone)})
+    assert [shown_clues(task_samples, sample) for sample in task_samples.samples] == [None] * 5

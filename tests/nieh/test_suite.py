@@ -12,6 +12,7 @@ from infthor_eval.nieh.samples import find_samples
 from infthor_eval.runs import execute, read_run
 from model_adapters import Capabilities, Reply
 
+from ..helpers.questions import make_question
 from .watching import Watcher
 
 TINY = "qwen2.5-vl-tiny"
@@ -25,8 +26,8 @@ def cells(outcome):
     return {name: task.by_clues for name, task in outcome.summary.summary.tasks.items()}
 
 
-def test_oracle_is_right_everywhere_and_lm_eval_agrees(prepared):
-    outcome = execute(prepared())
+def test_oracle_is_right_everywhere_and_lm_eval_agrees(prepare_run):
+    outcome = execute(prepare_run())
     assert Counter(record.task for record in outcome.records) == {"nieh_gt": 5, "nieh_full": 5}
     assert all(
         record.payload.reply == ", ".join(map(str, record.payload.answers))
@@ -42,22 +43,25 @@ def test_oracle_is_right_everywhere_and_lm_eval_agrees(prepared):
     assert len(list(outcome.folder.glob("lm_eval/*/samples_nieh_*.jsonl"))) == 2
 
 
-def test_the_same_command_goes_on_and_another_starts_anew(prepared):
+def test_the_same_command_goes_on_and_another_starts_anew(prepare_run):
     watchers = Watcher(), Watcher()
-    first, again = (execute(prepared(), watcher) for watcher in watchers)
-    assert [(len(watcher.made), len(watcher.found)) for watcher in watchers] == [(10, 0), (0, 10)]
+    first, again = (execute(prepare_run(), watcher) for watcher in watchers)
+    assert [(len(watcher.evaluated), len(watcher.resumed)) for watcher in watchers] == [
+        (10, 0),
+        (0, 10),
+    ]
     assert (again.folder, again.summary, again.records) == (
         first.folder,
         first.summary,
         first.records,
     )
     for changes in ({"seed": 1}, {"limit": 1}, {"tasks": ("nieh_gt",)}, {"model": "blind"}):
-        assert execute(prepared(**changes)).folder != first.folder
+        assert execute(prepare_run(**changes)).folder != first.folder
     assert read_run(first.folder, RECORDS) == (first.summary.header, first.records)
 
 
-def test_the_results_file_says_what_the_summary_says(prepared):
-    outcome = execute(prepared(name="mine"))
+def test_the_results_file_says_what_the_summary_says(prepare_run):
+    outcome = execute(prepare_run(name="mine"))
     document = json.loads((outcome.folder / "results.json").read_text())
     assert outcome.folder.parent.name == "mine"
     assert document.keys() == {
@@ -80,17 +84,17 @@ def test_the_results_file_says_what_the_summary_says(prepared):
     )
 
 
-def test_a_changed_frame_of_the_same_size_is_noticed(prepared, data):
-    execute(prepared(tasks=("nieh_gt",)))
+def test_a_changed_frame_of_the_same_size_is_noticed(prepare_run, data):
+    execute(prepare_run(tasks=("nieh_gt",)))
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     content = bytearray(frame.read_bytes())
     content[-20] ^= 1
     frame.write_bytes(bytes(content))
     watcher = Watcher()
-    execute(prepared(tasks=("nieh_gt",)), watcher)
-    made = {record.payload.question for record in watcher.made}
-    assert made == {"Is there a mug?", "Where was the mug before you put it?"}
-    assert {record.attempt for record in watcher.made} == {2}
+    execute(prepare_run(tasks=("nieh_gt",)), watcher)
+    evaluated = {record.payload.question for record in watcher.evaluated}
+    assert evaluated == {"Is there a mug?", "Where was the mug before you put it?"}
+    assert {record.attempt for record in watcher.evaluated} == {2}
 
 
 class Recorder:
@@ -100,7 +104,7 @@ class Recorder:
     capabilities = Capabilities(token_ids=False)
 
     def __init__(self):
-        self.asked = []
+        self.requests = []
 
     def identity(self):
         return {}
@@ -138,7 +142,7 @@ class Talk:
         return [self.reply_to([*self.parts, *parts]) for parts in continuations]
 
     def reply_to(self, parts):
-        self.model.asked.append(parts)
+        self.model.requests.append(parts)
         for part in parts[:-1]:
             part.load()
         return Reply(
@@ -154,13 +158,15 @@ def recorder(monkeypatch):
     return model
 
 
-def test_a_model_is_asked_by_trajectory_and_in_the_published_words(prepared, recorder):
-    outcome = execute(prepared(TINY, tasks=("nieh_full",)))
-    names = [[part.path.parts[-3] for part in parts[:-1]] for parts in recorder.asked]
+def test_a_model_is_asked_by_trajectory_and_in_the_published_words(prepare_run, recorder):
+    outcome = execute(prepare_run(TINY, tasks=("nieh_full",)))
+    names = [[part.path.parts[-3] for part in parts[:-1]] for parts in recorder.requests]
     assert names == [["traj_a"] * 6] * 3 + [["traj_b"] * 6] * 2
-    assert recorder.asked[0][-1] == (
-        "\nAnswer the question given the agent's views in time order. Do not include explanation "
-        "or reasoning in the answer. Answer with a single word or words.\nQuestion: Is there a mug?"
+    assert recorder.requests[0][-1] == (
+        "\n"
+        "Answer the question given the agent's views in time order. Do not include explanation "
+        "or reasoning in the answer. Answer with a single word or words.\n"
+        "Question: Is there a mug?"
     )
     assert set(replies(outcome).values()) == {"first line\nmug"}
     assert {
@@ -169,55 +175,54 @@ def test_a_model_is_asked_by_trajectory_and_in_the_published_words(prepared, rec
     } == {(7, 0, 2)}
 
 
-def test_a_unit_that_fails_is_recorded_and_the_run_goes_on(prepared, recorder, data):
+def test_a_unit_that_fails_is_recorded_and_the_run_goes_on(prepare_run, recorder, data):
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:60])
-    outcome = execute(prepared(TINY))
+    outcome = execute(prepare_run(TINY))
     failed = [record for record in outcome.records if record.failure]
     assert len(outcome.records) == 10
     assert Counter(record.task for record in failed) == {"nieh_gt": 2, "nieh_full": 3}
     assert all(str(frame) in record.failure for record in failed)
 
 
-def test_a_failed_unit_is_tried_again_by_the_next_run(prepared, recorder, data):
+def test_a_failed_unit_is_tried_again_by_the_next_run(prepare_run, recorder, data):
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     whole = frame.read_bytes()
-    frame.write_bytes(
-        whole[:60] + bytes(len(whole) - 60)
-    )  # its size is part of the set's fingerprint
-    failed = {record.key for record in execute(prepared(TINY)).records if record.failure}
+    # Its size is part of the set's fingerprint.
+    frame.write_bytes(whole[:60] + bytes(len(whole) - 60))
+    failed = {record.key for record in execute(prepare_run(TINY)).records if record.failure}
     frame.write_bytes(whole)
     watcher = Watcher()
-    outcome = execute(prepared(TINY), watcher)
+    outcome = execute(prepare_run(TINY), watcher)
     assert len(failed) == 5
-    assert {record.key for record in watcher.made} == failed
-    assert {record.attempt for record in watcher.made} == {2}
+    assert {record.key for record in watcher.evaluated} == failed
+    assert {record.attempt for record in watcher.evaluated} == {2}
     assert not any(record.failure for record in outcome.records)
 
 
-def test_a_frame_that_is_no_image_has_the_samples_that_need_it_skipped(prepared, data):
+def test_a_frame_that_is_no_image_has_the_samples_that_need_it_skipped(prepare_run, data):
     (data / "metadata" / "traj_b" / "img" / "000000002.png").write_text("text")
-    outcome = execute(prepared())
+    outcome = execute(prepare_run())
     assert {name: task.skipped.n for name, task in outcome.summary.summary.tasks.items()} == {
         "nieh_gt": 1,
         "nieh_full": 2,
     }
 
 
-def test_a_task_without_its_data_or_without_a_question_is_refused(prepared, make_nieh_set):
+def test_a_task_without_its_data_or_without_a_question_is_refused(prepare_run, make_nieh_set):
     with pytest.raises(UsageError, match="give its folder with --data"):
-        prepared(data=None)
-    empty = make_nieh_set([Question("t", "q", (99,), ("a",))], name="empty")
+        prepare_run(data=None)
+    empty = make_nieh_set([make_question(clues=(99,))], name="empty")
     with pytest.raises(UsageError, match=r"can be asked \(clue 99 is outside trajectory t"):
-        prepared(data=empty)
+        prepare_run(data=empty)
 
 
-def test_the_tiny_model_runs_through_and_shares_prefixes(prepared):
+def test_the_tiny_model_runs_through_and_shares_prefixes(prepare_run):
     watcher = Watcher()
-    execute(prepared(TINY, tasks=("nieh_full",)), watcher)
-    assert all(record.payload.reply is not None for record in watcher.made)
+    execute(prepare_run(TINY, tasks=("nieh_full",)), watcher)
+    assert all(record.payload.reply is not None for record in watcher.evaluated)
     by_trajectory = {}
-    for record in watcher.made:  # in the order of asking
+    for record in watcher.evaluated:  # in the order of asking
         by_trajectory.setdefault(record.cluster, []).append(record.tokens.cached)
     assert {traj_id: len(cached) for traj_id, cached in by_trajectory.items()} == {
         "traj_a": 3,
@@ -227,11 +232,11 @@ def test_the_tiny_model_runs_through_and_shares_prefixes(prepared):
 
 
 def test_batches_give_the_same_replies_and_one_that_fails_takes_no_other_with_it(
-    prepared, monkeypatch
+    prepare_run, monkeypatch
 ):
     tasks = ("nieh_full",)
-    alone = execute(prepared(TINY, tasks=tasks))
-    together = execute(prepared(TINY, {"batch_size": "4"}, tasks=tasks))
+    alone = execute(prepare_run(TINY, tasks=tasks))
+    together = execute(prepare_run(TINY, {"batch_size": "4"}, tasks=tasks))
     assert replies(together) == replies(alone)
     assert not any(record.faults for record in together.records)
 
@@ -245,7 +250,7 @@ def test_batches_give_the_same_replies_and_one_that_fails_takes_no_other_with_it
         return whole(talk, continuations, decoding)
 
     monkeypatch.setattr(BackendConversation, "replies", one_at_a_time)
-    with_retries = execute(prepared(TINY, {"batch_size": "3"}, tasks=tasks))
+    with_retries = execute(prepare_run(TINY, {"batch_size": "3"}, tasks=tasks))
     assert replies(with_retries) == replies(alone)
     assert Counter(record.faults for record in with_retries.records) == {
         ("asked with 2 others: out of memory on a batch",): 3,
@@ -253,7 +258,7 @@ def test_batches_give_the_same_replies_and_one_that_fails_takes_no_other_with_it
     }
 
 
-def test_one_of_a_batch_that_cannot_be_answered_fails_alone(prepared, monkeypatch):
+def test_one_of_a_batch_that_cannot_be_answered_fails_alone(prepare_run, monkeypatch):
     from model_adapters.backend import BackendConversation
 
     whole = BackendConversation.replies
@@ -264,7 +269,7 @@ def test_one_of_a_batch_that_cannot_be_answered_fails_alone(prepared, monkeypatc
         return whole(talk, continuations, decoding)
 
     monkeypatch.setattr(BackendConversation, "replies", but_the_sink)
-    outcome = execute(prepared(TINY, {"batch_size": "4"}, tasks=("nieh_full",)))
+    outcome = execute(prepare_run(TINY, {"batch_size": "4"}, tasks=("nieh_full",)))
     (failed,) = [record for record in outcome.records if record.failure]
     assert failed.payload.question == "Is there a sink?"
     assert failed.failure == "no sink, please"
@@ -275,7 +280,7 @@ def test_one_of_a_batch_that_cannot_be_answered_fails_alone(prepared, monkeypatc
 
 
 def test_a_model_that_counts_no_tokens_is_asked_once_the_size_of_a_frame_is_told(
-    prepared, recorder, monkeypatch
+    prepare_run, recorder, monkeypatch
 ):
     monkeypatch.setattr(
         Recorder, "capabilities", Capabilities(counts_tokens=False, token_ids=False)
@@ -283,45 +288,42 @@ def test_a_model_that_counts_no_tokens_is_asked_once_the_size_of_a_frame_is_told
     monkeypatch.setattr(Recorder, "tokens_per_frame", lambda *_: None)
     tasks = ("nieh_truncate_head_8k",)
     with pytest.raises(UsageError, match="which recorder does not count; give --tokens-per-frame"):
-        execute(prepared(TINY, tasks=tasks))
+        execute(prepare_run(TINY, tasks=tasks))
     watcher = Watcher()
-    execute(prepared(TINY, tasks=tasks, suite_options={"tokens_per_frame": 2000}), watcher)
-    assert {len(parts) for parts in recorder.asked} == {8192 // 2000 + 1}
+    execute(prepare_run(TINY, tasks=tasks, suite_options={"tokens_per_frame": 2000}), watcher)
+    assert {len(parts) for parts in recorder.requests} == {8192 // 2000 + 1}
     assert watcher.work.costs == []
 
 
 def test_the_limit_is_of_questions_that_can_be_asked_with_all_their_variants(make_nieh_set):
-    asked = [
+    inside = [
         Question("t", f"Is there a mug on {step}?", (step,), ("yes",)) for step in (14, 15, 16, 17)
     ]
     outside = [
         Question("t", f"Is there a cup on {step}?", (step,), ("yes",)) for step in (90, 91, 92)
     ]
-    questions = [outside[0], asked[0], asked[1], outside[1], asked[2], outside[2], asked[3]]
+    questions = [outside[0], inside[0], inside[1], outside[1], inside[2], outside[2], inside[3]]
     root = make_nieh_set(questions, n_frames=30, size=56)
     config = {"context": "haystack", "data": str(root), "ctx_size": 10, "tokens_per_frame": 1000}
 
-    def found(limit):
+    def take(limit):
         samples = find_samples(config, limit)
         return (
             [sample.question.text[-2:-1] for sample in samples.samples],
             [skipped.question.text for skipped in samples.skipped],
         )
 
-    taken = [found(limit) for limit in (1, 2, 3, 4, 9, None)]
-    for limit, (shown, _) in enumerate(taken[:4], 1):
-        assert shown == [digit for digit in sorted(set(shown)) for _ in range(5)]
-        assert len(set(shown)) == limit
+    taken = [take(limit) for limit in (1, 2, 3, 4, 9, None)]
+    for limit, (steps, _) in enumerate(taken[:4], 1):
+        assert steps == [digit for digit in sorted(set(steps)) for _ in range(5)]
+        assert len(set(steps)) == limit
     for (few, few_left_out), (more, more_left_out) in itertools.pairwise(taken):
         assert set(few) <= set(more)
         assert set(few_left_out) <= set(more_left_out)
     assert (
         taken[-1]
         == taken[-2]
-        == (
-            [digit for digit in "4567" for _ in range(5)],
-            [question.text for question in outside],
-        )
+        == ([digit for digit in "4567" for _ in range(5)], [question.text for question in outside])
     )
 
 
@@ -332,15 +334,17 @@ def test_the_limit_takes_from_all_trajectories(make_nieh_set):
         for n in range(9)
     ]
     root = make_nieh_set(questions, size=56)
-    asked = [
+    samples = [
         find_samples({"context": "clues", "data": str(root), "seed": seed}, 4).samples
         for seed in (0, 0, 1)
     ]
-    assert {sample.question.traj_id for sample in asked[0]} == {"a", "b", "c"}
-    assert asked[0] == asked[1] != asked[2]
+    assert {sample.question.traj_id for sample in samples[0]} == {"a", "b", "c"}
+    assert samples[0] == samples[1] != samples[2]
 
 
-def test_baselines_answer_the_same_whatever_runs_beside_them(prepared, make_nieh_set, task_files):
+def test_baselines_answer_the_same_whatever_runs_beside_them(
+    prepare_run, make_nieh_set, task_files
+):
     """Two tasks on sets with other answer keys: what one asks is no clue to another."""
     key = {"one": ("yes", "yes", "no"), "two": ("no", "no", "yes")}
     for name, answers in key.items():
@@ -353,19 +357,20 @@ def test_baselines_answer_the_same_whatever_runs_beside_them(prepared, make_nieh
             name=name,
         )
         (task_files / "nieh" / f"nieh_{name}.yaml").write_text(
-            f"include: _nieh.yaml\ntask: nieh_{name}\ndataset_kwargs: {{context: clues, data: "
-            f"{root}}}\n"
+            "include: _nieh.yaml\n"
+            f"task: nieh_{name}\n"
+            f"dataset_kwargs: {{context: clues, data: {root}}}\n"
         )
     for model in ("blind", "blind-count", "random"):
-        alone = [execute(prepared(model, tasks=(f"nieh_{name}",))) for name in key]
-        together = execute(prepared(model, tasks=("nieh_one", "nieh_two")))
+        alone = [execute(prepare_run(model, tasks=(f"nieh_{name}",))) for name in key]
+        together = execute(prepare_run(model, tasks=("nieh_one", "nieh_two")))
         assert replies(together) == replies(alone[0]) | replies(alone[1])
         assert cells(together) == cells(alone[0]) | cells(alone[1])
 
 
-def test_a_baseline_reads_the_whole_key_whatever_is_asked_of_it(prepared):
+def test_a_baseline_reads_the_whole_key_whatever_is_asked_of_it(prepare_run):
     for model in ("blind", "blind-count", "random"):
-        whole, few = (replies(execute(prepared(model, limit=limit))) for limit in (None, 2))
+        whole, few = (replies(execute(prepare_run(model, limit=limit))) for limit in (None, 2))
         assert len(few) == 4
         assert few.items() <= whole.items()
 
@@ -387,33 +392,37 @@ def sampling(task_files):
 
 
 def test_a_temperature_in_the_task_file_samples_and_the_seed_decides_what(
-    prepared, sampling, tmp_path
+    prepare_run, sampling, tmp_path
 ):
-    def said(settings, seed=0, folder="out"):
+    def reply_with(settings, seed=0, folder="out"):
         sampling(settings)
         return replies(
-            execute(prepared(TINY, tasks=("nieh_gt",), seed=seed, output=tmp_path / folder))
+            execute(prepare_run(TINY, tasks=("nieh_gt",), seed=seed, output=tmp_path / folder))
         )
 
-    greedy = said("max_gen_toks: 12, do_sample: false, temperature: 0.0")
-    drawn = said("max_gen_toks: 12, do_sample: true, temperature: 2.0")
+    greedy = reply_with("max_gen_toks: 12, do_sample: false, temperature: 0.0")
+    drawn = reply_with("max_gen_toks: 12, do_sample: true, temperature: 2.0")
     assert drawn != greedy
-    assert said("max_gen_toks: 12, do_sample: true, temperature: 2.0", folder="again") == drawn
-    assert said("max_gen_toks: 12, temperature: 2.0", folder="without the word") == drawn
     assert (
-        said("max_gen_toks: 12, do_sample: true, temperature: 2.0, top_p: 0.000001", folder="top")
+        reply_with("max_gen_toks: 12, do_sample: true, temperature: 2.0", folder="again") == drawn
+    )
+    assert reply_with("max_gen_toks: 12, temperature: 2.0", folder="without the word") == drawn
+    assert (
+        reply_with(
+            "max_gen_toks: 12, do_sample: true, temperature: 2.0, top_p: 0.000001", folder="top"
+        )
         == greedy
     )
 
 
-def test_another_seed_draws_other_replies_from_the_same_weights(prepared, sampling, tmp_path):
+def test_another_seed_draws_other_replies_from_the_same_weights(prepare_run, sampling, tmp_path):
     from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
     save_tiny_checkpoint(tmp_path / "checkpoint", seed=0)
     sampling("max_gen_toks: 12, do_sample: true, temperature: 2.0")
     options = {"pretrained": str(tmp_path / "checkpoint"), "device": "cpu"}
     first, second = (
-        replies(execute(prepared("qwen2.5-vl", options, tasks=("nieh_gt",), seed=seed)))
+        replies(execute(prepare_run("qwen2.5-vl", options, tasks=("nieh_gt",), seed=seed)))
         for seed in (0, 1)
     )
     assert first.keys() == second.keys()
@@ -421,7 +430,7 @@ def test_another_seed_draws_other_replies_from_the_same_weights(prepared, sampli
 
 
 @pytest.mark.parametrize(
-    ("settings", "said"),
+    ("settings", "expected"),
     [
         ("do_sample: false, temperature: 0.7", "temperature 0.7 without do_sample has no effect"),
         ("do_sample: true, temperature: 0.0", "do_sample with temperature 0 contradict each other"),
@@ -437,19 +446,21 @@ def test_another_seed_draws_other_replies_from_the_same_weights(prepared, sampli
     ],
 )
 def test_settings_that_would_not_act_are_refused_before_a_model_is_loaded(
-    prepared, sampling, settings, said
+    prepare_run, sampling, settings, expected
 ):
     sampling(settings if "max_gen_toks" in settings else f"max_gen_toks: 12, {settings}")
-    with pytest.raises(UsageError, match=rf"nieh_gt\.yaml: generation_kwargs: {said}") as caught:
-        prepared(TINY, tasks=("nieh_gt",))
+    with pytest.raises(
+        UsageError, match=rf"nieh_gt\.yaml: generation_kwargs: {expected}"
+    ) as caught:
+        prepare_run(TINY, tasks=("nieh_gt",))
     assert "\n" not in str(caught.value)
 
 
-def test_a_stop_text_of_the_task_file_ends_replies(prepared, sampling):
+def test_a_stop_text_of_the_task_file_ends_replies(prepare_run, sampling):
     sampling("max_gen_toks: 12, until: []")
-    whole = replies(execute(prepared(TINY, tasks=("nieh_gt",))))
+    whole = replies(execute(prepare_run(TINY, tasks=("nieh_gt",))))
     mark = next(text[1] for text in whole.values() if len(text) > 1)
     sampling(f"max_gen_toks: 12, until: {json.dumps([mark])}")
-    assert replies(execute(prepared(TINY, tasks=("nieh_gt",)))) == {
+    assert replies(execute(prepare_run(TINY, tasks=("nieh_gt",)))) == {
         key: text.partition(mark)[0] for key, text in whole.items()
     }

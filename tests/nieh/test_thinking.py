@@ -7,6 +7,7 @@ import pytest
 from infthor_eval.formats.question import Question
 from model_adapters import Reply
 from model_adapters.built_in import BUILT_IN, BuiltIn
+from tests.helpers.command_line import option_words
 from tests.model_adapters.toy_adapter import Talk, Toy
 
 QUESTIONS = tuple(
@@ -27,7 +28,7 @@ LIMITS = []
 class Thinker(Talk):
     def reply(self, decoding):
         LIMITS.append((decoding.max_new_tokens, decoding.stop))
-        text = next(said for word, said in SAYS.items() if word in self.turns[-1].parts[-1])
+        text = next(answer for word, answer in SAYS.items() if word in self.turns[-1].parts[-1])
         return Reply(text, n_reply_tokens=len(text.split()), n_context_tokens=10)
 
 
@@ -46,9 +47,9 @@ def answers_of(output):
     return {payload["question"]: payload for payload in payloads}
 
 
-def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run):
+def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(QUESTIONS, size=56)
-    code, _, err = run(
+    code, _, err = run_cli(
         "--model", "toy", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
     )
     assert code == 0, err
@@ -67,31 +68,22 @@ def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run):
     assert (task["n_thought"], task["failures"]) == (3, [])
     n_tokens = sum(len(text.split()) for text in SAYS.values())
     assert task["tokens_per_right"] == n_tokens / 2
-    assert run("show", results.parent)[0] == 0
+    assert run_cli("show", results.parent)[0] == 0
     assert {limit for limit, _ in LIMITS} == {50}
 
 
-def test_thoughts_have_a_budget_of_their_own(make_nieh_set, tmp_path, run):
+def test_thoughts_have_a_budget_of_their_own(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(QUESTIONS, size=56)
-    arguments = [
-        "--model",
-        "toy",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
-    assert run(*arguments, "--max-thinking-tokens", 1000)[0] == 0
+    arguments = option_words(model="toy", tasks="nieh_gt", data=data, output=tmp_path / "out")
+    assert run_cli(*arguments, "--max-thinking-tokens", 1000)[0] == 0
     assert {limit for limit, _ in LIMITS} == {1050}
-    assert "0 evaluated now" not in run(*arguments)[2]  # another run
-    code, _, err = run(*arguments, "--max-thinking-tokens", 0)
+    assert "0 evaluated now" not in run_cli(*arguments)[2]  # another run
+    code, _, err = run_cli(*arguments, "--max-thinking-tokens", 0)
     assert code == 2 and "--max-thinking-tokens 0: give 1 or more" in err
 
 
 def test_a_stop_string_ends_the_answer_and_not_the_thoughts(
-    make_nieh_set, tmp_path, run, monkeypatch
+    make_nieh_set, tmp_path, run_cli, monkeypatch
 ):
     monkeypatch.setitem(SAYS, "first", "<think>a\ncup</think>mug\ncup")
     data = make_nieh_set(QUESTIONS[:1], size=56)
@@ -100,19 +92,10 @@ def test_a_stop_string_ends_the_answer_and_not_the_thoughts(
         "include: _nieh.yaml\ntask: own\ndataset_kwargs: {context: clues}\n"
         'generation_kwargs: {until: ["\\n"], max_gen_toks: 20, do_sample: false}\n'
     )
-    arguments = [
-        "--model",
-        "toy",
-        "--tasks",
-        "own",
-        "--include-path",
-        tmp_path,
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
-    code, _, err = run(*arguments, "--max-thinking-tokens", 100)
+    arguments = option_words(
+        model="toy", tasks="own", include_path=tmp_path, data=data, output=tmp_path / "out"
+    )
+    code, _, err = run_cli(*arguments, "--max-thinking-tokens", 100)
     assert code == 0, err
     assert LIMITS == [(120, ())]
     assert answers_of(tmp_path / "out")["What first?"]["reply"] == "mug"

@@ -9,9 +9,10 @@ import pytest
 from infthor_eval.formats.nieh_set import NiehSet
 from model_adapters import check_adapter
 from model_adapters.built_in import BUILT_IN, BuiltIn
+from tests.helpers.command_line import assert_refused, option_words
 from tests.model_adapters.toy_adapter import Talk, Toy
 
-from ..bundled import BUNDLED
+from ..helpers.bundled import BUNDLED
 
 
 @pytest.fixture(autouse=True)
@@ -25,9 +26,9 @@ def test_it_keeps_the_contract():
     check_adapter(Toy())
 
 
-def test_it_runs_the_bundled_set(tmp_path, run):
+def test_it_runs_the_bundled_set(tmp_path, run_cli):
     n = len(NiehSet(BUNDLED).questions)
-    code, out, err = run("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)
+    code, out, err = run_cli("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)
     assert code == 0, err
     assert f"toy: {2 * n} evaluated now" in err
     (results,) = tmp_path.rglob("results.json")
@@ -38,19 +39,19 @@ def test_it_runs_the_bundled_set(tmp_path, run):
     }
     row = next(line.split() for line in out.splitlines() if line.split()[:1] == ["toy"])
     assert row[-1] == str(n)
-    again = run("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)[2]
+    again = run_cli("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)[2]
     assert f"0 evaluated now, {2 * n} resumed" in again
 
 
 def test_an_error_in_its_code_has_its_place_and_its_traceback_is_kept(
-    make_nieh_set, tmp_path, run, monkeypatch
+    make_nieh_set, tmp_path, run_cli, monkeypatch
 ):
     def reply(self, decoding):
         return self.turns[0].parts[99]
 
     monkeypatch.setattr(Talk, "reply", reply)
     data = make_nieh_set(size=56)
-    code, _, err = run(
+    code, _, err = run_cli(
         "--model", "toy", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
     )
     place = f"{Path(__file__).name}:{reply.__code__.co_firstlineno + 1} (reply)"
@@ -69,22 +70,15 @@ def test_an_error_in_its_code_has_its_place_and_its_traceback_is_kept(
     assert "in reply\n    return self.turns[0].parts[99]\n" in text
 
 
-def test_a_context_that_is_measured_in_tokens_wants_their_number(make_nieh_set, tmp_path, run):
+def test_a_context_that_is_measured_in_tokens_wants_their_number(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(n_frames=70, size=56)
-    arguments = [
-        "--model",
-        "toy",
-        "--tasks",
-        "nieh_truncate_head_8k",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
-    code, _, err = run(*arguments)
-    assert (code, len(err.strip().splitlines())) == (2, 1)
-    assert "a size in tokens, which toy does not count; give --tokens-per-frame" in err
-    assert run(*arguments, "--tokens-per-frame", 500)[0] == 0
+    arguments = option_words(
+        model="toy", tasks="nieh_truncate_head_8k", data=data, output=tmp_path / "out"
+    )
+    assert_refused(
+        run_cli(*arguments), "a size in tokens, which toy does not count; give --tokens-per-frame"
+    )
+    assert run_cli(*arguments, "--tokens-per-frame", 500)[0] == 0
     (samples,) = (tmp_path / "out").rglob("samples_*.jsonl")
     assert {
         len(json.loads(line)["doc"]["frames"]) for line in samples.read_text().splitlines()

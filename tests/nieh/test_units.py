@@ -22,21 +22,23 @@ def events(monkeypatch):
     answer = OpenBaseline.answer
     monkeypatch.setattr(units, "find_guesses", lambda *_: happened.append("learned") or _Guesses())
     monkeypatch.setattr(
-        OpenBaseline, "answer", lambda *given: happened.append("asked") or answer(*given)
+        OpenBaseline,
+        "answer",
+        lambda *arguments: happened.append("asked") or answer(*arguments),
     )
     return happened
 
 
-def test_a_question_is_asked_before_guesses_are_learned(prepared, events):
-    outcome = execute(prepared())
+def test_a_question_is_asked_before_guesses_are_learned(prepare_run, events):
+    outcome = execute(prepare_run())
     assert events[0] == "asked"
     assert [record.payload.guess.form for record in outcome.records] == [
         record.id for record in outcome.records
     ]
 
 
-def test_every_record_of_a_unit_has_its_guess(prepared, events):
-    unit = bind_run(prepared()).evaluation.workload.groups[0].units[0]
+def test_every_record_of_a_unit_has_its_guess(prepare_run, events):
+    unit = bind_run(prepare_run()).evaluation.workload.groups[0].units[0]
     assert unit.payload.guess is None
     assert events == []
     elsewhere = unit.without_inputs()

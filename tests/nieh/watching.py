@@ -25,11 +25,11 @@ class Watcher:
         self.notes.append(text)
 
     @property
-    def made(self) -> list[UnitRecord]:
+    def evaluated(self) -> list[UnitRecord]:
         """What was evaluated now."""
         return [record for record, resumed in self.done_units if not resumed]
 
     @property
-    def found(self) -> list[UnitRecord]:
+    def resumed(self) -> list[UnitRecord]:
         """What was in the journal."""
         return [record for record, resumed in self.done_units if resumed]

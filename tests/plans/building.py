@@ -97,8 +97,8 @@ def kitchen(
         if item.object_id not in without
     ]
     pose = AgentPose(Vector(at[0] * GRID, 0.9, at[1] * GRID), float(facing), horizon)
-    shown = view(*objects, inventory=() if held is None else (held,))
-    return replace(shown, agent=pose, success=not refused, error="no" if refused else "")
+    view_of_kitchen = view(*objects, inventory=() if held is None else (held,))
+    return replace(view_of_kitchen, agent=pose, success=not refused, error="no" if refused else "")
 
 
 # A corridor ten cells long, in which the agent walks towards greater z.

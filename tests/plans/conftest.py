@@ -1,37 +1,25 @@
 """Runs of plans on trajectories that are cut down, in simulators that all tests share."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from infthor_eval.runs import PreparedRun
 
-from ..episodes.pool import Pool
-from ..episodes.preparing import preparer
-from .cut import FORK, cut, write
-
-
-@pytest.fixture(scope="session")
-def simulators() -> Iterator[Pool]:
-    pool = Pool()
-    with pool.open:
-        yield pool
-
-
-@pytest.fixture
-def shared_simulator(simulators: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Has runs of plans use the shared processes instead of starting their own."""
-    monkeypatch.setattr("infthor_eval.episodes.evaluation.Simulators", simulators.simulators_type())
+from ..episodes.interrupted import simulator_calls  # noqa: F401 - a fixture
+from ..episodes.pool import pool, shared_simulators  # noqa: F401 - fixtures
+from ..episodes.preparing import make_preparer
+from ..helpers.trajectories import FORK, cut_trajectory, write_trajectories
 
 
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
     """A folder with the first task of a kitchen."""
-    return write(tmp_path / "data", cut(FORK))
+    return write_trajectories(tmp_path / "data", cut_trajectory(FORK))
 
 
 @pytest.fixture
-def prepared(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
-    """Prepares a run on that, see `preparer`."""
-    return preparer("planner", tasks=("infthor_plans",), data=data, output=tmp_path / "out")
+def prepare_run(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
+    """Prepares a run on that, see `make_preparer`."""
+    return make_preparer("planner", tasks=("infthor_plans",), data=data, output=tmp_path / "out")

@@ -12,7 +12,7 @@ from typing import Any
 
 from infthor_eval.formats.trajectory import Trajectory, TrajectorySource
 
-from .cut import FORK, cut
+from ..helpers.trajectories import FORK, cut_trajectory
 
 # look at a pen under the desk lamp; the pen goes to the dining table; look at a mug
 PEN = "living-room-1-seed3"
@@ -21,7 +21,7 @@ _N_PLANS = 10  # of PEN, of which 4 and 5 put the pen away
 
 def pen_put_away(**changes: Any) -> dict[str, Any]:
     """The document of PEN with its pen put away in a task of its own."""
-    document = cut(PEN, _N_PLANS, **changes)
+    document = cut_trajectory(PEN, _N_PLANS, **changes)
     plan, (before, after) = document["plan"], document["sub_trajs"]
     first, end = before["high_pddl_idx"][1], after["high_pddl_idx"][0]
     put = next(low["api_action"] for low in plan["low_actions"] if low["high_idx"] == end - 1)
@@ -40,7 +40,7 @@ def pen_put_away(**changes: Any) -> dict[str, Any]:
 def put_away_without_actions(name: str = FORK, n_plans: int = 6, **changes: Any) -> dict[str, Any]:
     """A document with a sub-goal without actions behind its first task, as files of before July
     2026."""
-    document = cut(name, n_plans, **changes)
+    document = cut_trajectory(name, n_plans, **changes)
     before, *later = document["sub_trajs"]
     first, low = before["high_pddl_idx"][1], before["low_pddl_idx"][1]
     for action in document["plan"]["low_actions"][low:]:

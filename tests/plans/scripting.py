@@ -30,8 +30,8 @@ class Talk(Transcript):
         for part in self.parts:
             if isinstance(part, FrameRef):
                 assert part.digest  # it is there, and known when it no longer is
-        self._model.asked.append((self.parts, decoding))
-        self._model.told = {part for turn in self.turns[:-1] for part in turn.parts}
+        self._model.requests.append((self.parts, decoding))
+        self._model.system_parts = {part for turn in self.turns[:-1] for part in turn.parts}
         return Reply(self._model.say(self.parts, decoding), 1, self.n_tokens, 0)
 
 
@@ -43,8 +43,8 @@ class ScriptedModel:
 
     def __init__(self, say: Callable[[Sequence[Part], object], str]):
         self.say = say
-        self.asked: list[tuple[list[Part], object]] = []
-        self.told: set[Part] = set()
+        self.requests: list[tuple[list[Part], object]] = []
+        self.system_parts: set[Part] = set()
 
     def identity(self):
         return {}
@@ -59,19 +59,19 @@ class ScriptedModel:
         pass
 
 
-def plan_asked(parts: Sequence[Part]) -> str:
+def plan_in_prompt(parts: Sequence[Part]) -> str:
     """The plan that is to be carried out."""
     text = "".join(part if isinstance(part, str) else "" for part in parts)
     return text.rpartition("<|plan|>Plan: ")[2].partition("<|plan|>")[0]
 
 
-def goal_asked(parts: Sequence[Part]) -> str:
+def goal_in_prompt(parts: Sequence[Part]) -> str:
     """The goal that it serves."""
     text = "".join(part if isinstance(part, str) else "" for part in parts)
     return text.rpartition("<|goal|>Your main goal: ")[2].partition("<|goal|>")[0]
 
 
-def done_so_far(parts: Sequence[Part]) -> list[str]:
+def actions_in_prompt(parts: Sequence[Part]) -> list[str]:
     """The actions of that plan up to now."""
     text = "".join(part if isinstance(part, str) else "" for part in parts)
     return text.rpartition("<|plan|>")[2].split("<|act|>")[1:-1:2]

@@ -14,17 +14,17 @@ from infthor_eval.thor.frames import FrameFolder
 from infthor_eval.thor.view import SimulatorView
 from model_adapters import ContractError
 
-from .cut import FORK, cut, write
+from ..helpers.trajectories import FORK, cut_trajectory, write_trajectories
 
 
 @pytest.fixture
 def trajectory(tmp_path):
-    return next(iter_trajectories(write(tmp_path / "data", cut(FORK))))
+    return next(iter_trajectories(write_trajectories(tmp_path / "data", cut_trajectory(FORK))))
 
 
 @pytest.fixture
-def environment(simulators, trajectory, tmp_path):
-    with simulators.one(image=True, instances=False) as simulator:
+def environment(pool, trajectory, tmp_path):
+    with pool.one(image=True, instances=False) as simulator:
         yield PlanEnvironment(trajectory, simulator, max_steps=12, frames=FrameFolder(tmp_path))
 
 
@@ -147,8 +147,8 @@ def test_a_broken_one_is_told_the_clause(environment, fault):
     assert "\n" not in str(caught.value)
 
 
-def test_without_frames_and_without_a_keeper_of_them_it_holds_too(simulators, trajectory):
-    with simulators.one(image=False, instances=False) as simulator:
+def test_without_frames_and_without_a_keeper_of_them_it_holds_too(pool, trajectory):
+    with pool.one(image=False, instances=False) as simulator:
         environment = PlanEnvironment(trajectory, simulator, max_steps=12)
         check_env(environment, (2,))
         observation, _ = environment.reset(2)

@@ -15,8 +15,8 @@ from infthor_eval.thor.frames import FrameFolder
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
-from ..bundled import BUNDLED, bundled_name
-from .cut import LAMP, whole
+from ..helpers.bundled import BUNDLED, bundled_name
+from ..helpers.trajectories import LAMP, read_trajectory
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_the_expert_earns_all_there_is(simulator):
 def test_a_goal_that_comes_to_hold_when_the_way_is_over_is_not_counted_on(simulator):
     """The lamp is on, and in view from the first step of the way on; often it is from the last
     steps on only."""
-    environment, plan = PlanEnvironment(whole(LAMP), simulator), 8
+    environment, plan = PlanEnvironment(read_trajectory(LAMP), simulator), 8
     assert environment.reset(plan)[1]["max_reward"] == pytest.approx(9.8)
     assert sum(outcome.reward for outcome in play(environment, plan)) == pytest.approx(9.8)
     actions = environment._expert._actions[plan]
@@ -114,8 +114,8 @@ def test_a_refused_action_ends_the_plan_and_the_limit_truncates_it(simulator):
 
 
 def test_the_history_is_the_sequence_that_models_are_trained_on(simulator, tmp_path):
-    found = trajectory()
-    environment = PlanEnvironment(found, simulator, frames=FrameFolder(tmp_path))
+    recorded = trajectory()
+    environment = PlanEnvironment(recorded, simulator, frames=FrameFolder(tmp_path))
     last = len(environment.plans) - 1
     environment.reset(last)
     play(environment, last)
@@ -125,7 +125,7 @@ def test_the_history_is_the_sequence_that_models_are_trained_on(simulator, tmp_p
         for segment in past.all
         for part in segment.parts()
     )
-    text_file = (BUNDLED / "metadata" / found.traj_id / "traj.txt").read_text().strip()
+    text_file = (BUNDLED / "metadata" / recorded.traj_id / "traj.txt").read_text().strip()
     assert text_file.startswith(text)
     assert text_file[len(text) :].startswith("<|act|>")
 
@@ -173,12 +173,12 @@ def test_a_disk_that_was_full_in_between_changes_nothing_that_is_remembered(
 
 
 def test_an_expert_that_is_refused_here_is_named_and_the_plans_before_go_on(simulator):
-    found = trajectory()
+    recorded = trajectory()
     broken = 5
-    first = next(low for low in found.plan.low_actions if low.high_idx == broken)
+    first = next(low for low in recorded.plan.low_actions if low.high_idx == broken)
     first.api_action.action = "OpenObject"
     first.api_action.object_id = "Wardrobe|+00.00|+00.00|+00.00"
-    environment = PlanEnvironment(found, simulator)
+    environment = PlanEnvironment(recorded, simulator)
     assert play(environment, 4)[-1].info.ended == Ended.DONE
     for plan in (5, 6):
         with pytest.raises(
@@ -217,8 +217,8 @@ def test_preparing_a_plan_does_not_take_longer_the_later_it_is(simulator):
 
 def test_a_simulator_that_keeps_no_copies_repeats_what_was_done(simulator, monkeypatch):
     """As Unity does."""
-    found = trajectory("bedroom-1")
-    expected = PlanEnvironment(found, simulator).reset(3)
+    recorded = trajectory("bedroom-1")
+    expected = PlanEnvironment(recorded, simulator).reset(3)
     query = simulator.query
     unsaved = query("Pass")
     object.__setattr__(unsaved, "success", False)
@@ -227,7 +227,7 @@ def test_a_simulator_that_keeps_no_copies_repeats_what_was_done(simulator, monke
         "query",
         lambda action, **kw: unsaved if "State" in action else query(action, **kw),
     )
-    environment = PlanEnvironment(found, simulator)
+    environment = PlanEnvironment(recorded, simulator)
     environment.reset(1)
     environment.step("RotateLeft")
     observation, info = environment.reset(3)

@@ -5,69 +5,38 @@ import json
 import os
 import random
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
-import msgspec
 import pytest
 
 from infthor_eval.errors import SimulatorError
 from infthor_eval.plans.environment import PlanEnvironment
 from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import execute, read_run
-from infthor_eval.thor.controller import SafeController
 
-from ..waiting import PATIENCE_S, wait_until
-from .cut import FORK, MUG, cut, write
-
-OURS = "from infthor_eval.cli import main; main()"
-
-
-def same(records):
-    """What is to be equal in two runs: all but times, attempts and faults."""
-    return [
-        msgspec.structs.replace(record, seconds=0.0, attempt=1, faults=()) for record in records
-    ]
+from ..episodes.interrupted import drop_times
+from ..helpers.processes import finish, start_cli
+from ..helpers.trajectories import FORK, MUG, cut_trajectory, write_trajectories
+from ..helpers.waiting import wait_until
 
 
-def found(output):
+def read_results(output):
     (folder,) = (path.parent for path in output.rglob("journal"))
-    return same(read_run(folder, RECORDS)[1]), json.loads((folder / "results.json").read_text())[
-        "summary"
-    ]
+    return drop_times(read_run(folder, RECORDS)[1]), json.loads(
+        (folder / "results.json").read_text()
+    )["summary"]
 
 
 def start(data, output, *more):
-    arguments = [
-        "run",
-        "--model",
-        "random",
-        "--tasks",
-        "infthor_plans",
-        "--data",
-        data,
-        "--output",
-        output,
-        *more,
-    ]
-    return subprocess.Popen(
-        [sys.executable, "-c", OURS, *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+    return start_cli(
+        *("run", "--model", "random", "--tasks", "infthor_plans"),
+        *("--data", data, "--output", output, *more),
     )
 
 
 def n_lines(output):
     return sum(path.read_bytes().count(b"\n") for path in output.rglob("worker-0.jsonl"))
-
-
-def finish(process):
-    _, said = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 0, said
 
 
 def wait_for(n, output, process):
@@ -92,51 +61,12 @@ def kill_and_go_on(data, output, n_kills, draw):
 
 
 def test_a_run_that_is_killed_again_and_again_ends_as_one_that_is_not(tmp_path):
-    data = write(tmp_path / "data", cut(FORK, 4), cut(MUG, 3))
+    data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 4), cut_trajectory(MUG, 3))
     finish(start(data, tmp_path / "whole"))
     killed = kill_and_go_on(data, tmp_path / "killed", 4, random.Random(0))
     assert killed >= 2
-    assert found(tmp_path / "killed") == found(tmp_path / "whole")
-    assert len(found(tmp_path / "whole")[0]) == 7
-
-
-class Calls:
-    """The calls of simulators in this process: counted, and their processes killed before some of
-    them.
-
-    Attributes:
-        n: how many there were so far.
-        deadly: numbers of those that come, before which the process is killed.
-        killed: how often it was.
-    """
-
-    def __init__(self):
-        self.n, self.deadly, self.killed = 0, set(), 0
-
-    def come(self, controller):
-        process = controller.server and controller.server.unity_proc
-        if controller.last_event is None or process is None:
-            return  # at starting
-        self.n += 1
-        if self.n in self.deadly:
-            os.kill(process.pid, signal.SIGKILL)
-            process.wait()
-            self.killed += 1
-
-    def deadly_from_now(self, numbers):
-        self.deadly = {self.n + number for number in numbers}
-
-
-@pytest.fixture
-def calls(monkeypatch, shared_simulator):
-    found, step = Calls(), SafeController.step
-
-    def counted(controller, action=None, **arguments):
-        found.come(controller)
-        return step(controller, action, **arguments)
-
-    monkeypatch.setattr(SafeController, "step", counted)
-    return found
+    assert read_results(tmp_path / "killed") == read_results(tmp_path / "whole")
+    assert len(read_results(tmp_path / "whole")[0]) == 7
 
 
 def n_restarts(outcome):
@@ -147,31 +77,33 @@ def n_restarts(outcome):
 
 @pytest.mark.parametrize("model", ["planner", "random"])
 def test_a_simulator_that_dies_in_mid_plan_changes_no_result_and_is_counted(
-    prepared, tmp_path, calls, model
+    prepare_run, tmp_path, simulator_calls, model
 ):
-    whole = execute(prepared(model, output=tmp_path / "whole"))
-    n_calls = calls.n
-    calls.deadly_from_now(random.Random(3).sample(range(1, n_calls), 2))
-    disturbed = execute(prepared(model, output=tmp_path / "disturbed"))
-    assert same(disturbed.records) == same(whole.records)
+    whole = execute(prepare_run(model, output=tmp_path / "whole"))
+    n_calls = simulator_calls.n["default"]
+    simulator_calls.deadly_from_now(random.Random(3).sample(range(1, n_calls), 2))
+    disturbed = execute(prepare_run(model, output=tmp_path / "disturbed"))
+    assert drop_times(disturbed.records) == drop_times(whole.records)
     assert disturbed.summary.summary == whole.summary.summary
-    assert (n_restarts(whole), n_restarts(disturbed), calls.killed) == (0, 2, 2)
+    assert (n_restarts(whole), n_restarts(disturbed), simulator_calls.killed) == (0, 2, 2)
 
 
-def test_an_episode_survives_more_deaths_than_one_plan_may_have(prepared, tmp_path, calls):
-    whole = execute(prepared(output=tmp_path / "whole"))
-    calls.deadly_from_now(range(10, 400, 28))
-    disturbed = execute(prepared(output=tmp_path / "disturbed"))
-    assert same(disturbed.records) == same(whole.records)
-    assert n_restarts(disturbed) == calls.killed > 3
+def test_an_episode_survives_more_deaths_than_one_plan_may_have(
+    prepare_run, tmp_path, simulator_calls
+):
+    whole = execute(prepare_run(output=tmp_path / "whole"))
+    simulator_calls.deadly_from_now(range(10, 400, 28))
+    disturbed = execute(prepare_run(output=tmp_path / "disturbed"))
+    assert drop_times(disturbed.records) == drop_times(whole.records)
+    assert n_restarts(disturbed) == simulator_calls.killed > 3
 
 
-@pytest.mark.usefixtures("shared_simulator")
+@pytest.mark.usefixtures("shared_simulators")
 @pytest.mark.parametrize("n_failures", [1, 2, 3])
 def test_a_plan_is_begun_anew_where_the_simulator_fails_for_good(
-    prepared, tmp_path, monkeypatch, n_failures
+    prepare_run, tmp_path, monkeypatch, n_failures
 ):
-    whole = execute(prepared(output=tmp_path / "whole"))
+    whole = execute(prepare_run(output=tmp_path / "whole"))
     step, failures = PlanEnvironment.step, []
 
     def failing(environment, action):
@@ -181,11 +113,11 @@ def test_a_plan_is_begun_anew_where_the_simulator_fails_for_good(
         return step(environment, action)
 
     monkeypatch.setattr(PlanEnvironment, "step", failing)
-    outcome = execute(prepared(output=tmp_path / "failing"))
+    outcome = execute(prepare_run(output=tmp_path / "failing"))
     third = outcome.records[2]
     if n_failures < 3:
         assert third.faults == tuple(failures)
-        assert same(outcome.records) == same(whole.records)
+        assert drop_times(outcome.records) == drop_times(whole.records)
     else:
         assert third.failure == "it hangs (2)"
         assert [record.payload.done for record in outcome.records] == [True, True, False, True]
@@ -193,7 +125,9 @@ def test_a_plan_is_begun_anew_where_the_simulator_fails_for_good(
 
 
 def test_no_simulator_outlives_a_run_that_is_killed(tmp_path):
-    process = start(write(tmp_path / "data", cut(FORK, 4)), tmp_path / "out")
+    process = start(
+        write_trajectories(tmp_path / "data", cut_trajectory(FORK, 4)), tmp_path / "out"
+    )
     wait_for(2, tmp_path / "out", process)
     children = [
         int(pid)

@@ -12,13 +12,13 @@ from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, iter_t
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.plans.plan import PlanKind, plans_of, tasks_of
 
-from .cut import whole
+from ..helpers.trajectories import read_trajectory
 
 SHARED = Path(__file__).parents[2] / "../shared/data"
 
 
 def ours(name="kitchen-1-seed7"):
-    return whole(name)
+    return read_trajectory(name)
 
 
 def published(name):
@@ -83,9 +83,8 @@ def test_alfred_plans():
         plans, tasks = plans_of(trajectory, Words.NATURAL), tasks_of(trajectory)
         assert len(tasks) == 1 and tasks[0].task.task_type == trajectory.task_type
         assert tasks[0].text == trajectory.turk_annotations["anns"][0]["task_desc"]
-        assert not any(
-            plan.is_final for plan in plans
-        )  # the sub-goal without an action is none of them
+        # The sub-goal without an action is none of them.
+        assert not any(plan.is_final for plan in plans)
         assert len(plans) == len(trajectory.plan.high_pddl) - (
             "End" in repr(trajectory.plan.high_pddl[-1])
         )

@@ -15,7 +15,7 @@ from infthor_eval.thor.frames import FrameFolder
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
-from .cut import CANDLE, FORK, MUG, cut, write
+from ..helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 from .put_away import PEN, pen_put_away, put_away_without_actions, read
 
 PUT = 4  # the plan that puts the pen away; 22 actions, the last of which puts it
@@ -76,28 +76,28 @@ def test_the_published_rules_pay_the_task_alone_and_count_the_put_as_refused(sim
     assert by_expert(environment, PUT + 1)[1].ended == "done"
 
 
-@pytest.mark.usefixtures("shared_simulator")
-def test_baselines_are_evaluated_on_it(prepared, tmp_path):
-    data = write(tmp_path / "away", pen_put_away(), cut(MUG, 2))
-    outcome = execute(prepared(data=data))
-    found = [record.payload for record in outcome.records if record.cluster == PEN]
-    assert [(plan.kind, plan.ended) for plan in found][PUT] == ("PutObject", "done")
-    assert all(plan.ended == "done" and plan.reward == plan.max_reward for plan in found)
-    assert found[PUT].goal == "put the Pen on the DiningTable"
+@pytest.mark.usefixtures("shared_simulators")
+def test_baselines_are_evaluated_on_it(prepare_run, tmp_path):
+    data = write_trajectories(tmp_path / "away", pen_put_away(), cut_trajectory(MUG, 2))
+    outcome = execute(prepare_run(data=data))
+    pen_plans = [record.payload for record in outcome.records if record.cluster == PEN]
+    assert [(plan.kind, plan.ended) for plan in pen_plans][PUT] == ("PutObject", "done")
+    assert all(plan.ended == "done" and plan.reward == plan.max_reward for plan in pen_plans)
+    assert pen_plans[PUT].goal == "put the Pen on the DiningTable"
     for name in ("random", "scripted", "history"):
-        others = execute(prepared(name, data=data))
+        others = execute(prepare_run(name, data=data))
         assert [record.payload.index for record in others.records if record.cluster == PEN] == list(
             range(9)
         )
         assert not any(record.excluded for record in others.records)
 
 
-@pytest.mark.usefixtures("shared_simulator")
-def test_a_final_task_has_it_in_its_history(prepared, tmp_path):
-    data = write(tmp_path / "final", pen_put_away(final=True))
+@pytest.mark.usefixtures("shared_simulators")
+def test_a_final_task_has_it_in_its_history(prepare_run, tmp_path):
+    data = write_trajectories(tmp_path / "final", pen_put_away(final=True))
     settings = {"tasks": ("infthor_final",), "data": data}
     for rules in ({}, {"protocol": "published", "rewards": "published"}):
-        outcome = execute(prepared(**settings, **rules))
+        outcome = execute(prepare_run(**settings, **rules))
         plans = [record.payload for record in outcome.records]
         assert [plan.index for plan in plans] == [5, 6, 7, 8]
         assert plans[0].ended == "done"
@@ -107,15 +107,15 @@ def test_the_published_history_has_its_goal_and_its_plan(simulator, tmp_path):
     environment = PlanEnvironment(read(pen_put_away()), simulator, frames=FrameFolder(tmp_path))
     environment.reset(PUT + 1)
     parts = PublishedHistory().recall(environment.past(PUT + 1), len)
-    shown = "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
+    prompt = "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
     begins = "<|goal|>Your main goal: put the Pen on the DiningTable<|goal|><image>"
     assert (
         f"{begins}<|plan|>Plan: put the Pen in the "
-        "DiningTable<|plan|><|act|><|act|>RotateLeft<|act|>" in shown
+        "DiningTable<|plan|><|act|><|act|>RotateLeft<|act|>" in prompt
     )
     assert (
         "<|act|>PutObject Pen DiningTable<|act|><image><|goal|>Your main goal: look at a mug"
-        in shown
+        in prompt
     )
 
 
@@ -140,22 +140,26 @@ def test_without_actions_it_is_no_plan_and_the_others_are():
     ]
 
 
-@pytest.mark.usefixtures("shared_simulator")
-def test_without_actions_the_default_goes_on_and_the_published_loop_is_over(prepared, tmp_path):
-    data = write(tmp_path / "old", put_away_without_actions())
-    assert [record.payload.ended for record in execute(prepared(data=data)).records] == ["done"] * 6
-    outcome = execute(prepared(data=data, rewards="published", history="published"))
+@pytest.mark.usefixtures("shared_simulators")
+def test_without_actions_the_default_goes_on_and_the_published_loop_is_over(prepare_run, tmp_path):
+    data = write_trajectories(tmp_path / "old", put_away_without_actions())
+    assert [record.payload.ended for record in execute(prepare_run(data=data)).records] == [
+        "done"
+    ] * 6
+    outcome = execute(prepare_run(data=data, rewards="published", history="published"))
     ends = "the published script ends at sub-goal 4, which has no actions"
     assert [record.excluded for record in outcome.records] == [None] * 4 + [ends] * 2
 
 
-@pytest.mark.usefixtures("shared_simulator")
+@pytest.mark.usefixtures("shared_simulators")
 @pytest.mark.parametrize(("name", "n_plans", "is_last"), [(FORK, 6, True), (CANDLE, 16, False)])
 def test_final_scripts_go_on_but_after_the_last_task_before_it(
-    prepared, tmp_path, name, n_plans, is_last
+    prepare_run, tmp_path, name, n_plans, is_last
 ):
-    data = write(tmp_path / "final", put_away_without_actions(name, n_plans, final=True))
+    data = write_trajectories(
+        tmp_path / "final", put_away_without_actions(name, n_plans, final=True)
+    )
     published = {"protocol": "published", "rewards": "published"}
-    first, *_ = execute(prepared(tasks=("infthor_final",), data=data, **published)).records
+    first, *_ = execute(prepare_run(tasks=("infthor_final",), data=data, **published)).records
     ends = "the published script ends at sub-goal 4, which has no actions"
     assert (first.excluded, first.payload.ended) == ((ends, "") if is_last else (None, "done"))

@@ -41,13 +41,13 @@ GOES_ON, DONE, FAILED = "goes on", "done", "failed"
 def run(rules, target, start, events, task=ELSEWHERE, grid=None, treatments=None):
     """What each event gives: (reward, how it leaves the plan)."""
     plan = PlanReward(rules, target, task, start, treatments or Treatments(), grid)
-    before, given = start, []
+    before, rewards = start, []
     for action, object_id, after in events:
         step = plan.after({"action": action, "objectId": object_id}, before, after)
         assert not (step.done and step.failed)
-        given.append((step.reward, DONE if step.done else FAILED if step.failed else GOES_ON))
+        rewards.append((step.reward, DONE if step.done else FAILED if step.failed else GOES_ON))
         before = after
-    return given
+    return rewards
 
 
 def walk(rules, poses, actions, goal=(0, 9), start=(0, 0), horizon=30.0, goal_horizon=30.0):
@@ -63,9 +63,9 @@ AHEAD = "MoveAhead"
 
 
 def test_goto_pays_steps_and_arrival():
-    given = walk(DEFAULT, [1, 2, 3, 4, 5, 6, 7], [AHEAD] * 7)
+    rewards = walk(DEFAULT, [1, 2, 3, 4, 5, 6, 7], [AHEAD] * 7)
     # Six to go, then 5, 4 and exactly 3 left: not there yet. At two left it is done.
-    assert given == [(pytest.approx(0.2), GOES_ON)] * 6 + [(pytest.approx(4.2), DONE)]
+    assert rewards == [(pytest.approx(0.2), GOES_ON)] * 6 + [(pytest.approx(4.2), DONE)]
 
 
 def test_a_way_of_exactly_three_is_not_there():
@@ -92,11 +92,8 @@ def test_looks_and_turns_are_steps():
         ("RotateRight", None, kitchen(at=(0, 0), horizon=0.0)),
         ("MoveAhead", None, kitchen(at=(0, 1), horizon=0.0)),
         ("LookDown", None, kitchen(at=(0, 1), horizon=30.0)),
-        (
-            "RotateRight",
-            None,
-            kitchen(at=(0, 1), facing=90, horizon=30.0),
-        ),  # one ahead is lost behind turns
+        # One ahead is lost behind turns.
+        ("RotateRight", None, kitchen(at=(0, 1), facing=90, horizon=30.0)),
         ("LookDown", None, kitchen(at=(0, 1), facing=0, horizon=60.0)),
     ]
     assert run(DEFAULT, target, start, events, grid=CORRIDOR) == [
@@ -263,13 +260,7 @@ PUTS = [
         ],
         [(0.0, GOES_ON), (0.0, GOES_ON)],
     ),
-    (
-        "open already",
-        STOW,
-        OPEN_FRIDGE,
-        [("PutObject", FRIDGE, IN_FRIDGE)],
-        [(2.0, DONE)],
-    ),
+    ("open already", STOW, OPEN_FRIDGE, [("PutObject", FRIDGE, IN_FRIDGE)], [(2.0, DONE)]),
     (
         "onto a closed lid",
         ON_THE_LID,

@@ -2,39 +2,32 @@
 finds."""
 
 import msgspec
-import psutil
 
 from infthor_eval.plans.actors.baselines import BASELINES
-from infthor_eval.runs import Silent, execute
+from infthor_eval.runs import execute
 from model_adapters import Capabilities
 
-from .cut import CANDLE, FORK, MUG, cut, write
+from ..helpers.processes import ChildCounter, find_children
+from ..helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 
 
-def children():
-    return {child.pid for child in psutil.Process().children()}
-
-
-class Counting(Silent):
-    """Counts the processes whenever a plan is done."""
-
-    def __init__(self):
-        self.before, self.most = children(), 0
-
-    def done(self, record, resumed):
-        self.most = max(self.most, len(children() - self.before))
-
-
-def test_four_episodes_at_once_find_what_one_after_the_other_finds(prepared, tmp_path, monkeypatch):
-    data = write(tmp_path / "three", cut(FORK, 2), cut(MUG, 2), cut(CANDLE, 3))
-    counting = Counting()
-    together = execute(prepared("random", data=data, output=tmp_path / "together"), counting)
+def test_four_episodes_at_once_find_what_one_after_the_other_finds(
+    prepare_run, tmp_path, monkeypatch
+):
+    data = write_trajectories(
+        tmp_path / "three",
+        cut_trajectory(FORK, 2),
+        cut_trajectory(MUG, 2),
+        cut_trajectory(CANDLE, 3),
+    )
+    counting = ChildCounter()
+    together = execute(prepare_run("random", data=data, output=tmp_path / "together"), counting)
     assert 1 < counting.most <= 3
-    assert not children() - counting.before  # simulators end with their runs
+    assert not find_children() - counting.before  # simulators end with their runs
     assert BASELINES["random"](0).capabilities.max_in_flight == 4
     one_by_one = Capabilities(counts_tokens=False, token_ids=False)
     monkeypatch.setattr(BASELINES["random"], "capabilities", one_by_one)
-    alone = execute(prepared("random", data=data, output=tmp_path / "alone"))
+    alone = execute(prepare_run("random", data=data, output=tmp_path / "alone"))
 
     def timeless(outcome):
         return [msgspec.structs.replace(record, seconds=0.0) for record in outcome.records]

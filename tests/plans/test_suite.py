@@ -11,9 +11,11 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.published import PublishedRow, PublishedTable
 from infthor_eval.runs import execute
 
-from .cut import CANDLE, FORK, MUG, cut, write
+from ..helpers.command_line import assert_refused, option_words
+from ..helpers.refusals import read_one_line
+from ..helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 
-pytestmark = pytest.mark.usefixtures("shared_simulator")
+pytestmark = pytest.mark.usefixtures("shared_simulators")
 
 
 def payloads(outcome):
@@ -38,14 +40,14 @@ def cells(outcome, title):
 # -- what a run finds
 
 
-def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepared, data):
-    write(data / "more", cut(MUG, 2))
-    outcome = execute(prepared())
-    found = {(record.cluster, record.payload.index): record.payload for record in outcome.records}
+def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepare_run, data):
+    write_trajectories(data / "more", cut_trajectory(MUG, 2))
+    outcome = execute(prepare_run())
+    plans = {(record.cluster, record.payload.index): record.payload for record in outcome.records}
     # By hand, from the expert's actions: eleven steps and a look, the last of which leaves a step
     # (done with fewer than three to go); what is closed is opened and closed around a thing.
     assert {
-        key: (plan.ended, len(plan.steps), plan.n_expert_steps) for key, plan in found.items()
+        key: (plan.ended, len(plan.steps), plan.n_expert_steps) for key, plan in plans.items()
     } == {
         (FORK, 0): ("done", 10, 12),
         (FORK, 1): ("done", 2, 3),
@@ -54,7 +56,7 @@ def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepared, dat
         (MUG, 0): ("done", 7, 9),
         (MUG, 1): ("done", 1, 1),
     }
-    assert {key: plan.reward for key, plan in found.items()} == {
+    assert {key: plan.reward for key, plan in plans.items()} == {
         (FORK, 0): pytest.approx(10 * 0.2 + 4),
         (FORK, 1): 2,
         (FORK, 2): pytest.approx(0.2 + 4),
@@ -62,9 +64,9 @@ def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepared, dat
         (MUG, 0): pytest.approx(7 * 0.2 + 4),
         (MUG, 1): 2,
     }
-    assert all(plan.reward == plan.max_reward for plan in found.values())
-    assert [key for key, plan in found.items() if plan.goal_reached] == [(FORK, 3)]
-    assert [step.reward for step in found[FORK, 3].steps] == [2, 7, 2]
+    assert all(plan.reward == plan.max_reward for plan in plans.values())
+    assert [key for key, plan in plans.items() if plan.goal_reached] == [(FORK, 3)]
+    assert [step.reward for step in plans[FORK, 3].steps] == [2, 7, 2]
     assert [plan.goal for plan in payloads(outcome)] == ["put a mug on the desk"] * 2 + [
         "put a fork in the drawer"
     ] * 4
@@ -84,16 +86,16 @@ def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepared, dat
     }
     assert (task.goals.mean, task.goals.n) == (0.5, 2)  # the mug's task is cut off
     assert task.endings == {"done": 6}
-    shown = cells(outcome, "Plans completed")
-    assert (shown["total"][:5], shown["plans"], shown["excluded"]) == ("100.0", "6", "0")
+    row = cells(outcome, "Plans completed")
+    assert (row["total"][:5], row["plans"], row["excluded"]) == ("100.0", "6", "0")
     assert cells(outcome, "Reward")["% of it"].startswith("100.0")
     assert outcome.run.suite.scores(outcome.records[-1]) == {"success": 1.0, "reward": 11.0}
 
 
-def test_what_is_exported_has_a_sample_for_each_plan(prepared):
+def test_what_is_exported_has_a_sample_for_each_plan(prepare_run):
     from infthor_eval.harness.export import export
 
-    outcome = execute(prepared())
+    outcome = execute(prepare_run())
     export(outcome)
     (path,) = outcome.folder.rglob("samples_infthor_plans_*.jsonl")
     rows = [json.loads(line) for line in path.read_text().splitlines()]
@@ -106,8 +108,8 @@ def test_what_is_exported_has_a_sample_for_each_plan(prepared):
     assert list(outcome.samples)[1].prompt == "put a fork in the drawer\npick up the Fork"
 
 
-def test_the_published_rules_have_the_published_faults(prepared):
-    plans = payloads(execute(prepared(rewards="published")))
+def test_the_published_rules_have_the_published_faults(prepare_run):
+    plans = payloads(execute(prepare_run(rewards="published")))
     assert [(plan.ended, plan.reward) for plan in plans] == [
         ("done", pytest.approx(6)),
         ("done", 2),
@@ -118,16 +120,16 @@ def test_the_published_rules_have_the_published_faults(prepared):
     assert all(step.call["forceAction"] for plan in plans for step in plan.steps)
 
 
-def test_the_limit_is_of_trajectories(prepared, tmp_path):
-    data = write(tmp_path / "two", cut(FORK, 1), cut(MUG, 1))
-    outcome = execute(prepared("scripted", data=data, limit=1))
+def test_the_limit_is_of_trajectories(prepare_run, tmp_path):
+    data = write_trajectories(tmp_path / "two", cut_trajectory(FORK, 1), cut_trajectory(MUG, 1))
+    outcome = execute(prepare_run("scripted", data=data, limit=1))
     assert [record.cluster for record in outcome.records] == [MUG]  # the first by name
     assert outcome.summary.header.config.limit == 1
 
 
-def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, tmp_path):
+def test_equal_seeds_act_alike_and_other_seeds_do_not(prepare_run, tmp_path):
     def actions(seed, folder):
-        outcome = execute(prepared("random", seed=seed, output=tmp_path / folder))
+        outcome = execute(prepare_run("random", seed=seed, output=tmp_path / folder))
         return [[step.action for step in plan.steps] for plan in payloads(outcome)]
 
     first = actions(7, "a")
@@ -135,23 +137,24 @@ def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, tmp_path):
     assert actions(8, "c") != first
 
 
-def test_what_a_baseline_does_in_a_trajectory_depends_on_no_other(prepared, data, tmp_path):
-    alone = payloads(execute(prepared("random")))
-    write(data / "more", cut(MUG, 1))
+def test_what_a_baseline_does_in_a_trajectory_depends_on_no_other(prepare_run, data, tmp_path):
+    alone = payloads(execute(prepare_run("random")))
+    write_trajectories(data / "more", cut_trajectory(MUG, 1))
     beside = [
         record
-        for record in execute(prepared("random", output=tmp_path / "b")).records
+        for record in execute(prepare_run("random", output=tmp_path / "b")).records
         if record.cluster == FORK
     ]
     assert [record.payload for record in beside] == alone
 
 
-def test_habits_are_learnt_in_other_scenes_alone(prepared, data, tmp_path):
-    alone = payloads(execute(prepared("history")))
+def test_habits_are_learnt_in_other_scenes_alone(prepare_run, data, tmp_path):
+    alone = payloads(execute(prepare_run("history")))
     assert {step.action for plan in alone for step in plan.steps} == {"NoOp"}
-    write(data / "more", cut(MUG, 4))
+    write_trajectories(data / "more", cut_trajectory(MUG, 4))
     learnt = [
-        record.payload for record in execute(prepared("history", output=tmp_path / "b")).records[4:]
+        record.payload
+        for record in execute(prepare_run("history", output=tmp_path / "b")).records[4:]
     ]
     assert learnt[0].steps[0].action == "MoveAhead"
     assert learnt[1].steps[0].message.startswith("PickupObject Fork: ")  # the cabinet is closed
@@ -163,17 +166,19 @@ def test_habits_are_learnt_in_other_scenes_alone(prepared, data, tmp_path):
 
 def refused_in(plan):
     """The kitchen, with an action of the expert in that plan that no simulator can carry out."""
-    document = cut(FORK)
+    document = cut_trajectory(FORK)
     low = next(low for low in document["plan"]["low_actions"] if low["high_idx"] == plan)
     low["api_action"] = {"action": "OpenObject", "objectId": "Wardrobe|+00.00|+00.00|+00.00"}
     return document
 
 
 @pytest.mark.parametrize("after_failure", ["continue", "stop"])
-def test_plans_that_the_expert_cannot_do_here_count_for_nobody(prepared, tmp_path, after_failure):
-    data = write(tmp_path / "refused", refused_in(2))
+def test_plans_that_the_expert_cannot_do_here_count_for_nobody(
+    prepare_run, tmp_path, after_failure
+):
+    data = write_trajectories(tmp_path / "refused", refused_in(2))
     for model, ended in (("planner", "done"), ("scripted", "refused by the simulator")):
-        outcome = execute(prepared(model, data=data, after_failure=after_failure))
+        outcome = execute(prepare_run(model, data=data, after_failure=after_failure))
         assert payloads(outcome)[0].ended == ended
         task = summary(outcome)
         assert (task.n_plans, task.n_failed, sum(task.endings.values())) == (2, 0, 2)
@@ -192,22 +197,22 @@ def test_plans_that_the_expert_cannot_do_here_count_for_nobody(prepared, tmp_pat
         assert f"2 left out: {reason}" in table.notes
 
 
-def test_a_plan_about_what_is_not_there_counts_for_nobody(prepared, tmp_path):
-    document = cut(FORK)
+def test_a_plan_about_what_is_not_there_counts_for_nobody(prepare_run, tmp_path):
+    document = cut_trajectory(FORK)
     document["plan"]["high_pddl"][3]["planner_action"]["receptacleObjectId"] = (
         "Elephant|+00.00|+00.00|+00.00"
     )
-    outcome = execute(prepared(data=write(tmp_path / "elephant", document)))
+    outcome = execute(prepare_run(data=write_trajectories(tmp_path / "elephant", document)))
     task = summary(outcome)
     assert task.excluded == {"the scene has no object for 'Elephant|+00.00|+00.00|+00.00'": 1}
     assert (task.n_plans, task.n_failed, task.endings) == (3, 0, {"done": 3})
 
 
-def test_trajectories_in_a_scene_that_is_not_here_count_for_nobody(prepared, data):
-    document = cut(MUG, 2, called="elsewhere")
+def test_trajectories_in_a_scene_that_is_not_here_count_for_nobody(prepare_run, data):
+    document = cut_trajectory(MUG, 2, called="elsewhere")
     document["scene"]["floor_plan"] = "FloorPlan7"
     (data / "elsewhere.json").write_text(json.dumps(document))
-    outcome = execute(prepared("scripted"))
+    outcome = execute(prepare_run("scripted"))
     task = summary(outcome)
     ((reason, number),) = task.excluded.items()
     assert reason.startswith("scene FloorPlan7: ")
@@ -215,21 +220,14 @@ def test_trajectories_in_a_scene_that_is_not_here_count_for_nobody(prepared, dat
     assert all(not record.faults for record in outcome.records)
 
 
-def test_where_all_is_left_out_the_exit_code_says_so(run, tmp_path):
-    document = cut(MUG, 2)
+def test_where_all_is_left_out_the_exit_code_says_so(run_cli, tmp_path):
+    document = cut_trajectory(MUG, 2)
     document["scene"]["floor_plan"] = "FloorPlan7"
-    data = write(tmp_path / "elsewhere", document)
-    arguments = (
-        "--model",
-        "scripted",
-        "--tasks",
-        "infthor_plans",
-        "--data",
-        str(data),
-        "--output",
-        str(tmp_path / "o"),
+    data = write_trajectories(tmp_path / "elsewhere", document)
+    arguments = option_words(
+        model="scripted", tasks="infthor_plans", data=str(data), output=str(tmp_path / "o")
     )
-    code, out, err = run("run", *arguments)
+    code, out, err = run_cli("run", *arguments)
     assert code == 1
     assert "scene FloorPlan7" in out and "--scenes DIR" in " ".join(out.split())
     assert "no result: every sample was excluded" in err
@@ -258,28 +256,28 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
-    damage, said = BROKEN[name]
-    document = cut(FORK, called="broken")
+def test_a_broken_trajectory_is_skipped_named_and_counted(prepare_run, data, name):
+    damage, expected = BROKEN[name]
+    document = cut_trajectory(FORK, called="broken")
     if isinstance(damage, str):
         (data / "broken.json").write_text(damage)
     else:
         damage(document)
         (data / "broken.json").write_text(json.dumps(document))
-    run = prepared("scripted")
+    run = prepare_run("scripted")
     (skipped,) = run.evaluation.bind(run.suite.baselines["scripted"](0)).workload.skipped
     assert skipped.key.id == "broken.json"
-    assert said in skipped.reason
+    assert expected in skipped.reason
     assert "\n" not in skipped.reason
     assert str(data) not in skipped.reason  # the run is the same one wherever its data lie
 
 
-def test_files_that_cannot_be_read_are_skipped_too(prepared, data):
+def test_files_that_cannot_be_read_are_skipped_too(prepare_run, data):
     (data / "a.jsonl.gz").write_bytes(b"no gzip")
     (data / "b.json").mkdir()
     (data / "c.json").symlink_to("nowhere")
-    (data / "d.jsonl").write_text(json.dumps(cut(MUG, 1, called="sound")) + "\n{\n")
-    outcome = execute(prepared())
+    (data / "d.jsonl").write_text(json.dumps(cut_trajectory(MUG, 1, called="sound")) + "\n{\n")
+    outcome = execute(prepare_run())
     assert {record.cluster for record in outcome.records} == {FORK, "sound"}
     task = summary(outcome)
     assert (sum(task.skipped.values()), task.n_trajectories) == (3, 2)
@@ -290,51 +288,45 @@ def test_files_that_cannot_be_read_are_skipped_too(prepared, data):
     )
 
 
-def one_line(caught):
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
-
-
-def test_nothing_to_evaluate_is_refused_in_one_line(prepared, tmp_path):
+def test_nothing_to_evaluate_is_refused_in_one_line(prepare_run, tmp_path):
     nowhere, empty, broken = (tmp_path / name for name in ("nowhere", "empty", "broken"))
     empty.mkdir()
     broken.mkdir()
     (broken / "a.json").write_text("{")
-    for place, error, said in (
+    for place, error, expected in (
         (None, UsageError, "no trajectories of its own; give them as --data"),
         (nowhere, UsageError, "there is no such file or folder"),
         (empty, DataError, "no .json, .jsonl, .jsonl.gz file"),
         (broken, DataError, "nothing to evaluate"),
     ):
-        with pytest.raises(error, match=said) as caught:
-            prepared(data=place)
-        one_line(caught)
-    twice = write(tmp_path / "twice", cut(FORK, 1))
-    write(twice / "again", cut(FORK, 2))
+        with pytest.raises(error, match=expected) as caught:
+            prepare_run(data=place)
+        read_one_line(caught)
+    twice = write_trajectories(tmp_path / "twice", cut_trajectory(FORK, 1))
+    write_trajectories(twice / "again", cut_trajectory(FORK, 2))
     with pytest.raises(DataError, match=f"{FORK} is the name of another trajectory too"):
-        prepared(data=twice)
+        prepare_run(data=twice)
 
 
 # -- final tasks
 
 
 def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_published_rows(
-    prepared, tmp_path, monkeypatch
+    prepare_run, tmp_path, monkeypatch
 ):
     row = PublishedRow("a paper's model", (), 7.0, (10.0, 20.0, 30.0, 25.0))
     table = PublishedTable(
         "Table 5", "here", "plans", "", "success", ("Go to", "Pick up", "Put", "total"), (row,)
     )
     monkeypatch.setattr("infthor_eval.plans.tables.published_tables", {"plans": (table,)}.get)
-    data = write(tmp_path / "final", cut(FORK, 6, final=True), cut(MUG, 2))
-    outcome = execute(prepared(tasks=("infthor_final",), data=data))
+    data = write_trajectories(
+        tmp_path / "final", cut_trajectory(FORK, 6, final=True), cut_trajectory(MUG, 2)
+    )
+    outcome = execute(prepare_run(tasks=("infthor_final",), data=data))
     assert [
         (record.cluster, record.payload.index, record.payload.is_final)
         for record in outcome.records
-    ] == [
-        (FORK, 4, True),
-        (FORK, 5, True),
-    ]
+    ] == [(FORK, 4, True), (FORK, 5, True)]
     task = summary(outcome, "infthor_final")
     assert (task.n_plans, task.n_trajectories, task.success["total"].mean) == (2, 1, 1)
     (table, *_) = outcome.run.suite.tables([outcome.summary])
@@ -344,7 +336,7 @@ def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_publishe
         for note in table.notes
     )
     theirs = execute(
-        prepared(tasks=("infthor_final",), data=data, protocol="published", rewards="published")
+        prepare_run(tasks=("infthor_final",), data=data, protocol="published", rewards="published")
     )
     (table, *_) = theirs.run.suite.tables([theirs.summary])
     (published,) = [row for row in table.rows if row.is_published]
@@ -356,38 +348,31 @@ def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_publishe
         "30.0*",
         "25.0",
     )
-    plain = execute(prepared(data=data))
+    plain = execute(prepare_run(data=data))
     assert len(plain.records) == 8
     assert not any(row.is_published for row in plain.run.suite.tables([plain.summary])[0].rows)
 
 
-def test_where_no_trajectory_has_a_final_task_that_is_said(prepared, run, data, tmp_path):
+def test_where_no_trajectory_has_a_final_task_that_is_said(prepare_run, run_cli, data, tmp_path):
     with pytest.raises(
         UsageError, match="infthor_final: no trajectory there has a final task"
     ) as caught:
-        prepared(tasks=("infthor_final",))
-    one_line(caught)
-    code, out, err = run(
-        "--model",
-        "planner",
-        "--tasks",
-        "infthor_final",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "o",
-        "--limit",
-        3,
+        prepare_run(tasks=("infthor_final",))
+    read_one_line(caught)
+    assert_refused(
+        run_cli(
+            *option_words(
+                model="planner", tasks="infthor_final", data=data, output=tmp_path / "o", limit=3
+            )
+        )
     )
-    assert (code, out) == (2, "")
-    assert len(err.strip().splitlines()) == 1
 
 
 # -- after a failure
 
 
-def test_where_a_failure_ends_the_episode_later_plans_are_not_come_to_and_earn_nothing(prepared):
-    outcome = execute(prepared("scripted", after_failure="stop"))
+def test_where_a_failure_ends_the_episode_later_plans_are_not_come_to_and_earn_nothing(prepare_run):
+    outcome = execute(prepare_run("scripted", after_failure="stop"))
     first, *others = outcome.records
     assert first.payload.ended == "refused by the simulator"  # it walks on and on
     assert {record.payload.ended for record in others} == {NOT_ATTEMPTED}
@@ -399,13 +384,13 @@ def test_where_a_failure_ends_the_episode_later_plans_are_not_come_to_and_earn_n
     assert (task.n_plans, task.endings) == (4, {NOT_ATTEMPTED: 3, "refused by the simulator": 1})
     assert task.success["total"].mean == 0
     assert outcome.run.suite.scores(others[0]) == {}
-    going_on = execute(prepared("scripted"))
+    going_on = execute(prepare_run("scripted"))
     assert [plan.ended for plan in payloads(going_on)][1:] != [NOT_ATTEMPTED] * 3
-    assert execute(prepared(after_failure="stop")).records[-1].payload.done
+    assert execute(prepare_run(after_failure="stop")).records[-1].payload.done
 
 
 def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(
-    prepared, monkeypatch
+    prepare_run, monkeypatch
 ):
     from infthor_eval.errors import ModelError
     from infthor_eval.plans.actors import baselines
@@ -419,7 +404,7 @@ def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(
 
     with monkeypatch.context() as patched:
         patched.setattr(baselines._ExpertActor, "act", fails)
-        broken = execute(prepared(after_failure="stop"))
+        broken = execute(prepare_run(after_failure="stop"))
     assert [(record.failure, record.payload.ended) for record in broken.records] == [
         (None, "done"),
         ("out of memory", ""),
@@ -429,7 +414,7 @@ def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(
     assert broken.records[1].payload.max_reward == 2
     task = summary(broken)
     assert (task.n_failed, task.endings) == (1, {"done": 1, "failed": 1, NOT_ATTEMPTED: 2})
-    mended = execute(prepared(after_failure="stop"))
+    mended = execute(prepare_run(after_failure="stop"))
     assert [record.payload.ended for record in mended.records] == ["done"] * 4
     assert [record.attempt for record in mended.records] == [1, 2, 2, 2]
 
@@ -468,28 +453,30 @@ def task_file(task_files: Path):
     return write_task
 
 
-@pytest.mark.parametrize(("settings", "said"), SETTINGS, ids=[said for _, said in SETTINGS])
-def test_a_setting_that_would_not_act_is_refused(prepared, task_file, settings, said):
+@pytest.mark.parametrize(
+    ("settings", "expected"), SETTINGS, ids=[expected for _, expected in SETTINGS]
+)
+def test_a_setting_that_would_not_act_is_refused(prepare_run, task_file, settings, expected):
     task_file(settings)
     with pytest.raises((DataError, UsageError)) as caught:
-        prepared()
-    assert said in one_line(caught)
+        prepare_run()
+    assert expected in read_one_line(caught)
 
 
-def test_settings_of_a_task_file_act_and_options_go_before_them(prepared, task_file):
+def test_settings_of_a_task_file_act_and_options_go_before_them(prepare_run, task_file):
     task_file("max_steps: 2, rewards: published")
-    plans = payloads(execute(prepared()))
+    plans = payloads(execute(prepare_run()))
     assert Counter(plan.ended for plan in plans) == {
         "step limit": 1,
         "done": 2,
         "refused by the simulator": 1,
     }
-    plans = payloads(execute(prepared(rewards="default")))
+    plans = payloads(execute(prepare_run(rewards="default")))
     assert Counter(plan.ended for plan in plans) == {"step limit": 2, "done": 2}
 
 
 @pytest.mark.parametrize(
-    ("more", "said"),
+    ("more", "expected"),
     [
         ("", "no dataset_kwargs; tasks of plans need dataset_kwargs, generation_kwargs"),
         ("dataset_kwargs: 5", "dataset_kwargs must be a mapping of settings"),
@@ -507,18 +494,18 @@ def test_settings_of_a_task_file_act_and_options_go_before_them(prepared, task_f
         ),
     ],
 )
-def test_what_is_wrong_beside_the_settings_is_refused_too(prepared, task_files, more, said):
+def test_what_is_wrong_beside_the_settings_is_refused_too(prepare_run, task_files, more, expected):
     (task_files / "plans" / "infthor_plans.yaml").write_text(
         f"include: _plans.yaml\ntask: infthor_plans\n{more}\n"
     )
     with pytest.raises((DataError, UsageError)) as caught:
-        prepared(data=None)
-    assert said in one_line(caught)
+        prepare_run(data=None)
+    assert expected in read_one_line(caught)
 
 
-def test_another_setting_is_another_run(prepared, data):
+def test_another_setting_is_another_run(prepare_run, data):
     def identity(**changes):
-        run = prepared(**changes)
+        run = prepare_run(**changes)
         return run.evaluation.bind(run.suite.baselines["planner"](0)).workload.config
 
     plain = identity()
@@ -534,11 +521,13 @@ def test_another_setting_is_another_run(prepared, data):
         {"frames": "blank"},
         {
             "tasks": ("infthor_final",),
-            "data": write(data.parent / "final", cut(CANDLE, 2, final=True)),
+            "data": write_trajectories(
+                data.parent / "final", cut_trajectory(CANDLE, 2, final=True)
+            ),
         },
     ):
         assert identity(**changes) != plain
-    document = cut(FORK)
+    document = cut_trajectory(FORK)
     document["plan"]["low_actions"].pop()
     (data / f"{FORK}.json").write_text(json.dumps(document))
     assert identity() != plain

@@ -8,17 +8,17 @@ from hypothesis import strategies as st
 from infthor_eval.plans.records import StepRecord
 from infthor_eval.plans.summary import summarise_plans
 
-from .made_runs import TASK, identity, plan
+from ..helpers.plan_runs import TASK, make_plan_record, make_plans_config
 
 
 def done_in(n_agent, n_expert, ended="done", index=0):
-    record = plan("t", index, (0, n_expert), ended=ended)
+    record = make_plan_record("t", index, (0, n_expert), ended=ended)
     payload = msgspec.structs.replace(record.payload, steps=(StepRecord(),) * n_agent)
     return msgspec.structs.replace(record, payload=payload)
 
 
 def path_weighted(records):
-    return summarise_plans(identity(["t"]), records).tasks[TASK].path_weighted.mean
+    return summarise_plans(make_plans_config(["t"]), records).tasks[TASK].path_weighted.mean
 
 
 @pytest.mark.parametrize(
@@ -45,5 +45,5 @@ def test_it_is_never_above_the_share_of_completed_plans(plans):
         done_in(n_agent, n_expert, "done" if done else "step limit", index)
         for index, (n_agent, n_expert, done) in enumerate(plans)
     ]
-    task = summarise_plans(identity(["t"]), records).tasks[TASK]
+    task = summarise_plans(make_plans_config(["t"]), records).tasks[TASK]
     assert 0 <= task.path_weighted.mean <= task.success["total"].mean + 1e-12

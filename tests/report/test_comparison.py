@@ -10,13 +10,13 @@ from infthor_eval.report.comparison import compare, comparison_table
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.suites.nieh import NiehPresenter
 
-from ..nieh.made import record
+from ..helpers.nieh_runs import make_record
 
 ABOVE = "strict, above guessing"
 
 
-def asked(number, reply, score=0.5, mean=0.5):
-    return record(
+def make_guessed_record(number, reply, score=0.5, mean=0.5):
+    return make_record(
         number, reply, guess=Guess(form="f", scores={"strict": score}, form_scores={"strict": mean})
     )
 
@@ -29,12 +29,12 @@ def compared(first, second, presenter=None):
 
 def test_further_scores_are_those_above_guessing_where_guessing_does_not_solve_the_form():
     presenter = NiehPresenter()
-    assert presenter.further_scores(asked(0, "mug", 0.0)) == {ABOVE: 2.0}
-    assert presenter.further_scores(asked(0, "cup", 1.0)) == {ABOVE: -2.0}
-    assert presenter.further_scores(asked(0, None, 0.25, 0.75)) == {ABOVE: -1.0}
-    assert presenter.further_scores(asked(0, "mug", 1.0, 0.96)) == {}
-    assert presenter.further_scores(record(0, "mug")) == {}
-    assert PlainPresenter().further_scores(asked(0, "mug")) == {}
+    assert presenter.further_scores(make_guessed_record(0, "mug", 0.0)) == {ABOVE: 2.0}
+    assert presenter.further_scores(make_guessed_record(0, "cup", 1.0)) == {ABOVE: -2.0}
+    assert presenter.further_scores(make_guessed_record(0, None, 0.25, 0.75)) == {ABOVE: -1.0}
+    assert presenter.further_scores(make_guessed_record(0, "mug", 1.0, 0.96)) == {}
+    assert presenter.further_scores(make_record(0, "mug")) == {}
+    assert PlainPresenter().further_scores(make_guessed_record(0, "mug")) == {}
 
 
 def test_runs_are_compared_above_guessing_on_the_questions_that_have_it():
@@ -45,12 +45,16 @@ def test_runs_are_compared_above_guessing_on_the_questions_that_have_it():
         ("mug", "cup", "mug", "mug", "mug", "cup"),
     )
     runs = [
-        [record(0, first), asked(1, second, 1.0, 1.0), *map(asked, (2, 3, 6, 7), counted)]
+        [
+            make_record(0, first),
+            make_guessed_record(1, second, 1.0, 1.0),
+            *map(make_guessed_record, (2, 3, 6, 7), counted),
+        ]
         for first, second, *counted in replies
     ]
-    found = compared(*runs)
-    assert list(found) == ["reference", "strict", ABOVE]
-    plain, above = found["strict"], found[ABOVE]
+    comparisons = compared(*runs)
+    assert list(comparisons) == ["reference", "strict", ABOVE]
+    plain, above = comparisons["strict"], comparisons[ABOVE]
     assert (plain.first, plain.second, plain.difference.estimate.n) == (4 / 6, 4 / 6, 6)
     # From 2 of 4 right to 3 of 4: (0.5 - 0.5) / 0.5 = 0 and (0.75 - 0.5) / 0.5 = 0.5.
     assert (above.first, above.second, above.difference.estimate.n) == (0.0, 0.5, 4)
@@ -59,39 +63,47 @@ def test_runs_are_compared_above_guessing_on_the_questions_that_have_it():
         2,
     )
     assert above.is_share
-    row = comparison_table(found.values(), "a", "b").rows[-1].cells
+    row = comparison_table(comparisons.values(), "a", "b").rows[-1].cells
     assert row[:6] == ("nieh_gt", ABOVE, "%", "0.00", "50.00", "+50.00")
     assert row[-2:] == ("4", "0")
 
 
 def test_a_question_that_only_one_run_has_it_for_is_not_compared_in_it():
-    first = [asked(0, "mug"), asked(1, "mug"), record(2, "mug")]
-    second = [asked(0, "cup"), record(1, "cup"), asked(2, "cup")]
-    found = compared(first, second)
-    assert (found["strict"].difference.estimate.n, found[ABOVE].difference.estimate.n) == (3, 1)
-    assert (found[ABOVE].first, found[ABOVE].second) == (1.0, -1.0)
-    assert ABOVE not in compared(first[:2], [record(0, "mug"), record(1, "mug")])
+    first = [make_guessed_record(0, "mug"), make_guessed_record(1, "mug"), make_record(2, "mug")]
+    second = [make_guessed_record(0, "cup"), make_record(1, "cup"), make_guessed_record(2, "cup")]
+    comparisons = compared(first, second)
+    assert (
+        comparisons["strict"].difference.estimate.n,
+        comparisons[ABOVE].difference.estimate.n,
+    ) == (3, 1)
+    assert (comparisons[ABOVE].first, comparisons[ABOVE].second) == (1.0, -1.0)
+    assert ABOVE not in compared(first[:2], [make_record(0, "mug"), make_record(1, "mug")])
     assert ABOVE not in compared(first, second, PlainPresenter())
 
 
 def test_a_metric_that_one_run_has_not_is_not_compared():
     """A task may have the reference scorer alone; to a run without any result, every metric is
     0."""
-    alone = [asked(0, "mug"), asked(1, None)]
+    alone = [make_guessed_record(0, "mug"), make_guessed_record(1, None)]
     alone[0] = replace(alone[0], payload=replace(alone[0].payload, scores={"reference": 1.0}))
-    both = [asked(0, "mug"), asked(1, "mug")]
+    both = [make_guessed_record(0, "mug"), make_guessed_record(1, "mug")]
     assert list(compared(alone, both)) == list(compared(both, alone)) == ["reference"]
-    assert list(compared([asked(0, None)], both)) == ["reference", "strict", ABOVE]
+    assert list(compared([make_guessed_record(0, None)], both)) == ["reference", "strict", ABOVE]
 
 
 def test_units_that_one_run_alone_has_are_counted_and_without_a_shared_one_there_is_an_error():
-    found = compared(
-        [asked(0, "mug"), asked(1, "mug")], [asked(1, "mug"), asked(2, "mug"), asked(3, "mug")]
+    comparisons = compared(
+        [make_guessed_record(0, "mug"), make_guessed_record(1, "mug")],
+        [
+            make_guessed_record(1, "mug"),
+            make_guessed_record(2, "mug"),
+            make_guessed_record(3, "mug"),
+        ],
     )
-    assert {metric: one.n_unshared for metric, one in found.items()} == {
+    assert {metric: one.n_unshared for metric, one in comparisons.items()} == {
         "reference": 3,
         "strict": 3,
         ABOVE: 3,
     }
     with pytest.raises(DataError, match="share no unit of the same task"):
-        compared([record(0, "mug")], [record(1, "mug")])
+        compared([make_record(0, "mug")], [make_record(1, "mug")])

@@ -91,7 +91,7 @@ def test_latex_has_no_letter_that_acts_and_reads_back(rows):
         assert len(cells) == 2
         for cell, text in zip(cells, row, strict=True):
             assert not re.search(r"[&%$#_{}~^\\]", _TOKEN.sub("", cell))
-            assert _TOKEN.sub(lambda found: _COMMANDS[found.group()], cell) == text
+            assert _TOKEN.sub(lambda token: _COMMANDS[token.group()], cell) == text
 
 
 @given(TABLES)
@@ -108,16 +108,16 @@ def test_markdown_has_as_many_cells_as_the_table_and_reads_back(rows):
 
 def test_titles_notes_and_published_numbers_are_kept():
     rows = (Row(("a", "1"), ends_section=True), Row(("b",), is_published=True))
-    told = Table("A & B", (Column("name", False), Column("number")), rows, ("50 % of it",))
-    latex = export_tables([told], "latex")
+    titled = Table("A & B", (Column("name", False), Column("number")), rows, ("50 % of it",))
+    latex = export_tables([titled], "latex")
     assert latex.splitlines()[0] == "% A & B"
     assert latex.count(r"\midrule") == 2
     assert r"b &  \\" in latex
     assert latex.rstrip().endswith("% 50 % of it")
-    markdown = export_tables([told, told], "markdown")
+    markdown = export_tables([titled, titled], "markdown")
     assert markdown.count("**A & B**") == 2
-    assert export_tables([told], "csv") == "name,number\na,1\nb,\n"
-    assert export_tables([told, told], "csv").count("# 50 % of it\n") == 2
+    assert export_tables([titled], "csv") == "name,number\na,1\nb,\n"
+    assert export_tables([titled, titled], "csv").count("# 50 % of it\n") == 2
 
 
 @pytest.mark.parametrize("form", ["csv", "latex", "markdown"])

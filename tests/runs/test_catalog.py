@@ -35,7 +35,7 @@ def test_an_unknown_name_is_answered_with_the_nearest(name, near):
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "expected"),
     [
         ("task: [", "not YAML"),
         ("- a", "not a mapping"),
@@ -45,9 +45,9 @@ def test_an_unknown_name_is_answered_with_the_nearest(name, near):
         ("include: none.yaml\ntask: a", "cannot be read"),
     ],
 )
-def test_a_broken_task_file_is_named(tmp_path, content, said):
+def test_a_broken_task_file_is_named(tmp_path, content, expected):
     (tmp_path / "a.yaml").write_text(content)
-    with pytest.raises(DataError, match=said) as caught:
+    with pytest.raises(DataError, match=expected) as caught:
         Catalog(tmp_path).expand(["a"])
     assert "yaml" in str(caught.value)
     assert "\n" not in str(caught.value)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from infthor_eval.runs import Usage, execute, prepare
 from infthor_eval.runs.results import write_usage
-from tests.runs.toy import ToySuite
+from tests.helpers.toy_suite import ToySuite
 from tests.runs.toy_command import request
 
 COUNTS = st.integers(0, 10**9)
@@ -27,7 +27,7 @@ def test_the_hit_rate_is_a_share_of_what_was_read(counts: list[tuple[int, int]])
 
 
 @pytest.mark.parametrize(
-    ("usage", "said"),
+    ("usage", "description"),
     [
         (
             Usage(2, 1000, 250, 10),
@@ -41,8 +41,8 @@ def test_the_hit_rate_is_a_share_of_what_was_read(counts: list[tuple[int, int]])
         ),
     ],
 )
-def test_usage_in_words(usage: Usage, said: str) -> None:
-    assert usage.description == said
+def test_usage_in_words(usage: Usage, description: str) -> None:
+    assert usage.description == description
 
 
 def test_what_was_taken_is_written_as_it_is(tmp_path: Any) -> None:

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from infthor_eval.runs import RunRequest, TaskFile, TaskRequest
-from tests.runs.toy import Sums, ToySuite, suite_of
+from tests.helpers.toy_suite import Sums, ToySuite, make_suite
 
 
 def request(output, **changes):
@@ -38,5 +38,5 @@ if __name__ == "__main__":
     from infthor_eval.cli.commands.run import evaluate
     from infthor_eval.cli.options.show import ShowOptions
 
-    suite = suite_of(Gated) if len(sys.argv) > 2 else ToySuite()
+    suite = make_suite(Gated) if len(sys.argv) > 2 else ToySuite()
     sys.exit(evaluate([(request(Path(sys.argv[1])), suite)], ShowOptions()))

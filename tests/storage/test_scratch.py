@@ -10,8 +10,10 @@ from infthor_eval.storage import scratch
 from infthor_eval.storage.scratch import ScratchFolder
 
 _HOLD = (
-    "import time\nfrom infthor_eval.storage.scratch import ScratchFolder\nfolder = "
-    "ScratchFolder()\n{}\n"
+    "import time\n"
+    "from infthor_eval.storage.scratch import ScratchFolder\n"
+    "folder = ScratchFolder()\n"
+    "{}\n"
 )
 
 

@@ -17,7 +17,7 @@ def simulator():
         yield simulator
 
 
-def told(vector: Vector) -> dict[str, float]:
+def as_arguments(vector: Vector) -> dict[str, float]:
     return {"x": vector.x, "y": vector.y, "z": vector.z}
 
 
@@ -86,7 +86,7 @@ def test_a_refused_movement_says_why(simulator):
 def test_a_recorded_scene_is_restored_for_the_arm_as_for_the_default_agent(simulator):
     view = simulator.reset("kitchen-1")
     poses = [
-        ObjectPose(o.name, told(o.position), told(o.rotation))
+        ObjectPose(o.name, as_arguments(o.position), as_arguments(o.rotation))
         for o in view.objects.values()
         if o.pickupable
     ]

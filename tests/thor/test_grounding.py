@@ -34,8 +34,8 @@ def test_a_type_that_was_renamed():
 def test_two_recorded_things_are_two_things():
     world = view(ONE, OTHER)
     grounding = Grounding(world)
-    found = [grounding.ground(f"Apple|+00.{n}|+00.90|+00.00", world) for n in ("05", "06", "05")]
-    assert found == [ONE.object_id, OTHER.object_id, ONE.object_id]
+    grounded = [grounding.ground(f"Apple|+00.{n}|+00.90|+00.00", world) for n in ("05", "06", "05")]
+    assert grounded == [ONE.object_id, OTHER.object_id, ONE.object_id]
 
 
 def test_furniture_may_be_merged():

@@ -13,7 +13,8 @@ from infthor_eval.errors import SimulatorError
 from infthor_eval.thor.launch import Launch, embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
-from .test_simulator import children, open_files, scripted
+from ..helpers.processes import find_children
+from .test_simulator import open_files, scripted
 
 SCENE = "kitchen-3"
 
@@ -162,12 +163,12 @@ def test_two_hundred_starts_and_stops_leave_nothing(tmp_path, monkeypatch):
 
     cycle()
     gc.collect()
-    before = children(), open_files(), threading.active_count()
+    before = find_children(), open_files(), threading.active_count()
     memory = resident()
     for _ in range(200):
         cycle()
     gc.collect()
-    assert (children(), open_files(), threading.active_count()) == before
+    assert (find_children(), open_files(), threading.active_count()) == before
     assert [path.name for path in tmp_path.iterdir()] == []
     assert resident() - memory < 20
 

@@ -34,11 +34,11 @@ def test_it_shows_several_times_as_many_objects_as_the_first_frame(
     assert any(
         abs(place.x - pose.position.x) + abs(place.z - pose.position.z) < 0.01 for place in places
     )
-    shown = simulator.query(**teleport_call(pose))
-    assert shown.success
-    assert n_seen(shown) >= 2 * n_seen(first)
-    assert n_seen(shown) >= 8
-    largest = max(instance.pixels for instance in shown.instances.values())
+    room_view = simulator.query(**teleport_call(pose))
+    assert room_view.success
+    assert n_seen(room_view) >= 2 * n_seen(first)
+    assert n_seen(room_view) >= 8
+    largest = max(instance.pixels for instance in room_view.instances.values())
     assert largest < 0.4 * SIZE * SIZE
 
 

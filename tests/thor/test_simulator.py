@@ -1,5 +1,4 @@
 import gc
-import os
 import shlex
 import sys
 import threading
@@ -11,7 +10,8 @@ from infthor_eval.errors import SimulatorError
 from infthor_eval.thor.launch import Launch, embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
-from ..waiting import PATIENCE_S
+from ..helpers.processes import find_children
+from ..helpers.waiting import PATIENCE_S
 
 PEER = Path(__file__).with_name("scripted_peer.py")
 
@@ -27,11 +27,6 @@ def scripted(tmp_path, fault="none", action="-", number=1):
     )
 
 
-def children():
-    path = Path(f"/proc/self/task/{os.getpid()}/children")
-    return path.read_text().split()
-
-
 def open_files():
     return len(list(Path("/proc/self/fd").iterdir()))
 
@@ -40,10 +35,10 @@ def open_files():
 def nothing_left_behind(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     gc.collect()  # of what earlier tests left open
-    before = children(), open_files(), threading.active_count()
+    before = find_children(), open_files(), threading.active_count()
     yield
     gc.collect()
-    assert (children(), open_files(), threading.active_count()) == before
+    assert (find_children(), open_files(), threading.active_count()) == before
     assert not (tmp_path / "home/.ai2thor").exists()
 
 

@@ -12,9 +12,9 @@ from infthor_eval.thor.view import instances_of
     )
 )
 def test_instances_count_and_box_every_code(codes):
-    found = instances_of(codes)
-    assert set(found) == set(np.unique(codes).tolist())
-    for code, instance in found.items():
+    instances = instances_of(codes)
+    assert set(instances) == set(np.unique(codes).tolist())
+    for code, instance in instances.items():
         rows, columns = np.nonzero(codes == code)
         assert instance.pixels == len(rows)
         assert instance.box == (columns.min(), rows.min(), columns.max(), rows.max())

@@ -8,13 +8,13 @@ def thing(object_id, **fields):
     parts = object_id.split("|")
     position = Vector(*(float(part) for part in parts[1:4]))
     object_type = parts[4].split("_")[0] if len(parts) > 4 else parts[0]
-    given = {
+    defaults = {
         "name": f"{object_type}_{len(object_id)}",
         "position": position,
         "visible": True,
         **fields,
     }
-    return ThorObject(object_id=object_id, object_type=object_type, **given)
+    return ThorObject(object_id=object_id, object_type=object_type, **defaults)
 
 
 def view(*things, inventory=(), instances=None):

@@ -20,6 +20,8 @@ from infthor_eval.training.action_sequences import recorded_segments, single_pla
 from infthor_eval.training.encoding import SkippedSequence, TrainingSequence
 from model_adapters.hf.prompting.prompt import Frame
 
+from ..helpers.prompts import join_parts
+
 _ACTION = re.compile(r"<\|act\|>(.*?)<\|act\|>")
 
 
@@ -31,10 +33,6 @@ def segments_of(root, name):
 
 def names_in(root):
     return sorted(path.name for path in (root / "metadata").iterdir())
-
-
-def text_of(parts):
-    return "".join(part if isinstance(part, str) else "<image>" for part in parts)
 
 
 def text_of_ids(encoder, pieces):
@@ -52,12 +50,14 @@ def trained_text(encoder, sequence):
 def test_a_recorded_history_says_what_the_replay_wrote(bundled_set):
     for name in names_in(bundled_set):
         parts = segment_parts(segments_of(bundled_set, name))
-        assert text_of(parts) == (bundled_set / "metadata" / name / "traj.txt").read_text().strip()
+        assert (
+            join_parts(parts) == (bundled_set / "metadata" / name / "traj.txt").read_text().strip()
+        )
         frames = [part for part in parts if isinstance(part, FrameRef)]
-        shown = NiehSet(bundled_set).frames(name)
+        all_frames = NiehSet(bundled_set).frames(name)
         # One frame per action, the last one of it, and the first; those at the start of a task come
         # again.
-        assert set(frames) <= set(shown)
+        assert set(frames) <= set(all_frames)
         assert [frame for frame, _ in itertools.groupby(frames)] == sorted(
             set(frames), key=lambda frame: frame.path
         )
@@ -140,9 +140,11 @@ def test_an_agent_is_asked_with_what_it_was_trained_on(bundled_set, encoder):
     window = encoder.actions(name, history)
     opens = [at for at, piece in enumerate(window.pieces) if piece == encoder._mark][::2]
     parts = segment_parts(history)
-    asked = [at for at, part in enumerate(parts) if isinstance(part, str) and part.startswith(ACT)]
-    assert len(opens) == len(asked)
-    for place, at in zip(opens, asked, strict=True):
+    requests = [
+        at for at, part in enumerate(parts) if isinstance(part, str) and part.startswith(ACT)
+    ]
+    assert len(opens) == len(requests)
+    for place, at in zip(opens, requests, strict=True):
         assert encoder.pieces([*parts[:at], ACT]) == list(window.pieces[: place + 1])
 
 
@@ -213,7 +215,7 @@ def test_a_sequence_of_130k_tokens_is_built_and_its_labels_are_right(bundled_set
     window, *rest = windows(encoder, "long", history, 131_072)
     assert 128_000 < window.n_tokens <= 131_072
     assert len(rest) == 1
-    text = text_of(segment_parts(history[: window_plans(window)]))
+    text = join_parts(segment_parts(history[: window_plans(window)]))
     assert trained_text(encoder, window) == [
         f"{ACT}{action}{ACT}" for action in _ACTION.findall(text)
     ]

@@ -26,6 +26,8 @@ from infthor_eval.training.recipe import ActionData, Recipe, read_recipe
 from infthor_eval.training.starting_model import load_starting_model
 from model_adapters.hf.prompting.prompt import Frame
 
+from ..helpers.prompts import join_parts
+
 GOLDEN = Path(__file__).parents[1] / "goldens" / "final_sequences.jsonl.gz"
 SIZE = 28
 
@@ -72,7 +74,7 @@ def recipe(form, limit=32768):
     )
 
 
-def shown(encoder, sequence):
+def read_sequence(encoder, sequence):
     """The text of a sequence with a mark for each frame, and the names of its frames."""
     pieces = [piece if isinstance(piece, int) else None for piece in sequence.pieces]
     runs = itertools.groupby(pieces, key=lambda piece: piece is None)
@@ -113,13 +115,9 @@ def test_windows_of_goals_are_those_of_the_published_class(golden, make_set, lim
     ]
     assert len(windows) == len(expected)
     for parts, line in zip(windows, expected, strict=True):
-        turns = [["system", system_prompt("goals")], ["user", text_of(parts)]]
+        turns = [["system", system_prompt("goals")], ["user", join_parts(parts)]]
         assert turns == line["messages"]
         assert [part.path.name for part in parts if isinstance(part, FrameRef)] == line["frames"]
-
-
-def text_of(parts):
-    return "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
 
 
 @pytest.mark.parametrize("form", ["goals", "text", "frames"])
@@ -131,7 +129,7 @@ def test_sequences_are_those_of_the_published_classes(golden, make_set, encoder,
     assert data.skipped == []
     assert len(data.sequences) == len(expected) > 0
     for sequence, line in zip(data.sequences, expected, strict=True):
-        text, frames = shown(encoder, sequence)
+        text, frames = read_sequence(encoder, sequence)
         of_turns = written(line["messages"])
         # A turn without a reply is asked for one; behind a reply the line break is left out.
         # Neither matters.
@@ -140,7 +138,9 @@ def test_sequences_are_those_of_the_published_classes(golden, make_set, encoder,
         )
         assert frames[:-1] == line["frames"][:-1]
         assert form == "frames" or frames[-1] == line["frames"][-1]
-        assert trained(encoder, sequence) == [said.removesuffix("\n") for said in line["trained"]]
+        assert trained(encoder, sequence) == [
+            text_of_loss.removesuffix("\n") for text_of_loss in line["trained"]
+        ]
 
 
 def test_the_current_frame_is_the_one_before_the_action_where_the_published_class_takes_another(
@@ -153,7 +153,7 @@ def test_the_current_frame_is_the_one_before_the_action_where_the_published_clas
     }
     published = [line["frames"][-1] for line in golden if line.get("form") == "frames"]
     data = read_training_data(recipe("frames"), encoder, [make_set()])
-    ours = [shown(encoder, sequence)[1][-1] for sequence in data.sequences]
+    ours = [read_sequence(encoder, sequence)[1][-1] for sequence in data.sequences]
     actions = {
         int(action): entry["top20"] for action, entry in trajectory["retrieved_image"].items()
     }
@@ -195,11 +195,8 @@ def test_a_trajectory_without_a_memory_is_left_out_and_told(
 
 def test_actions_that_cannot_be_used_are_left_out_and_told(make_set, encoder, golden):
     retrieved = golden[0]["trajectory"]["retrieved_image"]
-    wrong = {
-        "7": {"top20": []},
-        "99": {"top20": []},
-        "3": {"top20": ["000000099.png"]},
-    }  # 7 is between two tasks
+    # 7 is between two tasks.
+    wrong = {"7": {"top20": []}, "99": {"top20": []}, "3": {"top20": ["000000099.png"]}}
     data = read_training_data(
         recipe("frames"), encoder, [make_set(retrieved_image=retrieved | wrong)]
     )
@@ -222,7 +219,7 @@ def test_what_is_too_long_is_left_out_and_told(make_set, encoder):
 
 
 @pytest.mark.parametrize(
-    ("settings", "said"),
+    ("settings", "expected"),
     [
         (
             {"prompt": "plain"},
@@ -236,8 +233,8 @@ def test_what_is_too_long_is_left_out_and_told(make_set, encoder):
         ({"actions.form": "goal"}, "Invalid enum value 'goal'"),
     ],
 )
-def test_settings_that_do_not_fit_are_told(settings, said):
-    with pytest.raises(UsageError, match=said):
+def test_settings_that_do_not_fit_are_told(settings, expected):
+    with pytest.raises(UsageError, match=expected):
         read_recipe("final_goals", settings)
 
 

@@ -8,7 +8,6 @@ import subprocess
 import sys
 
 import pytest
-from safetensors.torch import load_file
 
 from infthor_eval.errors import InfthorError
 from infthor_eval.nieh.docs import doc_target
@@ -18,7 +17,9 @@ from infthor_eval.training.recipe import read_recipe
 from model_adapters import Decoding, load
 
 from ..conftest import QUESTIONS
-from ..waiting import wait_until
+from ..helpers.processes import cli_words
+from ..helpers.waiting import wait_until
+from .twins import read_weights
 
 RECIPE = """
 title: a small one
@@ -52,13 +53,7 @@ def train(recipe, data, out, **changes):
 
 
 def command(recipe, data, out, *more):
-    code = "from infthor_eval.cli import main; main()"
-    words = ["train", "--recipe", recipe, "--data", data, "--out", out, *more]
-    return [sys.executable, "-c", code, *map(str, words)]
-
-
-def weights(folder):
-    return load_file(folder / "checkpoint" / "model.safetensors")
+    return cli_words("train", "--recipe", recipe, "--data", data, "--out", out, *more)
 
 
 def same(first, second):
@@ -77,8 +72,8 @@ def test_a_trained_model_answers_as_it_was_trained_to_behind_its_familys_adapter
     samples = find_samples({"data": str(data), "context": "clues"})
     for sample in samples.samples:
         talk = model.conversation()
-        shown, text = samples.request(sample)
-        talk.append(*shown, text)
+        context, text = samples.request(sample)
+        talk.append(*context, text)
         assert talk.reply(Decoding(max_new_tokens=10)).text == doc_target(sample.question)
 
 
@@ -87,10 +82,10 @@ import sys
 from pathlib import Path
 from infthor_eval.training.fine_tuning import fine_tune, prepare_run
 from infthor_eval.training.recipe import read_recipe
-told = []
-fine_tune(prepare_run(read_recipe(sys.argv[1]), [Path(sys.argv[2])]), Path(sys.argv[3]), \
-told.append)
-print(told[0].step, told[-1].step)
+steps = []
+run = prepare_run(read_recipe(sys.argv[1]), [Path(sys.argv[2])])
+fine_tune(run, Path(sys.argv[3]), steps.append)
+print(steps[0].step, steps[-1].step)
 """
 
 
@@ -116,15 +111,15 @@ def test_a_run_that_is_killed_ends_with_the_weights_of_one_that_is_not(recipe, d
         (states / "checkpoint-11" / name).unlink(missing_ok=True)
     first, last = map(int, start("killed").communicate()[0].split())
     assert 1 < first <= last == 12
-    assert same(weights(tmp_path / "killed"), weights(tmp_path / "whole"))
+    assert same(read_weights(tmp_path / "killed"), read_weights(tmp_path / "whole"))
 
 
-def test_a_folder_is_one_runs(recipe, data, tmp_path, run):
+def test_a_folder_is_one_runs(recipe, data, tmp_path, run_cli):
     train(recipe, data, tmp_path / "out", max_steps=1)
     about = json.loads((tmp_path / "out" / "training.json").read_text())
     assert (about["sequences"], about["recipe"]["max_steps"]) == (5, 1)
     words = ["train", "--recipe", recipe, "--data", data, "--out", tmp_path / "out"]
-    code, _, err = run(*words, "--set", "max_steps=2")
+    code, _, err = run_cli(*words, "--set", "max_steps=2")
     assert (code, err.strip().splitlines()[-1]) == (
         2,
         f"infthor-eval: {tmp_path}/out is a run of another recipe; give another folder with --out",
@@ -141,7 +136,7 @@ def test_adapters_are_trained_and_merged(recipe, data, tmp_path):
     assert after.keys() == before.keys()
     changed = {name.split(".")[-2] for name in after if not after[name].equal(before[name])}
     assert changed == {"q_proj", "k_proj", "v_proj", "o_proj", "gate_proj", "up_proj", "down_proj"}
-    assert not any("lora" in name for name in weights(tmp_path / "out"))
+    assert not any("lora" in name for name in read_weights(tmp_path / "out"))
 
 
 @pytest.mark.parametrize("rope", ["dynamic", "longrope"])

@@ -79,9 +79,8 @@ def test_the_loss_falls(
     _run(model, sequences, tmp_path, steps.append, max_steps=20, sequences_per_step=5)
     assert [progress.step for progress in steps] == list(range(1, 21))
     assert steps[-1].loss < steps[0].loss / 4
-    assert steps[0].learning_rate == pytest.approx(
-        3e-3 / 5
-    )  # the first of four steps of a warm-up has a part already
+    # The first of four steps of a warm-up has a part already.
+    assert steps[0].learning_rate == pytest.approx(3e-3 / 5)
     assert steps[4].learning_rate == pytest.approx(3e-3)
     assert all(progress.tokens_per_second > 0 and progress.gradient_norm > 0 for progress in steps)
     assert not model.training

@@ -159,13 +159,13 @@ def test_a_frame_that_stands_twice_is_computed_once(
 ) -> None:
     first, second = write_frames(tmp_path, 2)
     batch = collate([sequence(qwen, [first, second, first])], qwen.family, PAD)
-    asked: list[int] = []
+    n_images: list[int] = []
     compute = qwen.family.features
     monkeypatch.setattr(
-        qwen.family, "features", lambda images: asked.append(len(images)) or compute(images)
+        qwen.family, "features", lambda images: n_images.append(len(images)) or compute(images)
     )
     SequenceModel(qwen)(**batch)
-    assert asked == [2]
+    assert n_images == [2]
 
 
 def test_sequences_without_frames_are_trained_on_too(qwen: LoadedCheckpoint) -> None:

@@ -9,13 +9,12 @@ from pathlib import Path
 import msgspec
 import psutil
 import pytest
-import torch
 import yaml
-from safetensors.torch import load_file
 
 from infthor_eval.training.recipe import Parallel, Recipe, read_recipe
 
-from ..waiting import PATIENCE_S, wait_until
+from ..helpers.waiting import PATIENCE_S, wait_until
+from .twins import read_weights
 
 SCALE = 16
 PROGRAM = Path(sys.executable).with_name("infthor-eval")
@@ -72,22 +71,18 @@ def launcher(n_processes: int) -> list[str]:
     ]
 
 
-def weights_of(out: Path) -> dict[str, torch.Tensor]:
-    return load_file(out / "checkpoint" / "model.safetensors")
-
-
 @pytest.mark.parametrize(
     ("name", "n_processes"), [("infthor_32k", 1), ("infthor_64k", 2), ("infthor_130k", 4)]
 )
 def test_it_trains(bundled_set: Path, tmp_path: Path, name: str, n_processes: int) -> None:
     recipe = scaled(name, n_processes)
     training = started(recipe, n_processes, bundled_set, tmp_path / "out")
-    said, _ = training.communicate(timeout=PATIENCE_S)
-    assert training.returncode == 0, said[-2000:]
+    output, _ = training.communicate(timeout=PATIENCE_S)
+    assert training.returncode == 0, output[-2000:]
     about = msgspec.json.decode((tmp_path / "out" / "training.json").read_bytes())
     assert about["recipe"]["max_tokens"] == recipe.max_tokens
     assert about["sequences"] > 0
-    assert all(weight.isfinite().all() for weight in weights_of(tmp_path / "out").values())
+    assert all(weight.isfinite().all() for weight in read_weights(tmp_path / "out").values())
 
 
 def test_processes_that_share_sequences_and_are_killed_end_with_the_weights_of_others(
@@ -101,17 +96,15 @@ def test_processes_that_share_sequences_and_are_killed_end_with_the_weights_of_o
     killed = started(recipe, 2, bundled_set, tmp_path / "killed")
     wait_until(lambda: list((tmp_path / "killed" / "states").glob("step-00000?")), killed)
     launching = psutil.Process(killed.pid)
-    for process in (
-        *launching.children(recursive=True),
-        launching,
-    ):  # each worker has a session of its own
+    # Each worker has a session of its own.
+    for process in (*launching.children(recursive=True), launching):
         process.kill()
     killed.communicate()
     assert not (tmp_path / "killed" / "checkpoint").exists()
     again = started(recipe, 2, bundled_set, tmp_path / "killed")
-    said, _ = again.communicate(timeout=PATIENCE_S)
-    assert again.returncode == 0, said[-2000:]
-    assert "step 6 of 6" in said
-    first, second = weights_of(tmp_path / "whole"), weights_of(tmp_path / "killed")
+    output, _ = again.communicate(timeout=PATIENCE_S)
+    assert again.returncode == 0, output[-2000:]
+    assert "step 6 of 6" in output
+    first, second = read_weights(tmp_path / "whole"), read_weights(tmp_path / "killed")
     assert first.keys() == second.keys()
     assert all(first[name].equal(second[name]) for name in first)

@@ -9,6 +9,8 @@ from infthor_eval.training.published import import_weights
 from infthor_eval.training.starting_model import load_starting_model
 from model_adapters import load
 
+from ..helpers.command_line import option_words
+
 
 def tiny(seed):
     return load_starting_model("llava-onevision-tiny", {}, "plain", seed)
@@ -44,10 +46,7 @@ def test_weights_are_taken_over_whatever_stands_before_their_names(tmp_path, pre
 @pytest.mark.parametrize(
     ("model", "renamed"),
     [
-        (
-            "qwen2.5-vl-tiny",
-            [("model.visual.", "visual."), ("model.language_model.", "model.")],
-        ),
+        ("qwen2.5-vl-tiny", [("model.visual.", "visual."), ("model.language_model.", "model.")]),
         (
             "llava-onevision-tiny",
             [
@@ -78,20 +77,15 @@ def test_weights_are_taken_over_by_the_names_of_the_transformers_of_the_publishe
     assert all(tensor.equal(wanted[name]) for name, tensor in other.model.state_dict().items())
 
 
-def test_a_chat_keeps_the_chat_template(tmp_path, run):
+def test_a_chat_keeps_the_chat_template(tmp_path, run_cli):
     tiny_qwen = load_starting_model("qwen2.5-vl-tiny", {}, "chat", 0)
     folder = saved(tiny_qwen, tmp_path / "dcp", "model.")
     words = (
         "import-checkpoint",
         folder,
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--prompt",
-        "chat",
-        "--out",
-        tmp_path / "out",
+        *option_words(model="qwen2.5-vl-tiny", prompt="chat", out=tmp_path / "out"),
     )
-    code, _, err = run(*words)
+    code, _, err = run_cli(*words)
     assert code == 0, err
     loaded = load(
         "qwen2.5-vl", {"pretrained": str(tmp_path / "out"), "dtype": "float32"}, seed=0
@@ -99,18 +93,15 @@ def test_a_chat_keeps_the_chat_template(tmp_path, run):
     assert loaded.template == tiny_qwen.template
 
 
-def test_the_command_writes_what_the_adapter_loads(tmp_path, run):
+def test_the_command_writes_what_the_adapter_loads(tmp_path, run_cli):
     folder = saved(tiny(0), tmp_path / "dcp", "model.")
     words = [
         "import-checkpoint",
         folder,
-        "--model",
-        "llava-onevision-tiny",
-        "--out",
-        tmp_path / "out",
+        *option_words(model="llava-onevision-tiny", out=tmp_path / "out"),
     ]
-    code, said, err = run(*words)
-    assert (code, "0 kept, 0 other tensors ignored" in said) == (0, True), err
+    code, output, err = run_cli(*words)
+    assert (code, "0 kept, 0 other tensors ignored" in output) == (0, True), err
     options = {"pretrained": str(tmp_path / "out"), "dtype": "float32", "max_tokens": "0"}
     model = load("llava-onevision", options, seed=0)
     ours, theirs = model.loaded.model.state_dict(), tiny(0).model.state_dict()

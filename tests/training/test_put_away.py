@@ -9,12 +9,12 @@ from infthor_eval.thor.simulator import Simulator
 from infthor_eval.training.action_sequences import single_plans
 from infthor_eval.training.data import read_history
 
-from ..plans.cut import write
+from ..helpers.trajectories import write_trajectories
 from ..plans.put_away import PEN, pen_put_away
 
 
 def test_it_is_a_plan_with_its_goal(tmp_path, encoder):
-    data = write(tmp_path / "data", pen_put_away())
+    data = write_trajectories(tmp_path / "data", pen_put_away())
     with Simulator(embedded_launch()) as simulator:
         replayed = replay_set(select([data]), simulator, tmp_path / "set")
     assert not replayed.failures

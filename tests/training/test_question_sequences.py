@@ -32,12 +32,12 @@ def test_questions_are_asked_as_the_evaluation_asks_them(bundled_set, chat_tiny,
         assert len(sequences) == len(samples.samples) > 100
         for sequence, sample in zip(sequences, samples.samples, strict=True):
             context, text = samples.request(sample)
-            asked = encoder._prompter.pieces([Turn("user", (*context, text))])
-            assert list(sequence.pieces[: len(asked)]) == asked
-            assert sequence.has_loss == (False,) * len(asked) + (True,) * (
-                len(sequence.pieces) - len(asked)
+            prompt = encoder._prompter.pieces([Turn("user", (*context, text))])
+            assert list(sequence.pieces[: len(prompt)]) == prompt
+            assert sequence.has_loss == (False,) * len(prompt) + (True,) * (
+                len(sequence.pieces) - len(prompt)
             )
-            reply = sequence.pieces[len(asked) :]
+            reply = sequence.pieces[len(prompt) :]
             assert reply[-1] == loaded.tokenizer.convert_tokens_to_ids("<|im_end|>")
             assert loaded.tokenizer.decode(reply[:-1]) == ", ".join(
                 map(str, sample.question.answers)

@@ -10,6 +10,8 @@ from infthor_eval.formats.published import published_tables
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.training.recipe import read_recipe, recipe_names
 
+from ..helpers.command_line import option_words
+
 
 def test_the_papers_recipes_are_table_5():
     (table,) = published_tables("training")
@@ -58,7 +60,7 @@ def test_model_options_of_a_recipe_apply_to_its_own_model_alone(name):
 
 
 @pytest.mark.parametrize("name", ["infthor_32k", "questions", "final_text"])
-def test_train_takes_another_model_than_the_recipes(name, bundled_set, tmp_path, run):
+def test_train_takes_another_model_than_the_recipes(name, bundled_set, tmp_path, run_cli):
     data = tmp_path / "set"
     shutil.copytree(bundled_set / "metadata/bedroom-1-seed7", data / "metadata/bedroom-1-seed7")
     questions = [
@@ -66,17 +68,10 @@ def test_train_takes_another_model_than_the_recipes(name, bundled_set, tmp_path,
     ]
     if name == "questions":  # trajectories alone are enough for the others
         write_questions(data / "qa_set_small.csv", questions[:3])
-    code, _, err = run(
+    code, _, err = run_cli(
         *(
             "train",
-            "--recipe",
-            name,
-            "--data",
-            data,
-            "--out",
-            tmp_path / "out",
-            "--model",
-            "qwen2.5-vl-tiny",
+            *option_words(recipe=name, data=data, out=tmp_path / "out", model="qwen2.5-vl-tiny"),
         ),
         *("--model-args", "dtype=float32", "--set", "max_steps=1", "--set", "sequences_per_step=1"),
         *("--set", "max_tokens=4000"),

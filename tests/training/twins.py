@@ -6,14 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from PIL import Image
+from safetensors.torch import load_file
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.training.encoding import Encoder, TrainingSequence
 from model_adapters import load
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
-__all__ = ["FAMILIES", "PAD", "everywhere", "loaded", "sequence", "write_frames"]
+__all__ = ["FAMILIES", "PAD", "everywhere", "loaded", "read_weights", "sequence", "write_frames"]
 
 FAMILIES = ("qwen2.5-vl", "llava-onevision", "deepseek-vl", "pixtral")
 PAD = 0
@@ -53,3 +55,8 @@ def sequence(
 def everywhere(encoded: TrainingSequence) -> TrainingSequence:
     """The same sequence with loss on every token of text."""
     return replace(encoded, has_loss=tuple(isinstance(piece, int) for piece in encoded.pieces))
+
+
+def read_weights(out: Path) -> dict[str, torch.Tensor]:
+    """The weights that a training has written."""
+    return load_file(out / "checkpoint" / "model.safetensors")

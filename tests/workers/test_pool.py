@@ -20,31 +20,31 @@ from infthor_eval.workers import (
     run_jobs,
 )
 
-from ..clusters import two_nodes
-from ..waiting import wait_until
+from ..helpers.clusters import two_nodes
+from ..helpers.waiting import wait_until
 from .toys import Job, OpenCounter, broken
 
 
 @pytest.fixture(scope="module")
 def cluster():
     """For all tests but the one that takes a node away, which comes last."""
-    with two_nodes() as (made, _):
-        yield made
+    with two_nodes() as (started, _):
+        yield started
 
 
 @pytest.fixture(params=["processes", "ray"])
 def pool(request):
     """Makes pools, of processes and of actors on two nodes."""
-    made = []
+    pools = []
 
     def make(opening=None, count=2, **more):
         address = request.getfixturevalue("cluster").address if request.param == "ray" else None
         connect = WorkerSettings(count, address).connect(opening or OpenCounter())
-        made.append(Pool(connect, count, **more))
-        return made[-1]
+        pools.append(Pool(connect, count, **more))
+        return pools[-1]
 
     yield make
-    for item in made:
+    for item in pools:
         item.close()
 
 
@@ -76,11 +76,8 @@ def test_a_job_whose_worker_dies_goes_to_another_and_loses_only_what_had_not_com
     events = list(shared.run(3, jobs.__getitem__))
     (lost,) = of(events, WorkerLost)
     assert (lost.job, "worker" in lost.reason) == (1, True)
-    assert counts(events, 1) in (
-        [0, 1, 0, 1, 2, 3],
-        [0, 0, 1, 2, 3],
-        [0, 1, 2, 3],
-    )  # what was sent may die with it
+    # What was sent may die with it.
+    assert counts(events, 1) in ([0, 1, 0, 1, 2, 3], [0, 0, 1, 2, 3], [0, 1, 2, 3])
     assert (counts(events, 0), counts(events, 2)) == ([0, 1, 2], [0, 1])
 
 
@@ -95,7 +92,7 @@ def test_a_job_that_kills_one_worker_after_the_other_is_given_up_and_the_others_
 
 
 @pytest.mark.parametrize(
-    ("error", "kind", "said"),
+    ("error", "kind", "expected"),
     [
         (broken(), DataError, "the abacus is broken; buy another"),
         (OSError(28, "No space left on device", "shard"), OSError, "No space left on device"),
@@ -107,10 +104,10 @@ def test_a_job_that_kills_one_worker_after_the_other_is_given_up_and_the_others_
         ),
     ],
 )
-def test_what_a_worker_raises_is_raised(pool, error, kind, said):
+def test_what_a_worker_raises_is_raised(pool, error, kind, expected):
     shared = pool(count=1)
     shared.open()
-    with pytest.raises(kind, match=said):
+    with pytest.raises(kind, match=expected):
         list(shared.run(1, lambda _: Job(1, raises=error)))
 
 
@@ -189,13 +186,13 @@ def is_running(pid):
 
 
 def test_jobs_of_one_result_come_with_their_numbers_and_what_is_given_up_is_an_error():
-    told = []
+    notes = []
     jobs = [Job(1), Job(1, dies=0), Job(1)]
-    found = dict(run_jobs(OpenCounter(), jobs, WorkerSettings(2), told.append))
-    assert (found[0][1], found[2][1]) == (0, 0)
-    assert isinstance(found[1], WorkerLostError)
-    assert len(told) == 2
-    alone = dict(run_jobs(OpenCounter(), jobs[:1], WorkerSettings(1), told.append))
+    results = dict(run_jobs(OpenCounter(), jobs, WorkerSettings(2), notes.append))
+    assert (results[0][1], results[2][1]) == (0, 0)
+    assert isinstance(results[1], WorkerLostError)
+    assert len(notes) == 2
+    alone = dict(run_jobs(OpenCounter(), jobs[:1], WorkerSettings(1), notes.append))
     assert alone == {0: (os.getpid(), 0)}
 
 
@@ -208,9 +205,9 @@ def test_a_worker_for_which_there_is_no_room_yet_joins_when_its_node_comes():
         for event in shared.run(400, lambda _: Job(1, slow=0.1)):
             events.append(event)
             if len(events) == 5:
-                assert len({made.worker for made in events}) == 1
+                assert len({event_so_far.worker for event_so_far in events}) == 1
                 cluster.add_node(num_cpus=1, object_store_memory=100 * 2**20)
-            if len({made.worker for made in events}) == 2:
+            if len({event_so_far.worker for event_so_far in events}) == 2:
                 break
         shared.close()
     assert {event.worker for event in events} == {1, 2}

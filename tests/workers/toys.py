@@ -9,7 +9,7 @@ from pathlib import Path
 
 from infthor_eval.errors import DataError, ModelError
 
-from ..waiting import wait_until
+from ..helpers.waiting import wait_until
 
 
 @dataclass(frozen=True)

@@ -5,37 +5,37 @@ import json
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 
-from ...nieh.made import record
+from ...helpers.nieh_runs import make_record
 
 REPLIES = (
-    record(0, "Sofa", ("Sofa",)),
-    record(1, "the soft thing", ("Sofa",)),  # unsure
-    record(2, "Bed", ("Sofa",)),
-    record(3, "yes", ("yes",)),
-    record(4, "Bed", ("Bed",)),
-    record(5, "the bin", ("Bed",)),  # unsure
-    record(6, None, ("Bed",), failure="m fails"),
-    record(7, "Bed, sofa", ("Bed", "Sofa", "Desk")),  # two of three
+    make_record(0, "Sofa", ("Sofa",)),
+    make_record(1, "the soft thing", ("Sofa",)),  # unsure
+    make_record(2, "Bed", ("Sofa",)),
+    make_record(3, "yes", ("yes",)),
+    make_record(4, "Bed", ("Bed",)),
+    make_record(5, "the bin", ("Bed",)),  # unsure
+    make_record(6, None, ("Bed",), failure="m fails"),
+    make_record(7, "Bed, sofa", ("Bed", "Sofa", "Desk")),  # two of three
 )
 
 
-def scores_in(folder, metric):
+def read_scores(folder, metric):
     return {one.id: one.payload.scores.get(metric) for one in read_run(folder, RECORDS)[1]}
 
 
-def lines_of(folder):
+def read_journal_lines(folder):
     return (folder / "journal" / "worker-0.jsonl").read_text().splitlines()
 
 
-def report_in(folder):
+def read_report(folder):
     return json.loads((folder / "rescored.json").read_text())
 
 
-def row(said, *beginning):
+def read_row(output, *beginning):
     """The rest of the row of a printed table that begins like this."""
-    (found,) = [
+    (cells,) = [
         line.split()
-        for line in said.splitlines()
+        for line in output.splitlines()
         if line.split()[: len(beginning)] == list(beginning)
     ]
-    return found[len(beginning) :]
+    return cells[len(beginning) :]

@@ -2,31 +2,32 @@
 
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question
-from tests.faults.told import said_in_one_line
+from tests.helpers.command_line import assert_refused
 
 
 def leaking(n=40):
     """All mugs are there, and no book; and as many questions that nothing gives away."""
-    asked = [(f"t{k}", *(("mug", "yes"), ("book", "no"))[k % 2]) for k in range(n)]
+    rows = [(f"t{k}", *(("mug", "yes"), ("book", "no"))[k % 2]) for k in range(n)]
     questions = [
-        Question(t, f"Is there any {item} in this room?", (1,), (said,)) for t, item, said in asked
+        Question(t, f"Is there any {item} in this room?", (1,), (answer,))
+        for t, item, answer in rows
     ]
     fair = [
         (f"t{k % 8}", f"Have you seen a thing{k}?", ("yes", "no")[k // 2 % 2]) for k in range(n)
     ]
-    return [*questions, *(Question(t, text, (1,), (said,)) for t, text, said in fair)]
+    return [*questions, *(Question(t, text, (1,), (answer,)) for t, text, answer in fair)]
 
 
-def test_a_set_is_audited_beside_a_run(make_nieh_set, tmp_path, run):
+def test_a_set_is_audited_beside_a_run(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(leaking(24), size=8)
     assert (
-        run(
+        run_cli(
             "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
         )[0]
         == 0
     )
     (folder,) = (tmp_path / "out" / "oracle").iterdir()
-    code, out, _ = run("audit", data, folder)
+    code, out, _ = run_cli("audit", data, folder)
     assert code == 0
     text = " ".join(out.split())
     assert (
@@ -36,9 +37,9 @@ def test_a_set_is_audited_beside_a_run(make_nieh_set, tmp_path, run):
     assert "100.0 (solved)" in text
 
 
-def test_the_balanced_part_is_written(make_nieh_set, tmp_path, run):
+def test_the_balanced_part_is_written(make_nieh_set, tmp_path, run_cli):
     data, part = make_nieh_set(leaking(), size=8), tmp_path / "qa_set_part.csv"
-    code, _, err = run("audit", data, "--balanced", part)
+    code, _, err = run_cli("audit", data, "--balanced", part)
     assert code == 0
     kept = read_questions(part)
     assert f"{part}: {len(kept)} of" in err
@@ -47,15 +48,17 @@ def test_the_balanced_part_is_written(make_nieh_set, tmp_path, run):
     )
 
 
-def test_what_cannot_be_audited_is_one_line(make_nieh_set, tmp_path, run, scripted_run):
+def test_what_cannot_be_audited_is_one_line(make_nieh_set, tmp_path, run_cli, scripted_run):
     data = make_nieh_set(size=8)
-    said_in_one_line(run("audit", tmp_path / "none"), "no such folder")
-    said_in_one_line(run("audit", data, scripted_run), "only runs of nieh can stand beside guesses")
+    assert_refused(run_cli("audit", tmp_path / "none"), "no such folder")
+    assert_refused(
+        run_cli("audit", data, scripted_run), "only runs of nieh can stand beside guesses"
+    )
     yes = make_nieh_set(
         [Question(f"t{n}", "Have you seen a mug?", (1,), ("yes",)) for n in range(4)],
         size=8,
         name="yes",
     )
-    code, _, err = run("audit", yes, "--balanced", tmp_path / "part.csv")
+    code, _, err = run_cli("audit", yes, "--balanced", tmp_path / "part.csv")
     assert (code, "has a balanced part; nothing is written" in err) == (2, True)
     assert not (tmp_path / "part.csv").exists()

@@ -11,6 +11,8 @@ from infthor_eval.formats.question import Question
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 
 from ...conftest import QUESTIONS
+from ...helpers.command_line import option_words
+from ...helpers.journals import read_records
 from ...model_adapters.checkpoints import save
 
 
@@ -24,17 +26,17 @@ def checkpoints(tmp_path_factory):
 
 
 @pytest.fixture
-def ask(make_nieh_set, tmp_path, run):
+def ask(make_nieh_set, tmp_path, run_cli):
     """Runs `nieh_gt` with the checkpoint in a folder."""
     data = make_nieh_set(size=56)
 
     def ask(model, folder, *options, **model_args):
-        given = ",".join(
+        settings = ",".join(
             f"{key}={value}"
             for key, value in {"pretrained": folder, "device": "cpu", **model_args}.items()
         )
-        arguments = ["--model", model, "--model-args", given, "--tasks", "nieh_gt", "--data", data]
-        return run(*arguments, "--output", tmp_path / "out", *options)
+        arguments = option_words(model=model, model_args=settings, tasks="nieh_gt", data=data)
+        return run_cli(*arguments, "--output", tmp_path / "out", *options)
 
     return ask
 
@@ -123,33 +125,26 @@ BROKEN = {
 def test_a_checkpoint_that_cannot_work_is_one_line_before_any_question(
     checkpoints, tmp_path, ask, name
 ):
-    model, checkpoint, damage, model_args, said = BROKEN[name]
+    model, checkpoint, damage, model_args, expected = BROKEN[name]
     folder = shutil.copytree(checkpoints / checkpoint, tmp_path / "checkpoint")
     damage(folder)
     code, out, err = ask(model, folder, **model_args)
     (line,) = [line for line in err.splitlines() if line.startswith("infthor-eval: ")]
-    assert said in line
+    assert expected in line
     assert (code, out) == (2, "")
     assert "Traceback" not in err
     assert not list(tmp_path.rglob("worker-*.jsonl"))
 
 
 def test_a_context_beyond_the_limit_is_recorded_with_its_tokens_and_the_limit(
-    make_nieh_set, tmp_path, run, records_in
+    make_nieh_set, tmp_path, run_cli
 ):
     data = make_nieh_set()
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--model-args",
-        "max_tokens=600",
-        "--tasks",
-        "nieh",
-        "--data",
-        data,
-    ]
-    code, _, err = run(*arguments, "--output", tmp_path / "out")
-    records = records_in(tmp_path / "out")
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", model_args="max_tokens=600", tasks="nieh", data=data
+    )
+    code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
+    records = read_records(tmp_path / "out")
     failed = [record for record in records if record.failure]
     # Six frames of 123 tokens; of the clues, three at most.
     assert {record.task for record in failed} == {"nieh_full"}
@@ -163,23 +158,14 @@ def test_a_context_beyond_the_limit_is_recorded_with_its_tokens_and_the_limit(
     assert "Traceback" not in err
 
 
-def test_a_question_with_the_models_image_token_fails_alone(
-    make_nieh_set, tmp_path, run, records_in
-):
+def test_a_question_with_the_models_image_token_fails_alone(make_nieh_set, tmp_path, run_cli):
     bad = Question("traj_b", "What is <|image_pad|>?", (3,), ("mug",))
     data = make_nieh_set([*QUESTIONS, bad], size=56)
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
-    assert run(*arguments)[0] == 1
-    (failed,) = [record for record in records_in(tmp_path / "out") if record.failure]
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path / "out"
+    )
+    assert run_cli(*arguments)[0] == 1
+    (failed,) = [record for record in read_records(tmp_path / "out") if record.failure]
     assert failed.payload.question == bad.text
     assert "2 image placeholders for 1 frames" in failed.failure
 
@@ -222,25 +208,18 @@ def install(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("batch_size", [1, 3])
 def test_out_of_memory_in_mid_run_costs_the_contexts_that_are_too_large(
-    make_nieh_set, tmp_path, run, install, records_in, batch_size
+    make_nieh_set, tmp_path, run_cli, install, batch_size
 ):
     install("cramped", f"{__name__}:Cramped")
     long = Question("traj_a", "What did you see?", (0, 1, 2, 3, 4), ("mug",))
     data = make_nieh_set([QUESTIONS[0], long, *QUESTIONS[3:]])
-    arguments = [
-        "--model",
-        "cramped",
-        "--model-args",
-        f"batch_size={batch_size}",
-        "--tasks",
-        "nieh",
-        "--data",
-        data,
-    ]
-    code, out, err = run(*arguments, "--output", tmp_path / "out")
+    arguments = option_words(
+        model="cramped", model_args=f"batch_size={batch_size}", tasks="nieh", data=data
+    )
+    code, out, err = run_cli(*arguments, "--output", tmp_path / "out")
     assert code == 1
     assert "Traceback" not in err
-    records = records_in(tmp_path / "out")
+    records = read_records(tmp_path / "out")
     failed = [record for record in records if record.failure]
     assert {(record.task, record.payload.n_clues) for record in failed} == {
         ("nieh_gt", 5),

@@ -8,36 +8,31 @@ from PIL import Image
 
 from model_adapters.policies.parity import load_policy
 
-from ...model_adapters.policies.servers import policy_answers, serving
+from ...model_adapters.policies.servers import policy_answers, serve
 
 Run = Callable[..., tuple[int, str, str]]
 
 
-@pytest.fixture(autouse=True)
-def no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("no_proxy", "127.0.0.1")
-
-
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
-    with serving(policy_answers(load_policy("openvla-tiny", {}))) as address:
+    with serve(policy_answers(load_policy("openvla-tiny", {}))) as address:
         yield address
 
 
-def test_equal_policies_end_with_0(run: Run, url: str) -> None:
-    code, out, _ = run("check-parity", "openvla-tiny", "--reference-url", url)
+def test_equal_policies_end_with_0(run_cli: Run, url: str) -> None:
+    code, out, _ = run_cli("check-parity", "openvla-tiny", "--reference-url", url)
     assert code == 0
     assert "openvla-tiny and its reference" in out
     assert "counts as equal: equal." in out
     assert out.count("pick up the") == 2
 
 
-def test_different_policies_end_with_1(run: Run, tmp_path: Path) -> None:
+def test_different_policies_end_with_1(run_cli: Run, tmp_path: Path) -> None:
     Image.new("RGB", (64, 64), "red").save(tmp_path / "red.png")
     words = ("--frames", tmp_path, "--instruction", "open the drawer")
-    with serving(policy_answers(load_policy("openvla-tiny", {}), change=0.125)) as other:
-        code, out, _ = run("check-parity", "openvla-tiny", "--reference-url", other, *words)
-        tolerated, _, _ = run(
+    with serve(policy_answers(load_policy("openvla-tiny", {}), change=0.125)) as other:
+        code, out, _ = run_cli("check-parity", "openvla-tiny", "--reference-url", other, *words)
+        tolerated, _, _ = run_cli(
             "check-parity", "openvla-tiny", "--reference-url", other, *words, "--tolerance", "0.2"
         )
     assert (code, tolerated) == (1, 0)
@@ -47,7 +42,7 @@ def test_different_policies_end_with_1(run: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "expected"),
     [
         (("openvla-tin", "--reference-url", "http://127.0.0.1:9"), "did you mean 'openvla-tiny'"),
         (("openvla-tiny",), "--reference-url"),
@@ -65,8 +60,8 @@ def test_different_policies_end_with_1(run: Run, tmp_path: Path) -> None:
         ),
     ],
 )
-def test_misuse_is_one_line(run: Run, words: tuple[str, ...], said: str) -> None:
-    code, out, err = run("check-parity", *words)
+def test_misuse_is_one_line(run_cli: Run, words: tuple[str, ...], expected: str) -> None:
+    code, out, err = run_cli("check-parity", *words)
     assert (code, out) == (2, "")
-    assert said in err
+    assert expected in err
     assert "Traceback" not in err

@@ -5,50 +5,46 @@ from msgspec.structs import replace
 
 from infthor_eval.plans.records import StepRecord
 
-from ...plans.made_runs import made_run, plan, write_run
+from ...helpers.command_line import assert_refused, option_words
+from ...helpers.journals import write_run
+from ...helpers.plan_runs import make_plan_record, make_plans_run
 
 
-def test_two_runs_are_compared_question_by_question(make_nieh_set, tmp_path, run):
+def test_two_runs_are_compared_question_by_question(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
-    run("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path)
+    run_cli("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path)
     (oracle,), (blind,) = (list((tmp_path / name).iterdir()) for name in ("oracle", "blind"))
-    code, out, _ = run("compare", blind, oracle)
+    code, out, _ = run_cli("compare", blind, oracle)
     rows = [line.split() for line in out.splitlines()]
     assert code == 0
     (row,) = [row for row in rows if row[:2] == ["nieh_gt", "strict"]]
     assert (row[2], row[4]) == ("%", "100.00")
     assert float(row[5]) == pytest.approx(100 - float(row[3]), abs=0.01)
     assert row[-2:] == ["5", "0"]
-    code, out, _ = run("compare", oracle, oracle)
+    code, out, _ = run_cli("compare", oracle, oracle)
     assert "+0.00" in out
     assert "1.0000" in out
 
 
 def test_runs_without_a_shared_unit_and_folders_without_a_run_are_refused(
-    make_nieh_set, tmp_path, run
+    make_nieh_set, tmp_path, run_cli
 ):
     data = make_nieh_set(size=56)
     for task in ("nieh_gt", "nieh_full"):
-        run("--model", "oracle", "--tasks", task, "--data", data, "--output", tmp_path)
+        run_cli("--model", "oracle", "--tasks", task, "--data", data, "--output", tmp_path)
     folders = sorted((tmp_path / "oracle").iterdir())
-    code, _, err = run("compare", *folders)
-    assert (code, len(err.splitlines())) == (2, 1)
-    assert "share no unit of the same task" in err
-    code, _, err = run("compare", tmp_path, folders[0])
-    assert (code, len(err.splitlines())) == (2, 1)
-    assert f"{tmp_path}: no journal in it; give the folder of a run" in err
+    assert_refused(run_cli("compare", *folders), "share no unit of the same task")
+    assert_refused(
+        run_cli("compare", tmp_path, folders[0]),
+        f"{tmp_path}: no journal in it; give the folder of a run",
+    )
 
 
-def test_a_run_of_an_earlier_version_is_refused_in_one_line(make_nieh_set, tmp_path, run):
-    run(
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "out",
+def test_a_run_of_an_earlier_version_is_refused_in_one_line(make_nieh_set, tmp_path, run_cli):
+    run_cli(
+        *option_words(
+            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "out"
+        )
     )
     (ours,) = (tmp_path / "out" / "oracle").iterdir()
     old = tmp_path / "old"
@@ -57,18 +53,20 @@ def test_a_run_of_an_earlier_version_is_refused_in_one_line(make_nieh_set, tmp_p
         json.dumps({"format": 1, "identity": {"model": {"name": "oracle"}}}) + "\n"
     )
     for folders in ((old, ours), (ours, old)):
-        code, out, err = run("compare", *folders)
-        assert (code, out, len(err.splitlines())) == (2, "", 1)
-        assert (
-            f"{old}: its journal is of format 1, this version reads 3; run the evaluation again"
-            in err
+        assert_refused(
+            run_cli("compare", *folders),
+            f"{old}: its journal is of format 1, this version reads 3; run the evaluation again",
         )
 
 
-def test_rewards_are_points_and_shares_are_percent(tmp_path, run):
+def test_rewards_are_points_and_shares_are_percent(tmp_path, run_cli):
     """Mean rewards of 4.4 and 2.2, of which every plan or none is a success."""
     steps = (StepRecord(),)
-    records = [plan(name, index, (index, index + 1), 4.4) for name in "ab" for index in range(2)]
+    records = [
+        make_plan_record(name, index, (index, index + 1), 4.4)
+        for name in "ab"
+        for index in range(2)
+    ]
     better = [
         replace(it, payload=replace(it.payload, steps=steps, max_reward=4.4)) for it in records
     ]
@@ -76,10 +74,10 @@ def test_rewards_are_points_and_shares_are_percent(tmp_path, run):
         replace(it, payload=replace(it.payload, reward=2.2, ended="step limit")) for it in better
     ]
     folders = [
-        write_run(made_run(label, of_run), tmp_path)
+        write_run(make_plans_run(label, of_run), tmp_path)
         for label, of_run in (("w", worse), ("b", better))
     ]
-    code, out, err = run("compare", *folders)
+    code, out, err = run_cli("compare", *folders)
     assert (code, err) == (0, "")
     rows = {
         line.split()[1]: line.split()[2:]
@@ -100,45 +98,31 @@ def test_rewards_are_points_and_shares_are_percent(tmp_path, run):
     ]
 
 
-def test_runs_of_one_name_are_told_apart_by_the_options_that_differ(make_nieh_set, tmp_path, run):
+def test_runs_of_one_name_are_told_apart_by_the_options_that_differ(
+    make_nieh_set, tmp_path, run_cli
+):
     data = make_nieh_set(size=56)
     for seed in (0, 1):
-        arguments = [
-            "--model",
-            "random",
-            "--tasks",
-            "nieh_gt",
-            "--data",
-            data,
-            "--output",
-            tmp_path,
-            "--seed",
-            seed,
-        ]
-        assert run(*arguments)[0] == 0
+        arguments = option_words(
+            model="random", tasks="nieh_gt", data=data, output=tmp_path, seed=seed
+        )
+        assert run_cli(*arguments)[0] == 0
     folders = sorted(
         (tmp_path / "random").iterdir(),
         key=lambda folder: "seed: 1" in (folder / "run.yaml").read_text(),
     )
-    code, out, _ = run("compare", *folders)
+    code, out, _ = run_cli("compare", *folders)
     assert code == 0
     assert "random (seed=1) against random (seed=0)" in " ".join(out.split())
 
 
-def test_blank_frames_are_part_of_the_name(make_nieh_set, tmp_path, run):
-    words = (
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path,
-        "--frames",
-        "shown,blank",
+def test_blank_frames_are_part_of_the_name(make_nieh_set, tmp_path, run_cli):
+    words = option_words(
+        tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path, frames="shown,blank"
     )
-    assert run("--model", "oracle", *words)[0] == 0
+    assert run_cli("--model", "oracle", *words)[0] == 0
     folders = sorted(
         (tmp_path / "oracle").iterdir(),
         key=lambda folder: "frames: blank" in (folder / "run.yaml").read_text(),
     )
-    assert "oracle, blank frames against oracle" in run("compare", *folders)[1]
+    assert "oracle, blank frames against oracle" in run_cli("compare", *folders)[1]

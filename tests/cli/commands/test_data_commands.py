@@ -12,15 +12,17 @@ from infthor_eval.cli import main
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import read_questions
 
+from ...helpers.command_line import option_words
+
 
 def _print(*arguments: object) -> dict:
     """What our command prints with --json, in a fixture of the module, which has no `run`."""
-    shown = io.TextIOWrapper(io.BytesIO())
-    with contextlib.redirect_stdout(shown), pytest.raises(SystemExit) as ended:
+    output = io.TextIOWrapper(io.BytesIO())
+    with contextlib.redirect_stdout(output), pytest.raises(SystemExit) as ended:
         main([*map(str, arguments), "--json"])
     assert ended.value.code == 0
-    shown.seek(0)
-    return json.load(shown)
+    output.seek(0)
+    return json.load(output)
 
 
 @pytest.fixture(scope="module")
@@ -37,12 +39,12 @@ def work(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def made(printed, work):
+def made_folder(printed, work):
     """The folder of the trajectory and its set."""
     return work
 
 
-def test_the_three_commands_make_a_set(printed, work, run):
+def test_the_three_commands_make_a_set(printed, work, run_cli):
     generated, replayed = printed
     assert generated["trajectories"] == 1
     assert replayed["whole"] == replayed["trajectories"] == 1
@@ -50,31 +52,31 @@ def test_the_three_commands_make_a_set(printed, work, run):
     assert {"iou", "seconds"} <= set(replayed)
 
     csv = work / "set/qa_set_mine.csv"
-    code, out, _ = run("questions", work / "set", "--out", csv, "--per-trajectory", 5)
+    code, out, _ = run_cli("questions", work / "set", "--out", csv, "--per-trajectory", 5)
     assert code == 0
     assert "5 questions on 1 trajectories" in out
     assert len(read_questions(csv)) == 5
     first = csv.read_bytes()
-    run("questions", work / "set", "--out", csv, "--per-trajectory", 5)
+    run_cli("questions", work / "set", "--out", csv, "--per-trajectory", 5)
     assert csv.read_bytes() == first
 
 
-def test_what_they_print_for_people(made, tmp_path, run):
-    code, out, _ = run("replay", made / "trajectories", "--out", made / "set")
+def test_what_they_print_for_people(made_folder, tmp_path, run_cli):
+    code, out, _ = run_cli("replay", made_folder / "trajectories", "--out", made_folder / "set")
     assert code == 0
     assert "1 trajectories on 1 floor plans (1 replayed earlier, 0 failed), 1 complete" in out
     assert "actions accepted, " in out and "MoveAhead" not in out and len(out.splitlines()) == 2
-    code, out, _ = run(
+    code, out, _ = run_cli(
         "generate", "--scene", "kitchen-5", "--min-steps", 1, "--min-subgoals", 1, "--out", tmp_path
     )
     assert code == 0
     assert "1 trajectories (0 generated earlier)" in out
 
 
-def test_a_truncated_trajectory_is_named_and_nothing_half_written(made, tmp_path, run):
-    source = next((made / "trajectories").glob("*.json"))
+def test_a_truncated_trajectory_is_named_and_nothing_half_written(made_folder, tmp_path, run_cli):
+    source = next((made_folder / "trajectories").glob("*.json"))
     (tmp_path / "cut.json").write_bytes(source.read_bytes()[:-100])
-    code, _, err = run("replay", tmp_path / "cut.json", "--out", tmp_path / "set")
+    code, _, err = run_cli("replay", tmp_path / "cut.json", "--out", tmp_path / "set")
     assert code == 1
     assert "cut.json: not a trajectory" in err
     assert not list((tmp_path / "set/metadata").iterdir())
@@ -93,33 +95,33 @@ def test_a_truncated_trajectory_is_named_and_nothing_half_written(made, tmp_path
         (("generate", "--scene", "FloorPlan1", "--out", "out"), "not generated: scene FloorPlan1"),
     ],
 )
-def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch, run):
+def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch, run_cli):
     monkeypatch.chdir(tmp_path)
-    code, out, err = run(*arguments)
+    code, out, err = run_cli(*arguments)
     assert code in {1, 2}
     assert out == ""
     assert words in err
     assert "Traceback" not in err
 
 
-def test_an_action_on_a_missing_object_is_reported_with_its_step(made, tmp_path, run):
-    document = json.loads(next((made / "trajectories").glob("*.json")).read_text())
+def test_an_action_on_a_missing_object_is_reported_with_its_step(made_folder, tmp_path, run_cli):
+    document = json.loads(next((made_folder / "trajectories").glob("*.json")).read_text())
     actions = document["plan"]["low_actions"]
     step = next(
         index for index, low in enumerate(actions) if low["api_action"]["action"] == "PickupObject"
     )
     actions[step]["api_action"]["objectId"] = "Teapot|+00.00|+01.00|+00.00"
     (tmp_path / "odd.json").write_text(json.dumps(document))
-    code, out, err = run("replay", tmp_path / "odd.json", "--out", tmp_path / "set")
+    code, out, err = run_cli("replay", tmp_path / "odd.json", "--out", tmp_path / "set")
     assert code == 0, err
     line = next(line for line in out.splitlines() if line.startswith("diverged: "))
     assert f"step {step}: PickupObject" in line
     assert "Teapot" in line
 
 
-def test_a_scene_in_which_no_task_can_be_done_is_one_line_and_leaves_no_file(tmp_path, run):
+def test_a_scene_in_which_no_task_can_be_done_is_one_line_and_leaves_no_file(tmp_path, run_cli):
     data = tmp_path / "data"
-    assert run("scenes", "dump", "kitchen-5", "--embedded", "--out", data)[0] == 0
+    assert run_cli("scenes", "dump", "kitchen-5", "--embedded", "--out", data)[0] == 0
     path = data / "thor_scenes" / "objects.jsonl.gz"
     scene = json.loads(gzip.decompress(path.read_bytes()))
     bare = [item for item in scene["objects"] if not item["pickupable"]]
@@ -128,7 +130,7 @@ def test_a_scene_in_which_no_task_can_be_done_is_one_line_and_leaves_no_file(tmp
     )
     for layout in (data / "alfred" / "layouts").iterdir():
         layout.rename(layout.with_name(layout.name.replace("kitchen-5", "FloorPlan7")))
-    code, _, err = run(
+    code, _, err = run_cli(
         "generate", "--scene", "FloorPlan7", "--data", data, "--out", tmp_path / "out"
     )
     assert code == 1
@@ -140,25 +142,20 @@ def test_a_scene_in_which_no_task_can_be_done_is_one_line_and_leaves_no_file(tmp
     assert not list((tmp_path / "out").iterdir())
 
 
-def test_a_set_of_another_version_is_neither_continued_nor_evaluated(made, tmp_path, run):
-    shutil.copytree(made / "set", tmp_path / "set")
+def test_a_set_of_another_version_is_neither_continued_nor_evaluated(
+    made_folder, tmp_path, run_cli
+):
+    shutil.copytree(made_folder / "set", tmp_path / "set")
     (tmp_path / "set/set.json").write_text('{"format": 2, "simulator": "embedded"}')
     before = sorted((tmp_path / "set").rglob("*"))
     for arguments in (
-        ("replay", made / "trajectories", "--out", tmp_path / "set"),
+        ("replay", made_folder / "trajectories", "--out", tmp_path / "set"),
         ("questions", tmp_path / "set", "--out", tmp_path / "set/qa_set_new.csv"),
-        (
-            "--model",
-            "oracle",
-            "--tasks",
-            "nieh_gt",
-            "--data",
-            tmp_path / "set",
-            "--output",
-            tmp_path / "runs",
+        option_words(
+            model="oracle", tasks="nieh_gt", data=tmp_path / "set", output=tmp_path / "runs"
         ),
     ):
-        code, _, err = run(*arguments)
+        code, _, err = run_cli(*arguments)
         assert code == 2
         (line,) = err.strip().splitlines()
         assert "set.json: the set has format 2, this version reads 1" in line
@@ -166,12 +163,12 @@ def test_a_set_of_another_version_is_neither_continued_nor_evaluated(made, tmp_p
     assert not (tmp_path / "runs").exists()
 
 
-def test_bathrooms_are_left_out_of_test_sets(tmp_path, run):
-    code, _, err = run("generate", "--scene", "bathroom-1", "--test-set", "--out", tmp_path)
+def test_bathrooms_are_left_out_of_test_sets(tmp_path, run_cli):
+    code, _, err = run_cli("generate", "--scene", "bathroom-1", "--test-set", "--out", tmp_path)
     assert code == 2
     assert "bathrooms are left out" in err
 
 
-def test_a_replayed_set_is_an_nieh_set(made, run):
-    shutil.rmtree(made / "set/metadata/.nothing", ignore_errors=True)
-    assert NiehSet(made / "set")
+def test_a_replayed_set_is_an_nieh_set(made_folder, run_cli):
+    shutil.rmtree(made_folder / "set/metadata/.nothing", ignore_errors=True)
+    assert NiehSet(made_folder / "set")

@@ -9,7 +9,8 @@ from infthor_eval.cli.commands import doctor as checks
 from infthor_eval.cli.set_checks import Check
 from infthor_eval.formats.question import Question
 
-from ...bundled import BUNDLED
+from ...helpers.bundled import BUNDLED
+from ...helpers.questions import make_question
 
 TOKEN = "hf_of_nobody_0123456789"
 
@@ -22,9 +23,9 @@ def offline(monkeypatch):
     monkeypatch.setattr(checks, "_connection_problem", lambda url: time.sleep(5) or "")
 
 
-def test_everything_is_checked_and_what_is_missing_has_a_hint(run, monkeypatch):
+def test_everything_is_checked_and_what_is_missing_has_a_hint(run_cli, monkeypatch):
     monkeypatch.setenv("HF_TOKEN", TOKEN)
-    code, out, err = run("doctor", "--json")
+    code, out, err = run_cli("doctor", "--json")
     assert (code, err) == (0, "")
     by_name = {check["name"]: check for check in json.loads(out)}
     assert {
@@ -55,18 +56,18 @@ def test_everything_is_checked_and_what_is_missing_has_a_hint(run, monkeypatch):
     assert TOKEN not in out
 
 
-def test_people_read_lines(run):
-    code, out, _ = run("doctor")
+def test_people_read_lines(run_cli):
+    code, out, _ = run_cli("doctor")
     assert code == 0
     assert any(line.startswith("ok       Python: 3.") for line in out.splitlines())
     assert "`infthor-eval fetch nieh`" in out
 
 
-def test_a_missing_requirement_sets_the_exit_code(run, monkeypatch):
+def test_a_missing_requirement_sets_the_exit_code(run_cli, monkeypatch):
     monkeypatch.setattr(
         checks, "_torch", lambda: Check("torch", "wrong", "none", "pip install torch")
     )
-    code, out, _ = run("doctor")
+    code, out, _ = run_cli("doctor")
     assert code == 1
     assert "wrong    torch: none\n         pip install torch" in out
 
@@ -77,14 +78,14 @@ def test_a_hub_that_refuses_is_reported_at_once(url, monkeypatch):
     assert checks._connection_problem(url)
 
 
-def checks_of(run, *words):
-    code, out, err = run("doctor", *words, "--json")
+def checks_of(run_cli, *words):
+    code, out, err = run_cli("doctor", *words, "--json")
     assert err == ""
     return code, {check["name"]: check for check in json.loads(out)}
 
 
-def test_a_set_is_read_whole_and_what_can_be_asked_is_said(run):
-    code, by_name = checks_of(run, "--data", str(BUNDLED))
+def test_a_set_is_read_whole_and_what_can_be_asked_is_said(run_cli):
+    code, by_name = checks_of(run_cli, "--data", str(BUNDLED))
     assert code == 0
     rows = (BUNDLED / "qa_set_nieh_mini.csv").read_text().count("\n") - 1
     assert by_name["questions qa_set_nieh_mini"]["detail"].startswith(f"{rows}: object_presence")
@@ -96,17 +97,15 @@ def test_a_set_is_read_whole_and_what_can_be_asked_is_said(run):
     assert "left out" not in by_name
 
 
-def test_what_a_set_lacks_is_counted_by_reason(run, make_nieh_set):
-    asked = Question("t", "Have you seen a mug?", (1,), ("yes",))
-    root = make_nieh_set(
-        [asked, Question("t", "q", (99,), ("a",)), Question("t", "q", (98,), ("a",))]
-    )
+def test_what_a_set_lacks_is_counted_by_reason(run_cli, make_nieh_set):
+    complete = Question("t", "Have you seen a mug?", (1,), ("yes",))
+    root = make_nieh_set([complete, make_question(clues=(99,)), make_question(clues=(98,))])
     (root / "metadata" / "other").mkdir()
     (root / "qa_set_x.csv").write_text(
         "traj_id,question,gt_img_idx,answer\ngone,q,[1],['a']\nt,q,[1,['a']\n"
     )
     (root / "metadata" / "t" / "expert_log.json").unlink(missing_ok=True)
-    code, by_name = checks_of(run, "--data", str(root))
+    code, by_name = checks_of(run_cli, "--data", str(root))
     assert code == 0
     assert by_name["rows"]["detail"].startswith("1 are no question: ")
     assert "3 questions: " in by_name["left out"]["detail"]
@@ -117,25 +116,25 @@ def test_what_a_set_lacks_is_counted_by_reason(run, make_nieh_set):
     assert by_name["task nieh_gt"]["detail"] == "1 of 5 samples can be asked"
 
 
-def test_a_set_of_which_nothing_can_be_asked_sets_the_exit_code(run, make_nieh_set):
-    root = make_nieh_set([Question("t", "q", (99,), ("a",))])
-    code, by_name = checks_of(run, "--data", str(root))
+def test_a_set_of_which_nothing_can_be_asked_sets_the_exit_code(run_cli, make_nieh_set):
+    root = make_nieh_set([make_question(clues=(99,))])
+    code, by_name = checks_of(run_cli, "--data", str(root))
     assert code == 1
     assert by_name["questions"]["detail"] == "none can be asked"
 
 
-def test_question_files_alone_have_no_frames(run, tmp_path):
+def test_question_files_alone_have_no_frames(run_cli, tmp_path):
     (tmp_path / "qa_set_x.csv").write_text("traj_id,question,gt_img_idx,answer\nt,q,[1],['a']\n")
-    code, by_name = checks_of(run, "--data", str(tmp_path))
+    code, by_name = checks_of(run_cli, "--data", str(tmp_path))
     assert code == 0
     assert "metadata.tar" in by_name["frames"]["hint"]
-    assert checks_of(run, "--data", str(tmp_path / "qa_set_x.csv")) == (code, by_name)
+    assert checks_of(run_cli, "--data", str(tmp_path / "qa_set_x.csv")) == (code, by_name)
 
 
-def test_what_is_no_set_is_one_line(run, tmp_path):
-    code, _, err = run("doctor", "--data", str(tmp_path))
+def test_what_is_no_set_is_one_line(run_cli, tmp_path):
+    code, _, err = run_cli("doctor", "--data", str(tmp_path))
     assert code == 2
     assert err.count("\n") == 1 and "qa_set" in err
-    code, _, err = run("doctor", "--trajectories", str(tmp_path))
+    code, _, err = run_cli("doctor", "--trajectories", str(tmp_path))
     assert code == 2
     assert "--data" in err

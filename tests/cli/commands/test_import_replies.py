@@ -49,22 +49,22 @@ def data(tmp_path):
 
 def row(number, reply, score, questions=QUESTIONS, **more):
     """A row as the published scripts write it."""
-    asked = questions[number]
+    question = questions[number]
     published = {
         "qidx": number,
-        "traj_id": asked.traj_id,
-        "question": asked.text,
-        "gt_img_idx": list(asked.clues),
+        "traj_id": question.traj_id,
+        "question": question.text,
+        "gt_img_idx": list(question.clues),
     }
     published |= {"ctx_size_k": 32, "n_imgs": 6, "ctx_n_tokens": 726, "llm_response": reply}
-    return published | {"gt_answer": list(asked.answers), "score": score} | more
+    return published | {"gt_answer": list(question.answers), "score": score} | more
 
 
 ROWS = [row(number, reply, float(number != 2)) for number, reply in enumerate(REPLIES)]
 
 
 @pytest.fixture
-def import_log(data, tmp_path, run):
+def import_log(data, tmp_path, run_cli):
     """Imports rows, texts or bytes as logs; returns exit code, what was said, and the records of
     the last run."""
 
@@ -77,7 +77,9 @@ def import_log(data, tmp_path, run):
             content = gzip.compress(content, mtime=0) if name.endswith(".gz") else content
         path.write_bytes(content)
         output = tmp_path / "out"
-        code, out, err = run("import-replies", path, "--data", data, "--output", output, *options)
+        code, out, err = run_cli(
+            "import-replies", path, "--data", data, "--output", output, *options
+        )
         folders = sorted(output.glob("*/*"), key=lambda folder: folder.stat().st_mtime)
         return code, out + err, read_run(folders[-1], RECORDS) if folders else None
 
@@ -89,9 +91,9 @@ def replies_in(read):
 
 
 @pytest.mark.parametrize("name", [LOG, f"{LOG}.gz"])
-def test_a_published_log_becomes_a_run(import_log, tmp_path, run, name):
-    code, said, read = import_log(ROWS, name)
-    assert (code, "4 replies imported, 0 of 4 questions without one" in said) == (0, True)
+def test_a_published_log_becomes_a_run(import_log, tmp_path, run_cli, name):
+    code, output, read = import_log(ROWS, name)
+    assert (code, "4 replies imported, 0 of 4 questions without one" in output) == (0, True)
     header, records = read
     assert (header.name, list(header.config.tasks)) == ("Some-VL-7B", ["nieh_full"])
     assert replies_in(read) == {f"qsingle{number}": reply for number, reply in enumerate(REPLIES)}
@@ -106,20 +108,21 @@ def test_a_published_log_becomes_a_run(import_log, tmp_path, run, name):
         ("ls", "runs", tmp_path / "out"),
         ("compare", folder, folder),
     ):
-        assert run(*words)[0] == 0
-    assert run("report", folder, "--out", tmp_path / "report.html")[0] == 0
+        assert run_cli(*words)[0] == 0
+    assert run_cli("report", folder, "--out", tmp_path / "report.html")[0] == 0
     before = (folder / "results.json").read_bytes()
     assert import_log(ROWS, name)[0] == 0
     assert (folder / "results.json").read_bytes() == before
     assert len(list((tmp_path / "out" / "Some-VL-7B").iterdir())) == 1
 
 
-def test_logs_of_one_mode_on_two_files_are_one_run(data, tmp_path, run):
+def test_logs_of_one_mode_on_two_files_are_one_run(data, tmp_path, run_cli):
     single, multi = tmp_path / LOG, tmp_path / f"eval_{MULTI}_Some-VL-7B_full_traj.log"
     single.write_text("\n".join(map(json.dumps, ROWS)))
     multi.write_text(json.dumps(row(0, "no", 1.0, OTHERS)))
     assert (
-        run("import-replies", single, multi, "--data", data, "--output", tmp_path / "out")[0] == 0
+        run_cli("import-replies", single, multi, "--data", data, "--output", tmp_path / "out")[0]
+        == 0
     )
     (folder,) = (tmp_path / "out" / "Some-VL-7B").iterdir()
     by_clues = json.loads((folder / "results.json").read_text())["summary"]["tasks"]["nieh_full"][
@@ -133,11 +136,11 @@ def test_logs_of_one_mode_on_two_files_are_one_run(data, tmp_path, run):
     }
 
 
-def test_two_logs_on_the_same_questions_count_them_once(data, tmp_path, run):
+def test_two_logs_on_the_same_questions_count_them_once(data, tmp_path, run_cli):
     for name, question_id in (("first.jsonl", "qsingle0"), ("second.jsonl", "qmulti4")):
         (tmp_path / name).write_text(json.dumps({"question_id": question_id, "reply": "no"}))
     logs = [tmp_path / "first.jsonl", tmp_path / "second.jsonl"]
-    code, _, err = run(
+    code, _, err = run_cli(
         "import-replies", *logs, "--model", "me", "--data", data, "--output", tmp_path / "out"
     )
     assert (code, "2 replies imported, 3 of 5 questions without one" in err) == (0, True)
@@ -162,10 +165,10 @@ def test_the_mode_is_part_of_the_run(import_log, more, task, setting):
 
 
 def test_half_a_log_is_a_run_with_the_rest_missing(import_log, tmp_path):
-    code, said, read = import_log([ROWS[0], json.dumps(ROWS[1])[:60]])
+    code, output, read = import_log([ROWS[0], json.dumps(ROWS[1])[:60]])
     assert code == 1
-    assert "1 replies imported, 3 of 4 questions without one" in said
-    assert f"{LOG}, line 2: is not a reply (" in said
+    assert "1 replies imported, 3 of 4 questions without one" in output
+    assert f"{LOG}, line 2: is not a reply (" in output
     assert len(read[1]) == 1
     (results,) = (tmp_path / "out").glob("*/*/results.json")
     assert json.loads(results.read_text())["n_missing"] == 3
@@ -194,12 +197,12 @@ BAD = {
 @pytest.mark.parametrize("bad", BAD)
 def test_a_row_that_does_not_fit_is_counted_and_named(import_log, bad):
     line, reason = BAD[bad]
-    code, said, read = import_log([ROWS[0], line, ROWS[2]])
+    code, output, read = import_log([ROWS[0], line, ROWS[2]])
     assert code == 1
-    assert "1 row(s) not imported" in said
-    assert f"{LOG}, line 2: {reason}" in said
+    assert "1 row(s) not imported" in output
+    assert f"{LOG}, line 2: {reason}" in output
     assert list(replies_in(read)) == ["qsingle0", "qsingle2"]
-    assert "Traceback" not in said
+    assert "Traceback" not in output
 
 
 @pytest.mark.parametrize(
@@ -223,16 +226,16 @@ def test_a_row_that_does_not_fit_is_counted_and_named(import_log, bad):
     ],
 )
 def test_a_log_that_cannot_be_imported_is_one_line(import_log, content, name, options, reason):
-    code, said, read = import_log(content, name, *options)
-    assert (code, read, said.count("\n")) == (2, None, 1)
-    assert reason in said
+    code, output, read = import_log(content, name, *options)
+    assert (code, read, output.count("\n")) == (2, None, 1)
+    assert reason in output
 
 
 def test_scores_that_differ_from_ours_are_named(import_log):
-    code, said, _ = import_log([{**ROWS[0], "score": 0.5}, *ROWS[1:]])
+    code, output, _ = import_log([{**ROWS[0], "score": 0.5}, *ROWS[1:]])
     assert code == 0
-    assert "1 row(s) scored otherwise than logged" in said
-    assert f"{LOG}, line 1: has the score 0.5; the reference scorer gives 1" in said
+    assert "1 row(s) scored otherwise than logged" in output
+    assert f"{LOG}, line 1: has the score 0.5; the reference scorer gives 1" in output
 
 
 def test_replies_in_any_language_are_scored(import_log):
@@ -252,10 +255,10 @@ def test_the_neutral_form(import_log):
         {"question_id": "qmulti4", "reply": "no"},
         {"question_id": "q?", "reply": "no"},
     ]
-    code, said, (header, records) = import_log(rows, "mine.jsonl", "--model", "a person")
+    code, output, (header, records) = import_log(rows, "mine.jsonl", "--model", "a person")
     assert (code, header.name, list(header.config.tasks)) == (1, "a person", ["imported"])
-    assert "2 replies imported, 3 of 5 questions without one" in said
-    assert "mine.jsonl, line 3: answers 'q?', which is not in the set" in said
+    assert "2 replies imported, 3 of 5 questions without one" in output
+    assert "mine.jsonl, line 3: answers 'q?', which is not in the set" in output
     assert [(record.id, record.payload.scores["strict"]) for record in records] == [
         ("qmulti4", 1.0),
         ("qsingle0", 1.0),
@@ -263,13 +266,15 @@ def test_the_neutral_form(import_log):
     assert (records[1].tokens.context, records[1].tokens.reply, records[1].seconds) == (9, 2, 1.5)
 
 
-def test_samples_of_lm_eval(make_nieh_set, tmp_path, run):
+def test_samples_of_lm_eval(make_nieh_set, tmp_path, run_cli):
     """What our own run exports in lm-eval's files comes back with the same scores."""
     data, out = make_nieh_set(size=56), tmp_path / "out"
-    assert run("--model", "blind", "--tasks", "nieh_gt", "--data", data, "--output", out)[0] == 0
+    assert (
+        run_cli("--model", "blind", "--tasks", "nieh_gt", "--data", data, "--output", out)[0] == 0
+    )
     (samples,) = out.rglob("samples_nieh_gt_*.jsonl")
     words = ("import-replies", samples, "--data", data, "--model", "again", "--output", out)
-    assert run(*words)[0] == 0
+    assert run_cli(*words)[0] == 0
     first, again = (
         read_run(next((out / name).iterdir()), RECORDS)[1] for name in ("blind", "again")
     )
@@ -280,9 +285,9 @@ def test_samples_of_lm_eval(make_nieh_set, tmp_path, run):
 
 
 @pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published logs are not at ../shared/data")
-def test_every_published_reply_has_its_logged_score(tmp_path, run):
+def test_every_published_reply_has_its_logged_score(tmp_path, run_cli):
     logs = sorted((PUBLISHED / "replies").glob("*.log.gz"))
-    code, _, err = run("import-replies", *logs, "--data", PUBLISHED, "--output", tmp_path)
+    code, _, err = run_cli("import-replies", *logs, "--data", PUBLISHED, "--output", tmp_path)
     assert (code, "not imported" in err, "scored otherwise" in err) == (0, False, False)
     assert err.count("the prompt it was asked with: published-logs\n") == 3
     means = {}

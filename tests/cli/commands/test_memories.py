@@ -7,21 +7,23 @@ import pytest
 
 from infthor_eval.memory import MEMORIES
 
+from ...helpers.command_line import option_words
+
 EXAMPLES = Path(__file__).parents[3] / "examples" / "memories"
 
 
 @pytest.mark.parametrize("name", ["changes.py:Changes", "longmemeval.py:LongMemEval"])
-def test_the_examples_keep_the_contract(name, run):
-    code, out, err = run("check-memory", EXAMPLES / name)
+def test_the_examples_keep_the_contract(name, run_cli):
+    code, out, err = run_cli("check-memory", EXAMPLES / name)
     assert (code, err) == (0, "")
     assert [line.split()[0] for line in out.splitlines()[:-1]] == ["holds"] * 7
     assert out.splitlines()[-1].endswith(f"{name}: keeps the contract")
 
 
-def test_a_broken_memory_has_a_line_for_each_clause(tmp_path, run):
+def test_a_broken_memory_has_a_line_for_each_clause(tmp_path, run_cli):
     path = tmp_path / "mine.py"
     path.write_text((EXAMPLES / "changes.py").read_text().replace("order[:room]", "order"))
-    code, out, _ = run("check-memory", f"{path}:Changes")
+    code, out, _ = run_cli("check-memory", f"{path}:Changes")
     assert code == 1
     assert "broken  budget          it recalls 2783 tokens where the budget is 0" in out
     assert out.splitlines()[-1] == f"{path}:Changes: 1 broken"
@@ -44,65 +46,40 @@ def test_a_broken_memory_has_a_line_for_each_clause(tmp_path, run):
             "no task of nieh_mini_gt leaves",
         ),
         (
-            (
-                "--model",
-                "oracle",
-                "--tasks",
-                "nieh_mini_memory",
-                "--memory",
-                "last",
-                "--budget",
-                "0",
-            ),
+            option_words(model="oracle", tasks="nieh_mini_memory", memory="last", budget="0"),
             "--budget 0: give",
         ),
         (
-            (
-                "--model",
-                "oracle",
-                "--tasks",
-                "nieh_mini_memory",
-                "--memory",
-                "last",
-                "--retriever",
-                "x",
-            ),
+            option_words(model="oracle", tasks="nieh_mini_memory", memory="last", retriever="x"),
             "--retriever:",
         ),
     ],
 )
-def test_misuse_is_one_line(typed, words, tmp_path, run):
+def test_misuse_is_one_line(typed, words, tmp_path, run_cli):
     more = ("--output", tmp_path) if "--tasks" in typed else ()
-    code, _, err = run(*typed, *more)
+    code, _, err = run_cli(*typed, *more)
     assert code == 2
     assert words in err
     assert "Traceback" not in err
 
 
-def test_all_are_listed_one_a_line_and_the_options_of_one(run):
-    code, out, _ = run("ls", "memories")
+def test_all_are_listed_one_a_line_and_the_options_of_one(run_cli):
+    code, out, _ = run_cli("ls", "memories")
     assert code == 0
     lines = [line.split()[0] for line in out.splitlines()[3:] if line.strip()]
     assert {"last", "uniform", "clip", "notes", "text-log", "oracle", "random"} <= set(lines)
     assert set(lines) <= set(MEMORIES.names)
-    code, out, _ = run("ls", "memories", "notes")
+    code, out, _ = run_cli("ls", "memories", "notes")
     assert (code, "window=20, tokens=64" in out) == (0, True)
-    code, _, err = run("ls", "memories", "note")
+    code, _, err = run_cli("ls", "memories", "note")
     assert (code, "unknown memory 'note'" in err) == (2, True)
 
 
-def test_a_run_for_each_memory_and_budget_with_a_table_of_all(tmp_path, run):
-    typed = (
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_mini_memory",
-        "--limit",
-        4,
-        "--output",
-        tmp_path,
+def test_a_run_for_each_memory_and_budget_with_a_table_of_all(tmp_path, run_cli):
+    typed = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_mini_memory", limit=4, output=tmp_path
     )
-    code, out, err = run(*typed, "--memory", "last,oracle", "--budget", "30,1k")
+    code, out, err = run_cli(*typed, "--memory", "last,oracle", "--budget", "30,1k")
     assert code == 0, err
     assert "Memories\n" in out
     folders = sorted(path.parent for path in tmp_path.rglob("results.json"))
@@ -121,29 +98,22 @@ def test_a_run_for_each_memory_and_budget_with_a_table_of_all(tmp_path, run):
     before = {
         path: path.read_bytes() for folder in folders for path in folder.rglob("results.json")
     }
-    assert run(*typed, "--memory", "last,oracle", "--budget", "30,1k")[0] == 0
+    assert run_cli(*typed, "--memory", "last,oracle", "--budget", "30,1k")[0] == 0
     assert all(path.read_bytes() == content for path, content in before.items())
-    code, _, err = run("report", *folders, "--out", tmp_path / "page.html")
+    code, _, err = run_cli("report", *folders, "--out", tmp_path / "page.html")
     assert code == 0, err
     page = (tmp_path / "page.html").read_text()
     assert "nieh_mini_memory: accuracy by tokens of what a memory recalls" in page
 
 
-def test_a_memory_that_fails_fails_its_questions_alone(tmp_path, run):
+def test_a_memory_that_fails_fails_its_questions_alone(tmp_path, run_cli):
     path = tmp_path / "mine.py"
     fails = "        if len(query.text) % 2:\n            raise KeyError('mug')\n        room ="
     path.write_text((EXAMPLES / "changes.py").read_text().replace("        room =", fails))
-    typed = (
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_mini_memory",
-        "--limit",
-        12,
-        "--output",
-        tmp_path / "out",
+    typed = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_mini_memory", limit=12, output=tmp_path / "out"
     )
-    _, _, err = run(*typed, "--memory", f"{path}:Changes")
+    _, _, err = run_cli(*typed, "--memory", f"{path}:Changes")
     (journal,) = (tmp_path / "out").rglob("worker-0.jsonl")
     units = [
         line for line in map(json.loads, journal.read_text().splitlines()) if line["type"] == "unit"

@@ -9,6 +9,8 @@ import pytest
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import PublishedColumns, Question
 
+from ...helpers.command_line import option_words
+
 PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
 FILES = ("qa_set_nieh_single_clue.csv", "qa_set_nsieh_multi_clue.csv")
 
@@ -26,19 +28,12 @@ def results_of(output, model):
     return json.loads((folder / "results.json").read_text())
 
 
-def test_baselines_run_on_them(alone, tmp_path, run):
+def test_baselines_run_on_them(alone, tmp_path, run_cli):
     out = tmp_path / "out"
-    words = (
-        "--model",
-        "oracle,blind,blind-count,random",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        alone,
-        "--output",
-        out,
+    words = option_words(
+        model="oracle,blind,blind-count,random", tasks="nieh_gt", data=alone, output=out
     )
-    code, _, err = run(*words)
+    code, _, err = run_cli(*words)
     assert code == 0, err
     by_clues = results_of(out, "oracle")["summary"]["tasks"]["nieh_gt"]["by_clues"]
     assert {name: by_clues[name]["n"] for name in ("1", "2", ">=3", "total")} == {
@@ -47,36 +42,37 @@ def test_baselines_run_on_them(alone, tmp_path, run):
         ">=3": 1,
         "total": 5,
     }
-    assert run("show", *(next((out / model).iterdir()) for model in ("oracle", "blind")))[0] == 0
+    assert (
+        run_cli("show", *(next((out / model).iterdir()) for model in ("oracle", "blind")))[0] == 0
+    )
 
 
 @pytest.mark.parametrize(
-    ("model", "task", "said"),
+    ("model", "task", "expected"),
     [
         ("qwen2.5-vl-tiny", "nieh_gt", "has questions but no frames, which qwen2.5-vl-tiny needs"),
         ("blind", "nieh_full", "has no metadata/ with frames; unpack the set's metadata.tar there"),
     ],
 )
-def test_what_shows_frames_says_that_there_are_none(alone, tmp_path, run, model, task, said):
-    code, out, err = run(
+def test_what_shows_frames_says_that_there_are_none(
+    alone, tmp_path, run_cli, model, task, expected
+):
+    code, out, err = run_cli(
         "--model", model, "--tasks", task, "--data", alone, "--output", tmp_path / "out"
     )
     assert (code, out) == (2, "")
-    assert said in err.splitlines()[-1]
+    assert expected in err.splitlines()[-1]
     assert "Traceback" not in err
 
 
-def test_further_forms_are_refused_in_the_published_words(make_nieh_set, tmp_path, run):
+def test_further_forms_are_refused_in_the_published_words(make_nieh_set, tmp_path, run_cli):
     words = (
         "questions",
         make_nieh_set(size=56),
-        "--out",
-        tmp_path / "a.csv",
-        "--words",
-        "published",
+        *option_words(out=tmp_path / "a.csv", words="published"),
         "--further",
     )
-    code, out, err = run(*words)
+    code, out, err = run_cli(*words)
     assert (code, out) == (2, "")
     assert (
         "--further adds forms that have no published words; leave it out, or --words published"
@@ -85,7 +81,7 @@ def test_further_forms_are_refused_in_the_published_words(make_nieh_set, tmp_pat
     assert not (tmp_path / "a.csv").exists()
 
 
-def test_table4_is_printed_from_the_files_scores(tmp_path, run):
+def test_table4_is_printed_from_the_files_scores(tmp_path, run_cli):
     matches = tuple((f"match{n}", 0.5) for n in range(1, 5))
     for file, name, n_clues in (("single", FILES[0], (1,)), ("multi", FILES[1], (2, 4))):
         questions = [
@@ -95,13 +91,13 @@ def test_table4_is_printed_from_the_files_scores(tmp_path, run):
             for n in n_clues
         ]  # fmt: skip
         write_questions(tmp_path / name, questions)
-    code, out, err = run("table4", tmp_path)
+    code, out, err = run_cli("table4", tmp_path)
     assert (code, err) == (0, "")
     assert [line.split()[-6:] for line in out.splitlines() if "match3" in line] == [
         ["(1)", "50.00", "(1)", "50.00", "(3)", "5.0–95.0"]
     ]
     (tmp_path / FILES[1]).unlink()
-    code, out, err = run("table4", tmp_path)
+    code, out, err = run_cli("table4", tmp_path)
     assert (code, out) == (2, "")
     assert "no question for the column 2; give a folder with both published question files" in err
 
@@ -114,11 +110,11 @@ def test_table4_is_printed_from_the_files_scores(tmp_path, run):
     [(FILES[0], 829, 76.47, 76.53), (FILES[1], 474, 67.33, 67.28)],
 )
 def test_who_sees_nothing_scores_this_on_the_published_files(
-    tmp_path, run, file, n, reference, strict
+    tmp_path, run_cli, file, n, reference, strict
 ):
     data, out = PUBLISHED / file, tmp_path / "out"
     assert (
-        run("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--output", out)[0]
+        run_cli("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--output", out)[0]
         == 0
     )
     totals = {
@@ -130,18 +126,20 @@ def test_who_sees_nothing_scores_this_on_the_published_files(
         assert round(100 * totals["blind"]["scores"][metric]["mean"], 2) == accuracy
 
 
-def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_files(tmp_path, run):
+def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_files(
+    tmp_path, run_cli
+):
     """One of two files of the published form has a bad row; whatever counts rows counts it, and
     goes on."""
     scores = tuple((f"match{number}", 1.0) for number in (1, 2, 3, 4))
-    for name, asked in zip(FILES, ([(1,), (2,), (3,)], [(1, 2), (1, 2, 3)]), strict=True):
+    for name, clues_of_rows in zip(FILES, ([(1,), (2,), (3,)], [(1, 2), (1, 2, 3)]), strict=True):
         kind = "single" if "single" in name else "multi"
         questions = [
             Question(
                 f"t{number}", f"Is there a mug {number}?", clues, ("yes",),
                 published=PublishedColumns(kind, f"{kind}{number}", matches=scores),
             )
-            for number, clues in enumerate(asked)
+            for number, clues in enumerate(clues_of_rows)
         ]  # fmt: skip
         write_questions(tmp_path / name, questions)
     path = tmp_path / FILES[0]
@@ -152,34 +150,17 @@ def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_fi
     log.write_text(
         "".join(json.dumps({"question_id": f"single{n}", "reply": "yes"}) + "\n" for n in range(3))
     )
-    said = f"{FILES[0]}, line 3: answer is empty; fill it or remove the row"
-    commands = {
-        ("table4", tmp_path): 0,
-        ("audit", tmp_path): 0,
-        (
-            "import-replies",
-            log,
-            "--data",
-            tmp_path,
-            "--model",
-            "m",
-            "--output",
-            tmp_path / "out",
-        ): 1,
-        (
-            "--model",
-            "oracle",
-            "--tasks",
-            "nieh_gt",
-            "--data",
-            tmp_path,
-            "--output",
-            tmp_path / "out",
-        ): 0,
-    }
-    for command, code in commands.items():
-        found, _, err = run(*command)
-        assert (found, said in " ".join(err.split())) == (code, True), (command, err)
+    expected = f"{FILES[0]}, line 3: answer is empty; fill it or remove the row"
+    output = tmp_path / "out"
+    commands = (
+        (0, ["table4", tmp_path]),
+        (0, ["audit", tmp_path]),
+        (1, ["import-replies", log, *option_words(data=tmp_path, model="m", output=output)]),
+        (0, option_words(model="oracle", tasks="nieh_gt", data=tmp_path, output=output)),
+    )
+    for code, command in commands:
+        ended, _, err = run_cli(*command)
+        assert (ended, expected in " ".join(err.split())) == (code, True), (command, err)
         assert (
             command[0] != "import-replies"
             or "2 replies imported, 2 of 4 questions without one" in err

@@ -4,10 +4,12 @@ import re
 
 import pytest
 
-from ...plans.made_runs import made_run, plan, planner_run, write_run
+from ...helpers.command_line import assert_refused, option_words
+from ...helpers.journals import write_run
+from ...helpers.plan_runs import make_plan_record, make_planner_run, make_plans_run
 
 PLANS = [
-    plan(name, index, (index, index + 1), 1.0, context=10 * index)
+    make_plan_record(name, index, (index, index + 1), 1.0, context=10 * index)
     for name in "ab"
     for index in range(3)
 ]
@@ -15,130 +17,114 @@ PLANS = [
 
 @pytest.fixture
 def folders(tmp_path):
-    made = (made_run("m", PLANS), made_run("n", PLANS), planner_run(PLANS))
-    return [write_run(run, tmp_path / "results") for run in made]
+    runs = (make_plans_run("m", PLANS), make_plans_run("n", PLANS), make_planner_run(PLANS))
+    return [write_run(run, tmp_path / "results") for run in runs]
 
 
-def refused(found, *said):
-    code, out, err = found
-    assert (code, out, len(err.splitlines())) == (2, "", 1)
-    for words in said:
-        assert words in err
-
-
-def test_figure_7_is_drawn_and_its_ends_are_printed(folders, tmp_path, run):
+def test_figure_7_is_drawn_and_its_ends_are_printed(folders, tmp_path, run_cli):
     out = tmp_path / "figures"
-    code, said, err = run("report", *folders, "--figure", "7", "--out", out)
+    code, output, err = run_cli("report", *folders, "--figure", "7", "--out", out)
     assert (code, err) == (0, "")
-    assert "reward at the end, mean over 2 trajectories" in said
-    assert said.splitlines()[-2:] == [str(out / "figure7.png"), str(out / "figure7.svg")]
+    assert "reward at the end, mean over 2 trajectories" in output
+    assert output.splitlines()[-2:] == [str(out / "figure7.png"), str(out / "figure7.svg")]
     assert all((out / name).stat().st_size > 1000 for name in ("figure7.png", "figure7.svg"))
-    rows = [line.split() for line in said.splitlines()]
+    rows = [line.split() for line in output.splitlines()]
     assert ["m", "3.00", "[3.00,", "3.00]", "100.0", "3", "20", "6", "0", "0"] in rows
 
 
-def test_runs_in_no_panel_are_named(folders, tmp_path, run):
+def test_runs_in_no_panel_are_named(folders, tmp_path, run_cli):
     (tmp_path / "panels.yaml").write_text("Ours: [m]\n")
     panels = tmp_path / "panels.yaml"
-    _, said, _ = run("report", *folders, "--figure", "7", "--out", tmp_path, "--panels", panels)
-    assert "in no panel: n" in said.splitlines()
+    _, output, _ = run_cli(
+        "report", *folders, "--figure", "7", "--out", tmp_path, "--panels", panels
+    )
+    assert "in no panel: n" in output.splitlines()
 
 
-def test_runs_of_one_name_are_told_apart_by_their_folders(tmp_path, run):
+def test_runs_of_one_name_are_told_apart_by_their_folders(tmp_path, run_cli):
     twins = [
-        write_run(made_run("m", PLANS), tmp_path, f"infthor_plans-{number}") for number in (1, 2)
+        write_run(make_plans_run("m", PLANS), tmp_path, f"infthor_plans-{number}")
+        for number in (1, 2)
     ]
-    _, said, _ = run("report", *twins, "--figure", "7", "--out", tmp_path / "figures")
-    assert "m (infthor_plans-1)" in said
-    assert "m (infthor_plans-2)" in said
+    _, output, _ = run_cli("report", *twins, "--figure", "7", "--out", tmp_path / "figures")
+    assert "m (infthor_plans-1)" in output
+    assert "m (infthor_plans-2)" in output
 
 
-def test_what_is_no_run_of_plans_is_refused(folders, make_nieh_set, tmp_path, run):
-    refused(
-        run("report", tmp_path, "--figure", "7"),
+def test_what_is_no_run_of_plans_is_refused(folders, make_nieh_set, tmp_path, run_cli):
+    assert_refused(
+        run_cli("report", tmp_path, "--figure", "7"),
         f"{tmp_path}: no journal in it; give the folder of a run",
     )
-    run(
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "nieh",
+    run_cli(
+        *option_words(
+            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "nieh"
+        )
     )
-    (asked,) = (tmp_path / "nieh" / "oracle").iterdir()
-    refused(
-        run("report", folders[0], asked, "--figure", "7"),
-        f"{asked}: is a run of nieh, and figure 7 is of plans",
+    (nieh_run,) = (tmp_path / "nieh" / "oracle").iterdir()
+    assert_refused(
+        run_cli("report", folders[0], nieh_run, "--figure", "7"),
+        f"{nieh_run}: is a run of nieh, and figure 7 is of plans",
     )
 
 
-def test_misuse_is_one_line(folders, tmp_path, run):
-    refused(
-        run("report", *folders, "--figure", "5"),
+def test_misuse_is_one_line(folders, tmp_path, run_cli):
+    assert_refused(
+        run_cli("report", *folders, "--figure", "5"),
         "--figure 5: is none that can be drawn; there are 6 (reward",
     )
-    refused(
-        run("report", *folders, "--task", "a"),
+    assert_refused(
+        run_cli("report", *folders, "--task", "a"),
         "--task: is for a figure; give --figure too, or leave it out",
     )
-    refused(
-        run("report", *folders, "--out", tmp_path / "page"), "the page is an .html file; name one"
+    assert_refused(
+        run_cli("report", *folders, "--out", tmp_path / "page"),
+        "the page is an .html file; name one",
     )
-    refused(run("report", "--figure", "7"), "RUN...")
-    refused(run("report", folders[0], folders[0], "--figure", "7"), "given twice")
+    assert_refused(run_cli("report", "--figure", "7"), "RUN...")
+    assert_refused(run_cli("report", folders[0], folders[0], "--figure", "7"), "given twice")
     (tmp_path / "file").write_text("")
-    refused(
-        run("report", folders[0], "--figure", "7", "--out", tmp_path / "file"),
+    assert_refused(
+        run_cli("report", folders[0], "--figure", "7", "--out", tmp_path / "file"),
         "cannot be written to",
     )
     missing = tmp_path / "missing.yaml"
-    refused(
-        run("report", folders[0], "--figure", "7", "--panels", missing, "--out", tmp_path),
+    assert_refused(
+        run_cli("report", folders[0], "--figure", "7", "--panels", missing, "--out", tmp_path),
         f"{missing}: ",
     )
 
 
-def test_a_page_is_written_and_its_size_is_told(make_nieh_set, tmp_path, run):
-    run(
-        "--model",
-        "oracle,blind",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "out",
+def test_a_page_is_written_and_its_size_is_told(make_nieh_set, tmp_path, run_cli):
+    run_cli(
+        *option_words(
+            model="oracle,blind",
+            tasks="nieh_gt",
+            data=make_nieh_set(size=56),
+            output=tmp_path / "out",
+        )
     )
     runs = [
         folder for model in ("oracle", "blind") for folder in (tmp_path / "out" / model).iterdir()
     ]
-    code, out, err = run("report", *runs, "--out", tmp_path / "pages" / "report.html")
+    code, out, err = run_cli("report", *runs, "--out", tmp_path / "pages" / "report.html")
     assert (code, err) == (0, "")
     assert out.startswith("5 samples, ")
     assert out.strip().endswith(f"MB: {tmp_path / 'pages' / 'report.html'}")
     page = (tmp_path / "pages" / "report.html").read_text()
-    assert (
-        "infthor-eval run --model oracle --tasks nieh_gt" in page
-    )  # how it is done again, and where its frames were
+    # How it is done again, and where its frames were.
+    assert "infthor-eval run --model oracle --tasks nieh_gt" in page
     assert "no frames are shown" not in page
 
 
 def test_replays_are_counted_with_the_time_left_also_where_there_is_no_terminal(
-    scripted_run, scripted_data, tmp_path, run, monkeypatch
+    scripted_run, scripted_data, tmp_path, run_cli, monkeypatch
 ):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
-    code, out, err = run(
+    code, out, err = run_cli(
         "report",
         scripted_run,
-        "--data",
-        scripted_data,
-        "--episodes",
-        3,
-        "--out",
-        tmp_path / "report.html",
+        *option_words(data=scripted_data, episodes=3, out=tmp_path / "report.html"),
     )
     assert code == 0
     assert "12 samples, " in out

@@ -10,8 +10,9 @@ from infthor_eval.nieh.config import RescoredConfig, SourceRun
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 
-from ...nieh.made import record
-from .rescored import REPLIES, lines_of, row, scores_in
+from ...helpers.command_line import option_words
+from ...helpers.nieh_runs import make_record
+from .rescored import REPLIES, read_journal_lines, read_row, read_scores
 
 RIGHT, WRONG = {"reference": 1.0, "strict": 1.0}, {"reference": 0.0, "strict": 0.0}
 FOUR = {f"q{number}": score for number, score in enumerate((1.0, 0.0, 0.0, 1.0, 1.0, 0.0))}
@@ -20,43 +21,47 @@ FOUR = {f"q{number}": score for number, score in enumerate((1.0, 0.0, 0.0, 1.0, 
 # -- our scorers
 
 
-def test_todays_scores_are_a_run_that_names_its_source(source, rescore, run):
+def test_todays_scores_are_a_run_that_names_its_source(source, rescore, run_cli):
     """The journal has q0 scored as a scorer with a fault would."""
-    folder = source([record(0, "Sofa", ("Sofa",), scores=WRONG), *REPLIES[1:]], n_samples=10)
-    code, said, new = rescore(folder)
+    folder = source([make_record(0, "Sofa", ("Sofa",), scores=WRONG), *REPLIES[1:]], n_samples=10)
+    code, output, new = rescore(folder)
     assert code == 0
-    assert "7 replies scored; 1 without a reply stay failed; 2 were never asked" in said
-    assert "nieh_gt, strict: 1 of 7 scores differ from those in the journal" in said
-    assert "  q0: 0, now 1: 'Sofa'" in said
-    assert row(said, "nieh_gt", "strict", "our", "strict", "scorer") == ["7", "40.00", "54.29", "1"]
+    assert "7 replies scored; 1 without a reply stay failed; 2 were never asked" in output
+    assert "nieh_gt, strict: 1 of 7 scores differ from those in the journal" in output
+    assert "  q0: 0, now 1: 'Sofa'" in output
+    assert read_row(output, "nieh_gt", "strict", "our", "strict", "scorer") == [
+        "7",
+        "40.00",
+        "54.29",
+        "1",
+    ]
     header, records = read_run(new, RECORDS)
     assert (header.name, new.parent.name, new.name) == ("m-rescored",) * 2 + (
         f"nieh_gt-{header.config.hash}",
     )
-    assert header.config.rescored == RescoredConfig(
-        source=SourceRun("m", read_run(folder, RECORDS)[0].config.hash), scorer=None, judge=None
-    )
+    source_run = SourceRun("m", read_run(folder, RECORDS)[0].config.hash)
+    assert header.config.rescored == RescoredConfig(source=source_run, scorer=None, judge=None)
     assert header.config.model == {"name": "m"}
-    assert {name: scores_in(new, "strict")[name] for name in FOUR} == FOUR
-    assert scores_in(new, "strict")["q7"] == pytest.approx(0.8)
+    assert {name: read_scores(new, "strict")[name] for name in FOUR} == FOUR
+    assert read_scores(new, "strict")["q7"] == pytest.approx(0.8)
     assert {one.id: one.failure for one in records if one.failure} == {"q6": "m fails"}
     results = json.loads((new / "results.json").read_text())
     assert (results["n_missing"], results["usage"]["requests"]) == (2, 0)
     for words in (("show", new, "--full"), ("compare", folder, new), ("ls", "runs", new.parent)):
-        assert run(*words)[0] == 0
+        assert run_cli(*words)[0] == 0
 
 
 def test_the_same_command_again_writes_nothing_new(source, rescore):
     _, _, new = rescore(source())
     before = (
-        lines_of(new),
+        read_journal_lines(new),
         (new / "results.json").read_bytes(),
         (new / "rescored.json").read_bytes(),
     )
     _, _, again = rescore(new.parents[2] / "elsewhere" / "a run")
     assert again == new
     assert (
-        lines_of(new),
+        read_journal_lines(new),
         (new / "results.json").read_bytes(),
         (new / "rescored.json").read_bytes(),
     ) == before
@@ -66,70 +71,70 @@ def test_a_changed_scorer_replaces_what_the_journal_has(source, rescore, monkeyp
     folder = source()
     _, _, new = rescore(folder)
     monkeypatch.setattr("infthor_eval.nieh.rescoring.rescore.scores", lambda reply, answers: WRONG)
-    code, said, again = rescore(folder)
+    code, output, again = rescore(folder)
     assert (code, again) == (0, new)
-    assert "nieh_gt, strict: 4 of 7 scores differ" in said
-    assert set(scores_in(new, "strict").values()) == {0.0, None}
+    assert "nieh_gt, strict: 4 of 7 scores differ" in output
+    assert set(read_scores(new, "strict").values()) == {0.0, None}
 
 
 def test_metrics_of_a_task_file_are_left_out_and_replies_that_they_failed_on_are_scored(
     source, rescore
 ):
-    failed = record(
+    failed = make_record(
         0, "Sofa", ("Sofa",), scores={}, failure="process_results fails on q0: no letters"
     )
     folder = source(
-        [failed, record(1, "Bed", ("Bed",), scores={"letters": 0.3})],
+        [failed, make_record(1, "Bed", ("Bed",), scores={"letters": 0.3})],
         n_samples=2,
         metrics=("letters",),
     )
-    code, said, new = rescore(folder)
+    code, output, new = rescore(folder)
     assert code == 0
-    assert "nieh_gt: letters: left out, as the journal does not say how to compute it" in said
+    assert "nieh_gt: letters: left out, as the journal does not say how to compute it" in output
     assert [(one.payload.scores, one.failure) for one in read_run(new, RECORDS)[1]] == [
         (RIGHT, None)
     ] * 2
-    assert row(said, "nieh_gt", "strict", "our", "strict", "scorer") == ["2", "-", "100.00", "-"]
+    assert read_row(output, "nieh_gt", "strict", "our", "strict", "scorer") == [
+        "2",
+        "-",
+        "100.00",
+        "-",
+    ]
 
 
 def test_a_run_of_another_suite_and_a_folder_without_a_run_are_refused_in_one_line(
     source, rescore, tmp_path
 ):
-    code, said, new = rescore(source((), suite="plans"))
-    assert (code, new, said.count("\n")) == (2, None, 1)
-    assert "a run: is a run of plans; give a run of nieh, which has replies" in said
-    code, said, _ = rescore(tmp_path)
-    assert (code, said.count("\n")) == (2, 1)
-    assert "no journal in it" in said
+    code, output, new = rescore(source((), suite="plans"))
+    assert (code, new, output.count("\n")) == (2, None, 1)
+    assert "a run: is a run of plans; give a run of nieh, which has replies" in output
+    code, output, _ = rescore(tmp_path)
+    assert (code, output.count("\n")) == (2, 1)
+    assert "no journal in it" in output
 
 
-def test_a_run_of_ours_has_the_scores_that_it_had(make_nieh_set, run, rescore, tmp_path):
+def test_a_run_of_ours_has_the_scores_that_it_had(make_nieh_set, run_cli, rescore, tmp_path):
     data = make_nieh_set(size=56)
     assert (
-        run(
-            "--model",
-            "oracle",
-            "--tasks",
-            "nieh_gt",
-            "--data",
-            data,
-            "--output",
-            tmp_path / "first",
+        run_cli(
+            *option_words(model="oracle", tasks="nieh_gt", data=data, output=tmp_path / "first")
         )[0]
         == 0
     )
     (folder,) = (tmp_path / "first" / "oracle").iterdir()
-    code, said, new = rescore(folder)
-    assert (code, "5 replies scored\n" in said, "differ from" in said) == (0, True, False)
+    code, output, new = rescore(folder)
+    assert (code, "5 replies scored\n" in output, "differ from" in output) == (0, True, False)
     before, now = (json.loads((one / "results.json").read_text()) for one in (folder, new))
     assert now["summary"] == before["summary"]
 
 
-def test_runs_on_true_and_blank_frames_are_a_pair_once_scored_again(source, rescore, run, tmp_path):
+def test_runs_on_true_and_blank_frames_are_a_pair_once_scored_again(
+    source, rescore, run_cli, tmp_path
+):
     _, _, seeing = rescore(source())
     (tmp_path / "elsewhere" / "a run").rename(tmp_path / "elsewhere" / "another")
     _, _, blank = rescore(source(frames="blank"))
-    assert "Gain over the same model's run on blank frames" in run("show", seeing, blank)[1]
+    assert "Gain over the same model's run on blank frames" in run_cli("show", seeing, blank)[1]
 
 
 # -- a scorer of one's own
@@ -146,9 +151,9 @@ LENGTH = "def length(reply, answers):\n    return len(reply) + len(answers)\n"
 
 def test_a_function_in_a_file_is_a_metric_of_its_name(source, rescore, own):
     own(LENGTH)
-    code, said, new = rescore(source(), "--scorer", "own.py:length")
+    code, output, new = rescore(source(), "--scorer", "own.py:length")
     assert code == 0
-    assert scores_in(new, "length") == {
+    assert read_scores(new, "length") == {
         "q0": 5,
         "q1": 15,
         "q2": 4,
@@ -158,7 +163,12 @@ def test_a_function_in_a_file_is_a_metric_of_its_name(source, rescore, own):
         "q6": None,
         "q7": 12,
     }
-    assert row(said, "nieh_gt", "length", "length", "in", "own.py") == ["7", "-", "742.86", "-"]
+    assert read_row(output, "nieh_gt", "length", "length", "in", "own.py") == [
+        "7",
+        "-",
+        "742.86",
+        "-",
+    ]
     scorer = read_run(new, RECORDS)[0].config.rescored.scorer
     assert (scorer["name"], scorer["metrics"], scorer["file"]) == ("length", ["length"], "own.py")
     own(LENGTH + "# edited\n")
@@ -167,28 +177,28 @@ def test_a_function_in_a_file_is_a_metric_of_its_name(source, rescore, own):
 
 def test_a_mapping_is_several_metrics(source, rescore, own):
     own("def both(reply, answers):\n    return {'b': True, 'a': reply == answers[0]}\n")
-    _, said, new = rescore(source(), "--scorer", "./own.py:both")
+    _, output, new = rescore(source(), "--scorer", "./own.py:both")
     assert read_run(new, RECORDS)[0].config.tasks["nieh_gt"].metrics.names == (
         "reference",
         "strict",
         "b",
         "a",
     )
-    assert scores_in(new, "a")["q0"] == scores_in(new, "b")["q1"] == 1.0
-    assert "a: both in own.py." in said
+    assert read_scores(new, "a")["q0"] == read_scores(new, "b")["q1"] == 1.0
+    assert "a: both in own.py." in output
 
 
 def test_an_exception_fails_the_reply_alone_and_its_traceback_is_kept(source, rescore, own):
     own("def third(reply, answers):\n    return reply.split()[2] == 'x'\n")
     folder = source()
-    code, said, new = rescore(folder, "--scorer", "own.py:third")
+    code, output, new = rescore(folder, "--scorer", "own.py:third")
     assert code == 1
     failure = (
         "third fails: IndexError in own.py:2 (third): list index out of range; traceback in "
         "journal/tracebacks.txt"
     )
-    assert f"nieh_gt: 6 sample(s) failed, counted as wrong: {failure}" in said
-    assert "1 replies scored; 6 failed by the scorer; 1 without a reply stay failed" in said
+    assert f"nieh_gt: 6 sample(s) failed, counted as wrong: {failure}" in output
+    assert "1 replies scored; 6 failed by the scorer; 1 without a reply stay failed" in output
     assert "reply.split()[2]" in (new / "journal" / "tracebacks.txt").read_text()
     records = {one.id: one for one in read_run(new, RECORDS)[1]}
     assert (records["q0"].failure, records["q0"].payload.scores, records["q0"].payload.reply) == (
@@ -197,9 +207,9 @@ def test_an_exception_fails_the_reply_alone_and_its_traceback_is_kept(source, re
         "Sofa",
     )
     assert records["q1"].failure is None
-    lines = lines_of(new)
+    lines = read_journal_lines(new)
     rescore(folder, "--scorer", "own.py:third")
-    assert lines_of(new) == lines
+    assert read_journal_lines(new) == lines
 
 
 @pytest.mark.parametrize(
@@ -213,10 +223,10 @@ def test_an_exception_fails_the_reply_alone_and_its_traceback_is_kept(source, re
 )
 def test_what_is_no_score_is_a_failure(source, rescore, own, body, failure):
     own(f"def f(reply, answers):\n    {body}\n")
-    code, said, _ = rescore(source(REPLIES[:2]), "--scorer", "own.py:f")
+    code, output, _ = rescore(source(REPLIES[:2]), "--scorer", "own.py:f")
     assert code == 1
-    assert failure in said
-    assert "Traceback" not in said
+    assert failure in output
+    assert "Traceback" not in output
 
 
 @pytest.mark.parametrize(
@@ -245,9 +255,9 @@ def test_what_is_no_score_is_a_failure(source, rescore, own, body, failure):
 )
 def test_a_scorer_that_cannot_be_had_is_one_line(source, rescore, own, text, name, reason):
     own(text)
-    code, said, new = rescore(source(), "--scorer", name)
-    assert (code, new, said.count("\n")) == (2, None, 1)
-    assert reason in said
+    code, output, new = rescore(source(), "--scorer", name)
+    assert (code, new, output.count("\n")) == (2, None, 1)
+    assert reason in output
 
 
 def shout(reply, answers):
@@ -261,7 +271,7 @@ def test_a_scorer_of_another_package_is_found_by_its_entry_point(source, rescore
         "infthor_eval.plugins.entry_points", lambda group: [point] if group == point.group else []
     )
     code, _, new = rescore(source(REPLIES[:1]), "--scorer", "loud")
-    assert (code, scores_in(new, "loud")) == (0, {"q0": 0.0})
+    assert (code, read_scores(new, "loud")) == (0, {"q0": 0.0})
     scorer = read_run(new, RECORDS)[0].config.rescored.scorer
     assert (scorer["name"], scorer["package"]) == ("loud", "tests")
     assert "there are loud)" in rescore(source(REPLIES[:1]), "--scorer", "quiet")[1]

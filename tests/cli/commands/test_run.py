@@ -1,8 +1,6 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 
 import pytest
 
@@ -10,18 +8,17 @@ from infthor_eval.formats.question import Question
 from infthor_eval.suites import baseline_suites
 from model_adapters import names, options
 
-from ...waiting import PATIENCE_S, wait_until
+from ...helpers.command_line import assert_refused, option_words
+from ...helpers.files import find_one
+from ...helpers.processes import finish, start_cli
+from ...helpers.questions import make_question
+from ...helpers.waiting import wait_until
 
 MANY = [
     Question(traj_id, f"Is there a {name}?", (index,), ("yes",), "object_presence")
     for traj_id in ("traj_a", "traj_b")
     for index, name in enumerate(("mug", "plate", "sink", "fridge", "apple", "bread"))
 ]
-
-
-def only(folder, pattern):
-    (path,) = folder.rglob(pattern)
-    return path
 
 
 # By clues, total, interval, bootstrap, open-ended, absence, samples, skipped, failed. Two
@@ -34,20 +31,11 @@ FULL_MARKS = [
 
 
 def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(
-    make_nieh_set, tmp_path, run
+    make_nieh_set, tmp_path, run_cli
 ):
     data = make_nieh_set(size=56)
-    arguments = [
-        "--model",
-        "oracle,blind",
-        "--tasks",
-        "nieh",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
-    code, out, _ = run(*arguments, "--full")
+    arguments = option_words(model="oracle,blind", tasks="nieh", data=data, output=tmp_path / "out")
+    code, out, _ = run_cli(*arguments, "--full")
     assert code == 0
     rows = [line.split() for line in out.splitlines()]
     assert ["oracle", "nieh_gt", "strict", *FULL_MARKS] in rows
@@ -56,40 +44,26 @@ def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(
     assert "Qwen2.5-VL 7B" in out
     assert "82.20" in out
     for model in ("oracle", "blind"):
-        results = json.loads(only(tmp_path / "out" / model, "results.json").read_text())
+        results = json.loads(find_one(tmp_path / "out" / model, "results.json").read_text())
         assert results["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"]["n"] == 5
 
 
-def test_frames_of_the_embedded_simulator_are_labelled(make_nieh_set, tmp_path, run):
+def test_frames_of_the_embedded_simulator_are_labelled(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
     (data / "set.json").write_text('{"simulator": "embedded"}')
-    _, out, _ = run(
-        "run",
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
+    _, out, _ = run_cli(
+        "run", *option_words(model="oracle", tasks="nieh_gt", data=data, output=tmp_path / "out")
     )
     assert "embedded simulator: not comparable" in " ".join(out.split())
 
 
-def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(make_nieh_set, tmp_path, run):
-    data = make_nieh_set([Question("t", "Is there a mug?", (70,), ("yes",))], n_frames=140, size=56)
+def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(
+    make_nieh_set, tmp_path, run_cli
+):
+    data = make_nieh_set([make_question(clues=(70,))], n_frames=140, size=56)
     tasks = "nieh_haystack_8k,nieh_haystack_1m"
-    code, out, err = run(
-        "--model",
-        "oracle",
-        "--tasks",
-        tasks,
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-        "--full",
+    code, out, err = run_cli(
+        *option_words(model="oracle", tasks=tasks, data=data, output=tmp_path / "out"), "--full"
     )
     assert code == 0
     rows = [line.split() for line in out.splitlines()]
@@ -104,11 +78,11 @@ def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(make_nieh_s
 
 
 def test_a_context_beyond_the_models_limit_is_reported_before_it_is_refused(
-    make_nieh_set, tmp_path, run
+    make_nieh_set, tmp_path, run_cli
 ):
     data = make_nieh_set(n_frames=20)
     arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", "max_tokens=1200", "--data", data]
-    code, _, err = run(*arguments, "--tasks", "nieh", "--output", tmp_path / "out")
+    code, _, err = run_cli(*arguments, "--tasks", "nieh", "--output", tmp_path / "out")
     assert code == 1
     fits, refused = (
         next(line for line in err.splitlines() if line.startswith(name))
@@ -120,28 +94,19 @@ def test_a_context_beyond_the_models_limit_is_reported_before_it_is_refused(
     assert "is beyond the 1200 tokens of qwen2.5-vl-tiny" in err
 
 
-def test_limit_evaluates_only_so_many_of_each_task(make_nieh_set, tmp_path, run):
+def test_limit_evaluates_only_so_many_of_each_task(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
-    run(
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "o",
-        "--limit",
-        2,
-    )
-    results = json.loads(only(tmp_path / "o", "results.json").read_text())
+    run_cli(*option_words(model="oracle", tasks="nieh", data=data, output=tmp_path / "o", limit=2))
+    results = json.loads(find_one(tmp_path / "o", "results.json").read_text())
     assert {name: task["n"] for name, task in results["summary"]["tasks"].items()} == {
         "nieh_gt": 2,
         "nieh_full": 2,
     }
 
 
-def test_the_limit_counts_questions_and_what_is_skipped_follows_it(make_nieh_set, tmp_path, run):
+def test_the_limit_counts_questions_and_what_is_skipped_follows_it(
+    make_nieh_set, tmp_path, run_cli
+):
     questions = [Question("t", f"Is there a {name}?", (70,), ("yes",)) for name in ("mug", "cup")]
     outside = [Question("t", f"Is there a {name}?", (999,), ("yes",)) for name in ("pan", "pot")]
     data = make_nieh_set(
@@ -149,9 +114,9 @@ def test_the_limit_counts_questions_and_what_is_skipped_follows_it(make_nieh_set
     )
     arguments = ["--model", "oracle", "--tasks", "nieh_haystack_8k", "--data", data]
     for limit, n in ((1, 5), (2, 10)):
-        code, _, err = run(*arguments, "--output", tmp_path / str(limit), "--limit", limit)
+        code, _, err = run_cli(*arguments, "--output", tmp_path / str(limit), "--limit", limit)
         assert code == 0
-        task = json.loads(only(tmp_path / str(limit), "results.json").read_text())["summary"][
+        task = json.loads(find_one(tmp_path / str(limit), "results.json").read_text())["summary"][
             "tasks"
         ]["nieh_haystack_8k"]
         assert task["n"] == n
@@ -161,7 +126,7 @@ def test_the_limit_counts_questions_and_what_is_skipped_follows_it(make_nieh_set
 
 
 def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(
-    make_nieh_set, tmp_path, run, task_files
+    make_nieh_set, tmp_path, run_cli, task_files
 ):
     (task_files / "nieh" / "own.py").write_text(
         "def measure(doc, results):\n    return {'letters': len(results[0]) / 20}\n"
@@ -170,15 +135,8 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(
         "include: _nieh.yaml\ntask: nieh_own\ndataset_kwargs: {context: clues}\n"
         "process_results: !function own.measure\nmetric_list: [{metric: letters}]\n"
     )
-    arguments = [
-        "--model",
-        "oracle",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "out",
-    ]
-    code, out, err = run(*arguments, "--tasks", "nieh_gt,nieh_own", "--full")
+    arguments = option_words(model="oracle", data=make_nieh_set(size=56), output=tmp_path / "out")
+    code, out, err = run_cli(*arguments, "--tasks", "nieh_gt,nieh_own", "--full")
     assert code == 0, err
     rows = [line.split() for line in out.splitlines()]
     assert [row[2] for row in rows if row[:2] == ["oracle", "nieh_own"] and len(row) > 7] == [
@@ -192,18 +150,18 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(
         "27.00",
     ]
     assert ["oracle", "nieh_gt", "strict", *FULL_MARKS] in rows
-    summary = json.loads(only(tmp_path / "out", "results.json").read_text())["summary"]["tasks"][
-        "nieh_own"
-    ]
+    summary = json.loads(find_one(tmp_path / "out", "results.json").read_text())["summary"][
+        "tasks"
+    ]["nieh_own"]
     assert summary["by_clues"]["total"]["scores"]["letters"]["mean"] == pytest.approx(0.27)
     samples = [
         json.loads(line)
-        for line in only(tmp_path / "out", "samples_nieh_own_*.jsonl").read_text().splitlines()
+        for line in find_one(tmp_path / "out", "samples_nieh_own_*.jsonl").read_text().splitlines()
     ]
     assert [sample["letters"] for sample in samples] == [0.15, 0.5, 0.5, 0.1, 0.1]
 
     (task_files / "nieh" / "own.py").write_text("def measure(doc, results):\n    return {}\n")
-    code, _, err = run(*arguments, "--tasks", "nieh_own")
+    code, _, err = run_cli(*arguments, "--tasks", "nieh_own")
     assert code == 1
     assert "nieh_own: 1 sample(s) failed, counted as wrong: process_results fails on traj_a/" in err
     (task_files / "nieh" / "nieh_own.yaml").write_text(
@@ -211,9 +169,10 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(
         .read_text()
         .replace("letters}", "letters, aggregation: median}")
     )
-    code, out, err = run(*arguments, "--tasks", "nieh_own")
-    assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
-    assert "letters is not averaged (aggregation: mean); use lm-eval" in err
+    assert_refused(
+        run_cli(*arguments, "--tasks", "nieh_own"),
+        "letters is not averaged (aggregation: mean); use lm-eval",
+    )
 
 
 @pytest.mark.parametrize("repeats", [1, 3])
@@ -222,21 +181,9 @@ def test_a_killed_run_resumes_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_
     n_answers = 2 * repeats * len(MANY)
 
     def start(output):
-        arguments = [
-            "--model",
-            "qwen2.5-vl-tiny",
-            "--tasks",
-            "nieh",
-            "--data",
-            data,
-            "--output",
-            output,
-        ]
+        arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh", data=data, output=output)
         arguments += ["--repeats", repeats]
-        code = "from infthor_eval.cli import main; main()"
-        return subprocess.Popen(
-            [sys.executable, "-c", code, *map(str, arguments)], stderr=subprocess.PIPE, text=True
-        )
+        return start_cli(*arguments)
 
     killed = start(tmp_path / "killed")
     shards = (tmp_path / "killed").rglob  # until some answers, not all, are on disk
@@ -245,20 +192,19 @@ def test_a_killed_run_resumes_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_
     )
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
-    n_before = only(tmp_path / "killed", "worker-0.jsonl").read_bytes().count(b"\n") - 1
+    n_before = find_one(tmp_path / "killed", "worker-0.jsonl").read_bytes().count(b"\n") - 1
     assert 0 < n_before < n_answers
 
-    again = start(tmp_path / "killed")
-    _, said = again.communicate(timeout=PATIENCE_S)
-    assert again.returncode == 0, said
-    assert f"{n_answers - n_before} evaluated now, {n_before} resumed" in said
-    whole = start(tmp_path / "whole")
-    assert whole.communicate(timeout=PATIENCE_S) and whole.returncode == 0
+    notes = finish(start(tmp_path / "killed"))
+    assert f"{n_answers - n_before} evaluated now, {n_before} resumed" in notes
+    finish(start(tmp_path / "whole"))
 
-    results = [only(tmp_path / name, "results.json") for name in ("killed", "whole")]
+    results = [find_one(tmp_path / name, "results.json") for name in ("killed", "whole")]
     assert results[0].read_bytes() == results[1].read_bytes()
     for task in ("nieh_gt", "nieh_full"):
-        samples = [only(tmp_path / name, f"samples_{task}_*.jsonl") for name in ("killed", "whole")]
+        samples = [
+            find_one(tmp_path / name, f"samples_{task}_*.jsonl") for name in ("killed", "whole")
+        ]
         assert samples[0].read_bytes() == samples[1].read_bytes()
 
 
@@ -282,16 +228,7 @@ BAD = [
         "oracle has no option a",
     ),
     (
-        [
-            "--model",
-            "qwen2.5-vl-tiny",
-            "--tasks",
-            "nieh",
-            "--data",
-            "SET",
-            "--model-args",
-            "dtpe=x",
-        ],
+        option_words(model="qwen2.5-vl-tiny", tasks="nieh", data="SET", model_args="dtpe=x"),
         "mean dtype?",
     ),
     (["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--limit", "0"], "--limit"),
@@ -304,35 +241,34 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("arguments", "said"), BAD, ids=[said for _, said in BAD])
-def test_misuse_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run, arguments, said):
+@pytest.mark.parametrize(("arguments", "expected"), BAD, ids=[expected for _, expected in BAD])
+def test_misuse_ends_in_one_line_and_exit_code_2(
+    make_nieh_set, tmp_path, run_cli, arguments, expected
+):
     data = make_nieh_set(size=56)
     arguments = [str(data) if argument == "SET" else argument for argument in arguments]
-    code, out, err = run(
-        *arguments, *(["--output", tmp_path / "out"] if "--model" in arguments else [])
+    assert_refused(
+        run_cli(*arguments, *(["--output", tmp_path / "out"] if "--model" in arguments else [])),
+        expected,
     )
-    assert code == 2
-    assert said in err
-    assert out == ""
-    assert len(err.strip().splitlines()) == 1
     assert not (tmp_path / "out").exists()
 
 
-def test_bad_data_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run):
+def test_bad_data_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
     for traj_id in ("traj_a", "traj_b"):
         (data / "metadata" / traj_id / "img" / "extra.png").write_bytes(b"")
-    code, _, err = run(
-        "--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"
+    assert_refused(
+        run_cli(
+            "--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"
+        ),
+        "trajectory traj_a: 7 frames but 6 entries",
     )
-    assert code == 2
-    assert "trajectory traj_a: 7 frames but 6 entries" in err
-    assert len(err.strip().splitlines()) == 1
 
 
-def test_what_is_skipped_is_counted_and_named(make_nieh_set, tmp_path, run):
+def test_what_is_skipped_is_counted_and_named(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set([*MANY, Question("traj_a", "Where is it?", (77,), ("Shelf",))], size=56)
-    code, _, err = run(
+    code, _, err = run_cli(
         "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
     )
     assert code == 0
@@ -340,22 +276,15 @@ def test_what_is_skipped_is_counted_and_named(make_nieh_set, tmp_path, run):
 
 
 def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_says_so(
-    make_nieh_set, tmp_path, run
+    make_nieh_set, tmp_path, run_cli
 ):
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
-    code, out, err = run(*arguments)
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path / "out"
+    )
+    code, out, err = run_cli(*arguments)
     assert code == 1
     assert "nieh_gt: 2 sample(s) failed, counted as wrong" in err
     assert str(frame) in err
@@ -366,16 +295,16 @@ def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_s
     ]
 
 
-def test_help_names_the_commands_and_the_version_is_printed(run):
-    code, out, _ = run("--help")
+def test_help_names_the_commands_and_the_version_is_printed(run_cli):
+    code, out, _ = run_cli("--help")
     assert code == 0
     assert all(name in out for name in ("run", "ls", "generate", "replay", "questions"))
-    assert run("--version")[1].startswith("infthor-eval, version ")
-    assert run("run", "--help")[0] == 0
+    assert run_cli("--version")[1].startswith("infthor-eval, version ")
+    assert run_cli("run", "--help")[0] == 0
 
 
-def test_ls_lists_models_one_a_line_with_engine_and_usual_checkpoint(run):
-    rows = [line.split() for line in run("ls", "models")[1].splitlines()[3:] if line.strip()]
+def test_ls_lists_models_one_a_line_with_engine_and_usual_checkpoint(run_cli):
+    rows = [line.split() for line in run_cli("ls", "models")[1].splitlines()[3:] if line.strip()]
     assert [row[0] for row in rows] == [*baseline_suites(), *names()]
     by_name = {row[0]: row[1:] for row in rows}
     assert by_name["random"] == ["a", "baseline", "of", "nieh,", "plans", "-"]
@@ -383,43 +312,43 @@ def test_ls_lists_models_one_a_line_with_engine_and_usual_checkpoint(run):
     assert (by_name["qwen2.5-vl@vllm"][-1], by_name["openai"][-1]) == ("vllm", "-")
 
 
-def test_ls_prints_the_options_of_a_model(run):
-    said = " ".join(run("ls", "models", "qwen2.5-vl-tiny")[1].split())
-    assert "random weights" in said and options("qwen2.5-vl-tiny") in said
-    assert "a baseline of nieh; no options" in run("ls", "models", "blind")[1]
-    code, _, err = run("ls", "models", "blnd")
+def test_ls_prints_the_options_of_a_model(run_cli):
+    printed = " ".join(run_cli("ls", "models", "qwen2.5-vl-tiny")[1].split())
+    assert "random weights" in printed and options("qwen2.5-vl-tiny") in printed
+    assert "a baseline of nieh; no options" in run_cli("ls", "models", "blind")[1]
+    code, _, err = run_cli("ls", "models", "blnd")
     assert code == 2
     assert err == "infthor-eval: unknown model 'blnd'; did you mean 'blind'?\n"
 
 
-def test_ls_lists_tasks_and_joins_those_that_differ_in_size(run):
-    said = " ".join(run("ls", "tasks")[1].split())
-    assert "nieh_mini_gt " in said
-    assert "nieh_haystack_{8k,...,1m} A window of {8K,...,1M} tokens, with" in said
-    assert "group: nieh_haystack_{8k,16k,32k,64k,128k,256k,512k,1m}" in said
-    assert "nieh_published_last_{32k,64k} " in said
+def test_ls_lists_tasks_and_joins_those_that_differ_in_size(run_cli):
+    printed = " ".join(run_cli("ls", "tasks")[1].split())
+    assert "nieh_mini_gt " in printed
+    assert "nieh_haystack_{8k,...,1m} A window of {8K,...,1M} tokens, with" in printed
+    assert "group: nieh_haystack_{8k,16k,32k,64k,128k,256k,512k,1m}" in printed
+    assert "nieh_published_last_{32k,64k} " in printed
 
 
-def test_ls_lists_a_users_own_tasks(run, tmp_path):
+def test_ls_lists_a_users_own_tasks(run_cli, tmp_path):
     (tmp_path / "mine.yaml").write_text(
         "include: _nieh.yaml\ntask: my_own_task\ndataset_kwargs: {context: clues}\n"
     )
-    assert "my_own_task" not in run("ls", "tasks")[1]
-    assert "my_own_task" in run("ls", "tasks", "--include-path", tmp_path)[1]
+    assert "my_own_task" not in run_cli("ls", "tasks")[1]
+    assert "my_own_task" in run_cli("ls", "tasks", "--include-path", tmp_path)[1]
 
 
-def test_help_of_a_run_has_each_option_once(run):
-    said = " ".join(run("run", "--help")[1].split())
-    assert said.count("or the path of a Unity executable") == 1
-    assert "[manipulation, plans]" in said
-    assert "9223372036854775807" not in said
+def test_help_of_a_run_has_each_option_once(run_cli):
+    help_text = " ".join(run_cli("run", "--help")[1].split())
+    assert help_text.count("or the path of a Unity executable") == 1
+    assert "[manipulation, plans]" in help_text
+    assert "9223372036854775807" not in help_text
 
 
 @pytest.mark.parametrize(
     ("limit", "reason"), [("0", "0 is less than 1"), (str(2**63), "is more than"), ("x", "'x'")]
 )
-def test_an_invalid_number_is_refused(run, limit, reason):
-    code, _, said = run("--model", "oracle", "--tasks", "nieh_mini_gt", "--limit", limit)
+def test_an_invalid_number_is_refused(run_cli, limit, reason):
+    code, _, err = run_cli("--model", "oracle", "--tasks", "nieh_mini_gt", "--limit", limit)
     assert code == 2
-    assert "--limit" in said
-    assert reason in said
+    assert "--limit" in err
+    assert reason in err

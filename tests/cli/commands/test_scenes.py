@@ -6,11 +6,13 @@ import pytest
 from PIL import Image
 
 
-def test_a_dumped_scene_runs_from_the_folder_and_keeps_its_objects(tmp_path, run):
+def test_a_dumped_scene_runs_from_the_folder_and_keeps_its_objects(tmp_path, run_cli):
     folder = tmp_path / "data"
-    code, out, err = run("scenes", "dump", "kitchen-2", "bedroom-1", "--embedded", "--out", folder)
+    code, out, err = run_cli(
+        "scenes", "dump", "kitchen-2", "bedroom-1", "--embedded", "--out", folder
+    )
     assert code == 0, err
-    assert run("scenes", "dump", "kitchen-2", "--embedded", "--out", folder)[0] == 0
+    assert run_cli("scenes", "dump", "kitchen-2", "--embedded", "--out", folder)[0] == 0
     with gzip.open(folder / "thor_scenes" / "objects.jsonl.gz", "rt") as file:
         lines = [json.loads(line) for line in file]
     assert [line["scene"] for line in lines] == ["bedroom-1", "kitchen-2"]
@@ -19,12 +21,12 @@ def test_a_dumped_scene_runs_from_the_folder_and_keeps_its_objects(tmp_path, run
     cells = np.load(folder / "alfred" / "layouts" / "kitchen-2-layout.npy")
     assert cells.shape[1] == 2
     assert len(cells) > 10
-    assert "kitchen-2" in run("ls", "scenes", "--data", folder)[1]
+    assert "kitchen-2" in run_cli("ls", "scenes", "--data", folder)[1]
 
 
-def test_a_scene_is_drawn_from_above_and_from_the_agent(tmp_path, run):
+def test_a_scene_is_drawn_from_above_and_from_the_agent(tmp_path, run_cli):
     path = tmp_path / "kitchen.png"
-    code, _, err = run("scenes", "show", "kitchen-1", "--out", path, "--size", 100)
+    code, _, err = run_cli("scenes", "show", "kitchen-1", "--out", path, "--size", 100)
     assert code == 0, err
     picture = np.asarray(Image.open(path))
     assert picture.shape == (100, 200, 3)
@@ -34,7 +36,7 @@ def test_a_scene_is_drawn_from_above_and_from_the_agent(tmp_path, run):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "expected"),
     [
         (["scenes", "show", "attic-1"], "attic-1"),
         (["scenes", "show", "FloorPlan1"], "FloorPlan1"),
@@ -46,9 +48,9 @@ def test_a_scene_is_drawn_from_above_and_from_the_agent(tmp_path, run):
         (["ls", "scenes", "--data", "."], "give a folder of recorded floor plans"),
     ],
 )
-def test_a_scene_that_is_not_there_is_one_line(arguments, said, run, tmp_path, monkeypatch):
+def test_a_scene_that_is_not_there_is_one_line(arguments, expected, run_cli, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code, _, err = run(*arguments)
+    code, _, err = run_cli(*arguments)
     assert code in (1, 2)
-    assert said in err
+    assert expected in err
     assert len(err.strip().splitlines()) == 1

@@ -7,28 +7,19 @@ import math
 
 import pytest
 
-from infthor_eval.formats.question import Question
-from tests.faults.told import said_in_one_line
+from tests.helpers.command_line import assert_refused, option_words
+from tests.helpers.questions import make_question
 
 
 @pytest.fixture
-def ran(make_nieh_set, tmp_path, run):
+def ran(make_nieh_set, tmp_path, run_cli):
     """The folders of runs of the oracle and of the blind on five questions, and what was printed at
     their end."""
     data = make_nieh_set(size=56)
-    arguments = [
-        "--model",
-        "oracle,blind",
-        "--tasks",
-        "nieh",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(model="oracle,blind", tasks="nieh", data=data, output=tmp_path / "out")
 
     def ran(*options):
-        code, out, err = run(*arguments, *options)
+        code, out, err = run_cli(*arguments, *options)
         assert code == 0, err
         folders = [next((tmp_path / "out" / model).iterdir()) for model in ("oracle", "blind")]
         return folders, out
@@ -39,9 +30,9 @@ def ran(make_nieh_set, tmp_path, run):
 @pytest.mark.parametrize(
     "options", [(), ("--full",), ("--json",), ("--format", "latex"), ("--format", "csv")]
 )
-def test_a_run_is_shown_again_as_it_was_shown(ran, run, options):
+def test_a_run_is_shown_again_as_it_was_shown(ran, run_cli, options):
     folders, printed = ran(*options)
-    code, out, err = run("show", *folders, *options)
+    code, out, err = run_cli("show", *folders, *options)
     assert (code, out, err) == (0, printed, "")
 
 
@@ -54,10 +45,10 @@ def test_the_first_screen_has_one_number_a_task_and_fits(ran):
     assert max(len(line) for line in printed.splitlines() if "/" not in line) <= 100
 
 
-def test_a_task_without_samples_is_a_line(make_nieh_set, tmp_path, run):
-    data = make_nieh_set([Question("t", "Is there a mug?", (70,), ("yes",))], n_frames=140, size=56)
+def test_a_task_without_samples_is_a_line(make_nieh_set, tmp_path, run_cli):
+    data = make_nieh_set([make_question(clues=(70,))], n_frames=140, size=56)
     tasks = "nieh_haystack_8k,nieh_haystack_1m"
-    code, out, err = run(
+    code, out, err = run_cli(
         "--model", "oracle", "--tasks", tasks, "--data", data, "--output", tmp_path / "out"
     )
     assert code == 0, err
@@ -67,7 +58,7 @@ def test_a_task_without_samples_is_a_line(make_nieh_set, tmp_path, run):
     )
 
 
-def test_quiet_prints_folders_and_nothing_else(ran, capfd, run):
+def test_quiet_prints_folders_and_nothing_else(ran, capfd, run_cli):
     folders, printed = ran("--quiet")
     assert printed.split() == [str(folder) for folder in folders]
 
@@ -110,22 +101,22 @@ def test_all_tables_of_csv_have_numbers_in_their_columns_of_numbers(ran):
             ), (name, cells)
 
 
-def test_json_with_format_or_full_is_refused(run, tmp_path):
-    said_in_one_line(run("show", tmp_path, "--json", "--full"), "--json holds everything")
+def test_json_with_format_or_full_is_refused(run_cli, tmp_path):
+    assert_refused(run_cli("show", tmp_path, "--json", "--full"), "--json holds everything")
 
 
-def test_a_folder_without_a_run_is_named(run, tmp_path):
-    said_in_one_line(
-        run("show", tmp_path), f"{tmp_path}: no journal in it; give the folder of a run"
+def test_a_folder_without_a_run_is_named(run_cli, tmp_path):
+    assert_refused(
+        run_cli("show", tmp_path), f"{tmp_path}: no journal in it; give the folder of a run"
     )
 
 
 # -- ls
 
 
-def test_runs_are_listed_with_counts_and_primary_metrics(ran, run, tmp_path):
+def test_runs_are_listed_with_counts_and_primary_metrics(ran, run_cli, tmp_path):
     folders, _ = ran()
-    code, out, err = run("ls", "runs", tmp_path / "out")
+    code, out, err = run_cli("ls", "runs", tmp_path / "out")
     assert (code, err) == (0, "")
     (oracle,) = [line for line in out.splitlines() if line.split()[:1] == ["oracle"]]
     assert oracle.split()[1:5] == ["nieh", "10", "0", "0"]
@@ -133,26 +124,26 @@ def test_runs_are_listed_with_counts_and_primary_metrics(ran, run, tmp_path):
     assert str(folders[0]) in oracle
 
 
-def test_a_killed_run_is_listed_without_results_and_a_broken_one_is_named(ran, run, tmp_path):
+def test_a_killed_run_is_listed_without_results_and_a_broken_one_is_named(ran, run_cli, tmp_path):
     (oracle, blind), _ = ran()
     (oracle / "results.json").unlink()
     journal = blind / "journal" / "worker-0.jsonl"
     journal.write_bytes(journal.read_bytes() + b"no record\n")
-    code, out, err = run("ls", "runs", tmp_path)
+    code, out, err = run_cli("ls", "runs", tmp_path)
     assert code == 0
     (row,) = [line.split() for line in out.splitlines() if line.split()[:1] == ["oracle"]]
     assert row[1:5] == ["nieh", "10", "?", "0"]
     assert f"{blind}: cannot be read: " in err.replace("\n", "")
 
 
-def test_a_folder_without_runs_says_how_to_make_one(run, tmp_path):
-    code, out, _ = run("ls", "runs", tmp_path)
+def test_a_folder_without_runs_says_how_to_make_one(run_cli, tmp_path):
+    code, out, _ = run_cli("ls", "runs", tmp_path)
     assert code == 0
     assert "`infthor-eval --model MODEL --tasks TASKS` starts one" in out
-    said_in_one_line(run("ls", "runs", tmp_path / "no"), "no: no such folder")
+    assert_refused(run_cli("ls", "runs", tmp_path / "no"), "no: no such folder")
 
 
-def test_bare_ls_says_what_can_be_listed(run):
-    code, out, _ = run("ls")
+def test_bare_ls_says_what_can_be_listed(run_cli):
+    code, out, _ = run_cli("ls")
     assert code == 0
     assert all(name in out for name in ("models", "tasks", "scenes", "runs"))

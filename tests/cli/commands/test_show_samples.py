@@ -9,29 +9,23 @@ import pandas
 import pytest
 
 import infthor_eval
-from tests.faults.told import said_in_one_line
+from tests.helpers.command_line import assert_refused, option_words
+from tests.helpers.processes import cli_words
 
 
 @pytest.fixture
-def folders(make_nieh_set, tmp_path, run):
+def folders(make_nieh_set, tmp_path, run_cli):
     """The folders of runs of the oracle and of the blind on five questions."""
     data = make_nieh_set(size=56)
-    code, _, err = run(
-        "--model",
-        "oracle,blind",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
+    code, _, err = run_cli(
+        *option_words(model="oracle,blind", tasks="nieh_gt", data=data, output=tmp_path / "out")
     )
     assert code == 0, err
     return [next((tmp_path / "out" / model).iterdir()) for model in ("oracle", "blind")]
 
 
-def test_csv_has_a_row_per_sample_of_every_run(folders, run):
-    code, out, err = run("show", *folders, "--per-sample", "--format", "csv")
+def test_csv_has_a_row_per_sample_of_every_run(folders, run_cli):
+    code, out, err = run_cli("show", *folders, "--per-sample", "--format", "csv")
     assert (code, err) == (0, "")
     rows = list(csv.DictReader(io.StringIO(out)))
     assert [row["run"] for row in rows] == ["oracle"] * 5 + ["blind"] * 5
@@ -43,14 +37,7 @@ def test_csv_has_a_row_per_sample_of_every_run(folders, run):
     "options", [("--format", "parquet"), ("--per-sample", "--format", "parquet")]
 )
 def test_parquet_is_the_frame(folders, options):
-    words = [
-        sys.executable,
-        "-c",
-        "from infthor_eval.cli import main; main()",
-        "show",
-        *folders[:1],
-        *options,
-    ]
+    words = cli_words("show", *folders[:1], *options)
     done = subprocess.run(words, capture_output=True, check=True, timeout=600)
     pandas.testing.assert_frame_equal(
         pandas.read_parquet(io.BytesIO(done.stdout)),
@@ -68,14 +55,16 @@ def test_parquet_is_the_frame(folders, options):
         ("--format", "parquet", "--full"),
     ],
 )
-def test_what_has_no_row_per_sample_is_refused(folders, run, options):
-    said_in_one_line(
-        run("show", *folders, *options), "--per-sample: is for --format csv and --format parquet"
+def test_what_has_no_row_per_sample_is_refused(folders, run_cli, options):
+    assert_refused(
+        run_cli("show", *folders, *options),
+        "--per-sample: is for --format csv and --format parquet",
     )
 
 
-def test_parquet_is_not_written_on_a_terminal(folders, run, monkeypatch):
+def test_parquet_is_not_written_on_a_terminal(folders, run_cli, monkeypatch):
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    said_in_one_line(
-        run("show", *folders, "--format", "parquet"), "write it into a file, `> samples.parquet`"
+    assert_refused(
+        run_cli("show", *folders, "--format", "parquet"),
+        "write it into a file, `> samples.parquet`",
     )

@@ -10,6 +10,8 @@ from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.storage.folders import packaged_folder
 from model_adapters import Capabilities
 
+from ...helpers.questions import make_question
+
 # Of known skill: which answers each scripted model gets right.
 SKILLS = {
     "one-clue": lambda q: len(q.clues) == 1,
@@ -20,7 +22,7 @@ SKILLS = {
     "half": lambda q: len(q.answers) == 2,
 }
 QUESTIONS = [
-    Question("t", "Is there a mug?", (1,), ("yes",)),
+    make_question(),
     Question("t", "What is <b>it</b>?", (2,), ("mug",)),
     Question("t", "Was it there?", (1, 2), ("yes",)),
     Question("t", "Where was it?", (1, 3), ("shelf",)),
@@ -66,10 +68,10 @@ def kept(folder):
 
 
 def test_questions_that_one_model_answers_are_kept_and_the_rest_is_rejected_or_inspected(
-    data, tmp_path, run
+    data, tmp_path, run_cli
 ):
     out = tmp_path / "validated"
-    code, printed, err = run("validate", data, "--models", "yes,none", "--out", out)
+    code, printed, err = run_cli("validate", data, "--models", "yes,none", "--out", out)
     assert code == 0, err
     assert kept(out) == ["Is there a mug?", "Was it there?"]
     rejected = [json.loads(line) for line in (out / "rejected.jsonl").read_text().splitlines()]
@@ -83,18 +85,20 @@ def test_questions_that_one_model_answers_are_kept_and_the_rest_is_rejected_or_i
         *("100.00", "(1)", "100.00", "(1)", "-", "100.00")
     ]
     assert (
-        run("--model", "oracle", "--tasks", "nieh_gt", "--data", out, "--output", tmp_path / "o")[0]
+        run_cli(
+            "--model", "oracle", "--tasks", "nieh_gt", "--data", out, "--output", tmp_path / "o"
+        )[0]
         == 0
     )
 
 
-def test_the_bundled_set_keeps_exactly_what_a_model_of_four_can_answer(data, tmp_path, run):
+def test_the_bundled_set_keeps_exactly_what_a_model_of_four_can_answer(data, tmp_path, run_cli):
     bundled, out, models = (
         packaged_folder("sets/nieh_mini"),
         tmp_path / "validated",
         ("yes", "counter", "places", "none"),
     )
-    code, printed, err = run("validate", bundled, "--models", ",".join(models), "--out", out)
+    code, printed, err = run_cli("validate", bundled, "--models", ",".join(models), "--out", out)
     assert code == 0, err
     questions = [
         item for path in sorted(bundled.glob("qa_set*.csv")) for item in read_questions(path)
@@ -118,9 +122,9 @@ def test_the_bundled_set_keeps_exactly_what_a_model_of_four_can_answer(data, tmp
     assert f"{len(questions)} questions: {len(known)} kept" in printed
 
 
-def test_the_page_shows_frames_and_lets_no_markup_through(data, tmp_path, run):
+def test_the_page_shows_frames_and_lets_no_markup_through(data, tmp_path, run_cli):
     out = tmp_path / "validated"
-    run("validate", data, "--models", "none", "--out", out)
+    run_cli("validate", data, "--models", "none", "--out", out)
     page = (out / "inspection.html").read_text()
     assert "<script>wrong" not in page
     assert "&lt;script&gt;wrong" in page
@@ -129,17 +133,17 @@ def test_the_page_shows_frames_and_lets_no_markup_through(data, tmp_path, run):
     assert (out / source).resolve().is_file()
 
 
-def test_decisions_are_applied(data, tmp_path, run):
+def test_decisions_are_applied(data, tmp_path, run_cli):
     out = tmp_path / "validated"
     arguments = ["validate", data, "--models", "one-clue,none", "--out", out]
-    run(*arguments)
+    run_cli(*arguments)
     rows = list(csv.DictReader((out / "inspection.csv").open(newline="")))
     decisions = tmp_path / "decisions.csv"
     choices = zip(rows, ("keep", "drop", ""), strict=True)
     decisions.write_text(
         "question_id,decision\n" + "".join(f"{row['question_id']},{c}\n" for row, c in choices)
     )
-    code, printed, err = run(*arguments, "--decisions", decisions)
+    code, printed, err = run_cli(*arguments, "--decisions", decisions)
     assert code == 0
     assert kept(out) == ["Is there a mug?", "What is <b>it</b>?", "Was it there?"]
     assert "3 kept, 1 rejected, 1 to inspect" in printed
@@ -147,31 +151,31 @@ def test_decisions_are_applied(data, tmp_path, run):
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "expected"),
     [
         ("question_id,decision\nx,keep\n", "about x, which is not in the set"),
         ("question_id,decision\nx,maybe\n", "line 2: decision is 'maybe'; write keep or drop"),
         ("question_id\nx\n", "no column decision"),
     ],
 )
-def test_decisions_that_do_not_fit_are_refused(data, tmp_path, run, content, said):
+def test_decisions_that_do_not_fit_are_refused(data, tmp_path, run_cli, content, expected):
     decisions = tmp_path / "decisions.csv"
     decisions.write_text(content)
-    code, _, err = run(
+    code, _, err = run_cli(
         "validate", data, "--models", "none", "--out", tmp_path / "v", "--decisions", decisions
     )
     assert code == 2
-    assert said in err
+    assert expected in err
     assert not (tmp_path / "v" / "qa_set_validated.csv").exists()
 
 
-def test_the_published_filter_keeps_what_is_answered_in_part(data, tmp_path, run):
+def test_the_published_filter_keeps_what_is_answered_in_part(data, tmp_path, run_cli):
     words = ("validate", str(data), "--models", "half", "--out")
-    code, out, _ = run(*words, str(tmp_path / "strict"))
+    code, out, _ = run_cli(*words, str(tmp_path / "strict"))
     assert (code, "0 kept" in out) == (0, True)
-    code, out, _ = run(*words, str(tmp_path / "published"), "--published")
+    code, out, _ = run_cli(*words, str(tmp_path / "published"), "--published")
     assert (code, "1 kept" in out) == (0, True)
     assert kept(tmp_path / "published") == ["Which two?"]
-    code, _, err = run(*words, str(tmp_path / "both"), "--published", "--scorer", "strict")
+    code, _, err = run_cli(*words, str(tmp_path / "both"), "--published", "--scorer", "strict")
     assert code == 2
     assert "--scorer strict" in err

@@ -10,18 +10,11 @@ from PIL import Image
 from infthor_eval.plans.records import RECORDS
 from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.runs import read_run
-from infthor_eval.runs.journals.journal import Journal
 
-from ...plans.cut import FORK, cut
-from ...plans.cut import MUG as NAME
-from ..remarks import remarks
-
-
-def refused(found, *said):
-    code, out, err = found
-    assert (code, out, len(err.splitlines())) == (2, "", 1)
-    for words in said:
-        assert words in err
+from ...helpers.command_line import assert_refused, option_words, read_remarks
+from ...helpers.journals import write_journal
+from ...helpers.trajectories import FORK, cut_trajectory
+from ...helpers.trajectories import MUG as NAME
 
 
 def n_pictures(folder, *numbers):
@@ -30,23 +23,16 @@ def n_pictures(folder, *numbers):
     return sum(TITLE_REPEATS + len(plans[number].steps) + END_REPEATS for number in numbers)
 
 
-def test_two_plans_become_an_mp4(scripted_run, scripted_data, tmp_path, run):
+def test_two_plans_become_an_mp4(scripted_run, scripted_data, tmp_path, run_cli):
     out = tmp_path / "new" / "watched.mp4"
-    code, said, err = run(
+    code, output, err = run_cli(
         "watch",
         scripted_run,
-        "--trajectory",
-        NAME,
-        "--plans",
-        "2-3",
-        "--data",
-        scripted_data,
-        "--out",
-        out,
+        *option_words(trajectory=NAME, plans="2-3", data=scripted_data, out=out),
     )
     wanted = n_pictures(scripted_run, 2, 3)
-    assert (code, remarks(err)) == (0, [])
-    assert said.splitlines() == [f"2 of 12 plans, {wanted / 2:.0f} s: {out}"]
+    assert (code, read_remarks(err)) == (0, [])
+    assert output.splitlines() == [f"2 of 12 plans, {wanted / 2:.0f} s: {out}"]
     video = cv2.VideoCapture(str(out))
     sizes = []
     while (picture := video.read())[0]:
@@ -55,9 +41,9 @@ def test_two_plans_become_an_mp4(scripted_run, scripted_data, tmp_path, run):
     assert [path.name for path in out.parent.iterdir()] == ["watched.mp4"]
 
 
-def test_a_gif_is_as_long_as_its_plans(scripted_run, scripted_data, tmp_path, run):
+def test_a_gif_is_as_long_as_its_plans(scripted_run, scripted_data, tmp_path, run_cli):
     out = tmp_path / "watched.gif"
-    code, _, _ = run(
+    code, _, _ = run_cli(
         "watch", scripted_run, "--plans", 2, "--data", scripted_data, "--out", out, "--fps", 5
     )
     assert code == 0
@@ -70,108 +56,99 @@ def test_a_gif_is_as_long_as_its_plans(scripted_run, scripted_data, tmp_path, ru
     assert sum(durations) == 200 * n_pictures(scripted_run, 2)
 
 
-def test_a_file_is_named_for_what_it_shows(scripted_run, scripted_data, tmp_path, run, monkeypatch):
+def test_a_file_is_named_for_what_it_shows(
+    scripted_run, scripted_data, tmp_path, run_cli, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
-    code, said, _ = run("watch", scripted_run, "--plans", "2", "--data", scripted_data)
+    code, output, _ = run_cli("watch", scripted_run, "--plans", "2", "--data", scripted_data)
     path = f"results/recordings/scripted-infthor_plans-{NAME}-2.mp4"
-    assert (code, said.split()[-1]) == (0, path)
+    assert (code, output.split()[-1]) == (0, path)
     assert (tmp_path / path).stat().st_size > 1000
 
 
 def test_what_ends_otherwise_than_recorded_is_said_in_a_line(
-    scripted_run, scripted_data, tmp_path, run
+    scripted_run, scripted_data, tmp_path, run_cli
 ):
+    def change(record):
+        steps = tuple(msgspec.structs.replace(step, reward=9.0) for step in record.payload.steps)
+        payload = msgspec.structs.replace(record.payload, steps=steps)
+        return msgspec.structs.replace(record, payload=payload)
+
     header, records = read_run(scripted_run, RECORDS)
-    with Journal(tmp_path / "run", header, RECORDS) as journal:
-        for record in records:
-            steps = tuple(
-                msgspec.structs.replace(step, reward=9.0) for step in record.payload.steps
-            )
-            journal.append(
-                msgspec.structs.replace(
-                    record, payload=msgspec.structs.replace(record.payload, steps=steps)
-                )
-            )
-    code, said, err = run(
+    write_journal(tmp_path / "run", header, [change(record) for record in records], RECORDS)
+    code, output, err = run_cli(
         "watch",
         tmp_path / "run",
-        "--plans",
-        2,
-        "--data",
-        scripted_data,
-        "--out",
-        tmp_path / "a.gif",
+        *option_words(plans=2, data=scripted_data, out=tmp_path / "a.gif"),
     )
     line = (
         "otherwise than recorded: plan 2, action 1: PickupObject Mug earns 2 now, and 9 in the run"
     )
-    assert (code, remarks(err)) == (0, [line])
-    assert "1 of 12 plans" in said
+    assert (code, read_remarks(err)) == (0, [line])
+    assert "1 of 12 plans" in output
 
 
 def test_what_cannot_be_watched_is_one_line(
-    scripted_run, scripted_data, make_nieh_set, tmp_path, run
+    scripted_run, scripted_data, make_nieh_set, tmp_path, run_cli
 ):
     def watch(*words):
-        return run("watch", scripted_run, "--data", scripted_data, *words)
+        return run_cli("watch", scripted_run, "--data", scripted_data, *words)
 
-    refused(
+    assert_refused(
         watch("--trajectory", "hall-9"),
         f"unknown trajectory of this run 'hall-9'; there are {NAME}",
     )
-    refused(
+    assert_refused(
         watch("--task", "infthor"),
         "unknown task of this run 'infthor'; did you mean 'infthor_plans'?",
     )
-    refused(watch("--plans", "3-99"), "--plans 3-99: the run has plans 1 to 12")
-    refused(watch("--plans", "99"), "--plans 99: the run has plans 1 to 12")
-    refused(
+    assert_refused(watch("--plans", "3-99"), "--plans 3-99: the run has plans 1 to 12")
+    assert_refused(watch("--plans", "99"), "--plans 99: the run has plans 1 to 12")
+    assert_refused(
         watch("--plans", "two"),
         "--plans 'two': is neither a plan's number nor two of them; write 7, or 3-7",
     )
-    refused(
+    assert_refused(
         watch("--out", tmp_path / "a.avi"),
         "a.avi: unknown format; give a file name that ends in .mp4 or .gif",
     )
-    refused(watch("--out", tmp_path / "a.mp4", "--fps", "0"), "--fps")
+    assert_refused(watch("--out", tmp_path / "a.mp4", "--fps", "0"), "--fps")
     (tmp_path / "a.mp4").mkdir()
-    refused(watch("--out", tmp_path / "a.mp4"), "not a file; give another place with --out")
-    refused(
-        run("watch", scripted_run),
+    assert_refused(watch("--out", tmp_path / "a.mp4"), "not a file; give another place with --out")
+    assert_refused(
+        run_cli("watch", scripted_run),
         "do not come with the package; give them as --data FILE or FOLDER",
     )
-    refused(
-        run("watch", scripted_run, "--data", tmp_path / "none"), "there is no such file or folder"
+    assert_refused(
+        run_cli("watch", scripted_run, "--data", tmp_path / "none"),
+        "there is no such file or folder",
     )
-    refused(run("watch", tmp_path), f"{tmp_path}: no journal in it; give the folder of a run")
-    run(
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "nieh",
+    assert_refused(
+        run_cli("watch", tmp_path), f"{tmp_path}: no journal in it; give the folder of a run"
     )
-    (asked,) = (tmp_path / "nieh" / "oracle").iterdir()
-    refused(
-        run("watch", asked),
-        f"{asked}: is a run of nieh, and only runs of plans and manipulation can be watched",
+    run_cli(
+        *option_words(
+            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "nieh"
+        )
+    )
+    (nieh_run,) = (tmp_path / "nieh" / "oracle").iterdir()
+    assert_refused(
+        run_cli("watch", nieh_run),
+        f"{nieh_run}: is a run of nieh, and only runs of plans and manipulation can be watched",
     )
 
 
 @pytest.mark.parametrize("name", [NAME, FORK])
-def test_a_trajectory_that_is_not_the_runs_is_one_line(scripted_run, tmp_path, run, name):
-    (tmp_path / "changed.json").write_text(json.dumps(cut(name) | {"more": 1}))
-    said = (
+def test_a_trajectory_that_is_not_the_runs_is_one_line(scripted_run, tmp_path, run_cli, name):
+    (tmp_path / "changed.json").write_text(json.dumps(cut_trajectory(name) | {"more": 1}))
+    expected = (
         "changed since the run" if name == NAME else f"not among the trajectories of --data ({name}"
     )
-    refused(
-        run(
+    assert_refused(
+        run_cli(
             "watch", scripted_run, "--data", tmp_path / "changed.json", "--out", tmp_path / "a.gif"
         ),
         NAME,
-        said,
+        expected,
     )
     assert not (tmp_path / "a.gif").exists()

@@ -9,9 +9,9 @@ from infthor_eval.cli import main
 from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.runs import read_run
-from infthor_eval.runs.journals.journal import Journal
 
-from ..remarks import remarks
+from ...helpers.command_line import assert_refused, option_words, read_remarks
+from ...helpers.journals import write_journal
 
 
 @pytest.fixture(scope="module")
@@ -19,16 +19,7 @@ def arm_run(tmp_path_factory):
     """Two pick-ups and two puts of one trajectory, by an arm that moves at random: in deltas, as
     policies do."""
     output = tmp_path_factory.mktemp("arms")
-    words = (
-        "--model",
-        "random-arm",
-        "--tasks",
-        "manipulathor_mini",
-        "--limit",
-        2,
-        "--output",
-        output,
-    )
+    words = option_words(model="random-arm", tasks="manipulathor_mini", limit=2, output=output)
     with pytest.MonkeyPatch.context() as patched, pytest.raises(SystemExit) as ended:
         # The first ones, which are of one trajectory; a limit takes them from all.
         patched.setattr(
@@ -54,49 +45,39 @@ def trajectory(arm_run):
     return name
 
 
-def refused(found, *said):
-    code, out, err = found
-    assert (code, out, len(err.splitlines())) == (2, "", 1)
-    for words in said:
-        assert words in err
-
-
 def rewritten(folder, place, change):
     header, records = read_run(folder, RECORDS)
-    with Journal(place, header, RECORDS) as journal:
-        for record in records:
-            journal.append(change(record))
-    return place
+    return write_journal(place, header, [change(record) for record in records], RECORDS)
 
 
 def test_episodes_become_an_mp4_and_go_as_they_were_recorded(
-    arm_run, episodes, trajectory, tmp_path, run
+    arm_run, episodes, trajectory, tmp_path, run_cli
 ):
     out = tmp_path / "new" / "watched.mp4"
     chosen = [episodes[0], next(payload for payload in episodes if payload.kind == "put")]
     numbers = ",".join(str(payload.index) for payload in chosen)
-    code, said, err = run(
+    code, output, err = run_cli(
         "watch", arm_run, "--trajectory", trajectory, "--episode", numbers, "--out", out
     )
     wanted = sum(TITLE_REPEATS + len(payload.steps) + END_REPEATS for payload in chosen)
-    assert (code, remarks(err)) == (0, [])
-    assert said.splitlines() == [f"2 of 4 episodes, {wanted / 2:.0f} s: {out}"]
+    assert (code, read_remarks(err)) == (0, [])
+    assert output.splitlines() == [f"2 of 4 episodes, {wanted / 2:.0f} s: {out}"]
     video, sizes = cv2.VideoCapture(str(out)), []
     while (picture := video.read())[0]:
         sizes.append(picture[1].shape)
     assert sizes == [(SIZE[1], SIZE[0], 3)] * wanted
 
 
-def test_a_sheet_shows_all_episodes(arm_run, tmp_path, run):
+def test_a_sheet_shows_all_episodes(arm_run, tmp_path, run_cli):
     out = tmp_path / "sheet.png"
-    code, said, err = run("watch", arm_run, "--sheet", out)
-    assert (code, remarks(err), said.splitlines()) == (0, [], [f"4 of 4 episodes: {out}"])
+    code, output, err = run_cli("watch", arm_run, "--sheet", out)
+    assert (code, read_remarks(err), output.splitlines()) == (0, [], [f"4 of 4 episodes: {out}"])
     with Image.open(out) as sheet:
         assert sheet.size[1] > 4 * 300
         assert len(sheet.convert("RGB").getcolors(1 << 24)) > 1000
 
 
-def test_what_goes_otherwise_than_recorded_is_said_in_a_line(arm_run, episodes, tmp_path, run):
+def test_what_goes_otherwise_than_recorded_is_said_in_a_line(arm_run, episodes, tmp_path, run_cli):
     def moved(record):
         steps = tuple(
             msgspec.structs.replace(step, hand=(step.hand[0], step.hand[1] + 0.1, step.hand[2]))
@@ -108,58 +89,62 @@ def test_what_goes_otherwise_than_recorded_is_said_in_a_line(arm_run, episodes, 
 
     folder = rewritten(arm_run, tmp_path / "run", moved)
     first = episodes[0].index
-    code, _, err = run("watch", folder, "--episode", first, "--out", tmp_path / "a.gif")
+    code, _, err = run_cli("watch", folder, "--episode", first, "--out", tmp_path / "a.gif")
     line = (
         f"otherwise than recorded: action {first}, step 1: the hand is 10 cm from where it was in "
         "the run"
     )
-    assert (code, remarks(err)) == (0, [line])
+    assert (code, read_remarks(err)) == (0, [line])
 
 
-def test_episodes_in_which_nobody_acted_have_the_title_alone(arm_run, episodes, tmp_path, run):
+def test_episodes_in_which_nobody_acted_have_the_title_alone(arm_run, episodes, tmp_path, run_cli):
     def failed(record):
         fresh = msgspec.structs.replace(record.payload, steps=(), ended="", reward=0.0)
         return msgspec.structs.replace(record, payload=fresh, failure="out of memory")
 
     folder = rewritten(arm_run, tmp_path / "run", failed)
-    code, said, _ = run(
+    code, output, _ = run_cli(
         "watch", folder, "--episode", episodes[0].index, "--out", tmp_path / "a.gif", "--fps", 1
     )
-    assert (code, said.splitlines()) == (
+    assert (code, output.splitlines()) == (
         0,
         [f"1 of 4 episodes, {TITLE_REPEATS} s: {tmp_path / 'a.gif'}"],
     )
-    assert run("watch", folder, "--sheet", tmp_path / "sheet.png")[0] == 0
+    assert run_cli("watch", folder, "--sheet", tmp_path / "sheet.png")[0] == 0
 
 
 def test_what_cannot_be_watched_is_one_line(
-    arm_run, episodes, trajectory, scripted_run, tmp_path, run
+    arm_run, episodes, trajectory, scripted_run, tmp_path, run_cli
 ):
     def watch(*words):
-        return run("watch", arm_run, *words)
+        return run_cli("watch", arm_run, *words)
 
     there = ", ".join(str(payload.index) for payload in episodes)
-    refused(
+    assert_refused(
         watch("--trajectory", "hall-9"),
         f"unknown trajectory of this run 'hall-9'; there are {trajectory}",
     )
-    refused(watch("--task", "nothing"), "unknown task of this run 'nothing'")
-    refused(watch("--episode", "1"), f"--episode 1: the run has episodes {there} of {trajectory}")
-    refused(
+    assert_refused(watch("--task", "nothing"), "unknown task of this run 'nothing'")
+    assert_refused(
+        watch("--episode", "1"), f"--episode 1: the run has episodes {there} of {trajectory}"
+    )
+    assert_refused(
         watch("--episode", "one"), "--episode 'one': is no number of an action; write 17, or 17,75"
     )
-    refused(
+    assert_refused(
         watch("--plans", "1"),
         f"--plans: is not for runs of manipulation, and {arm_run} is one; leave it out",
     )
-    refused(watch("--sheet", tmp_path / "a.jpg"), "a.jpg: a sheet is a PNG")
-    refused(
+    assert_refused(watch("--sheet", tmp_path / "a.jpg"), "a.jpg: a sheet is a PNG")
+    assert_refused(
         watch("--sheet", tmp_path / "a.png", "--out", tmp_path / "a.gif"),
         "--sheet and --out: one picture or",
     )
-    refused(watch("--data", tmp_path / "none"), "there is no such file or folder")
-    refused(run("watch", scripted_run, "--episode", "1"), "--episode: is not for runs of plans")
-    refused(
-        run("watch", scripted_run, "--sheet", tmp_path / "a.png"),
+    assert_refused(watch("--data", tmp_path / "none"), "there is no such file or folder")
+    assert_refused(
+        run_cli("watch", scripted_run, "--episode", "1"), "--episode: is not for runs of plans"
+    )
+    assert_refused(
+        run_cli("watch", scripted_run, "--sheet", tmp_path / "a.png"),
         "--sheet: is not for runs of plans",
     )

@@ -11,8 +11,8 @@ import pytest
 
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs.journals.journal import Journal
-from tests.faults.told import said_in_one_line
-from tests.nieh.made import record
+from tests.helpers.command_line import assert_refused
+from tests.helpers.nieh_runs import make_record
 from tests.report.live.conftest import header_of
 
 pytest.importorskip(
@@ -35,10 +35,10 @@ def test_the_page_is_served_until_ctrl_c_while_the_run_goes_on(tmp_path):
         place, _, address = process.stdout.readline().strip().partition(": ")
         assert place == str(tmp_path)
         with Journal(tmp_path / "m" / "nieh-1", header_of(), RECORDS) as journal:
-            journal.append(record(0, "Sofa", ("Sofa",)))
+            journal.append(make_record(0, "Sofa", ("Sofa",)))
             with urllib.request.urlopen(f"{address}state.json", timeout=600) as answer:
                 state = json.load(answer)
-            journal.append(record(1, "Bed", ("Sofa",)))
+            journal.append(make_record(1, "Bed", ("Sofa",)))
         assert (state["totals"]["n_done"], state["n_units"]) == (1, 8)
         with pytest.raises(urllib.error.HTTPError, match="403"):
             urllib.request.urlopen(address.rpartition("/")[0][:-1] + "/", timeout=600)
@@ -48,13 +48,14 @@ def test_the_page_is_served_until_ctrl_c_while_the_run_goes_on(tmp_path):
     assert (process.returncode, out, err) == (0, "", "")
 
 
-def test_a_file_is_no_folder_of_runs(run, tmp_path):
+def test_a_file_is_no_folder_of_runs(run_cli, tmp_path):
     (tmp_path / "file").write_text("")
-    said_in_one_line(
-        run("watch-run", tmp_path / "file"), "is a file; give the folder of a run, or one above it"
+    assert_refused(
+        run_cli("watch-run", tmp_path / "file"),
+        "is a file; give the folder of a run, or one above it",
     )
 
 
-def test_without_the_extra_it_says_how_to_install_it(run, tmp_path, monkeypatch):
+def test_without_the_extra_it_says_how_to_install_it(run_cli, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "uvicorn", None)
-    said_in_one_line(run("watch-run", tmp_path), "pip install 'infthor-eval[page]'")
+    assert_refused(run_cli("watch-run", tmp_path), "pip install 'infthor-eval[page]'")

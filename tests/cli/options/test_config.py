@@ -15,14 +15,10 @@ from infthor_eval.cli.options.run import RunOptions, run_options
 from infthor_eval.cli.options.values import ModelList
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import RunRequest, Suite, read_stored_command
-from tests.faults.told import said_in_one_line
+from tests.helpers.command_line import assert_refused
+from tests.helpers.files import find_one
 
 KEY = "sk-of-nobody-0123456789"
-
-
-def only(folder: Path, pattern: str) -> Path:
-    (path,) = folder.rglob(pattern)
-    return path
 
 
 @pytest.fixture
@@ -45,17 +41,17 @@ def config(make_nieh_set, tmp_path):
 
 
 @pytest.mark.parametrize("words", [("run", "--config"), ("--config",)])
-def test_a_run_by_a_file_and_the_command_line_overrides_it(config, tmp_path, run, words):
-    code, _, err = run(*words, config(limit=2))
+def test_a_run_by_a_file_and_the_command_line_overrides_it(config, tmp_path, run_cli, words):
+    code, _, err = run_cli(*words, config(limit=2))
     assert code == 0, err
     assert "oracle: 2 evaluated now" in err
-    code, _, err = run(*words, config(limit=2), "--limit", 3, "--model", "blind")
+    code, _, err = run_cli(*words, config(limit=2), "--limit", 3, "--model", "blind")
     assert "blind: 3 evaluated now" in err
 
 
-def test_the_file_of_a_run_resumes_that_run(config, tmp_path, run, monkeypatch):
+def test_the_file_of_a_run_resumes_that_run(config, tmp_path, run_cli, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    run(
+    run_cli(
         "--config",
         config(data="set", output="out", limit=4, frames="blank,shown", seed=3, name="mine"),
     )
@@ -64,31 +60,31 @@ def test_the_file_of_a_run_resumes_that_run(config, tmp_path, run, monkeypatch):
     monkeypatch.chdir("/")
     before = [(path.parent / "results.json").read_bytes() for path in left]
     for path in left:
-        code, _, err = run("--config", path)
+        code, _, err = run_cli("--config", path)
         assert code == 0
         assert "mine: 0 evaluated now, 4 resumed" in err
     assert sorted((tmp_path / "out" / "mine").rglob("run.yaml")) == left
     assert [(path.parent / "results.json").read_bytes() for path in left] == before
 
 
-def test_the_command_of_the_file_is_the_run(config, run):
-    run("--config", config(limit=2, frames="blank"))
-    command = read_stored_command(only(config().parent / "out", "run.yaml").parent)
-    _, _, err = run(*shlex.split(command.line)[1:])
+def test_the_command_of_the_file_is_the_run(config, run_cli):
+    run_cli("--config", config(limit=2, frames="blank"))
+    command = read_stored_command(find_one(config().parent / "out", "run.yaml").parent)
+    _, _, err = run_cli(*shlex.split(command.line)[1:])
     assert "oracle: 0 evaluated now, 2 resumed" in err
 
 
-def test_several_workers_write_it_too(config, tmp_path, run):
-    code, _, err = run("--config", config(workers=2))
+def test_several_workers_write_it_too(config, tmp_path, run_cli):
+    code, _, err = run_cli("--config", config(workers=2))
     assert code == 0, err
-    assert yaml.safe_load(only(tmp_path / "out", "run.yaml").read_text())["workers"] == 2
+    assert yaml.safe_load(find_one(tmp_path / "out", "run.yaml").read_text())["workers"] == 2
 
 
-def test_no_key_is_written(config, tmp_path, run, monkeypatch):
+def test_no_key_is_written(config, tmp_path, run_cli, monkeypatch):
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
     typed = {"model": "m", "base_url": "http://localhost:9/v1", "retries": 0}
-    run("--config", config(model="openai", model_args=typed))
-    assert only(tmp_path / "out", "run.yaml")
+    run_cli("--config", config(model="openai", model_args=typed))
+    assert find_one(tmp_path / "out", "run.yaml")
     for path in (tmp_path / "out").rglob("*"):
         assert path.is_dir() or KEY.encode() not in path.read_bytes()
 
@@ -115,14 +111,14 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_a_wrong_option_in_a_file_is_named(config, tmp_path, run, name):
-    changes, said = BAD[name]
-    said_in_one_line(run("--config", config(**changes)), said)
+def test_a_wrong_option_in_a_file_is_named(config, tmp_path, run_cli, name):
+    changes, expected = BAD[name]
+    assert_refused(run_cli("--config", config(**changes)), expected)
     assert not (tmp_path / "out").exists()
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path, run):
-    said_in_one_line(run("--config", tmp_path / "no.yaml"), "no.yaml")
+def test_a_file_that_is_not_there_is_named(tmp_path, run_cli):
+    assert_refused(run_cli("--config", tmp_path / "no.yaml"), "no.yaml")
 
 
 @pytest.fixture
@@ -132,8 +128,8 @@ def requests():
     def requests(*arguments: object) -> list[RunRequest]:
         @click.command()
         @run_options
-        def command(**given: Any) -> list[tuple[RunRequest, Suite]]:
-            return RunOptions.from_click(given).requests()
+        def command(**options: Any) -> list[tuple[RunRequest, Suite]]:
+            return RunOptions.from_click(options).requests()
 
         return [
             request for request, _ in command.main(list(map(str, arguments)), standalone_mode=False)
@@ -145,8 +141,13 @@ def requests():
 def test_threads_are_for_models_that_compute_here(config, requests):
     file = config()
     models = "oracle,qwen2.5-vl-tiny,qwen2.5-vl-tiny:threads=3,openai:model=m"
-    asked = requests("--config", file, "--model", models, "--threads", 2)
-    assert [request.model_options.get("threads") for request in asked] == [None, "2", "3", None]
+    run_requests = requests("--config", file, "--model", models, "--threads", 2)
+    assert [request.model_options.get("threads") for request in run_requests] == [
+        None,
+        "2",
+        "3",
+        None,
+    ]
     (request,) = requests(
         "--config", file, "--model", "qwen2.5-vl", "--engine", "vllm", "--threads", 2
     )
@@ -205,21 +206,23 @@ OPTIONS = st.dictionaries(st.text("xy_", min_size=1), st.text("/:=1 z", min_size
 @given(st.lists(st.tuples(NAMES, OPTIONS), min_size=1))
 def test_models_as_typed_come_back(models):
     parts = [
-        f"{name}:{','.join(f'{key}={value}' for key, value in given.items())}" if given else name
-        for name, given in models
+        f"{name}:{','.join(f'{key}={value}' for key, value in options.items())}"
+        if options
+        else name
+        for name, options in models
     ]
     expected = [model for place, model in enumerate(models) if model not in models[:place]]
     assert list(ModelList().convert(",".join(parts), None, None)) == expected
 
 
 @pytest.mark.parametrize(
-    ("typed", "said"),
+    ("typed", "expected"),
     [("x=1,A", "comes before any model"), (",", "--model is empty"), ("A:x=1,x=2", "given twice")],
 )
-def test_invalid_lists_of_models_are_refused(run, typed, said):
-    said_in_one_line(run("--model", typed, "--tasks", "nieh_gt"), said)
+def test_invalid_lists_of_models_are_refused(run_cli, typed, expected):
+    assert_refused(run_cli("--model", typed, "--tasks", "nieh_gt"), expected)
 
 
-def test_results_do_not_name_the_file(config, tmp_path, run):
-    run("--config", config(limit=1))
-    assert "typed.yaml" not in only(tmp_path / "out", "results.json").read_text()
+def test_results_do_not_name_the_file(config, tmp_path, run_cli):
+    run_cli("--config", config(limit=1))
+    assert "typed.yaml" not in find_one(tmp_path / "out", "results.json").read_text()

@@ -3,16 +3,17 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 
 import pytest
 
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs import read_header, read_run
+from infthor_eval.runs import read_header
 
-from ...waiting import PATIENCE_S, wait_until
+from ...helpers.command_line import assert_refused, option_words
+from ...helpers.files import find_one
+from ...helpers.journals import read_records
+from ...helpers.processes import finish, start_cli
+from ...helpers.waiting import wait_until
 
 QUESTIONS = [
     Question(traj_id, f"Is there a {name}?", (index,), ("yes",), "object_presence")
@@ -21,15 +22,10 @@ QUESTIONS = [
 ]
 
 
-def only(folder, pattern):
-    (path,) = folder.rglob(pattern)
-    return path
-
-
 def docs(folder, task):
     return [
         json.loads(line)["doc"]
-        for line in only(folder, f"samples_{task}_*.jsonl").read_text().splitlines()
+        for line in find_one(folder, f"samples_{task}_*.jsonl").read_text().splitlines()
     ]
 
 
@@ -39,22 +35,22 @@ def data(make_nieh_set):
 
 
 def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(
-    data, make_clip, tmp_path, run
+    data, make_clip, tmp_path, run_cli
 ):
     tasks, out = "nieh_clip_retrieval,nieh_memory_frames", tmp_path / "out"
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", tasks, "--data", data, "--output", out]
     first, second = make_clip(seed=0), make_clip(seed=1)
-    code, _, err = run(*arguments, "--retriever", first)
+    code, _, err = run_cli(*arguments, "--retriever", first)
     assert code == 0, err
     assert [len(doc["frames"]) for doc in docs(out, "nieh_clip_retrieval")] == [10] * 6
     assert [(len(doc["frames"]), doc["frames"][-1]) for doc in docs(out, "nieh_memory_frames")] == [
         (21, 44)
     ] * 6
-    results = only(out, "results.json").read_bytes()
-    code, _, err = run(*arguments, "--retriever", first)
+    results = find_one(out, "results.json").read_bytes()
+    code, _, err = run_cli(*arguments, "--retriever", first)
     assert "0 evaluated now, 12 resumed" in err
-    assert only(out, "results.json").read_bytes() == results
-    assert run(*arguments, "--retriever", second)[0] == 0
+    assert find_one(out, "results.json").read_bytes() == results
+    assert run_cli(*arguments, "--retriever", second)[0] == 0
     identities = [read_header(path.parent).config for path in out.rglob("journal")]
     retrievers = {
         task["sources"]["retriever"]["fingerprint"]
@@ -64,23 +60,20 @@ def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(
     assert (len(identities), len(retrievers)) == (2, 2)
 
 
-def test_a_missing_retriever_ends_in_one_line(data, tmp_path, run, monkeypatch):
+def test_a_missing_retriever_ends_in_one_line(data, tmp_path, run_cli, monkeypatch):
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_OFFLINE", True)
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
     arguments = ["--model", "oracle", "--data", data, "--output", tmp_path / "out"]
-    for tasks, options, said in (
+    for tasks, options, expected in (
         ("nieh_clip_retrieval", (), "and give --retriever DIR"),
         ("nieh_memory_frames", ("--retriever", "./nowhere"), "there is no such folder"),
         ("nieh_gt", ("--retriever", "./nowhere"), "no context of nieh_gt retrieves frames"),
     ):
-        code, out, err = run(*arguments, "--tasks", tasks, *options)
-        assert (code, out) == (2, "")
-        assert said in err
-        assert len(err.strip().splitlines()) == 1
+        assert_refused(run_cli(*arguments, "--tasks", tasks, *options), expected)
     assert not (tmp_path / "out").exists()
 
 
-def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run):
+def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run_cli):
     folder, out = tmp_path / "trajectories", tmp_path / "out"
     folder.mkdir()
     actions = [{"api_action": {"action": "PickupObject", "objectId": "Mug|1|2|3"}}]
@@ -93,25 +86,20 @@ def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run
         (folder / f"{traj_id}.json").write_text(json.dumps(trajectory))
         log = {"images": [{"low_idx": 0, "image_name": "000000007.png"}]}
         (data / "metadata" / traj_id / "expert_log.json").write_text(json.dumps(log))
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_interleaved,nieh_text_state",
-        "--data",
-        data,
-    ]
-    code, _, err = run(*arguments, "--output", out, "--trajectories", folder)
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_interleaved,nieh_text_state", data=data
+    )
+    code, _, err = run_cli(*arguments, "--output", out, "--trajectories", folder)
     assert code == 0, err
     assert [doc["frames"] for doc in docs(out, "nieh_interleaved")] == [[0, 7]] * 6
     assert [doc["frames"] for doc in docs(out, "nieh_text_state")] == [[44]] * 6
-    code, _, err = run(*arguments, "--output", tmp_path / "none")
+    code, _, err = run_cli(*arguments, "--output", tmp_path / "none")
     assert code == 2
     assert (
         "can be asked (the trajectory's JSON is not in metadata/; give its folder with "
         "--trajectories)" in err
     )
-    for tasks, given, said in (
+    for tasks, trajectories, expected in (
         ("nieh_gt", folder, "--trajectories: no context of nieh_gt tells of the trajectory"),
         (
             "nieh_interleaved",
@@ -119,34 +107,35 @@ def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run
             "no such folder; give the folder of the trajectories with --traj",
         ),
     ):
-        code, shown, err = run(
-            "--model", "oracle", "--tasks", tasks, "--data", data, "--trajectories", given
+        assert_refused(
+            run_cli(
+                "--model",
+                "oracle",
+                "--tasks",
+                tasks,
+                "--data",
+                data,
+                "--trajectories",
+                trajectories,
+            ),
+            expected,
         )
-        assert (code, shown, len(err.strip().splitlines())) == (2, "", 1)
-        assert said in err
 
 
 def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(
-    data, write_video, tmp_path, run
+    data, write_video, tmp_path, run_cli
 ):
     metadata, out = data / "metadata", tmp_path / "out"
     write_video(metadata / "traj_a" / "traj_a_10fps.mp4", range(0, 250, 10))
     (metadata / "traj_b" / "traj_b_10fps.mp4").write_bytes(b"no video")
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_video",
-        "--data",
-        data,
-        "--output",
-        out,
-    ]
-    code, _, err = run(*arguments)
+    arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh_video", data=data, output=out)
+    code, _, err = run_cli(*arguments)
     assert code == 0, err
     assert "nieh_video: 3 sample(s) skipped: " in err
     assert "traj_b_10fps.mp4: not a video that OpenCV can decode" in err
-    results = json.loads(only(out, "results.json").read_text())["summary"]["tasks"]["nieh_video"]
+    results = json.loads(find_one(out, "results.json").read_text())["summary"]["tasks"][
+        "nieh_video"
+    ]
     assert (results["n"], results["skipped"]["n"], list(results["by_variant"])) == (
         3,
         3,
@@ -155,14 +144,14 @@ def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(
     assert [len(doc["frames"]) for doc in docs(out, "nieh_video")] == [4] * 3
     assert "; the film is given as a video" in err
     (metadata / "traj_b" / "traj_b_10fps.mp4").unlink()
-    assert run(*arguments)[0] == 0
+    assert run_cli(*arguments)[0] == 0
     summaries = [json.loads(path.read_text())["summary"] for path in out.rglob("results.json")]
     variants = [summary["tasks"]["nieh_video"]["by_variant"] for summary in summaries]
     assert sorted(map(sorted, variants)) == [["source=frames", "source=mp4"], ["source=mp4"]]
 
 
 @pytest.mark.parametrize(
-    ("model", "film", "placeholder", "said"),
+    ("model", "film", "placeholder", "expected"),
     [
         ("qwen2.5-vl-tiny", "video", "<video>", "the film is given as a video"),
         ("llava-onevision-tiny", "video", "<video>", "the film is given as a video"),
@@ -175,17 +164,17 @@ def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(
     ],
 )
 def test_a_film_is_a_video_where_a_family_takes_it_and_the_run_says_so(
-    data, tmp_path, run, model, film, placeholder, said
+    data, tmp_path, run_cli, model, film, placeholder, expected
 ):
     out = tmp_path / "out"
-    code, _, err = run(
+    code, _, err = run_cli(
         "--model", model, "--tasks", "nieh_video", "--data", data, "--output", out, "--limit", 1
     )
     assert code == 0, err
-    assert said in err
+    assert expected in err
     (folder,) = {path.parent for path in out.rglob("results.json")}
     assert read_header(folder).config.tasks["nieh_video"]["film"] == film
-    sample = json.loads(only(out, "samples_nieh_video_*.jsonl").read_text())
+    sample = json.loads(find_one(out, "samples_nieh_video_*.jsonl").read_text())
     assert sample["arguments"]["gen_args_0"]["arg_0"].startswith(
         f"{placeholder}\nAnswer the question given the video"
     )
@@ -193,20 +182,10 @@ def test_a_film_is_a_video_where_a_family_takes_it_and_the_run_says_so(
 
 def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_path):
     def start(output):
-        arguments = [
-            "--model",
-            "qwen2.5-vl-tiny",
-            "--tasks",
-            "nieh_memory_notes",
-            "--data",
-            data,
-            "--output",
-            output,
-        ]
-        code = "from infthor_eval.cli import main; main()"
-        return subprocess.Popen(
-            [sys.executable, "-c", code, *map(str, arguments)], stderr=subprocess.PIPE, text=True
+        arguments = option_words(
+            model="qwen2.5-vl-tiny", tasks="nieh_memory_notes", data=data, output=output
         )
+        return start_cli(*arguments)
 
     killed = start(tmp_path / "killed")
     shards = (tmp_path / "killed").rglob
@@ -215,22 +194,18 @@ def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_
     )
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
-    journal = only(tmp_path / "killed", "worker-0.jsonl")
+    journal = find_one(tmp_path / "killed", "worker-0.jsonl")
     before = journal.read_bytes().count(b'"type":"nieh_note"')
     assert 0 < before < 6  # three windows of twenty frames in each of two trajectories
 
     for name in ("killed", "whole"):
-        process = start(tmp_path / name)
-        _, said = process.communicate(timeout=PATIENCE_S)
-        assert process.returncode == 0, said
+        finish(start(tmp_path / name))
     assert journal.read_bytes().count(b'"type":"nieh_note"') == 6
-    assert (
-        journal.read_bytes().count(b'\n{"type":"artifact","') == 6 + 6
-    )  # and what was recalled for each question
-    results = [only(tmp_path / name, "results.json").read_bytes() for name in ("killed", "whole")]
-    assert results[0] == results[1]
-    records = [
-        read_run(only(tmp_path / name, "journal").parent, RECORDS)[1]
-        for name in ("killed", "whole")
+    # And what was recalled for each question.
+    assert journal.read_bytes().count(b'\n{"type":"artifact","') == 6 + 6
+    results = [
+        find_one(tmp_path / name, "results.json").read_bytes() for name in ("killed", "whole")
     ]
+    assert results[0] == results[1]
+    records = [read_records(tmp_path / name) for name in ("killed", "whole")]
     assert [r.fingerprint for r in records[0]] == [r.fingerprint for r in records[1]]

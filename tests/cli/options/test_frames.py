@@ -2,6 +2,9 @@
 
 import json
 
+from ...helpers.command_line import assert_refused, option_words
+from ...helpers.journals import read_records
+
 TINY = "qwen2.5-vl-tiny"
 
 
@@ -10,48 +13,37 @@ def results(folder):
     return {document["config"]["frames"]: document for document in documents}
 
 
-def tokens(folder, records_in):
+def tokens(folder):
     tokens = {}
     for path in folder.rglob("journal"):
-        for record in records_in(path.parent):
+        for record in read_records(path.parent):
             tokens.setdefault(record.key, set()).add(record.tokens.context)
     return tokens
 
 
-def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run, records_in):
+def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run_cli):
     data, out = make_nieh_set(size=56), tmp_path / "out"
     arguments = ["--model", TINY, "--tasks", "nieh_full", "--data", data, "--output", out]
-    code, shown, err = run(*arguments, "--frames", "shown,blank,shuffled,other")
+    code, output, err = run_cli(*arguments, "--frames", "shown,blank,shuffled,other")
     assert code == 0, err
     assert results(out).keys() == {"shown", "blank", "shuffled", "other"}
-    assert all(
-        len(counts) == 1 for counts in tokens(out, records_in).values()
-    )  # blanks cost as much
-    rows = [line.split() for line in shown.splitlines()]
+    # Blanks cost as much.
+    assert all(len(counts) == 1 for counts in tokens(out).values())
+    rows = [line.split() for line in output.splitlines()]
     assert [TINY + ",", "blank", "frames", "nieh_full"] in [row[:4] for row in rows]
-    assert "Gain over the same model's run on blank frames, in points" in shown
-    _, shown, err = run(*arguments)
-    assert (
-        "0 evaluated now, 5 resumed" in err
-    )  # the run on true frames is the one without the option
-    assert "Gain over" not in shown
+    assert "Gain over the same model's run on blank frames, in points" in output
+    _, output, err = run_cli(*arguments)
+    # The run on true frames is the one without the option.
+    assert "0 evaluated now, 5 resumed" in err
+    assert "Gain over" not in output
 
 
-def test_unknown_frame_ablations_are_one_line(make_nieh_set, tmp_path, run):
-    arguments = [
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=8),
-        "--output",
-        tmp_path / "o",
-    ]
-    for given, said in (
+def test_unknown_frame_ablations_are_one_line(make_nieh_set, tmp_path, run_cli):
+    arguments = option_words(
+        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=8), output=tmp_path / "o"
+    )
+    for names, expected in (
         ("none", "--frames none: there are shown, blank"),
         (",", "--frames is empty; give a name"),
     ):
-        code, out, err = run(*arguments, "--frames", given)
-        assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
-        assert said in err
+        assert_refused(run_cli(*arguments, "--frames", names), expected)

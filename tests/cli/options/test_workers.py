@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.plans.cut import FORK, MUG, cut, write
+from tests.helpers.trajectories import FORK, MUG, cut_trajectory, write_trajectories
 
 
 def results(folder):
@@ -25,17 +25,19 @@ def exported(folder):
         ("planner-arm", "manipulathor_pickup"),
     ],
 )
-def test_two_workers_have_the_results_of_one_process(run, make_nieh_set, tmp_path, model, task):
+def test_two_workers_have_the_results_of_one_process(run_cli, make_nieh_set, tmp_path, model, task):
     data = (
         make_nieh_set(size=56)
         if task == "nieh_gt"
-        else write(tmp_path / "data", cut(FORK, 3), cut(MUG, 4))
+        else write_trajectories(tmp_path / "data", cut_trajectory(FORK, 3), cut_trajectory(MUG, 4))
     )
     words = ("--model", model, "--tasks", task, "--data", data)
     for workers in (1, 2):
-        code, shown, err = run(*words, "--output", tmp_path / str(workers), "--workers", workers)
+        code, output, err = run_cli(
+            *words, "--output", tmp_path / str(workers), "--workers", workers
+        )
         assert code == 0, err
-        assert model in shown
+        assert model in output
     one, two = tmp_path / "1", tmp_path / "2"
     assert results(one) == results(two)
     assert exported(one) == exported(two)

@@ -9,6 +9,8 @@ from infthor_eval.cli.progress.bar import PacedBar, StepBars
 from infthor_eval.cli.progress.pace import Pace, format_duration
 from infthor_eval.terminal import progress_bar
 
+from ...helpers.command_line import option_words
+
 
 def test_resumed_units_do_not_count_for_the_pace():
     pace = Pace(100, 0.0)
@@ -52,50 +54,43 @@ def test_work_in_a_pipe_prints_lines_without_resumed_units(monkeypatch):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
     clock = iter(range(100))
     monkeypatch.setattr("infthor_eval.cli.progress.bar.time.monotonic", lambda: float(next(clock)))
-    said = io.StringIO()
-    with progress_bar(Console(file=said)) as progress:
+    output = io.StringIO()
+    with progress_bar(Console(file=output)) as progress:
         bar = PacedBar(progress, "replay", 4)
         for resumed in (True, True, False, False):
             bar.advance(resumed=resumed)
-    assert said.getvalue().splitlines()[-1] == "replay: 3 of 4 (75 %), 1.0 s left, 1.0 a second"
+    assert output.getvalue().splitlines()[-1] == "replay: 3 of 4 (75 %), 1.0 s left, 1.0 a second"
 
 
 def test_a_resumed_training_prints_its_own_pace(monkeypatch):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
     clock = iter(range(0, 200, 2))
     monkeypatch.setattr("infthor_eval.cli.progress.bar.time.monotonic", lambda: float(next(clock)))
-    said = io.StringIO()
-    with progress_bar(Console(file=said)) as progress:
+    output = io.StringIO()
+    with progress_bar(Console(file=output)) as progress:
         bars = StepBars(progress)
         for step in (7, 8, 9):
             bars.advance("train", step, 10, f"loss {step}")
         bars.advance("answer", 1, 5, "loss 3")
-    assert said.getvalue().splitlines() == [
+    assert output.getvalue().splitlines() == [
         "train: 8 of 10 (80 %), 4.0 s left, 2.0 s each; loss 8",
         "train: 9 of 10 (90 %), 2.0 s left, 2.0 s each; loss 9",
     ]
 
 
 def test_where_there_is_no_terminal_no_bar_is_left():
-    said = io.StringIO()
-    with progress_bar(Console(file=said)) as progress:
+    output = io.StringIO()
+    with progress_bar(Console(file=output)) as progress:
         progress.advance(progress.add_task("work", total=1))
-    assert said.getvalue() == ""
+    assert output.getvalue() == ""
 
 
-def test_a_run_in_a_pipe_prints_lines_without_colour(make_nieh_set, tmp_path, run, monkeypatch):
+def test_a_run_in_a_pipe_prints_lines_without_colour(make_nieh_set, tmp_path, run_cli, monkeypatch):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
-    arguments = [
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path,
-    ]
-    _, out, err = run(*arguments)
+    arguments = option_words(
+        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path
+    )
+    _, out, err = run_cli(*arguments)
     lines = err.splitlines()
     assert [line.partition(")")[0] for line in lines[:-1]] == [
         f"oracle: {n} of 5 ({20 * n} %" for n in range(1, 5)
@@ -104,21 +99,14 @@ def test_a_run_in_a_pipe_prints_lines_without_colour(make_nieh_set, tmp_path, ru
     assert "\x1b" not in out + err
 
 
-def test_quiet_prints_only_failures(make_nieh_set, tmp_path, run):
+def test_quiet_prints_only_failures(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
-    code, _, err = run(*arguments, "--quiet")
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path / "out"
+    )
+    code, _, err = run_cli(*arguments, "--quiet")
     assert code == 1
     assert err.startswith("nieh_gt: 2 sample(s) failed")
 

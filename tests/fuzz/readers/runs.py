@@ -17,6 +17,7 @@ from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.report.presented import read_report_runs
 from infthor_eval.runs.stored.search import StoredRun, find_runs
 
+from ...helpers.command_line import option_words
 from ..damage import Form
 from ..reader import Reader
 from .samples import make_set, trajectory_document
@@ -31,16 +32,9 @@ def _run(model: str, task: str = "nieh_gt") -> Path:
     scratch = TemporaryDirectory()
     _kept.append(scratch)
     root = Path(scratch.name)
-    words = [
-        "--model",
-        model,
-        "--tasks",
-        task,
-        "--data",
-        str(make_set(root / "set")),
-        "--output",
-        str(root / "out"),
-    ]
+    words = option_words(
+        model=model, tasks=task, data=str(make_set(root / "set")), output=str(root / "out")
+    )
     with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
         main(words)
     (folder,) = (root / "out" / model).iterdir()

@@ -39,12 +39,12 @@ def _ask(folder: Path) -> None:
     assert len(good) == 2, f"{len(good)} of 2 good questions come"
     for context in _CONTEXTS:
         open_set.cache_clear()
-        found = find_samples({"context": context, "data": str(folder), **_SETTINGS})
+        task_samples = find_samples({"context": context, "data": str(folder), **_SETTINGS})
         n_good = 0
-        for sample in found.samples:
+        for sample in task_samples.samples:
             is_good = sample.question.traj_id == GOOD
             try:
-                found.request(sample)
+                task_samples.request(sample)
             except InfthorError:
                 assert not is_good, f"{context}: a good question is refused"
             n_good += is_good
@@ -54,16 +54,16 @@ def _ask(folder: Path) -> None:
 def _recall(folder: Path) -> None:
     for memory in ("last", "text-log", "oracle"):
         open_set.cache_clear()
-        found = find_samples(
+        task_samples = find_samples(
             {"context": "memory", "memory": memory, "budget": 200, "data": str(folder), **_SETTINGS}
         )
-        for sample in recall_all(found):
-            found.request(sample)
+        for sample in recall_all(task_samples):
+            task_samples.request(sample)
 
 
 def _generate(folder: Path) -> None:
-    made = generate_questions(folder, seed=0, per_trajectory=20, further=True)
-    assert any(question.traj_id == GOOD for question in made.questions), (
+    generated = generate_questions(folder, seed=0, per_trajectory=20, further=True)
+    assert any(question.traj_id == GOOD for question in generated.questions), (
         "no question on the good one"
     )
 
@@ -77,8 +77,9 @@ def _questions(folder: Path) -> None:
 def _make_decisions(folder: Path) -> Path:
     path = folder / "inspection.csv"
     path.write_text(
-        "question_id,traj_id,question,clues,answers,replies,decision\na,t,q,[1],['b'],m: "
-        "x,keep\nb,,,,,,\n"
+        "question_id,traj_id,question,clues,answers,replies,decision\n"
+        "a,t,q,[1],['b'],m: x,keep\n"
+        "b,,,,,,\n"
     )
     return path
 

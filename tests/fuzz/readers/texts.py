@@ -32,9 +32,9 @@ def _said(folder: Path) -> str:
 
 
 def _score(folder: Path) -> None:
-    said = split_thinking(_said(folder))
+    split_reply = split_thinking(_said(folder))
     for answers in _ANSWERS:
-        for value in scores(said.answer, answers).values():
+        for value in scores(split_reply.answer, answers).values():
             assert 0 <= value <= 2
 
 

@@ -42,11 +42,11 @@ def _make_lines(folder: Path) -> Path:
 
 
 def _read(folder: Path) -> None:
-    found = select([folder])
-    names = [trajectory.traj_id for _, trajectory in found.items]
+    selected = select([folder])
+    names = [trajectory.traj_id for _, trajectory in selected.items]
     assert GOOD in names, f"the good one does not come: {names}"
-    _hold_lines(failure.message for failure in found.failures)
-    write_supplement([trajectory for _, trajectory in found.items], folder / "supplement")
+    _hold_lines(failure.message for failure in selected.failures)
+    write_supplement([trajectory for _, trajectory in selected.items], folder / "supplement")
     for read in (lambda source: read_plan_trajectory(source, Words.NATURAL), read_arm_trajectory):
         known = find_trajectories(folder, None, read)
         assert any(item.traj_id == GOOD for item in known.trajectories)

@@ -20,12 +20,12 @@ def history(start, *events, boxes=None):
         boxes: of some frames the boxes of some objects.
     """
     steps, ids = [], list(start)
-    told = ObjectLog(visible=[key.partition("|")[0] for key in ids], pickupable=list(LOOSE))
+    object_log = ObjectLog(visible=[key.partition("|")[0] for key in ids], pickupable=list(LOOSE))
     for number, (action, target, receptacle, changes) in enumerate(
         [(None, None, None, start), *events]
     ):
-        shown = {key: ObjectInFrame(400, (100, 100, 120, 120), True) for key in ids}
-        shown |= {
+        instances = {key: ObjectInFrame(400, (100, 100, 120, 120), True) for key in ids}
+        instances |= {
             key: ObjectInFrame(400, box, True) for key, box in (boxes or {}).get(number, {}).items()
         }
         steps.append(
@@ -33,11 +33,11 @@ def history(start, *events, boxes=None):
                 number,
                 f"{number:09d}.png",
                 max(0, number - 1),
-                told,
+                object_log,
                 action,
                 target=target,
                 receptacle=receptacle,
-                seen=shown,
+                seen=instances,
                 changes=changes,
             )
         )

@@ -33,12 +33,12 @@ def texts(candidates):
 
 
 def check(log, candidates):
-    found = list(candidates)
-    for candidate in found:
+    checked = list(candidates)
+    for candidate in checked:
         assert Checker(log.steps, DEFAULT_SHARE).verdict(candidate.question("made")).sound, (
             candidate
         )
-    return {candidate.text: candidate.answers for candidate in found}
+    return {candidate.text: candidate.answers for candidate in checked}
 
 
 def test_contents_are_asked_of_what_never_changes():
@@ -54,7 +54,7 @@ def test_contents_are_asked_of_what_never_changes():
 
 
 @pytest.mark.parametrize(
-    ("more", "asked"),
+    ("more", "expected"),
     [
         ({}, True),
         ({"DeskLamp|1": state("DeskLamp|1", position=FAR)}, True),
@@ -64,9 +64,9 @@ def test_contents_are_asked_of_what_never_changes():
         ({"DiningTable|2": state("DiningTable|2")}, False),
     ],
 )
-def test_contents_are_asked_where_every_reading_gives_the_same(more, asked):
+def test_contents_are_asked_where_every_reading_gives_the_same(more, expected):
     log = history({**PLACES, MUG: state(MUG, TABLE), **more})
-    assert any("dining table" in text for text in texts(contents.contents(log))) == asked
+    assert any("dining table" in text for text in texts(contents.contents(log))) == expected
 
 
 def test_further_contents_say_what_counts_and_count_it_so():
@@ -156,12 +156,12 @@ def test_no_room_is_meant_in_a_house_of_several():
         (rooms, {"Have you seen"}),
     ):
         log = history({**PLACES, **floors, MUG: state(MUG, TABLE)})
-        asked = [
+        candidates = [
             *presence.yes_questions(log),
             *presence.no_questions(log, frozenset({"Toaster"}), random.Random(0)),
         ]
-        assert {" ".join(candidate.text.split()[:3]) for candidate in asked} == forms
-        assert {candidate.answers for candidate in asked} == {("yes",), ("no",)}
+        assert {" ".join(candidate.text.split()[:3]) for candidate in candidates} == forms
+        assert {candidate.answers for candidate in candidates} == {("yes",), ("no",)}
 
 
 def test_what_no_frame_shows_was_not_seen_but_is_in_the_room():
@@ -169,11 +169,11 @@ def test_what_no_frame_shows_was_not_seen_but_is_in_the_room():
     for step in log.steps:
         del step.seen[MUG]
     log = TrajectoryHistory("made", log.steps)
-    asked = list(presence.no_questions(log, frozenset({"Mug", "Toaster"}), random.Random(0)))
-    texts_on_mugs = {candidate.text for candidate in asked if candidate.subjects == ("Mug",)}
+    candidates = list(presence.no_questions(log, frozenset({"Mug", "Toaster"}), random.Random(0)))
+    texts_on_mugs = {candidate.text for candidate in candidates if candidate.subjects == ("Mug",)}
     assert texts_on_mugs == {"Have you seen a mug?"}
     checker = Checker(log.steps, DEFAULT_SHARE)
-    assert all(checker.verdict(candidate.question("made")).sound for candidate in asked)
+    assert all(checker.verdict(candidate.question("made")).sound for candidate in candidates)
     assert not checker.verdict(
         Question("made", "Is there any mug in this room?", (0,), ("no",))
     ).right
@@ -181,10 +181,10 @@ def test_what_no_frame_shows_was_not_seen_but_is_in_the_room():
 
 def test_absences_are_of_what_rooms_of_the_kind_have():
     bathroom = history({"Toilet|1": state("Toilet|1"), "Sink|1": state("Sink|1")})
-    asked = {
+    absent = {
         item.subjects[0] for item in presence.no_questions(bathroom, frozenset(), random.Random(0))
     }
-    assert "Plunger" in asked and not asked & {"Toaster", "Bed", "Toilet"}
+    assert "Plunger" in absent and not absent & {"Toaster", "Bed", "Toilet"}
 
 
 @pytest.mark.parametrize(

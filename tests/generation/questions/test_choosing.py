@@ -19,14 +19,14 @@ FORMS = {
 
 @st.composite
 def candidates(draw):
-    found = []
+    drawn = []
     for at in range(draw(st.integers(0, 25))):
         form = draw(st.sampled_from(sorted(FORMS)))
         thing, answer = draw(st.sampled_from(OBJECTS)), draw(st.sampled_from(FORMS[form]))
-        found.append(
+        drawn.append(
             Candidate(form, f"{form} {{}}?", (f"{thing} {at}",), (at,), (answer,), (thing,))
         )
-    return found
+    return drawn
 
 
 TRAJECTORIES = st.lists(
@@ -36,9 +36,9 @@ TRAJECTORIES = st.lists(
 
 def counted(trajectories, **options):
     chooser, by_form, by_object = Chooser(**options), defaultdict(Counter), defaultdict(Counter)
-    for number, (rooms, found) in enumerate(trajectories):
-        chosen = chooser.choose(found, 12, random.Random(number), rooms)
-        assert len(chosen) <= 12 and set(chosen) <= set(found) and len(set(chosen)) == len(chosen)
+    for number, (rooms, offered) in enumerate(trajectories):
+        chosen = chooser.choose(offered, 12, random.Random(number), rooms)
+        assert len(chosen) <= 12 and set(chosen) <= set(offered) and len(set(chosen)) == len(chosen)
         for item in chosen:
             by_form[item.form][item.answers[0]] += 1
             by_object[item.form, rooms, item.subjects[0]][item.answers[0]] += 1

@@ -46,9 +46,8 @@ CLOSED = (
     r"Is the .+ open now\?",
     r"Is the .+ (in|on) the .+\?",
 )
-RARE = {
-    "container_content"
-}  # of what is the only one of its type and never changes; `test_readings` has some
+# Of what is the only one of its type and never changes; `test_readings` has some.
+RARE = {"container_content"}
 TABLE_3 = {
     "object_presence": (r"Is there any .+ in this room\?", r"Have you seen .+\?"),
     "open_state": (r"Was the .+ open\?",),
@@ -101,9 +100,13 @@ def test_the_checker_agrees_with_every_question(everything):
 
 
 def test_without_further_forms_all_are_in_the_words_of_table_3(replayed, everything):
-    asked = generate_questions(replayed, per_trajectory=1000, by_subject=False).questions
-    assert QUESTION_TYPES - RARE <= {question.question_type for question in asked} <= QUESTION_TYPES
-    for question in asked:
+    questions = generate_questions(replayed, per_trajectory=1000, by_subject=False).questions
+    assert (
+        QUESTION_TYPES - RARE
+        <= {question.question_type for question in questions}
+        <= QUESTION_TYPES
+    )
+    for question in questions:
         forms = TABLE_3[question.question_type]
         assert any(re.fullmatch(form, question.text) for form in forms), question
     for question in everything.questions:
@@ -156,10 +159,10 @@ def test_a_frame_shows_the_moment_that_a_question_asks_about(everything, replaye
         "sliced": "SliceObject",
     }
     verbs["turned on"] = "ToggleObjectOn"
-    asked = [question for question in everything.questions if " when you " in question.text]
-    asked = [question for question in asked if question.question_type.endswith("_further")]
-    assert len({question.question_type for question in asked}) == 2
-    for question in asked:
+    questions = [question for question in everything.questions if " when you " in question.text]
+    questions = [question for question in questions if question.question_type.endswith("_further")]
+    assert len({question.question_type for question in questions}) == 2
+    for question in questions:
         moment = question.text.partition(" when you ")[2]
         action = next(action for words, action in verbs.items() if moment.startswith(words))
         steps = [logs[question.traj_id][clue] for clue in question.clues]
@@ -170,9 +173,9 @@ def test_a_frame_shows_the_moment_that_a_question_asks_about(everything, replaye
 
 def test_gold_answers_score_full_marks(everything):
     for question in everything.questions:
-        said = ", ".join(str(answer) for answer in question.answers)
+        reply = ", ".join(str(answer) for answer in question.answers)
         for scorer in ("reference", "strict"):
-            assert score(said, question.answers, scorer=scorer) == 1.0, (
+            assert score(reply, question.answers, scorer=scorer) == 1.0, (
                 question.text,
                 question.answers,
             )
@@ -198,14 +201,18 @@ def test_the_checker_notices_what_is_wrong(everything, replayed):
 
 
 def test_choice_is_balanced_and_seeded(replayed):
-    made = [generate_questions(replayed, seed=seed, per_trajectory=25) for seed in (0, 0, 1)]
-    assert made[0].questions == made[1].questions != made[2].questions
-    assert len(made[0].questions) <= 25 * len({question.traj_id for question in made[0].questions})
-    yes = [question for question in made[0].questions if question.answers == ("yes",)]
-    no = [question for question in made[0].questions if question.answers == ("no",)]
+    generated = [generate_questions(replayed, seed=seed, per_trajectory=25) for seed in (0, 0, 1)]
+    assert generated[0].questions == generated[1].questions != generated[2].questions
+    assert len(generated[0].questions) <= 25 * len(
+        {question.traj_id for question in generated[0].questions}
+    )
+    yes = [question for question in generated[0].questions if question.answers == ("yes",)]
+    no = [question for question in generated[0].questions if question.answers == ("no",)]
     assert abs(len(yes) - len(no)) <= 5
-    assert set(made[0].by_type()) >= QUESTION_TYPES - RARE
-    assert len(made[0].questions) < len(generate_questions(replayed, by_subject=False).questions)
+    assert set(generated[0].by_type()) >= QUESTION_TYPES - RARE
+    assert len(generated[0].questions) < len(
+        generate_questions(replayed, by_subject=False).questions
+    )
 
 
 def test_absences_are_flagged_and_look_like_presences(everything):
@@ -221,9 +228,9 @@ def test_absences_are_flagged_and_look_like_presences(everything):
 
 
 def test_no_answer_follows_from_the_form_or_the_object_of_a_question(replayed):
-    made = generate_questions(replayed, per_trajectory=60, further=True)
+    generated = generate_questions(replayed, per_trajectory=60, further=True)
     answers = defaultdict(Counter)
-    for question in made.questions:
+    for question in generated.questions:
         if str(question.answers[0]) in {"yes", "no"} or str(question.answers[0]).isdecimal():
             answers[_form(question.text)][question.answers[0]] += 1
     assert len(answers) > 4
@@ -231,7 +238,7 @@ def test_no_answer_follows_from_the_form_or_the_object_of_a_question(replayed):
         most = counts.most_common(1)[0][1]
         assert most <= counts.total() - most + 1, (form, counts)
     on_object = defaultdict(Counter)
-    for question in made.questions:
+    for question in generated.questions:
         if question.question_type == "object_presence":  # both trajectories are in a kitchen
             on_object[re.sub(r"Is there any|Have you seen an?|in this room|\W", "", question.text)][
                 question.answers
@@ -282,12 +289,12 @@ def test_a_log_that_contradicts_itself_is_skipped_and_the_others_are_asked_about
     opened = next(step for step in steps if (step.get("action") or "").startswith("PickupObject"))
     opened["target"] = "Mug|+09.00|+09.00|+09.00"  # which is nowhere
     path.write_text(json.dumps(steps))
-    made = generate_questions(tmp_path / "set", per_trajectory=10)
-    (line,) = made.skipped
+    generated = generate_questions(tmp_path / "set", per_trajectory=10)
+    (line,) = generated.skipped
     assert (
         "kitchen-3-seed4: its log is inconsistent (no 'Mug|+09.00|+09.00|+09.00'); replay" in line
     )
-    assert {question.traj_id for question in made.questions} == {
+    assert {question.traj_id for question in generated.questions} == {
         "kitchen-2-seed2",
         "kitchen-5-seed4",
     }

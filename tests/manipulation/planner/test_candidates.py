@@ -25,10 +25,10 @@ def goal(others=(), entry=None, **changes):
     return PutGoal(Places(**places), entry, list(others))
 
 
-def ends(linkage, asked, contacts=(), obstacles=()):
+def ends(linkage, goal_places, contacts=(), obstacles=()):
     terrain = Terrain(linkage, obstacles_of(obstacles), list(contacts))
-    found = release_poses(asked, terrain, STAND, np.random.default_rng(0))
-    return found, linkage.held_box(found.poses)
+    released = release_poses(goal_places, terrain, STAND, np.random.default_rng(0))
+    return released, linkage.held_box(released.poses)
 
 
 def bottoms(held):
@@ -36,13 +36,13 @@ def bottoms(held):
 
 
 def test_things_are_let_go_low_above_the_inner_part_of_a_board(linkage):
-    asked = goal()
-    found, held = ends(linkage, asked)
-    assert len(found.poses) and (np.diff(found.costs) >= 0).all()
-    assert (support(held, asked.places) == 1.0).all()
+    board = goal()
+    released, held = ends(linkage, board)
+    assert len(released.poses) and (np.diff(released.costs) >= 0).all()
+    assert (support(held, board.places) == 1.0).all()
     assert bottoms(held) == pytest.approx(0.82)
     assert np.abs(held.center[:, 0, 0]).max() < 0.26
-    assert ((found.poses.bases >= STAND.low) & (found.poses.bases <= STAND.high)).all()
+    assert ((released.poses.bases >= STAND.low) & (released.poses.bases <= STAND.high)).all()
 
 
 def test_things_are_let_go_above_a_rim_and_in_what_is_entered_below_its_ceiling(linkage):
@@ -69,11 +69,11 @@ def test_nothing_is_let_go_on_other_things_while_there_is_room(linkage):
 
 @pytest.mark.parametrize("on_goal", [True, False])
 def test_where_an_opening_was_met_on_one_side_another_is_entered(linkage, on_goal):
-    asked = goal(top=1.3, entered=True, entry=Entry(2, -1, 0.8))
-    _, before = ends(linkage, asked)
+    board = goal(top=1.3, entered=True, entry=Entry(2, -1, 0.8))
+    _, before = ends(linkage, board)
     side = float(np.median(before.center[:, 0, 0]))
     met = [Contact(np.array([side, 1.0, 0.3]), np.array([side, 1.0, 0.7]), on_goal)]
-    _, after = ends(linkage, asked, met)
+    _, after = ends(linkage, board, met)
     assert (np.abs(after.center[:, 0, 0] - side).min() >= 0.06) == on_goal
 
 
@@ -82,13 +82,13 @@ def test_places_that_are_too_far_have_no_ends(linkage):
 
 
 def test_poses_to_pass_are_free_and_some_are_before_the_opening(linkage):
-    asked = goal(top=1.3, entered=True, entry=Entry(2, -1, 0.8))
+    board = goal(top=1.3, entered=True, entry=Entry(2, -1, 0.8))
     below = [("Floor|1", Corners((-5.0, -1.0, -5.0), (5.0, 0.9, 5.0)))]
     terrain = Terrain(linkage, obstacles_of(below), [])
-    found, _ = ends(linkage, asked, obstacles=below)
-    others = passing_poses(asked, terrain, STAND, found.poses, 50, np.random.default_rng(0))
+    released, _ = ends(linkage, board, obstacles=below)
+    others = passing_poses(board, terrain, STAND, released.poses, 50, np.random.default_rng(0))
     assert len(others) > 100 and terrain.free(others).all()
-    before = found.poses.wrists[0] + np.array([0.0, 0.02, -0.12])
+    before = released.poses.wrists[0] + np.array([0.0, 0.02, -0.12])
     assert (np.abs(others.wrists - before).max(axis=1) < 1e-9).any()
 
 

@@ -105,9 +105,8 @@ def test_loose_things_count_wherever_they_belong_but_not_what_the_receptacle_is_
 
 def test_an_open_door_tells_where_an_opening_is_and_the_agent_where_there_is_no_door():
     places = board(top=1.2, entered=True)
-    fridge = thing(
-        "Fridge|1", 0.3, 0.9, 0.0, openable=True, is_open=True
-    )  # the door widens its box towards +x
+    # The door widens its box towards +x.
+    fridge = thing("Fridge|1", 0.3, 0.9, 0.0, openable=True, is_open=True)
     entry = entry_of(view_of(fridge), fridge, places)
     assert entry == Entry(0, 1, pytest.approx(0.225))
     assert entry.vector_out(0.2).tolist() == [0.2, 0.0, 0.0]

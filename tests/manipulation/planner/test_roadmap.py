@@ -46,9 +46,8 @@ def wall(low, high):
     return obstacles_of([("Wall", Corners(low, high))])
 
 
-BEFORE_IT = wall(
-    (-0.5, 0.0, 0.97), (0.1, 1.5, 0.99)
-)  # the hand can reach over it or past it on the right
+# The hand can reach over it or past it on the right.
+BEFORE_IT = wall((-0.5, 0.0, 0.97), (0.1, 1.5, 0.99))
 
 
 def draws(count):
@@ -97,9 +96,8 @@ def test_movements_are_made_in_an_order_in_which_nothing_is_met(linkage):
     assert [move.kind for move in moves] == [MoveKind.LIFT, MoveKind.REACH]
     none, met = terrain.movements(linkage.now, pose(z=0.88))
     assert none is None
-    assert linkage.held_box(met).center[0, 0, 2] == pytest.approx(
-        0.95, abs=0.09
-    )  # where it comes to the wall
+    # Where it comes to the wall.
+    assert linkage.held_box(met).center[0, 0, 2] == pytest.approx(0.95, abs=0.09)
 
 
 def test_a_roadmap_goes_around_what_is_straight_ahead(linkage):
@@ -139,9 +137,8 @@ def test_what_was_met_is_not_tried_again(linkage):
     on_it = Contact(goal.world()[0], linkage.held_box(goal).center[0, 0])
     assert not Terrain(linkage, free, [on_it]).free(goal).any()
     elsewhere = Contact(goal.world()[0], linkage.held_box(pose(x=0.3, z=0.75, yaw=90)).center[0, 0])
-    assert (
-        Terrain(linkage, free, [elsewhere]).free(goal).all()
-    )  # the hand was rotations_about otherwise there
+    # The hand was turned otherwise there.
+    assert Terrain(linkage, free, [elsewhere]).free(goal).all()
 
 
 def test_what_is_in_a_thing_may_get_out_of_it_but_not_deeper(linkage):

@@ -35,11 +35,13 @@ def cupboard(kind="Fridge", origin=0.0):
 
 def surroundings(linkage, item, *others, places=None):
     """With lattices of places by the ids of things."""
-    found = {item.object_id: lattice(ACROSS, DEEP, (0.8,)), **(places or {})}
+    places_of = {item.object_id: lattice(ACROSS, DEEP, (0.8,)), **(places or {})}
 
     def query(action, objectId, anywhere):
         assert (action, anywhere) == ("GetSpawnCoordinatesAboveReceptacle", True)
-        return [dict(zip("xyz", point, strict=True)) for point in found.get(objectId, [])] or None
+        return [
+            dict(zip("xyz", point, strict=True)) for point in places_of.get(objectId, [])
+        ] or None
 
     start = SimpleNamespace(object_id=MUG.object_id, receptacle_id=item.object_id)
     return Surroundings(
@@ -52,14 +54,12 @@ def at(x, y, z):
 
 
 def is_solid(around, belief, *point):
-    found = clearances(at(*point), around.obstacles(belief))
-    return found.size > 0 and bool(found.min() < 0)
+    distances = clearances(at(*point), around.obstacles(belief))
+    return distances.size > 0 and bool(distances.min() < 0)
 
 
-LEFT, RIGHT = (
-    (-0.2, 1.1, 1.3),
-    (0.2, 1.1, 1.3),
-)  # before the opening, whose right is that of who looks into it
+# Before the opening, whose right is that of who looks into it.
+LEFT, RIGHT = ((-0.2, 1.1, 1.3), (0.2, 1.1, 1.3))
 
 
 @pytest.mark.parametrize(("kind", "origin", "door"), [
@@ -114,13 +114,13 @@ def test_what_the_arm_or_the_places_are_in_is_not_filled(linkage):
         "CounterTop|1", 0.0, 0.5, 0.8, (2.0, 1.1, 0.6), pickupable=False, receptacle=True
     )
     around_places = thing("Dresser|1", 0.0, 0.9, 1.7, (1.0, 1.0, 0.5), pickupable=False)
-    found = surroundings(linkage, cupboard(), around_arm, around_places, places={
+    around = surroundings(linkage, cupboard(), around_arm, around_places, places={
         "CounterTop|1": lattice(np.arange(-0.9, -0.5, 0.05), np.arange(0.6, 1.1, 0.05), (1.0,))
     })  # fmt: skip
-    assert not is_solid(found, Belief.WHOLE, 0.3, 0.5, 0.8) and is_solid(
-        found, Belief.WHOLE, -0.7, 0.5, 0.8
+    assert not is_solid(around, Belief.WHOLE, 0.3, 0.5, 0.8) and is_solid(
+        around, Belief.WHOLE, -0.7, 0.5, 0.8
     )
-    assert not is_solid(found, Belief.WHOLE, 0.4, 1.0, 1.7)
+    assert not is_solid(around, Belief.WHOLE, 0.4, 1.0, 1.7)
 
 
 def test_loose_things_take_places_but_are_in_nobodys_way(linkage):

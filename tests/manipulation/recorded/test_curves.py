@@ -11,16 +11,16 @@ from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.runs import RunConfig
 from infthor_eval.runs.journals.journal import Journal
 
-from ..made_runs import episode, made_run, planner_run
+from ...helpers.arm_runs import make_arm_planner_run, make_arm_run, make_episode_record
 
 T = 12.7062  # quantile of the t interval over two trajectories
 # Two trajectories: of a pick-up and a put, and of a pick-up.
 EPISODES = (
-    episode("a", 10),
-    episode("a", 20, "put"),
-    episode("b", 30),
+    make_episode_record("a", 10),
+    make_episode_record("a", 20, "put"),
+    make_episode_record("b", 30),
 )
-FAILED_PUT = (EPISODES[0], episode("a", 20, "put", done=False), EPISODES[2])
+FAILED_PUT = (EPISODES[0], make_episode_record("a", 20, "put", done=False), EPISODES[2])
 
 
 def curve_of(curves, label, facet=ALL):
@@ -34,7 +34,16 @@ def means(curve):
 
 def test_reward_adds_up_over_the_experts_steps_and_the_expert_takes_over_what_failed():
     curves = arm_curves(
-        [made_run("m", [episode("a", 5, done=False), episode("a", 10), episode("a", 20, "put")])]
+        [
+            make_arm_run(
+                "m",
+                [
+                    make_episode_record("a", 5, done=False),
+                    make_episode_record("a", 10),
+                    make_episode_record("a", 20, "put"),
+                ],
+            )
+        ]
     )
     curve = curve_of(curves, "m")
     assert (curve.places, means(curve)) == ((0, 5, 10, 20), [0, 0, 2, 4])
@@ -42,7 +51,7 @@ def test_reward_adds_up_over_the_experts_steps_and_the_expert_takes_over_what_fa
 
 
 def test_both_kinds_are_drawn_together_and_each_by_itself_over_the_same_trajectories():
-    curves = arm_curves([made_run("m", EPISODES)])
+    curves = arm_curves([make_arm_run("m", EPISODES)])
     assert list(curves.facets) == [ALL, "pickup", "put"]
     assert [facet.title for facet in curves.facets.values()] == [
         "Pick-up and put",
@@ -59,14 +68,14 @@ def test_both_kinds_are_drawn_together_and_each_by_itself_over_the_same_trajecto
 
 
 def test_of_one_kind_there_is_one_curve():
-    curves = arm_curves([made_run("m", [EPISODES[0], EPISODES[2]])])
+    curves = arm_curves([make_arm_run("m", [EPISODES[0], EPISODES[2]])])
     assert list(curves.facets) == ["pickup"]
     assert curves.task == "arm_pickup"
     assert means(curve_of(curves, "m", "pickup")) == [0, 1, 2]
 
 
 def test_tasks_can_be_chosen():
-    runs = [made_run("m", EPISODES)]
+    runs = [make_arm_run("m", EPISODES)]
     assert list(arm_curves(runs, "arm_put").facets) == ["put"]
     assert list(arm_curves(runs, "arm_put, arm_pickup").facets) == [ALL, "pickup", "put"]
     with pytest.raises(UsageError, match="unknown task of all these runs 'arm'"):
@@ -74,7 +83,7 @@ def test_tasks_can_be_chosen():
 
 
 def test_two_tasks_of_one_kind_are_not_drawn_together():
-    run = made_run("m", [*EPISODES, episode("a", 10, task="other_pickup")])
+    run = make_arm_run("m", [*EPISODES, make_episode_record("a", 10, task="other_pickup")])
     with pytest.raises(
         UsageError, match="arm_pickup and other_pickup are both of pickup; give one of each kind"
     ):
@@ -83,9 +92,9 @@ def test_two_tasks_of_one_kind_are_not_drawn_together():
 
 
 def test_an_excluded_episode_is_left_out_of_all_runs_and_a_failed_one_earns_nothing():
-    refused = (*EPISODES[:1], episode("a", 20, "put", excluded="refused"), EPISODES[2])
-    failed = (episode("a", 10, failure="out of memory"), *EPISODES[1:])
-    curves = arm_curves([made_run("m", refused), made_run("n", failed)])
+    refused = (*EPISODES[:1], make_episode_record("a", 20, "put", excluded="refused"), EPISODES[2])
+    failed = (make_episode_record("a", 10, failure="out of memory"), *EPISODES[1:])
+    curves = arm_curves([make_arm_run("m", refused), make_arm_run("n", failed)])
     assert means(curve_of(curves, "m")) == [0, 1, 2]
     assert means(curve_of(curves, "n")) == [0, 0, 1]
     assert means(curve_of(curves, AT_MOST)) == [0, 1, 2]
@@ -99,7 +108,10 @@ def test_an_excluded_episode_is_left_out_of_all_runs_and_a_failed_one_earns_noth
 
 def test_a_run_that_was_stopped_amid_a_trajectory_does_not_draw_it():
     curves = arm_curves(
-        [made_run("m", EPISODES), made_run("n", [EPISODES[0], EPISODES[2], episode("c", 3, "put")])]
+        [
+            make_arm_run("m", EPISODES),
+            make_arm_run("n", [EPISODES[0], EPISODES[2], make_episode_record("c", 3, "put")]),
+        ]
     )
     assert curves.n_trajectories == 1
     assert means(curve_of(curves, "m")) == [0, 2]
@@ -107,7 +119,7 @@ def test_a_run_that_was_stopped_amid_a_trajectory_does_not_draw_it():
 
 
 def test_the_planner_is_the_bound_and_comes_last():
-    curves = arm_curves([planner_run(FAILED_PUT), made_run("m", EPISODES)])
+    curves = arm_curves([make_arm_planner_run(FAILED_PUT), make_arm_run("m", EPISODES)])
     assert [(run.label, run.is_bound) for run in curves.runs] == [
         ("m", False),
         ("planner-arm", True),
@@ -115,7 +127,10 @@ def test_the_planner_is_the_bound_and_comes_last():
 
 
 def test_of_several_planners_none_is_the_bound():
-    planners = [planner_run(EPISODES, "p", radius=0.5), planner_run(FAILED_PUT, "p", radius=0.06)]
+    planners = [
+        make_arm_planner_run(EPISODES, "p", radius=0.5),
+        make_arm_planner_run(FAILED_PUT, "p", radius=0.06),
+    ]
     curves = arm_curves(label_by_radius(planners))
     assert [(run.label, run.is_bound) for run in curves.runs] == [
         ("p, 0.5 m", False),
@@ -127,28 +142,31 @@ def test_of_several_planners_none_is_the_bound():
 
 
 def test_runs_differ_in_simulator_and_settings_in_a_note():
-    other = made_run("n", EPISODES, simulator="unity", settings={"max_steps": 9})
-    notes = "\n".join(arm_curves([made_run("m", EPISODES), other]).notes)
+    other = make_arm_run("n", EPISODES, simulator="unity", settings={"max_steps": 9})
+    notes = "\n".join(arm_curves([make_arm_run("m", EPISODES), other]).notes)
     assert "simulator: embedded (m), unity (n)" in notes
     assert "max_steps of arm_put: the default (m), 9 (n)" in notes
 
 
 def other_digest():
-    run = made_run("n", EPISODES)
+    run = make_arm_run("n", EPISODES)
     for task in run.config.tasks.values():
         task.trajectories.update(dict.fromkeys(task.trajectories, "other"))
     return run
 
 
 REFUSED = {
-    "another task": (made_run("n", [episode("a", 10, task="other")]), "m and n share no task"),
+    "another task": (
+        make_arm_run("n", [make_episode_record("a", 10, task="other")]),
+        "m and n share no task",
+    ),
     "another trajectory": (
-        made_run("n", [episode("z", 10), episode("z", 20, "put")]),
+        make_arm_run("n", [make_episode_record("z", 10), make_episode_record("z", 20, "put")]),
         "share no trajectory of arm",
     ),
     "another file": (other_digest(), "share no trajectory of arm"),
     "other rewards": (
-        made_run("n", [episode("a", 10, most=5.0), *EPISODES[1:]]),
+        make_arm_run("n", [make_episode_record("a", 10, most=5.0), *EPISODES[1:]]),
         "earn different rewards in arm_pick",
     ),
 }
@@ -156,13 +174,13 @@ REFUSED = {
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_cannot_be_drawn_together_is_refused(case):
-    other, said = REFUSED[case]
-    with pytest.raises((DataError, UsageError), match=said):
-        arm_curves([made_run("m", EPISODES), other])
+    other, expected = REFUSED[case]
+    with pytest.raises((DataError, UsageError), match=expected):
+        arm_curves([make_arm_run("m", EPISODES), other])
 
 
 def test_a_journal_of_another_form_is_refused(tmp_path):
-    run = made_run("m", EPISODES)
+    run = make_arm_run("m", EPISODES)
     config = RunConfig(tasks={task: {} for task in run.config.tasks})
     header = msgspec.structs.replace(run.header, config=config)
     with Journal(tmp_path, header, RECORDS):

@@ -5,13 +5,13 @@ import pytest
 from infthor_eval.errors import UsageError
 from infthor_eval.manipulation.recorded.radii import success_by_radius
 
-from ..made_runs import episode, made_run, planner_run
+from ...helpers.arm_runs import make_arm_planner_run, make_arm_run, make_episode_record
 
 
 def episodes(done: int, inside: int = 0, **more):
     """Four pick-ups and four puts of two trajectories, of each kind so many with success."""
-    found = [
-        episode(
+    pick_ups = [
+        make_episode_record(
             name,
             10 * number,
             done=number + 2 * (name == "b") < done,
@@ -20,8 +20,8 @@ def episodes(done: int, inside: int = 0, **more):
         for name in "ab"
         for number in range(2)
     ]
-    return found + [
-        episode(name, 10 * number + 5, "put", done=number + 2 * (name == "b") < done)
+    return pick_ups + [
+        make_episode_record(name, 10 * number + 5, "put", done=number + 2 * (name == "b") < done)
         for name in "ab"
         for number in range(2)
     ]
@@ -33,41 +33,46 @@ def means(points):
 
 def test_a_line_per_model_and_kind_with_the_planner_last():
     runs = [
-        planner_run(episodes(4), radius=0.5),
-        made_run("m", episodes(3, 2), radius=0.5),
-        made_run("m", episodes(1, 1), radius=0.06),
+        make_arm_planner_run(episodes(4), radius=0.5),
+        make_arm_run("m", episodes(3, 2), radius=0.5),
+        make_arm_run("m", episodes(1, 1), radius=0.06),
     ]
-    found = success_by_radius(runs)
-    assert [(line.label, line.kind, line.is_bound) for line in found.lines] == [
+    by_radius = success_by_radius(runs)
+    assert [(line.label, line.kind, line.is_bound) for line in by_radius.lines] == [
         ("m", "pickup", False),
         ("planner-arm", "pickup", True),
         ("m", "put", False),
         ("planner-arm", "put", True),
     ]
-    assert means(found.lines[0].points) == [(0.06, 0.25, 4), (0.5, 0.75, 4)]
-    assert all(0 <= rate.low < rate.mean < rate.high <= 1 for _, rate in found.lines[0].points)
-    assert found.notes == ()
+    assert means(by_radius.lines[0].points) == [(0.06, 0.25, 4), (0.5, 0.75, 4)]
+    assert all(0 <= rate.low < rate.mean < rate.high <= 1 for _, rate in by_radius.lines[0].points)
+    assert by_radius.notes == ()
 
 
 def test_the_floor_is_the_share_that_lies_in_the_sphere_at_the_start():
-    runs = [made_run("m", episodes(4, 3), radius=0.5), made_run("m", episodes(2, 1), radius=0.1)]
+    runs = [
+        make_arm_run("m", episodes(4, 3), radius=0.5),
+        make_arm_run("m", episodes(2, 1), radius=0.1),
+    ]
     assert means(success_by_radius(runs).floor) == [(0.1, 0.25, 4), (0.5, 0.75, 4)]
     assert success_by_radius(runs, "arm_put").floor == ()
 
 
 def test_of_the_floor_a_run_that_failed_tells_nothing():
-    failed = [episode("a", 0, failure="broken"), *episodes(4, 4)[1:]]
-    runs = [made_run("m", failed), made_run("n", episodes(0, 4))]
-    found = success_by_radius(runs)
-    assert means(found.floor) == [(0.5, 1.0, 4)]
-    assert means(found.lines[0].points) == [(0.5, 0.75, 4)]
-    assert found.lines[0].n_failed == 1
+    failed = [make_episode_record("a", 0, failure="broken"), *episodes(4, 4)[1:]]
+    runs = [make_arm_run("m", failed), make_arm_run("n", episodes(0, 4))]
+    by_radius = success_by_radius(runs)
+    assert means(by_radius.floor) == [(0.5, 1.0, 4)]
+    assert means(by_radius.lines[0].points) == [(0.5, 0.75, 4)]
+    assert by_radius.lines[0].n_failed == 1
 
 
 def test_episodes_that_a_radius_excludes_are_left_out_of_all():
-    refused = [episode("a", 0, excluded="no room"), *episodes(0)[1:]]
-    found = success_by_radius([made_run("m", episodes(4)), made_run("m", refused, radius=0.06)])
-    assert means(found.lines[0].points) == [(0.06, 0.0, 3), (0.5, 1.0, 3)]
+    refused = [make_episode_record("a", 0, excluded="no room"), *episodes(0)[1:]]
+    by_radius = success_by_radius(
+        [make_arm_run("m", episodes(4)), make_arm_run("m", refused, radius=0.06)]
+    )
+    assert means(by_radius.lines[0].points) == [(0.06, 0.0, 3), (0.5, 1.0, 3)]
 
 
 def test_two_runs_of_one_model_and_radius_are_refused():
@@ -75,4 +80,4 @@ def test_two_runs_of_one_model_and_radius_are_refused():
         UsageError,
         match=r"two runs are called m and have a radius of 0\.5 m; leave one of them out",
     ):
-        success_by_radius([made_run("m", episodes(1)), made_run("m", episodes(2))])
+        success_by_radius([make_arm_run("m", episodes(1)), make_arm_run("m", episodes(2))])

@@ -20,13 +20,13 @@ PLACES = ("in the sink", "in the bin", "on the table", "on the table top", "on")
 @pytest.fixture(scope="module")
 def ways(checkpoints: dict[str, Path]) -> dict[str, Any]:
     """One checkpoint in every way it can be run."""
-    given = {"pretrained": str(checkpoints["llava"]), "device": "cpu", "dtype": "float32"}
+    settings = {"pretrained": str(checkpoints["llava"]), "device": "cpu", "dtype": "float32"}
     options = {
         "shared": {"chunk_tokens": "20"},
         "batched": {"batch_size": "4"},
         "uncached": {"share_prefix": "false"},
     }
-    return {way: load("hf-vlm", {**given, **chosen}, seed=0) for way, chosen in options.items()}
+    return {way: load("hf-vlm", {**settings, **chosen}, seed=0) for way, chosen in options.items()}
 
 
 def _asked(frames: Sequence[FrameRef]) -> list[list[Part]]:

@@ -56,8 +56,8 @@ def test_half_precision_answers_the_same_every_time(
     family: str, mode: str, checkpoints: dict[str, Path], frames: list[FrameRef]
 ) -> None:
     options = MODES.get(mode, {"device_map": "auto"})
-    given = {"pretrained": str(checkpoints[family]), "dtype": "bfloat16", "max_tokens": "0"}
-    model: Any = load(family, given | options, seed=0)
+    settings = {"pretrained": str(checkpoints[family]), "dtype": "bfloat16", "max_tokens": "0"}
+    model: Any = load(family, settings | options, seed=0)
     assert torch.isfinite(model.encode(model.pieces(user(*frames[:2], QUESTIONS[0])))).all()
     _forget(model)
     first = _asked(model, frames[:2])

@@ -91,13 +91,13 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], P
 
 
 def _load(folders: Mapping[tuple[str, str], Path], family: str, tokens: str, **options: str) -> Any:
-    given = {
+    defaults = {
         "pretrained": str(folders[family, tokens]),
         "device": "cpu",
         "dtype": "float32",
         "max_tokens": "0",
     }
-    return load(family, {**given, **options}, seed=0)
+    return load(family, {**defaults, **options}, seed=0)
 
 
 def _play(

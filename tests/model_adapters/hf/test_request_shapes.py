@@ -43,16 +43,16 @@ def shapes(make_frames: Callable[..., list[FrameRef]]) -> dict[str, list[Shape]]
     encoded."""
     frames = make_frames(7, seed=3)
     steps = [part for frame in frames[:3] for part in (frame, "<|act|>MoveAhead<|act|>")]
-    asked = (
+    questions = (
         "\nIs there a mug?",
         "\nWhere was the mug before you put it there?",
         "\nHow many plates did you see?",
     )
     return {
-        "clues": [Shape((frames[4],)), Shape((frames[0], frames[4]), asked[:2])],
-        "trajectory": [Shape(tuple(frames), asked)],
-        "interleaved": [Shape(("Your main goal: wash the cup.", *steps, frames[5]), asked[:2])],
-        "truncated": [Shape(tuple(frames[-4:]), asked[:2])],
+        "clues": [Shape((frames[4],)), Shape((frames[0], frames[4]), questions[:2])],
+        "trajectory": [Shape(tuple(frames), questions)],
+        "interleaved": [Shape(("Your main goal: wash the cup.", *steps, frames[5]), questions[:2])],
+        "truncated": [Shape(tuple(frames[-4:]), questions[:2])],
         # The window moves back over the trajectory; then two windows that begin alike.
         "haystack": [Shape(tuple(frames[at : at + 3])) for at in (4, 2, 0)]
         + [Shape(tuple(frames[:5]))],
@@ -70,13 +70,13 @@ def family(request: pytest.FixtureRequest) -> str:
 @pytest.fixture(scope="module")
 def build(family: str, checkpoints: dict[str, Path]) -> Callable[[Mapping[str, str]], Any]:
     def build(options: Mapping[str, str]) -> Any:
-        given = {
+        defaults = {
             "pretrained": str(checkpoints[family]),
             "device": "cpu",
             "dtype": "float32",
             "max_tokens": "0",
         }
-        return load(ADAPTERS[family], {**given, **options}, seed=0)
+        return load(ADAPTERS[family], {**defaults, **options}, seed=0)
 
     return build
 
@@ -158,9 +158,9 @@ def test_ids_and_replies_are_those_of_transformers_own_processor_and_generate(
         assert list(token_ids(model.pieces(prompt))) == ids
         talk = model.conversation()
         talk.append(*prompt[0].parts)
-        got = list(talk.reply(up_to(NEW)).token_ids)
-        assert got == reply[: len(got)]
-        assert reply[len(got) :] == [] or reply[len(got)] in model._loaded.generation.end_ids
+        answer = list(talk.reply(up_to(NEW)).token_ids)
+        assert answer == reply[: len(answer)]
+        assert reply[len(answer) :] == [] or reply[len(answer)] in model._loaded.generation.end_ids
 
 
 def _received(model: Any, talk: Conversation) -> tuple[int, int, int]:

@@ -36,7 +36,7 @@ def _threads_of(network: torch.nn.Module, use: Any) -> set[int]:
 
 
 @pytest.mark.parametrize(
-    ("name", "given", "expected"),
+    ("name", "model_options", "expected"),
     [
         ("qwen2.5-vl-tiny", {}, 1),
         ("qwen2.5-vl-tiny", {"threads": "2"}, 2),
@@ -46,9 +46,9 @@ def _threads_of(network: torch.nn.Module, use: Any) -> set[int]:
     ],
 )
 def test_a_model_computes_on_its_threads(
-    name: str, given: dict[str, str], expected: int, frames: list[FrameRef]
+    name: str, model_options: dict[str, str], expected: int, frames: list[FrameRef]
 ) -> None:
-    model: Any = load(name, given, seed=0)
+    model: Any = load(name, model_options, seed=0)
 
     def use() -> None:
         parts: tuple[Part, ...] = (frames[0], "\nWhat is it?")
@@ -63,13 +63,13 @@ def test_a_model_computes_on_its_threads(
 
 
 @pytest.mark.parametrize(
-    ("name", "given", "expected"),
+    ("name", "model_options", "expected"),
     [("openvla-tiny", {}, 1), ("spatialvla-tiny", {"threads": "2"}, 2)],
 )
 def test_a_policy_acts_on_its_threads(
-    name: str, given: dict[str, str], expected: int, frames: list[FrameRef]
+    name: str, model_options: dict[str, str], expected: int, frames: list[FrameRef]
 ) -> None:
-    policy: Any = load(name, given, seed=0)
+    policy: Any = load(name, model_options, seed=0)
     threads = _threads_of(policy._network.weights, lambda: policy.act(frames[0], "pick up the mug"))
     assert threads == {expected}
     assert torch.get_num_threads() == 2

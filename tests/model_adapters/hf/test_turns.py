@@ -47,13 +47,13 @@ def plainly(
 
 
 def _load(name: str, checkpoints: Mapping[str, Path], **options: str) -> Any:
-    given = {
+    defaults = {
         "pretrained": str(checkpoints[name]),
         "device": "cpu",
         "dtype": "float32",
         "max_tokens": "0",
     }
-    return load(ADAPTERS[name], {**given, **options}, seed=0)
+    return load(ADAPTERS[name], {**defaults, **options}, seed=0)
 
 
 @pytest.mark.parametrize("name", ADAPTERS)

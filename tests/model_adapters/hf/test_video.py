@@ -101,10 +101,10 @@ def test_replies_are_those_of_the_whole_processor_and_generate(
     Eight frames a second, so that no time of Qwen2.5-VL's clips is beyond their rows, where
     transformers 5 numbers the text behind the video in its own way.
     """
-    new, asked = 6, {}
+    new, requests = 6, {}
     for family, side in (("qwen2.5-vl", 336), ("llava-onevision", 384)):
         frames = make_frames(5, side, side, seed=3)
-        asked[family] = [
+        requests[family] = [
             user(Video(tuple(frames[:4]), 8.0), QUESTION),
             user(
                 "Before: ",
@@ -114,8 +114,10 @@ def test_replies_are_those_of_the_whole_processor_and_generate(
                 QUESTION,
             ),
         ]
-    answers = answer_plainly({checkpoints[family]: turns for family, turns in asked.items()}, new)
-    for family, turns in asked.items():
+    answers = answer_plainly(
+        {checkpoints[family]: turns for family, turns in requests.items()}, new
+    )
+    for family, turns in requests.items():
         model: Any = load(family, {"pretrained": str(checkpoints[family]), "device": "cpu"}, seed=0)
         for one, (ids, reply) in zip(turns, answers[checkpoints[family]], strict=True):
             require_same(model, one, ids, reply, new)
@@ -148,12 +150,12 @@ def test_sharing_and_chunks_change_no_reply(
 def test_the_rate_and_the_order_of_frames_change_the_prompt(
     tiny: Any, frames: list[FrameRef]
 ) -> None:
-    shown = [
+    videos = [
         Video(tuple(frames), 1.0),
         Video(tuple(frames), 2.0),
         Video(tuple(reversed(frames)), 1.0),
     ]
-    first, *others = [tiny.pieces(user(video, QUESTION)) for video in shown]
+    first, *others = [tiny.pieces(user(video, QUESTION)) for video in videos]
     assert first not in others
 
 
@@ -228,7 +230,5 @@ def test_the_pixels_of_long_videos_are_shared_by_their_frames(tiny: Any) -> None
     300 tokens."""
     large = (1400, 1400)
     tokens = [tiny._loaded.family.video.n_tokens(ClipShape(large, 0, n, 1.0)) for n in (2, 384)]
-    assert tokens == [
-        27 * 27,
-        17 * 17,
-    ]  # 768 tokens and 300 are the most, in whole rows and columns
+    # 768 tokens and 300 are the most, in whole rows and columns.
+    assert tokens == [27 * 27, 17 * 17]

@@ -14,18 +14,18 @@ ASKED = Inquiry((Turn("user", ("Where is the mug?",)),), Decoding(max_new_tokens
 
 def asking(desk: Desk) -> tuple[threading.Thread, list[object]]:
     """Ask in a thread; the answer, or the type of the error, comes into a list."""
-    found: list[object] = []
+    answers: list[object] = []
 
     def ask() -> None:
         try:
-            found.append(desk.ask(ASKED))
+            answers.append(desk.ask(ASKED))
         except KeyboardInterrupt as error:
-            found.append(type(error))
+            answers.append(type(error))
 
     thread = threading.Thread(target=ask, daemon=True)
     thread.start()
     until(lambda: desk.question is not None)
-    return thread, found
+    return thread, answers
 
 
 def until(holds: Callable[[], bool]) -> None:
@@ -38,25 +38,25 @@ def until(holds: Callable[[], bool]) -> None:
 
 def test_a_question_waits_for_its_answer_and_is_gone_then() -> None:
     desk = Desk()
-    thread, found = asking(desk)
+    thread, answers = asking(desk)
     assert desk.question is not None and desk.question.number == 1
     desk.give(1, Answer("Fridge", 7))
     thread.join()
-    assert (found, desk.question, desk.n_answered) == ([Answer("Fridge", 7)], None, 1)
+    assert (answers, desk.question, desk.n_answered) == ([Answer("Fridge", 7)], None, 1)
 
 
 def test_an_answer_to_another_question_is_refused_and_the_first_of_two_counts() -> None:
     desk = Desk()
     with pytest.raises(StaleError):
         desk.give(1, Answer("too early", 0))
-    thread, found = asking(desk)
+    thread, answers = asking(desk)
     with pytest.raises(StaleError):
         desk.give(2, Answer("another", 0))
     desk.give(1, Answer("first", 0))
     with pytest.raises(StaleError):
         desk.give(1, Answer("second", 0))
     thread.join()
-    assert found == [Answer("first", 0)]
+    assert answers == [Answer("first", 0)]
     thread, _ = asking(desk)
     assert desk.question is not None and desk.question.number == 2
     desk.stop()
@@ -65,10 +65,10 @@ def test_an_answer_to_another_question_is_refused_and_the_first_of_two_counts() 
 
 def test_a_run_that_is_stopped_ends_as_by_ctrl_c() -> None:
     desk = Desk()
-    thread, found = asking(desk)
+    thread, answers = asking(desk)
     desk.stop()
     thread.join()
-    assert (found, desk.n_answered) == ([KeyboardInterrupt], 0)
+    assert (answers, desk.n_answered) == ([KeyboardInterrupt], 0)
 
 
 def test_who_waits_for_a_change_learns_of_it() -> None:

@@ -4,7 +4,6 @@ controls."""
 import json
 import re
 import subprocess
-import sys
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
@@ -18,9 +17,9 @@ from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.plans.records import RECORDS as PLAN_RECORDS
 from infthor_eval.runs import UnitRecord, read_run
 
-from ...plans.cut import FORK, cut, write
+from ...helpers.processes import cli_words
+from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
 
-OURS = "from infthor_eval.cli import main; main()"
 HOSTILE = "Is </script><img src=x onerror='document.title=\"hacked\"'> here?"
 KEY = ("yes", "no", "Fridge", "3", "SideTable, Desk")
 # Ten questions on two trajectories, told apart by their texts.
@@ -41,9 +40,8 @@ class Session:
 
     def __init__(self, browser: Any, output: Path, *words: object) -> None:
         model = () if "--model" in words else ("--model", "human:browser=false")
-        command = ["-c", OURS, *model, "--output", output, *words]
         self.process = subprocess.Popen(
-            [sys.executable, *map(str, command)],
+            cli_words(*model, "--output", output, *words),
             stderr=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             text=True,
@@ -55,9 +53,9 @@ class Session:
     def _address(self) -> str:
         assert self.process.stderr is not None
         for line in self.process.stderr:
-            found = re.search(r"human: answer at (http://\S+)", line)
-            if found:
-                return found[1]
+            match = re.search(r"human: answer at (http://\S+)", line)
+            if match:
+                return match[1]
         pytest.fail("the run ended without a page")
 
     def new_tab(self, browser: Any) -> Any:
@@ -79,9 +77,9 @@ class Session:
     def end(self) -> int:
         """Wait until the run ends, and return its exit code."""
         assert self.process.stderr is not None
-        said = self.process.stderr.read()
+        error_text = self.process.stderr.read()
         code = self.process.wait(60)
-        assert "Traceback" not in said, said
+        assert "Traceback" not in error_text, error_text
         return code
 
 
@@ -122,7 +120,7 @@ def test_ten_questions_by_keyboard_alone(
     keyboard, unknown = one.tab.keyboard, ""
     for number in range(10):
         one.await_answered(number)
-        asked = one.question
+        question = one.question
         assert one.tab.locator("#place").inner_text() == "1 of 12"
         keyboard.press("Shift+ArrowRight")
         keyboard.press(".")
@@ -130,21 +128,21 @@ def test_ten_questions_by_keyboard_alone(
         one.tab.wait_for_timeout(150)  # for which a frame counts as looked at
         if number == 3:
             keyboard.press("n")
-            unknown = asked
+            unknown = question
             continue
         keyboard.press("Enter")
-        keyboard.type(ANSWERS[asked])
+        keyboard.type(ANSWERS[question])
         keyboard.press("Enter")
     one.tab.get_by_text("All is answered. Thank you.").wait_for()
     assert one.end() == 0
     assert one.errors == []
-    found = by_text(tmp_path)
-    assert {text: answer.reply for text, answer in found.items()} == ANSWERS | {
+    answers = by_text(tmp_path)
+    assert {text: answer.reply for text, answer in answers.items()} == ANSWERS | {
         unknown: "I do not know"
     }
-    assert all(answer.scores["strict"] == (text != unknown) for text, answer in found.items())
+    assert all(answer.scores["strict"] == (text != unknown) for text, answer in answers.items())
     assert all(
-        answer.n_watched is not None and 1 <= answer.n_watched <= 3 for answer in found.values()
+        answer.n_watched is not None and 1 <= answer.n_watched <= 3 for answer in answers.values()
     )
     assert all(
         record.seconds >= 0.15 and record.tokens.context is None for record in records(tmp_path)
@@ -157,13 +155,13 @@ def test_ten_questions_by_mouse(
     one = session("--tasks", "nieh_gt", "--data", data)
     for number in range(10):
         one.await_answered(number)
-        asked = one.question
-        if asked == HOSTILE:  # it is text, and no element of it is there
+        question = one.question
+        if question == HOSTILE:  # it is text, and no element of it is there
             assert one.tab.locator("img[src=x]").count() == 0
             one.tab.locator("#whole summary").click()
             assert HOSTILE in one.tab.locator("#parts").inner_text()
         one.tab.locator("#text").click()
-        answer = ANSWERS[asked]
+        answer = ANSWERS[question]
         one.tab.locator("#text").fill(answer[:2].lower())
         word = one.tab.locator("#words li", has_text=re.compile(f"^{re.escape(answer)}$"))
         if word.count():
@@ -204,9 +202,8 @@ def test_two_tabs_answer_one_question_once(
     one = session("--tasks", "nieh_gt", "--data", data, "--limit", 2)
     one.await_answered(0)
     other = one.new_tab(browser)
-    other.route(
-        "**/state.json*", lambda route: route.abort()
-    )  # it does not learn that the question was answered
+    # It does not learn that the question was answered.
+    other.route("**/state.json*", lambda route: route.abort())
     first = one.question
     one.tab.locator("#text").fill("first")
     one.tab.keyboard.press("Enter")
@@ -238,16 +235,16 @@ def test_what_is_no_answer_is_refused_with_the_reason(
             with error:
                 return error.code
 
-    given = json.dumps({"number": 1, "text": "yes"}).encode()
+    reply = json.dumps({"number": 1, "text": "yes"}).encode()
     assert post(f"{one.address}answer", b"[]") == 400
     assert (
         post(f"{one.address}answer", json.dumps({"number": 1, "text": "a" * 2001}).encode()) == 400
     )
-    assert post(f"{one.address}answer", given, Origin="http://elsewhere.example") == 403
+    assert post(f"{one.address}answer", reply, Origin="http://elsewhere.example") == 403
     token = one.address.rstrip("/").rpartition("/")[2]
-    assert post(f"{one.address.replace(token, 'x' * len(token))}answer", given) == 403
+    assert post(f"{one.address.replace(token, 'x' * len(token))}answer", reply) == 403
     assert one.question  # nobody has answered it
-    assert post(f"{one.address}answer", given) == 200
+    assert post(f"{one.address}answer", reply) == 200
     assert one.end() == 0
 
 
@@ -264,17 +261,17 @@ def test_a_run_that_is_killed_goes_on_where_it_was(
     one.process.kill()
     one.tab.get_by_text("The run has stopped. All answers are kept").wait_for()
     again = session(*words)
-    asked = []
+    questions = []
     for number in range(2):
         again.await_answered(number)
-        asked.append(again.question)
+        questions.append(again.question)
         again.tab.locator("#unknown").click()
     assert again.end() == 0
-    assert first not in asked
-    found = by_text(tmp_path)
-    assert {text: answer.reply for text, answer in found.items()} == {
+    assert first not in questions
+    answers = by_text(tmp_path)
+    assert {text: answer.reply for text, answer in answers.items()} == {
         first: "mine"
-    } | dict.fromkeys(asked, "I do not know")
+    } | dict.fromkeys(questions, "I do not know")
 
 
 def test_a_run_is_stopped_from_the_page(session: Callable[..., Session], data: Path) -> None:
@@ -286,8 +283,8 @@ def test_a_run_is_stopped_from_the_page(session: Callable[..., Session], data: P
 
 @pytest.mark.parametrize("by", ["keyboard", "mouse"])
 def test_a_plan_is_acted_out(session: Callable[..., Session], tmp_path: Path, by: str) -> None:
-    document = cut(FORK, 1)
-    data = write(tmp_path / "data", document)
+    document = cut_trajectory(FORK, 1)
+    data = write_trajectories(tmp_path / "data", document)
     one = session("--tasks", "infthor_plans", "--data", data)
     keys = {
         "MoveAhead": "ArrowUp",
@@ -321,19 +318,8 @@ def test_a_plan_is_acted_out(session: Callable[..., Session], tmp_path: Path, by
 
 
 def test_people_are_told_apart(session: Callable[..., Session], data: Path, tmp_path: Path) -> None:
-    command = [
-        "-c",
-        OURS,
-        "--model",
-        "human:reader=../x",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        str(data),
-    ]
-    refused = subprocess.run(
-        [sys.executable, *command], capture_output=True, text=True, check=False
-    )
+    words = cli_words("--model", "human:reader=../x", "--tasks", "nieh_gt", "--data", data)
+    refused = subprocess.run(words, capture_output=True, text=True, check=False)
     assert refused.returncode == 2
     assert "reader is '../x'; write a name" in refused.stderr
     for reader in ("ann", "ben"):

@@ -13,9 +13,17 @@ from PIL import Image
 
 from model_adapters import load
 
-from ..policies.servers import Answer, serving
+from ..policies.servers import Answer, serve
 
-__all__ = ["chatting", "completion", "images_in", "kept", "opened", "says", "talkative"]
+__all__ = [
+    "always_say",
+    "completion",
+    "images_in",
+    "keep_requests",
+    "open_model",
+    "serve_chat",
+    "talkative",
+]
 
 PATH = "/v1/chat/completions"
 
@@ -52,24 +60,24 @@ def talkative(request: dict[str, Any], _handler: BaseHTTPRequestHandler) -> dict
     return completion(" ".join(words), (n_read, len(words), n_read // 2))
 
 
-def says(text: str) -> Answer:
+def always_say(text: str) -> Answer:
     """Says the same whatever it is asked."""
     return lambda *_: completion(text)
 
 
 @contextmanager
-def chatting(answer: Answer = talkative) -> Iterator[str]:
+def serve_chat(answer: Answer = talkative) -> Iterator[str]:
     """The base_url of a server, for as long as it is needed."""
-    with serving(answer, PATH) as url:
+    with serve(answer, PATH) as url:
         yield f"{url}/v1"
 
 
 @contextmanager
-def opened(answer: Answer = talkative, **options: object) -> Iterator[Any]:
+def open_model(answer: Answer = talkative, **options: object) -> Iterator[Any]:
     """A model behind such a server; nothing is left open."""
-    with chatting(answer) as url:
-        given = {name: str(value) for name, value in {"retries": 0, **options}.items()}
-        model: Any = load("openai", {"base_url": url, "model": "m", **given}, 0)
+    with serve_chat(answer) as url:
+        settings = {name: str(value) for name, value in {"retries": 0, **options}.items()}
+        model: Any = load("openai", {"base_url": url, "model": "m", **settings}, 0)
         try:
             yield model
         finally:
@@ -88,12 +96,12 @@ def images_in(request: dict[str, Any]) -> list[Image.Image]:
     return [Image.open(BytesIO(base64.b64decode(url.partition(",")[2]))) for url in urls]
 
 
-def kept(asked: list[dict[str, Any]], answer: Callable[..., Any] = talkative) -> Answer:
+def keep_requests(requests: list[dict[str, Any]], answer: Callable[..., Any] = talkative) -> Answer:
     """Answers likewise, and keeps what was asked, with its head under "headers" (names in lower
     case)."""
 
     def keep(request: dict[str, Any], handler: BaseHTTPRequestHandler) -> Any:
-        asked.append(
+        requests.append(
             request | {"headers": {name.lower(): value for name, value in handler.headers.items()}}
         )
         return answer(request, handler)

@@ -20,7 +20,7 @@ from model_adapters import Decoding, Reply
 from model_adapters.openai.completions import read_completion
 
 from ..policies.servers import Answer, send
-from .talking import completion, opened, says, talkative
+from .talking import always_say, completion, open_model, talkative
 
 endpoint = pytest.importorskip(
     "model_adapters.openai.endpoint", reason="the client library is not installed"
@@ -38,7 +38,7 @@ def _ask(model: Any) -> Reply:
 
 
 def _refused(answer: Answer, **options: object) -> str:
-    with opened(answer, **options) as model, pytest.raises(ModelError) as caught:
+    with open_model(answer, **options) as model, pytest.raises(ModelError) as caught:
         _ask(model)
     message = str(caught.value)
     assert message.startswith("http://127.0.0.1:")
@@ -247,7 +247,7 @@ def test_no_document_is_a_traceback(data: st.DataObject) -> None:
     ],
 )
 def test_what_was_said_is_the_reply(document: dict[str, Any], text: str) -> None:
-    with opened(_answers(document)) as model:
+    with open_model(_answers(document)) as model:
         assert _ask(model).text == text
 
 
@@ -297,7 +297,7 @@ def test_what_passes_is_sent_again_and_told(fault: str) -> None:
         n_asked += 1
         return fail(request, handler) if n_asked < 3 else talkative(request, handler)
 
-    with opened(answer, retries=2) as model:
+    with open_model(answer, retries=2) as model:
         reply = _ask(model)
     assert n_asked == 3
     assert len(reply.faults) == 2
@@ -319,7 +319,7 @@ def test_a_server_that_is_down_is_not_waited_for_by_every_unit() -> None:
         n_asked += 1
         return send(handler, 503, b"") if down else talkative(request, handler)
 
-    with opened(answer, retries=3) as model:
+    with open_model(answer, retries=3) as model:
         for n_expected in (4, 5, 6):
             with pytest.raises(ModelError, match="answers 503"):
                 _ask(model)
@@ -339,7 +339,7 @@ def test_a_server_that_is_only_busy_is_asked_as_patiently_by_every_unit() -> Non
         n_asked += 1
         send(handler, 429, b"slow down")
 
-    with opened(answer, retries=2) as model:
+    with open_model(answer, retries=2) as model:
         for n_expected in (3, 6):
             with pytest.raises(
                 ModelError, match="answers 429 Too Many Requests: 'slow down', in 3 attempts; lower"
@@ -353,7 +353,7 @@ def test_a_server_that_is_not_there_is_one_line() -> None:
         taken.bind(("127.0.0.1", 0))
         where = f"http://127.0.0.1:{taken.getsockname()[1]}/v1"
         with (
-            opened(talkative, base_url=where, retries=1) as model,
+            open_model(talkative, base_url=where, retries=1) as model,
             pytest.raises(ModelError) as caught,
         ):
             _ask(model)
@@ -374,7 +374,7 @@ def test_a_wait_that_the_server_asks_for_is_kept(monkeypatch: pytest.MonkeyPatch
     def answer(request: Any, handler: Handler) -> Any:
         return answers.pop(0)(request, handler)
 
-    with opened(answer, retries=4) as model:
+    with open_model(answer, retries=4) as model:
         _ask(model)
     assert waited[:2] == pytest.approx([7, 1.5], abs=0.1)
     assert 15 < waited[2] <= 30  # until a time of day, which comes nearer while the machine is busy
@@ -390,9 +390,9 @@ def test_without_one_each_wait_is_longer(monkeypatch: pytest.MonkeyPatch) -> Non
     assert max(waited) <= 75
 
 
-@pytest.mark.parametrize("asked", ["100000", "9" * 400])
-def test_a_wait_without_end_is_not_kept(asked: str) -> None:
-    message = _refused(_sends(429, b"come back later", {"Retry-After": asked}), retries=3)
+@pytest.mark.parametrize("retry_after", ["100000", "9" * 400])
+def test_a_wait_without_end_is_not_kept(retry_after: str) -> None:
+    message = _refused(_sends(429, b"come back later", {"Retry-After": retry_after}), retries=3)
     assert "answers 429 Too Many Requests: 'come back later', and asks to wait " in message
     assert "run the same command again then" in message
 
@@ -472,7 +472,7 @@ def test_a_server_that_says_the_key_again_does_not_have_it_told(
         return send(handler, status, f"wrong key: {'x' * 170} {heard[0]}".encode())
 
     if status == 200:
-        with opened(answer) as model:
+        with open_model(answer) as model:
             message = _ask(model).text
         assert message == "The key is Bearer [key]."
     else:
@@ -483,5 +483,5 @@ def test_a_server_that_says_the_key_again_does_not_have_it_told(
 
 def test_a_short_key_keeps_no_secret(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "mug")
-    with opened(says("a mug")) as model:
+    with open_model(always_say("a mug")) as model:
         assert _ask(model).text == "a mug"

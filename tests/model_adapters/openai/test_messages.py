@@ -88,12 +88,8 @@ def test_no_more_is_kept_than_there_is_room_for(frames: list[FrameRef], monkeypa
     monkeypatch.setattr(FrameRef, "load", lambda frame: loaded.append(frame) or load(frame))
     for frame in (frames[0], frames[1], frames[0], frames[2], frames[0], frames[1]):
         encoded.url(frame)
-    assert loaded == [
-        frames[0],
-        frames[1],
-        frames[2],
-        frames[1],
-    ]  # what was used longest ago made place
+    # What was used longest ago made place.
+    assert loaded == [frames[0], frames[1], frames[2], frames[1]]
 
 
 def test_a_frame_that_cannot_be_read_is_a_fault_of_the_data(tmp_path: Path) -> None:

@@ -15,7 +15,15 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters import Decoding, check_adapter, load
 
 from ..asking import up_to
-from .talking import chatting, completion, images_in, kept, opened, says, talkative
+from .talking import (
+    always_say,
+    completion,
+    images_in,
+    keep_requests,
+    open_model,
+    serve_chat,
+    talkative,
+)
 
 served = pytest.importorskip(
     "model_adapters.openai.model", reason="the client library is not installed"
@@ -31,7 +39,7 @@ def _ask(model: Any, *parts: Any, decoding: Decoding | None = None) -> Any:
 
 
 def test_it_keeps_the_contract() -> None:
-    with opened() as model:
+    with open_model() as model:
         check_adapter(model)
 
 
@@ -41,13 +49,13 @@ def test_it_keeps_the_contract_of_choices_where_the_server_holds_replies_to_them
             return completion(request["structured_outputs"]["choice"][0])
         return talkative(request, handler)
 
-    with opened(answer, guided="vllm") as model:
+    with open_model(answer, guided="vllm") as model:
         check_adapter(model)
 
 
 def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]) -> None:
-    asked: list[dict[str, Any]] = []
-    with opened(kept(asked)) as model:
+    requests: list[dict[str, Any]] = []
+    with open_model(keep_requests(requests)) as model:
         talk = model.conversation()
         talk.append("Be brief.", role="system")
         talk.append("Look:", frames[0], frames[1], "What is it?")
@@ -55,7 +63,7 @@ def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]
         talk.append("A mug.", role="assistant")
         talk.append("Where?")
         talk.reply(up_to(7, temperature=0.5, top_p=0.9, seed=2**63 + 5, stop=tuple("abcdef")))
-    first, second = asked
+    first, second = requests
     assert {name for name in first if name != "headers"} == {
         "model",
         "messages",
@@ -70,38 +78,36 @@ def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]
         "image_url",
         "text",
     ]
-    for shown, frame in zip(images_in(first), frames, strict=False):
-        assert (np.asarray(shown) == np.asarray(frame.load())).all()
+    for image, frame in zip(images_in(first), frames, strict=False):
+        assert (np.asarray(image) == np.asarray(frame.load())).all()
     assert second["messages"][:2] == first["messages"]
     assert second["messages"][2:] == [
         {"role": "assistant", "content": "A mug."},
         {"role": "user", "content": "Where?"},
     ]
     assert (second["temperature"], second["top_p"], second["seed"]) == (0.5, 0.9, 5)
-    assert second["stop"] == [
-        "a",
-        "b",
-        "c",
-        "d",
-    ]  # more are not taken; the reply is cut here in any case
+    # More are not taken; the reply is cut here in any case.
+    assert second["stop"] == ["a", "b", "c", "d"]
     assert "authorization" not in first["headers"]
 
 
 def test_what_a_server_does_not_take_is_not_sent() -> None:
-    asked: list[dict[str, Any]] = []
+    requests: list[dict[str, Any]] = []
     without = {
         "send_seed": False,
         "send_stop": False,
         "send_temperature": False,
         "send_repetition_penalty": False,
     }
-    with opened(
-        kept(asked, says("x")), max_tokens_field="max_completion_tokens", **without
+    with open_model(
+        keep_requests(requests, always_say("x")),
+        max_tokens_field="max_completion_tokens",
+        **without,
     ) as model:
         _ask(
             model, "What?", decoding=up_to(5, temperature=0.5, stop=("b",), repetition_penalty=1.0)
         )
-    assert {name for name in asked[0] if name != "headers"} == {
+    assert {name for name in requests[0] if name != "headers"} == {
         "model",
         "messages",
         "max_completion_tokens",
@@ -109,34 +115,36 @@ def test_what_a_server_does_not_take_is_not_sent() -> None:
 
 
 def test_a_penalty_is_sent_where_one_is_asked_for() -> None:
-    asked: list[dict[str, Any]] = []
-    with opened(kept(asked, says("x"))) as model:
+    requests: list[dict[str, Any]] = []
+    with open_model(keep_requests(requests, always_say("x"))) as model:
         _ask(model, "What?", decoding=up_to(5, repetition_penalty=1.0))
         _ask(model, "What?", decoding=up_to(5))
-    assert [request.get("repetition_penalty") for request in asked] == [1.0, None]
+    assert [request.get("repetition_penalty") for request in requests] == [1.0, None]
 
 
 @pytest.mark.parametrize(("sent", "expected"), [(True, [False, None]), (False, [None, None])])
 def test_special_tokens_are_asked_for_where_one_may_stop_a_reply(
     sent: bool, expected: list[bool | None]
 ) -> None:
-    asked: list[dict[str, Any]] = []
-    with opened(kept(asked, says("x")), send_skip_special_tokens=sent) as model:
+    requests: list[dict[str, Any]] = []
+    with open_model(
+        keep_requests(requests, always_say("x")), send_skip_special_tokens=sent
+    ) as model:
         for stop in (("<|act|>",), ()):
             _ask(model, "What?", decoding=up_to(5, stop=stop))
         assert model.identity().get("send_skip_special_tokens") == (None if sent else False)
-    assert [request.get("skip_special_tokens") for request in asked] == expected
+    assert [request.get("skip_special_tokens") for request in requests] == expected
 
 
 def test_the_key_goes_into_the_head_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OTHER_KEY", f" {KEY}\n")
-    asked: list[dict[str, Any]] = []
-    with opened(kept(asked), api_key_env="OTHER_KEY") as model:
+    requests: list[dict[str, Any]] = []
+    with open_model(keep_requests(requests), api_key_env="OTHER_KEY") as model:
         _ask(model, "What?")
-        shown = [repr(model), str(vars(model)), str(model.identity()), repr(model._secret)]
-    assert asked[0]["headers"].pop("authorization") == f"Bearer {KEY}"
-    assert KEY not in repr(asked)
-    assert KEY not in "".join(shown)
+        descriptions = [repr(model), str(vars(model)), str(model.identity()), repr(model._secret)]
+    assert requests[0]["headers"].pop("authorization") == f"Bearer {KEY}"
+    assert KEY not in repr(requests)
+    assert KEY not in "".join(descriptions)
 
 
 @pytest.mark.parametrize("value", ["", "  ", "two words", "schlüssel-schlüssel"])
@@ -150,20 +158,20 @@ def test_a_missing_or_broken_key_is_one_line(value: str, monkeypatch: pytest.Mon
 
 
 def test_stop_strings_cut_whatever_the_server_does() -> None:
-    with opened(says("MoveAhead<|act|>and more\nyes")) as model:
+    with open_model(always_say("MoveAhead<|act|>and more\nyes")) as model:
         assert _ask(model, "What?", decoding=up_to(9, stop=("\n", "<|act|>"))).text == "MoveAhead"
 
 
 def test_tokens_and_cost_are_told_with_the_reply() -> None:
     prices = {"price_per_m_input": 2, "price_per_m_cached": 0.5, "price_per_m_output": 8}
-    with opened(lambda *_: completion("yes", (1000, 10, 400)), **prices) as model:
+    with open_model(lambda *_: completion("yes", (1000, 10, 400)), **prices) as model:
         reply = _ask(model, "What?")
     assert (reply.n_context_tokens, reply.n_cached_tokens, reply.n_reply_tokens) == (1000, 400, 10)
     assert reply.cost == pytest.approx((600 * 2 + 400 * 0.5 + 10 * 8) / 1e6)
-    with opened(lambda *_: completion("yes", (1000, 10))) as model:
+    with open_model(lambda *_: completion("yes", (1000, 10))) as model:
         reply = _ask(model, "What?")
     assert (reply.n_context_tokens, reply.n_cached_tokens, reply.cost) == (1000, None, None)
-    with opened(
+    with open_model(
         lambda *_: completion("yes", None), price_per_m_input=1, price_per_m_output=1
     ) as model:
         reply = _ask(model, "What?")
@@ -171,7 +179,7 @@ def test_tokens_and_cost_are_told_with_the_reply() -> None:
 
 
 def test_a_reply_that_cannot_be_used_is_paid_for_all_the_same() -> None:
-    with opened(lambda *_: completion(None, (100, 10)), max_tokens_total=200) as model:
+    with open_model(lambda *_: completion(None, (100, 10)), max_tokens_total=200) as model:
         for _ in range(2):
             with pytest.raises(ModelError, match="gives no text"):
                 _ask(model, "What?")
@@ -181,7 +189,7 @@ def test_a_reply_that_cannot_be_used_is_paid_for_all_the_same() -> None:
 
 def test_a_server_that_does_not_hold_to_choices_is_found_out() -> None:
     with (
-        opened(says("perhaps"), guided="vllm") as model,
+        open_model(always_say("perhaps"), guided="vllm") as model,
         pytest.raises(ModelError, match="leave out guided"),
     ):
         _ask(model, "What?", decoding=up_to(5, choices=("yes", "no")))
@@ -201,7 +209,7 @@ def test_there_is_a_request_in_flight_per_thread_and_conversations_are_independe
             together -= 1
         return completion(request["messages"][0]["content"])
 
-    with opened(answer, max_in_flight=4) as model, ThreadPoolExecutor(4) as pool:
+    with open_model(answer, max_in_flight=4) as model, ThreadPoolExecutor(4) as pool:
         replies = list(pool.map(lambda number: _ask(model, f"say {number}").text, range(8)))
     assert replies == [f"say {number}" for number in range(8)]
     assert most == 4
@@ -215,17 +223,17 @@ def waits(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
 
 
 def test_what_is_in_flight_ends_when_the_model_is_closed() -> None:
-    asked, done = threading.Event(), threading.Event()
+    request_came, done = threading.Event(), threading.Event()
 
     def answer(_request: Any, _handler: Any) -> None:
-        asked.set()
+        request_came.set()
         done.wait(20)
 
     try:
         with ThreadPoolExecutor(1) as pool:
-            with opened(answer) as model:
+            with open_model(answer) as model:
                 waiting = pool.submit(_ask, model, "What?")
-                assert asked.wait(10)
+                assert request_came.wait(10)
             with pytest.raises(ModelError, match="is no longer waited for: the model is closed"):
                 waiting.result(10)
             with pytest.raises(ModelError, match="gets no more requests: the model is closed"):
@@ -242,7 +250,7 @@ def test_a_server_on_this_machine_is_asked_without_the_environments_proxy(
         monkeypatch.setenv(name, "http://127.0.0.1:1")
     for name in ("NO_PROXY", "no_proxy"):
         monkeypatch.delenv(name, raising=False)
-    with opened(says("a mug")) as model:
+    with open_model(always_say("a mug")) as model:
         assert _ask(model, "What?").text == "a mug"
 
 
@@ -250,12 +258,12 @@ def test_what_is_no_encryption_is_found_out() -> None:
     refused = pytest.raises(
         ModelError, match=r"^https://127.0.0.1:\d+/v1 cannot be reached \(.*SSL"
     )
-    with chatting() as url, opened(base_url=url.replace("http:", "https:")) as model, refused:
+    with serve_chat() as url, open_model(base_url=url.replace("http:", "https:")) as model, refused:
         _ask(model, "What?")
 
 
 def test_tokens_a_minute_are_kept_by_the_size_of_the_last_request(waits: list[float]) -> None:
-    with opened(
+    with open_model(
         lambda *_: completion("yes", (90, 10)), tokens_per_minute=1000, requests_per_minute=10
     ) as model:
         for _ in range(2):
@@ -264,8 +272,8 @@ def test_tokens_a_minute_are_kept_by_the_size_of_the_last_request(waits: list[fl
 
 
 def test_the_identity_is_whom_is_asked_and_how() -> None:
-    with opened(
-        says("x"),
+    with open_model(
+        always_say("x"),
         base_url="https://host:1/v1/",
         max_cost=1,
         price_per_m_input=1,
@@ -315,17 +323,17 @@ def test_thoughts_that_the_server_tells_apart_are_kept_apart(
 ) -> None:
     monkeypatch.setenv("MY_KEY", KEY)
     answer = completion("a cup", message={field: f"A mug? {KEY}"})
-    with opened(lambda *_: answer, api_key_env="MY_KEY") as model:
+    with open_model(lambda *_: answer, api_key_env="MY_KEY") as model:
         reply = _ask(model, "What?")
     assert (
         reply.text == "a cup" and reply.thinking.startswith("A mug?") and KEY not in reply.thinking
     )
-    with opened(
+    with open_model(
         lambda *_: completion(None, message={field: "A mug?"}, finish_reason="length")
     ) as model:
         assert _ask(model, "What?").text == ""
     with (
-        opened(
+        open_model(
             lambda *_: completion(None, message={field: "A mug?"}, finish_reason="stop")
         ) as model,
         pytest.raises(ModelError, match="gives no text"),

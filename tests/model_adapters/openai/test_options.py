@@ -10,7 +10,7 @@ ASKED = {"model": "m"}
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("settings", "message"),
     [
         ({"model": ""}, "it needs model="),
         ({"base_url": "localhost:8000"}, "base_url is not the address of a server"),
@@ -46,10 +46,10 @@ ASKED = {"model": "m"}
     ],
 )
 def test_misuse_is_refused_in_one_line_that_tells_no_secret(
-    given: dict[str, str], message: str
+    settings: dict[str, str], message: str
 ) -> None:
     with pytest.raises(UsageError) as caught:
-        check_options("openai", ASKED | given)
+        check_options("openai", ASKED | settings)
     assert message in str(caught.value)
     assert SECRET not in str(caught.value)
     assert "\n" not in str(caught.value)

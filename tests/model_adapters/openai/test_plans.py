@@ -10,10 +10,11 @@ import pytest
 
 from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import UnitRecord, read_run
-from tests.plans.cut import CANDLE, FORK, MUG, cut, write
+from tests.helpers.command_line import option_words
+from tests.helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 
 from ..policies.servers import send
-from .talking import chatting, completion
+from .talking import completion, serve_chat
 
 MOVES = ("RotateLeft", "RotateRight", "LookUp", "LookDown", "MoveAhead")
 
@@ -25,7 +26,7 @@ def _moves(request: dict[str, Any], _handler: Any = None) -> dict[str, Any]:
 
 
 @pytest.fixture
-def played(task_files: Path, tmp_path: Path, run: Any) -> Any:
+def played(task_files: Path, tmp_path: Path, run_cli: Any) -> Any:
     """Plays plans of at most four actions; gives exit code, records and results."""
     task = task_files / "plans" / "infthor_plans.yaml"
     task.write_text(
@@ -35,19 +36,10 @@ def played(task_files: Path, tmp_path: Path, run: Any) -> Any:
     def played(
         url: str, data: Path, name: str = "m", **more: object
     ) -> tuple[int, list[UnitRecord[Any]], Any]:
-        given = {"base_url": url, "model": "m", "retries": 0, **more}
-        typed = ",".join(f"{option}={value}" for option, value in given.items())
-        arguments = [
-            "--model",
-            "openai",
-            "--model-args",
-            typed,
-            "--tasks",
-            "infthor_plans",
-            "--data",
-            data,
-        ]
-        code, _, err = run(*arguments, "--greedy", "--name", name, "--output", tmp_path / "out")
+        settings = {"base_url": url, "model": "m", "retries": 0, **more}
+        typed = ",".join(f"{option}={value}" for option, value in settings.items())
+        arguments = option_words(model="openai", model_args=typed, tasks="infthor_plans", data=data)
+        code, _, err = run_cli(*arguments, "--greedy", "--name", name, "--output", tmp_path / "out")
         assert "Traceback" not in err
         (results,) = (tmp_path / "out" / name).rglob("results.json")
         return code, read_run(results.parent, RECORDS)[1], json.loads(results.read_text())
@@ -56,8 +48,13 @@ def played(task_files: Path, tmp_path: Path, run: Any) -> Any:
 
 
 def test_episodes_at_once_find_what_one_after_the_other_finds(played: Any, tmp_path: Path) -> None:
-    data = write(tmp_path / "data", cut(FORK, 1), cut(MUG, 1), cut(CANDLE, 1))
-    with chatting(_moves) as url:
+    data = write_trajectories(
+        tmp_path / "data",
+        cut_trajectory(FORK, 1),
+        cut_trajectory(MUG, 1),
+        cut_trajectory(CANDLE, 1),
+    )
+    with serve_chat(_moves) as url:
         runs = [played(url, data, f"with-{number}", max_in_flight=number) for number in (3, 1)]
     together, alone = (
         [msgspec.structs.replace(record, seconds=0.0) for record in records]
@@ -87,8 +84,8 @@ def test_a_plan_that_fails_in_the_middle_says_what_it_took_and_the_next_one_is_p
         n_asked += 1
         return send(handler, 400, b"no") if n_asked == 3 else completion("RotateLeft", (100, 3))
 
-    data = write(tmp_path / "data", cut(FORK, 2))
-    with chatting(answer) as url:
+    data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 2))
+    with serve_chat(answer) as url:
         code, (first, second), results = played(url, data)
     assert code == 1
     assert "answers 400 Bad Request: 'no'" in first.failure
@@ -104,8 +101,8 @@ def test_a_survived_fault_stands_in_the_plans_record(played: Any, tmp_path: Path
         n_asked += 1
         return send(handler, 503, b"busy") if n_asked == 2 else completion("RotateLeft")
 
-    data = write(tmp_path / "data", cut(FORK, 1))
-    with chatting(answer) as url:
+    data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 1))
+    with serve_chat(answer) as url:
         code, (record,), _ = played(url, data, retries=1)
     assert code == 0
     (fault,) = record.faults
@@ -115,8 +112,8 @@ def test_a_survived_fault_stands_in_the_plans_record(played: Any, tmp_path: Path
 def test_plans_beyond_the_cap_are_not_asked_and_are_played_by_the_next_run(
     played: Any, tmp_path: Path
 ) -> None:
-    data = write(tmp_path / "data", cut(FORK, 2))
-    with chatting(lambda *_: completion("RotateLeft", (95, 5))) as url:
+    data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 2))
+    with serve_chat(lambda *_: completion("RotateLeft", (95, 5))) as url:
         code, (first, second), _ = played(url, data, max_tokens_total=400)
         assert (code, first.failure, first.usage.requests) == (1, None, 4)
         assert second.failure.startswith(

@@ -15,31 +15,23 @@ import pytest
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 
+from ...helpers.command_line import option_words
 from ..policies.servers import send
-from .talking import chatting, completion, kept, says, talkative
+from .talking import always_say, completion, keep_requests, serve_chat, talkative
 
 KEY = "sk-0123456789abcdef0123456789"
 
 
 @pytest.fixture
-def ask(make_nieh_set: Any, tmp_path: Path, run: Any) -> Any:
+def ask(make_nieh_set: Any, tmp_path: Path, run_cli: Any) -> Any:
     """Runs `nieh_gt` on five questions."""
     data = make_nieh_set(size=56)
 
     def ask(url: str, *options: object, **model_args: object) -> tuple[int, str, str]:
-        given = {"base_url": url, "model": "m", "retries": 0, **model_args}
-        typed = ",".join(f"{name}={value}" for name, value in given.items())
-        arguments = [
-            "--model",
-            "openai",
-            "--model-args",
-            typed,
-            "--tasks",
-            "nieh_gt",
-            "--data",
-            data,
-        ]
-        return run(*arguments, "--output", tmp_path / "out", *options)
+        settings = {"base_url": url, "model": "m", "retries": 0, **model_args}
+        typed = ",".join(f"{name}={value}" for name, value in settings.items())
+        arguments = option_words(model="openai", model_args=typed, tasks="nieh_gt", data=data)
+        return run_cli(*arguments, "--output", tmp_path / "out", *options)
 
     return ask
 
@@ -54,7 +46,7 @@ def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(
     ask: Any, tmp_path: Path
 ) -> None:
     prices = {"price_per_m_input": 2, "price_per_m_cached": 1, "price_per_m_output": 10}
-    with chatting(lambda *_: completion("yes", (1000, 10, 200))) as url:
+    with serve_chat(lambda *_: completion("yes", (1000, 10, 200))) as url:
         code, out, err = ask(url, **prices)
     assert code == 0, err
     records, results = _run(tmp_path / "out")
@@ -75,35 +67,35 @@ def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(
 
 
 def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask: Any, tmp_path: Path) -> None:
-    asked: list[Any] = []
-    with chatting(kept(asked, lambda *_: completion("yes", (95, 5)))) as url:
+    requests: list[Any] = []
+    with serve_chat(keep_requests(requests, lambda *_: completion("yes", (95, 5)))) as url:
         code, _, err = ask(url, "--max-tokens-total", 250)
         assert code == 1
         assert (
             "2 sample(s) failed, counted as wrong: not asked: 300 tokens reach "
             "max_tokens_total=250; raise" in err
         )
-        assert len(asked) == 3
+        assert len(requests) == 3
         code, _, err = ask(url, "--max-tokens-total", 10_000, max_in_flight=1, timeout_s=90)
         assert code == 0, err
         assert "2 evaluated now, 3 resumed from the journal" in err
-        assert len(asked) == 5
+        assert len(requests) == 5
     records, results = _run(tmp_path / "out")
     assert [record.failure for record in records] == [None] * 5
     assert results["usage"] == {"requests": 5, "context": 475, "reply": 25, "cost": None}
 
 
 def test_money_is_capped_likewise(ask: Any) -> None:
-    asked: list[Any] = []
-    with chatting(kept(asked, lambda *_: completion("yes", (1000, 0)))) as url:
+    requests: list[Any] = []
+    with serve_chat(keep_requests(requests, lambda *_: completion("yes", (1000, 0)))) as url:
         code, _, err = ask(url, "--max-cost", 0.0015, price_per_m_input=1, price_per_m_output=1)
     assert code == 1
-    assert len(asked) == 2
+    assert len(requests) == 2
     assert "not asked: 0.0020 US dollars reach max_cost=0.0015" in err
 
 
 @pytest.mark.parametrize(
-    ("options", "given", "message"),
+    ("options", "model_args", "message"),
     [
         (
             ("--max-cost", 1),
@@ -122,9 +114,13 @@ def test_money_is_capped_likewise(ask: Any) -> None:
     ],
 )
 def test_misuse_is_one_line_before_anything_is_read(
-    options: tuple[object, ...], given: dict[str, object], message: str, ask: Any, tmp_path: Path
+    options: tuple[object, ...],
+    model_args: dict[str, object],
+    message: str,
+    ask: Any,
+    tmp_path: Path,
 ) -> None:
-    code, out, err = ask("http://127.0.0.1:1/v1", *options, **given)
+    code, out, err = ask("http://127.0.0.1:1/v1", *options, **model_args)
     assert (code, out, len(err.splitlines())) == (2, "", 1)
     assert message in err
     assert KEY not in err
@@ -132,21 +128,12 @@ def test_misuse_is_one_line_before_anything_is_read(
 
 
 def test_a_cap_is_not_for_models_that_cost_nothing(
-    run: Any, make_nieh_set: Any, tmp_path: Path
+    run_cli: Any, make_nieh_set: Any, tmp_path: Path
 ) -> None:
     data = make_nieh_set(size=56)
-    arguments = [
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-        "--max-cost",
-        1,
-    ]
+    arguments = option_words(tasks="nieh_gt", data=data, output=tmp_path / "out", max_cost=1)
     for model in ("qwen2.5-vl-tiny", "oracle"):
-        code, _, err = run("--model", model, *arguments)
+        code, _, err = run_cli("--model", model, *arguments)
         assert code == 2
         assert f"{model} has no option max_cost" in err
 
@@ -156,7 +143,7 @@ def test_units_that_fail_are_named_and_the_others_answered(ask: Any, tmp_path: P
         text = request["messages"][0]["content"][-1]["text"]
         return send(handler, 400, b"no fridge") if "fridge" in text else completion("yes")
 
-    with chatting(answer) as url:
+    with serve_chat(answer) as url:
         code, _, err = ask(url)
     assert code == 1
     assert "Traceback" not in err
@@ -175,7 +162,7 @@ def test_a_survived_fault_stands_in_the_record(ask: Any, tmp_path: Path) -> None
         n_asked += 1
         return send(handler, 503, b"busy") if n_asked == 1 else completion("yes")
 
-    with chatting(answer) as url:
+    with serve_chat(answer) as url:
         assert ask(url, retries=1, max_in_flight=1)[0] == 0
     faults = [fault for record in _run(tmp_path / "out")[0] for fault in record.faults]
     assert len(faults) == 1
@@ -209,7 +196,7 @@ def test_the_key_is_in_no_file_and_in_nothing_that_is_said(
 ) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
     heard: list[Any] = []
-    with caplog.at_level(logging.DEBUG), chatting(kept(heard, _echoes)) as url:
+    with caplog.at_level(logging.DEBUG), serve_chat(keep_requests(heard, _echoes)) as url:
         code, out, err = ask(url, retries=1)
     assert code == 1
     assert {request["headers"]["authorization"] for request in heard} == {f"Bearer {KEY}"}
@@ -227,25 +214,18 @@ def test_the_key_is_in_no_file_and_in_nothing_that_is_said(
 def test_a_run_interrupted_twice_ends_at_once_in_one_line(
     make_nieh_set: Any, tmp_path: Path, in_flight: int
 ) -> None:
-    asked, done = threading.Event(), threading.Event()
+    request_came, done = threading.Event(), threading.Event()
 
     def answer(_request: Any, _handler: Any) -> None:
-        asked.set()
+        request_came.set()
         done.wait(600)
 
     data = make_nieh_set(size=56)
-    with chatting(answer) as url:
-        given = f"base_url={url},model=m,max_in_flight={in_flight}"
-        arguments = [
-            "--model",
-            "openai",
-            "--model-args",
-            given,
-            "--tasks",
-            "nieh_full",
-            "--data",
-            data,
-        ]
+    with serve_chat(answer) as url:
+        model_args = f"base_url={url},model=m,max_in_flight={in_flight}"
+        arguments = option_words(
+            model="openai", model_args=model_args, tasks="nieh_full", data=data
+        )
         command = [
             sys.executable,
             "-c",
@@ -259,7 +239,7 @@ def test_a_run_interrupted_twice_ends_at_once_in_one_line(
             text=True,
         )
         try:
-            assert asked.wait(600)
+            assert request_came.wait(600)
             stopped.send_signal(signal.SIGINT)  # to end after the unit in hand, for which it waits
             time.sleep(0.5)
             stopped.send_signal(signal.SIGINT)
@@ -274,21 +254,14 @@ def test_a_run_interrupted_twice_ends_at_once_in_one_line(
     assert "pending" not in err
 
 
-def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run: Any) -> None:
+def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run_cli: Any) -> None:
     data = make_nieh_set(size=56)
-    with chatting(lambda *_: completion("a note", (100, 10))) as url:
-        given = f"base_url={url},model=m,price_per_m_input=1,price_per_m_output=10"
-        arguments = [
-            "--model",
-            "openai",
-            "--model-args",
-            given,
-            "--tasks",
-            "nieh_memory_notes",
-            "--data",
-            data,
-        ]
-        code, out, err = run(*arguments, "--output", tmp_path / "out")
+    with serve_chat(lambda *_: completion("a note", (100, 10))) as url:
+        model_args = f"base_url={url},model=m,price_per_m_input=1,price_per_m_output=10"
+        arguments = option_words(
+            model="openai", model_args=model_args, tasks="nieh_memory_notes", data=data
+        )
+        code, out, err = run_cli(*arguments, "--output", tmp_path / "out")
     assert code == 0, err
     _, results = _run(tmp_path / "out")
     assert results["usage"] == {
@@ -301,25 +274,18 @@ def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run: Any) ->
 
 
 def test_in_process_models_and_baselines_tell_what_they_read(
-    make_nieh_set: Any, tmp_path: Path, run: Any
+    make_nieh_set: Any, tmp_path: Path, run_cli: Any
 ) -> None:
-    arguments = [
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "out",
-    ]
-    assert "requests" not in run("--model", "oracle", *arguments)[1]
+    arguments = option_words(tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "out")
+    assert "requests" not in run_cli("--model", "oracle", *arguments)[1]
     assert "qwen2.5-vl-tiny: 5 requests, " in (
-        out := run("--model", "qwen2.5-vl-tiny", *arguments)[1]
+        out := run_cli("--model", "qwen2.5-vl-tiny", *arguments)[1]
     )
     assert "US dollars" not in out
 
 
 def test_several_trajectories_are_asked_about_at_once(
-    make_nieh_set: Any, tmp_path: Path, run: Any
+    make_nieh_set: Any, tmp_path: Path, run_cli: Any
 ) -> None:
     both = threading.Barrier(2, timeout=600)
     seen: set[int] = set()
@@ -331,24 +297,17 @@ def test_several_trajectories_are_asked_about_at_once(
         return talkative(request, handler)
 
     data = make_nieh_set(size=56)
-    with chatting(answer) as url:
-        given = f"base_url={url},model=m"
-        arguments = [
-            "--model",
-            "openai",
-            "--model-args",
-            given,
-            "--tasks",
-            "nieh_full",
-            "--data",
-            data,
-        ]
-        code, _, err = run(*arguments, "--output", tmp_path / "out")
+    with serve_chat(answer) as url:
+        model_args = f"base_url={url},model=m"
+        arguments = option_words(
+            model="openai", model_args=model_args, tasks="nieh_full", data=data
+        )
+        code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
     assert code == 0, err
 
 
 def test_a_server_that_says_nonsense_fails_every_unit_and_nothing_else(ask: Any) -> None:
-    with chatting(says("\x1b[2J\x00 not a word")) as url:
+    with serve_chat(always_say("\x1b[2J\x00 not a word")) as url:
         code, out, err = ask(url)
     assert code == 0
     assert "\x1b[2J" not in out + err

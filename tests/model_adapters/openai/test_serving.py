@@ -18,12 +18,14 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.runs import UnitRecord
 from model_adapters import check_adapter, load
-from tests.bundled import BUNDLED
-from tests.plans.cut import CANDLE, FORK, cut, write
+from tests.helpers.bundled import BUNDLED
+from tests.helpers.command_line import option_words
+from tests.helpers.journals import read_records
+from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
 
 from ..asking import up_to
 from ..checkpoints import save
-from ..serving import free_port, records_in, wait_for_server
+from ..serving import free_port, wait_for_server
 
 for package in ("openai", "fastapi", "uvicorn", "multipart"):
     pytest.importorskip(
@@ -51,9 +53,8 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     root = tmp_path_factory.mktemp("served")
     folder = root / "idefics3"
     save("idefics3", folder)
-    settings = (
-        folder / "generation_config.json"
-    )  # without do_sample this server draws at no temperature
+    # Without do_sample this server draws at no temperature.
+    settings = folder / "generation_config.json"
     settings.write_text(json.dumps(json.loads(settings.read_text()) | {"do_sample": True}))
     port = free_port()
     command = [sys.executable, "-c", SERVE, "serve", "--host", "127.0.0.1", "--port", str(port)]
@@ -78,7 +79,9 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 
 @pytest.fixture
-def both(served: Served, tmp_path: Path, run: Any) -> Callable[..., list[list[UnitRecord[Any]]]]:
+def both(
+    served: Served, tmp_path: Path, run_cli: Any
+) -> Callable[..., list[list[UnitRecord[Any]]]]:
     """Runs the same tasks behind the server and in this process; gives the records of both."""
 
     def both(*arguments: object, **more: str) -> list[list[UnitRecord[Any]]]:
@@ -89,21 +92,14 @@ def both(served: Served, tmp_path: Path, run: Any) -> Callable[..., list[list[Un
             "max_tokens": 100_000,
         }
         records = []
-        for model, given in (("openai", served.options | more), ("hf-vlm", here)):
-            options = ",".join(f"{name}={value}" for name, value in given.items())
-            typed = [
-                "--model",
-                model,
-                "--model-args",
-                options,
-                "--name",
-                model,
-                "--output",
-                tmp_path / "out",
-            ]
-            code, _, err = run(*typed, *arguments)
+        for model, settings in (("openai", served.options | more), ("hf-vlm", here)):
+            options = ",".join(f"{name}={value}" for name, value in settings.items())
+            typed = option_words(
+                model=model, model_args=options, name=model, output=tmp_path / "out"
+            )
+            code, _, err = run_cli(*typed, *arguments)
             assert code == 0, err
-            records.append(records_in(tmp_path / "out" / model))
+            records.append(read_records(tmp_path / "out" / model))
         return records
 
     return both
@@ -131,7 +127,7 @@ def test_questions_are_answered_as_in_this_process(
 def test_plans_are_carried_out_as_in_this_process(
     both: Callable[..., list[list[UnitRecord[Any]]]], tmp_path: Path
 ) -> None:
-    data = write(tmp_path / "data", cut(FORK, 2), cut(CANDLE, 2))
+    data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 2), cut_trajectory(CANDLE, 2))
     behind, here = both(
         "--tasks", "infthor_plans", "--data", data, "--greedy", **WITHOUT_STOP, **WITHOUT_PENALTY
     )

@@ -92,9 +92,9 @@ def test_threads_pass_a_cap_by_one_request_at_most() -> None:
         return True
 
     with ThreadPoolExecutor(8) as pool:
-        asked = list(pool.map(ask, range(40)))
+        allowed = list(pool.map(ask, range(40)))
     assert sum(taken) == 105
-    assert asked.count(True) == 7
+    assert allowed.count(True) == 7
 
 
 @pytest.fixture

@@ -16,16 +16,12 @@ from model_adapters.policies.policy import VlaPolicy
 from model_adapters.tiny.openvla import OpenVLATiny
 from model_adapters.tiny.spatialvla import SpatialVLATiny
 
+from .servers import no_proxy  # noqa: F401 - a fixture
+
 TWINS = {"openvla": OpenVLATiny.twin, "spatialvla": SpatialVLATiny.twin}
 FAMILIES = tuple(TWINS)
 
 Edit = Callable[[Path], object]
-
-
-@pytest.fixture(autouse=True)
-def no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No proxy on the way to the servers that tests start."""
-    monkeypatch.setenv("no_proxy", "127.0.0.1")
 
 
 @pytest.fixture(scope="session")

@@ -11,20 +11,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Policy
 
-__all__ = ["Answer", "asked_image", "policy_answers", "send", "serving"]
+__all__ = ["Answer", "no_proxy", "policy_answers", "read_image", "send", "serve"]
 
 # Gets the request and its handler; gives what is sent as JSON, or None where it has answered by
 # itself.
 Answer = Callable[[dict[str, Any], BaseHTTPRequestHandler], Any]
 
 
+@pytest.fixture(autouse=True)
+def no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No proxy on the way to the servers that tests start."""
+    monkeypatch.setenv("no_proxy", "127.0.0.1")
+
+
 @contextmanager
-def serving(answer: Answer, path: str = "/act") -> Iterator[str]:
+def serve(answer: Answer, path: str = "/act") -> Iterator[str]:
     """The address of a server that answers POSTs to a path, for as long as it is needed."""
 
     class Handler(BaseHTTPRequestHandler):
@@ -64,7 +71,7 @@ def send(
     handler.wfile.write(body)
 
 
-def asked_image(request: dict[str, Any]) -> np.ndarray:
+def read_image(request: dict[str, Any]) -> np.ndarray:
     """The frame in a request, as the package json_numpy or a plain list has it."""
     image = request["image"]
     if isinstance(image, list):
@@ -81,7 +88,7 @@ def policy_answers(policy: Policy, change: float = 0.0) -> Answer:
         policy.reset()
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "frame.png"
-            Image.fromarray(asked_image(request)).save(path)
+            Image.fromarray(read_image(request)).save(path)
             steps = policy.act(FrameRef(path), request["instruction"])
         actions = [
             [step.translation[0] + change, *step.translation[1:], *step.rotation, step.gripper]

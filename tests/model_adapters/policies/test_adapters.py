@@ -20,8 +20,8 @@ Altered = Callable[[str, Edit], Path]
 NAMES = ("openvla-tiny", "spatialvla-tiny")
 
 
-def _load(family: str, folder: Path, **given: str) -> Any:
-    return load(family, {"pretrained": str(folder), "device": "cpu", **given}, 0)
+def _load(family: str, folder: Path, **settings: str) -> Any:
+    return load(family, {"pretrained": str(folder), "device": "cpu", **settings}, 0)
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +78,8 @@ def test_chunks_of_spatialvla_are_four_steps_unless_they_are_averaged(
 ) -> None:
     folder = policy_checkpoints["spatialvla"]
     lengths = [
-        len(_load("spatialvla", folder, **given).act(plain_frames[0], "pick up the mug"))
-        for given in ({}, {"ensemble": "none"}, {"ensemble": "none", "execute": "3"})
+        len(_load("spatialvla", folder, **settings).act(plain_frames[0], "pick up the mug"))
+        for settings in ({}, {"ensemble": "none"}, {"ensemble": "none", "execute": "3"})
     ]
     assert lengths == [1, 4, 3]
 

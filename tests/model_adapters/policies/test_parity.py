@@ -20,7 +20,7 @@ from model_adapters.policies.parity import (
 )
 from model_adapters.policies.policy import VlaPolicy
 
-from .servers import policy_answers, serving
+from .servers import policy_answers, serve
 
 
 class Still:
@@ -46,11 +46,11 @@ OTHER = ArmDelta((0.0, 0.25, 0.0), (0.0, 0.0, -0.5), 0.0)
 def test_the_same_policy_behind_a_server_is_equal(
     family: str, policy_checkpoints: dict[str, Path], policies: dict[str, VlaPolicy]
 ) -> None:
-    given = {"pretrained": str(policy_checkpoints[family]), "device": "cpu"}
-    theirs = load_policy(family, given)
-    with synthetic_frames() as frames, serving(policy_answers(theirs)) as url:
+    settings = {"pretrained": str(policy_checkpoints[family]), "device": "cpu"}
+    theirs = load_policy(family, settings)
+    with synthetic_frames() as frames, serve(policy_answers(theirs)) as url:
         report = compare_policies(
-            load_policy(family, given), reference_policy(url, None), frames, INSTRUCTIONS, 1e-6
+            load_policy(family, settings), reference_policy(url, None), frames, INSTRUCTIONS, 1e-6
         )
         apart = compare_policies(
             policies["openvla"], reference_policy(url, None), frames[:1], INSTRUCTIONS[:1], 1e-6

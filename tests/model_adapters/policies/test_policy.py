@@ -20,10 +20,10 @@ class Scripted:
 
     def __init__(self, chunk: Any) -> None:
         self._chunk = chunk
-        self.asked: list[tuple[str, bool]] = []
+        self.instructions: list[tuple[str, bool]] = []
 
     def predict(self, image: Any, instruction: str, *, constrained: bool) -> Any:
-        self.asked.append((instruction, constrained))
+        self.instructions.append((instruction, constrained))
         if isinstance(self._chunk, Exception):
             raise self._chunk
         return np.array(self._chunk, dtype=np.float64)

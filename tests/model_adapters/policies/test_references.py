@@ -63,7 +63,7 @@ def test_features_are_theirs(family: str, policies: dict[str, VlaPolicy], frame:
 def test_actions_are_theirs(
     family: str, policy_checkpoints: dict[str, Path], frame: FrameRef
 ) -> None:
-    given = {"pretrained": str(policy_checkpoints[family]), "device": "cpu", "ensemble": "none"}
-    steps = load(family, given, 0).act(frame, "pick up the mug")  # type: ignore[union-attr]
+    settings = {"pretrained": str(policy_checkpoints[family]), "device": "cpu", "ensemble": "none"}
+    steps = load(family, settings, 0).act(frame, "pick up the mug")  # type: ignore[union-attr]
     values = [(*step.translation, *step.rotation, step.gripper) for step in steps]
     assert np.array(values) == pytest.approx(np.array(ACTIONS[family]), abs=2e-6)

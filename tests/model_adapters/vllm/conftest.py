@@ -16,9 +16,8 @@ from .double import Double
 def vllm(monkeypatch: pytest.MonkeyPatch) -> Double:
     """The double, found by whoever imports vLLM."""
     double = Double()
-    monkeypatch.setenv(
-        "VLLM_LOGGING_STREAM", "ext://sys.stderr"
-    )  # else the adapter sets it for all tests to come
+    # Else the adapter sets it for all tests to come.
+    monkeypatch.setenv("VLLM_LOGGING_STREAM", "ext://sys.stderr")
     for name, module in double.modules().items():
         monkeypatch.setitem(sys.modules, name, module)
     return double
@@ -29,8 +28,10 @@ def start(vllm: Double, checkpoints: dict[str, Path]) -> Callable[..., Any]:
     """Starts a model of a tiny checkpoint on the double."""
 
     def start(family: str = "qwen2.5-vl", name: str | None = None, **options: object) -> Any:
-        given = {"pretrained": checkpoints[family], "dtype": "float32", **options}
-        return load(f"{name or family}@vllm", {key: str(value) for key, value in given.items()}, 0)
+        settings = {"pretrained": checkpoints[family], "dtype": "float32", **options}
+        return load(
+            f"{name or family}@vllm", {key: str(value) for key, value in settings.items()}, 0
+        )
 
     return start
 
@@ -43,14 +44,14 @@ def in_process(checkpoints: dict[str, Path]) -> Iterator[Callable[..., Any]]:
     def get(family: str, name: str | None = None, **options: object) -> Any:
         key = (family, str(sorted(options.items())))
         if key not in loaded:
-            given = {
+            settings = {
                 "pretrained": checkpoints[family],
                 "dtype": "float32",
                 "device": "cpu",
                 **options,
             }
             loaded[key] = load(
-                name or family, {option: str(value) for option, value in given.items()}, 0
+                name or family, {option: str(value) for option, value in settings.items()}, 0
             )
         return loaded[key]
 

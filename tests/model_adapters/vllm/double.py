@@ -33,35 +33,37 @@ _BLOCK = 16
 _DTYPES = ("auto", "bfloat16", "float16", "float32", "half", "float")
 
 
-def _checked(of: str, given: Mapping[str, Any], *more: str) -> dict[str, Any]:
-    unknown = set(given) - set(SIGNATURES[of]).union(*(SIGNATURES[name] for name in more))
+def _checked(of: str, arguments: Mapping[str, Any], *more: str) -> dict[str, Any]:
+    unknown = set(arguments) - set(SIGNATURES[of]).union(*(SIGNATURES[name] for name in more))
     if unknown:
         raise TypeError(f"{of} got an unexpected keyword argument {sorted(unknown)}")
-    return dict(given)
+    return dict(arguments)
 
 
 class StructuredOutputsParams:
-    def __init__(self, **given: Any) -> None:
-        self.choice: list[str] = _checked("StructuredOutputsParams", given)["choice"]
+    def __init__(self, **arguments: Any) -> None:
+        self.choice: list[str] = _checked("StructuredOutputsParams", arguments)["choice"]
 
 
 class SamplingParams:
     """The settings with vLLM's defaults, as far as they are used."""
 
-    def __init__(self, **given: Any) -> None:
-        _checked("SamplingParams", given)
-        if not 0 <= given.get("temperature", 1.0) <= 2:
+    def __init__(self, **arguments: Any) -> None:
+        _checked("SamplingParams", arguments)
+        if not 0 <= arguments.get("temperature", 1.0) <= 2:
             raise ValueError("temperature must be in [0, 2]")
-        self.max_tokens: int = given.get("max_tokens", 16)
-        self.temperature: float = given.get("temperature", 1.0)
-        self.top_p: float = given.get("top_p", 1.0)
-        self.seed: int | None = given.get("seed")
-        self.stop: list[str] = given.get("stop", [])
-        self.stop_token_ids: list[int] = given.get("stop_token_ids", [])
-        self.repetition_penalty: float = given.get("repetition_penalty", 1.0)
-        self.ignore_eos: bool = given.get("ignore_eos", False)
-        self.allowed_token_ids: list[int] | None = given.get("allowed_token_ids")
-        self.structured_outputs: StructuredOutputsParams | None = given.get("structured_outputs")
+        self.max_tokens: int = arguments.get("max_tokens", 16)
+        self.temperature: float = arguments.get("temperature", 1.0)
+        self.top_p: float = arguments.get("top_p", 1.0)
+        self.seed: int | None = arguments.get("seed")
+        self.stop: list[str] = arguments.get("stop", [])
+        self.stop_token_ids: list[int] = arguments.get("stop_token_ids", [])
+        self.repetition_penalty: float = arguments.get("repetition_penalty", 1.0)
+        self.ignore_eos: bool = arguments.get("ignore_eos", False)
+        self.allowed_token_ids: list[int] | None = arguments.get("allowed_token_ids")
+        self.structured_outputs: StructuredOutputsParams | None = arguments.get(
+            "structured_outputs"
+        )
 
 
 @dataclass
@@ -113,11 +115,11 @@ class _Vlm:
     ) -> tuple[list[int], str]:
         tokenizer, model = self._loaded.tokenizer, self._loaded.model
 
-        def said(written: Sequence[int]) -> str:
+        def decode(written: Sequence[int]) -> str:
             return str(tokenizer.decode(list(written), skip_special_tokens=True))
 
         def stopped(rows: torch.Tensor, scores: Any, **_: Any) -> torch.Tensor:
-            text = said(rows[0, len(ids) :].tolist())
+            text = decode(rows[0, len(ids) :].tolist())
             return torch.tensor([any(stop in text for stop in params.stop)])
 
         ends = sorted({*params.stop_token_ids, tokenizer.eos_token_id})
@@ -139,16 +141,16 @@ class _Vlm:
                 prefix_allowed_tokens_fn=held,
             )
         written = output[0, len(ids) :].tolist()
-        return written, said(written)
+        return written, decode(written)
 
-    def cut(self, said: Sequence[int], params: SamplingParams) -> tuple[list[int], str]:
+    def cut(self, ids: Sequence[int], params: SamplingParams) -> tuple[list[int], str]:
         """What vLLM gives back of a model that would say this: up to the token that ends it."""
         tokenizer = self._loaded.tokenizer
-        for n in range(1, len(said) + 1):
-            text = str(tokenizer.decode(list(said[:n]), skip_special_tokens=True))
-            if said[n - 1] in params.stop_token_ids or any(stop in text for stop in params.stop):
-                return list(said[:n]), text
-        return list(said), text
+        for n in range(1, len(ids) + 1):
+            text = str(tokenizer.decode(list(ids[:n]), skip_special_tokens=True))
+            if ids[n - 1] in params.stop_token_ids or any(stop in text for stop in params.stop):
+                return list(ids[:n]), text
+        return list(ids), text
 
     def _inputs(self, ids: list[int], images: Sequence[Image.Image]) -> dict[str, Any]:
         rows = torch.tensor([ids])
@@ -281,9 +283,9 @@ class Double:
 
 
 class _LLM:
-    def __init__(self, double: Double, model: str, **given: Any) -> None:
+    def __init__(self, double: Double, model: str, **engine_arguments: Any) -> None:
         self._double = double
-        arguments = _checked("LLM", {"model": model, **given}, "EngineArgs")
+        arguments = _checked("LLM", {"model": model, **engine_arguments}, "EngineArgs")
         assert arguments.get("dtype", "auto") in _DTYPES
         double.started.append(arguments)
         if double.fails is not None:
@@ -296,9 +298,9 @@ class _LLM:
         self._seen: list[list[tuple[int, str]]] = []
 
     def generate(
-        self, prompts: Any, sampling_params: SamplingParams | None = None, **given: Any
+        self, prompts: Any, sampling_params: SamplingParams | None = None, **arguments: Any
     ) -> list[Any]:
-        _checked("LLM.generate", given)
+        _checked("LLM.generate", arguments)
         double = self._double
         double.calls.append(_Call(prompts, sampling_params or SamplingParams()))
         if double.fails is not None:
@@ -334,9 +336,11 @@ class _LLM:
         self, prompt: dict[str, Any], read: _Read, cached: int, params: SamplingParams
     ) -> Any:
         images = prompt.get("multi_modal_data", {}).get("image", [])
-        said = self._double.would_say
+        scripted_ids = self._double.would_say
         ids, text = (
-            self._model.cut(said, params) if said else self._model.write(read.ids, images, params)
+            self._model.cut(scripted_ids, params)
+            if scripted_ids
+            else self._model.write(read.ids, images, params)
         )
         prompt_ids = read.ids + [0] * self._double.expands
         completion = SimpleNamespace(token_ids=ids, text=text)

@@ -111,10 +111,7 @@ def test_every_option_arrives_under_vllms_name() -> None:
         "mm_encoder_attn_backend": "TORCH_SDPA",
         "max_model_len": 9_999,
         "trust_remote_code": True,
-        "limit_mm_per_prompt": {
-            "image": {"count": 12, "width": 640, "height": 640},
-            "video": 0,
-        },
+        "limit_mm_per_prompt": {"image": {"count": 12, "width": 640, "height": 640}, "video": 0},
         "mm_processor_kwargs": {"use_fast": False},
         "hf_overrides": {
             "text_config": {
@@ -241,7 +238,7 @@ def test_three_axes_of_another_family_are_not_extended_unknown() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("settings", "message"),
     [
         ({"dtype": "int8"}, "dtype=int8 is not auto, bfloat16"),
         ({"gpu_memory_utilization": "0"}, "gpu_memory_utilization=0.0 is not above 0"),
@@ -250,25 +247,22 @@ def test_three_axes_of_another_family_are_not_extended_unknown() -> None:
         ({"tensor_parallel_size": "0"}, "tensor_parallel_size=0 is not from 1"),
         ({"max_frames": "0"}, "max_frames=0 is not from 1"),
         ({"mm_processor_cache_gb": "-1"}, "mm_processor_cache_gb=-1.0 is not from 0"),
-        (
-            {"data_parallel_size": "2"},
-            "external_launcher in vLLM; use --workers 2 instead",
-        ),
+        ({"data_parallel_size": "2"}, "external_launcher in vLLM; use --workers 2 instead"),
         ({"rope": "yarn"}, "rope=yarn is not TYPE:FACTOR"),
         ({"prompt": "loud"}, "prompt=loud is not chat or plain"),
         ({"max_pixels": "0"}, "max_pixels=0 is not between"),
         ({"device": "cpu"}, "has no option device"),
     ],
 )
-def test_options_that_cannot_be_are_refused_at_once(given: dict[str, str], message: str) -> None:
+def test_options_that_cannot_be_are_refused_at_once(settings: dict[str, str], message: str) -> None:
     with pytest.raises(UsageError, match=message):
-        check_options("qwen2.5-vl@vllm", given)
+        check_options("qwen2.5-vl@vllm", settings)
 
 
-@pytest.mark.parametrize("given", [{"ensemble": "loud"}, {"dtype": "int8"}, {"execute": "0"}])
-def test_a_policys_options_are_refused_likewise(given: dict[str, str]) -> None:
-    with pytest.raises(UsageError, match=next(iter(given))):
-        check_options("openvla@vllm", given)
+@pytest.mark.parametrize("settings", [{"ensemble": "loud"}, {"dtype": "int8"}, {"execute": "0"}])
+def test_a_policys_options_are_refused_likewise(settings: dict[str, str]) -> None:
+    with pytest.raises(UsageError, match=next(iter(settings))):
+        check_options("openvla@vllm", settings)
 
 
 @pytest.mark.parametrize("name", ["qwen2.5-vl", "llava-onevision", "pixtral", "openvla"])

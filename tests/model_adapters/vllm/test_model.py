@@ -220,10 +220,10 @@ def _talk(model: Any, *parts: Part) -> Any:
 def test_of_continuations_the_first_goes_alone_and_the_others_find_its_prefix(
     start: Start, in_process: Start, vllm: Double, frames: list[FrameRef]
 ) -> None:
-    asked = [[f"\nQuestion {number}: what is it?"] for number in range(5)]
-    replies = _talk(start(), *frames).replies(asked, up_to(4))
+    requests = [[f"\nQuestion {number}: what is it?"] for number in range(5)]
+    replies = _talk(start(), *frames).replies(requests, up_to(4))
     assert [len(call.prompts) for call in vllm.calls] == [1, 4]
-    theirs = _talk(in_process("qwen2.5-vl"), *frames).replies(asked, up_to(4))
+    theirs = _talk(in_process("qwen2.5-vl"), *frames).replies(requests, up_to(4))
     assert [facts(reply) for reply in replies] == [facts(reply) for reply in theirs]
     shared = _talk(start(), *frames).n_tokens // 16 * 16 - 16
     assert replies[0].n_cached_tokens == 0
@@ -244,13 +244,13 @@ def test_the_first_of_each_context_go_together_and_then_the_others(
     start: Start, in_process: Start, vllm: Double, frames: list[FrameRef]
 ) -> None:
     contexts = [frames[:3], frames[:3], frames[3:], frames[3:]]
-    asked = [[*context, f"\nQuestion {number}?"] for number, context in enumerate(contexts)]
-    asked.append([frames[0], "\nAlone?"])
-    replies = start().conversation().replies(asked, up_to(4))
+    requests = [[*context, f"\nQuestion {number}?"] for number, context in enumerate(contexts)]
+    requests.append([frames[0], "\nAlone?"])
+    replies = start().conversation().replies(requests, up_to(4))
     assert [len(call.prompts) for call in vllm.calls] == [3, 2]
     assert min(replies[1].n_cached_tokens, replies[3].n_cached_tokens) > 40
     theirs = [
-        in_process("qwen2.5-vl").conversation().replies([parts], up_to(4))[0] for parts in asked
+        in_process("qwen2.5-vl").conversation().replies([parts], up_to(4))[0] for parts in requests
     ]
     assert [facts(reply) for reply in replies] == [facts(reply) for reply in theirs]
 
@@ -271,10 +271,8 @@ def test_other_frames_are_no_warm_prefix(start: Start, frames: list[FrameRef]) -
     first = model.answer(user(*frames[:3], "What?"), up_to(2))
     other = model.answer(user(*frames[3:], "What?"), up_to(2))
     again = model.answer(user(*frames[:3], "Where?"), up_to(2))
-    assert (first.n_cached_tokens, other.n_cached_tokens) == (
-        0,
-        16,
-    )  # a block of the template's own words
+    # A block of the template's own words.
+    assert (first.n_cached_tokens, other.n_cached_tokens) == (0, 16)
     assert again.n_cached_tokens == 48
 
 

@@ -28,8 +28,8 @@ def policy(vllm: Double, folder: Path) -> Callable[..., Any]:
     """Starts the tiny policy on the double."""
 
     def start(**options: object) -> Any:
-        given = {"pretrained": folder, "dtype": "float32", **options}
-        return load("openvla@vllm", {name: str(value) for name, value in given.items()}, 0)
+        settings = {"pretrained": folder, "dtype": "float32", **options}
+        return load("openvla@vllm", {name: str(value) for name, value in settings.items()}, 0)
 
     return start
 
@@ -42,14 +42,13 @@ def test_actions_are_those_of_the_native_port(
     theirs: Any = load(
         "openvla", {"pretrained": str(folder), "device": "cpu", "constrained": str(constrained)}, 0
     )
-    asked = [
+    requests = [
         (frame, text) for frame in frames[:3] for text in ("pick up the Mug", "close the fridge")
     ]
-    actions = [[each.act(frame, text) for frame, text in asked] for each in (ours, theirs)]
+    actions = [[each.act(frame, text) for frame, text in requests] for each in (ours, theirs)]
     assert actions[0] == actions[1]
-    assert (
-        len(set(actions[0])) > 1 or not constrained
-    )  # without, it writes words, which are clipped
+    # Without, it writes words, which are clipped.
+    assert len(set(actions[0])) > 1 or not constrained
 
 
 def test_it_keeps_the_contract_of_policies(policy: Callable[..., Any]) -> None:

@@ -12,32 +12,24 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.plans.records import RECORDS as PLAN_RECORDS
 from infthor_eval.runs import read_run
 from model_adapters import name_on_engine
-from tests.plans.cut import MUG, cut, write
+from tests.helpers.command_line import option_words
+from tests.helpers.trajectories import MUG, cut_trajectory, write_trajectories
 
 from .double import Double
 
 
 @pytest.fixture
-def ask(make_nieh_set: Any, checkpoints: dict[str, Path], tmp_path: Path, run: Any) -> Any:
+def ask(make_nieh_set: Any, checkpoints: dict[str, Path], tmp_path: Path, run_cli: Any) -> Any:
     """Runs a task (`nieh_full`) on five questions about two trajectories."""
     data = make_nieh_set(size=56)
 
     def ask(
         name: str, *options: object, task: str = "nieh_full", **model_args: object
     ) -> tuple[int, str, str]:
-        given = {"pretrained": checkpoints["qwen2.5-vl"], "dtype": "float32", **model_args}
-        typed = ",".join(f"{option}={value}" for option, value in given.items())
-        arguments = [
-            "--model",
-            "qwen2.5-vl",
-            "--model-args",
-            typed,
-            "--tasks",
-            task,
-            "--data",
-            data,
-        ]
-        return run(*arguments, "--name", name, "--output", tmp_path / "out", *options)
+        settings = {"pretrained": checkpoints["qwen2.5-vl"], "dtype": "float32", **model_args}
+        typed = ",".join(f"{option}={value}" for option, value in settings.items())
+        arguments = option_words(model="qwen2.5-vl", model_args=typed, tasks=task, data=data)
+        return run_cli(*arguments, "--name", name, "--output", tmp_path / "out", *options)
 
     return ask
 
@@ -114,28 +106,21 @@ def test_questions_on_different_frames_of_a_trajectory_are_asked_together(
 
 
 def test_plans_are_carried_out_alike(
-    checkpoints: dict[str, Path], vllm: Double, task_files: Path, tmp_path: Path, run: Any
+    checkpoints: dict[str, Path], vllm: Double, task_files: Path, tmp_path: Path, run_cli: Any
 ) -> None:
     task = task_files / "plans" / "infthor_plans.yaml"
     task.write_text(
         "include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 3}\n"
     )
-    data = write(tmp_path / "data", cut(MUG, 2))
+    data = write_trajectories(tmp_path / "data", cut_trajectory(MUG, 2))
     played = []
     for engine, more in (("vllm", ""), ("transformers", ",device=cpu")):
-        given = f"pretrained={checkpoints['qwen2.5-vl']},dtype=float32{more}"
-        arguments = [
-            "--model",
-            "qwen2.5-vl",
-            "--model-args",
-            given,
-            "--tasks",
-            "infthor_plans",
-            "--data",
-            data,
-        ]
+        model_args = f"pretrained={checkpoints['qwen2.5-vl']},dtype=float32{more}"
+        arguments = option_words(
+            model="qwen2.5-vl", model_args=model_args, tasks="infthor_plans", data=data
+        )
         output = tmp_path / "out" / engine
-        code, _, err = run(*arguments, "--engine", engine, "--constrained", "--output", output)
+        code, _, err = run_cli(*arguments, "--engine", engine, "--constrained", "--output", output)
         assert code == 0, err
         (results,) = output.rglob("results.json")
         records = read_run(results.parent, PLAN_RECORDS)[1]
@@ -146,10 +131,12 @@ def test_plans_are_carried_out_alike(
     assert all(call.params.structured_outputs is not None for call in vllm.calls)
 
 
-def test_engines_that_do_not_run_a_model_are_refused_in_one_line(run: Any, tmp_path: Path) -> None:
+def test_engines_that_do_not_run_a_model_are_refused_in_one_line(
+    run_cli: Any, tmp_path: Path
+) -> None:
     known = "these do: hf-vlm, llava-onevision, openvla, pixtral, qwen2.5-vl"
     for command in ("run", "plan"):
-        code, _, err = run(
+        code, _, err = run_cli(
             command, "--model", "deepseek-vl", "--engine", "vllm", "--tasks", "nieh_mini"
         )
         assert code == 2

@@ -9,20 +9,29 @@ FILES = {
     "vllm/entrypoints/llm.py": (
         "class LLM:\n"
         "    def __init__(self, model, *, seed=0, **kwargs): ...\n"
-        "    @overload\n    def generate(self, prompts): ...\n"
+        "    @overload\n"
+        "    def generate(self, prompts): ...\n"
         "    def generate(self, prompts, sampling_params=None, *, use_tqdm=True): ...\n"
         "    def chat(self, messages): ...\n"
     ),
-    "vllm/engine/arg_utils.py": "class EngineArgs:\n    model: str = 1\n    x: ClassVar[int] = 2\n "
-    "   _y: int = 3\n",
-    "vllm/sampling_params.py": "class SamplingParams:\n    n: int\nclass "
-    "StructuredOutputsParams:\n    choice: list\n",
-    "vllm/outputs.py": (
-        "class RequestOutput:\n    def __init__(self, request_id, *, more=None): ...\n"
-        "class CompletionOutput:\n    text: str\n"
+    "vllm/engine/arg_utils.py": (
+        "class EngineArgs:\n    model: str = 1\n    x: ClassVar[int] = 2\n    _y: int = 3\n"
     ),
-    "vllm/inputs/llm.py": "class Base(TypedDict):\n    a: int\nclass TokensPrompt(Base):\n    "
-    "prompt_token_ids: list\n",
+    "vllm/sampling_params.py": (
+        "class SamplingParams:\n    n: int\nclass StructuredOutputsParams:\n    choice: list\n"
+    ),
+    "vllm/outputs.py": (
+        "class RequestOutput:\n"
+        "    def __init__(self, request_id, *, more=None): ...\n"
+        "class CompletionOutput:\n"
+        "    text: str\n"
+    ),
+    "vllm/inputs/llm.py": (
+        "class Base(TypedDict):\n"
+        "    a: int\n"
+        "class TokensPrompt(Base):\n"
+        "    prompt_token_ids: list\n"
+    ),
 }
 
 

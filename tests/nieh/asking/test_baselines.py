@@ -18,30 +18,30 @@ from infthor_eval.nieh.guessing.forms import question_type
 from model_adapters import names
 
 
-def asked(
+def make_sample(
     text: str, *answers: str, question_type: str | None = None, traj: str = "t", n_frames: int = 1
 ) -> Sample:
     return Sample(Question(traj, text, (0,), answers, question_type), tuple(range(n_frames)))
 
 
 KEY = [
-    asked("Did you see a mug?", "yes", question_type="presence"),
-    asked("Did you see a cup?", "no", question_type="presence"),
-    asked("Did you see a pan?", "no", question_type="presence"),
-    asked("What did you put on the desk?", "Mug", "Plate", question_type="put"),
-    asked("How many plates are there?", "2"),
-    asked("How many mugs are there?", "3"),
-    asked("How MANY cups are there?", "3"),
+    make_sample("Did you see a mug?", "yes", question_type="presence"),
+    make_sample("Did you see a cup?", "no", question_type="presence"),
+    make_sample("Did you see a pan?", "no", question_type="presence"),
+    make_sample("What did you put on the desk?", "Mug", "Plate", question_type="put"),
+    make_sample("How many plates are there?", "2"),
+    make_sample("How many mugs are there?", "3"),
+    make_sample("How MANY cups are there?", "3"),
 ]
 
 
-def said(baseline: Baseline, key: list[Sample]) -> list[str]:
+def predict_all(baseline: Baseline, key: list[Sample]) -> list[str]:
     predict = baseline.fit(key)
     return [predict(sample) for sample in key]
 
 
 def test_oracle_reads_the_key() -> None:
-    assert said(Oracle(0), KEY)[:4] == ["yes", "no", "no", "Mug, Plate"]
+    assert predict_all(Oracle(0), KEY)[:4] == ["yes", "no", "no", "Mug, Plate"]
 
 
 def test_type_is_the_files_or_the_leading_words() -> None:
@@ -56,45 +56,45 @@ def test_type_is_the_files_or_the_leading_words() -> None:
 
 def test_blind_guesses_from_the_words_with_the_objects_among_them() -> None:
     key = [
-        asked(f"{stem} a {name}?", answer, traj=f"t{number}")
+        make_sample(f"{stem} a {name}?", answer, traj=f"t{number}")
         for number in range(4)
         for stem in ("Is there", "Have you seen")
         for name, answer in (("mug", "yes"), ("safe", "no"))
-    ] + [asked("Where is the mug?", "Shelf", traj=f"t{number}") for number in range(4)]
-    assert said(Blind(0), key) == ["yes", "no"] * 8 + ["Shelf"] * 4
+    ] + [make_sample("Where is the mug?", "Shelf", traj=f"t{number}") for number in range(4)]
+    assert predict_all(Blind(0), key) == ["yes", "no"] * 8 + ["Shelf"] * 4
 
 
 def test_blind_learns_nothing_from_the_trajectory_that_is_asked_about() -> None:
     key = [
-        asked(f"Is number {n} here?", "no" if t else "yes", traj=f"t{t}")
+        make_sample(f"Is number {n} here?", "no" if t else "yes", traj=f"t{t}")
         for t in range(3)
         for n in range(5)
     ]
-    assert said(Blind(0), key) == ["no"] * 15
-    assert said(
-        Blind(0), [asked(f"Where is {t}?", f"place {t}", traj=f"t{t}") for t in range(3)]
+    assert predict_all(Blind(0), key) == ["no"] * 15
+    assert predict_all(
+        Blind(0), [make_sample(f"Where is {t}?", f"place {t}", traj=f"t{t}") for t in range(3)]
     ) == [*("place 1", "place 0", "place 0")]
 
 
 def test_blind_on_one_trajectory_learns_from_the_other_questions() -> None:
-    key = [asked(f"Is number {n} here?", "yes" if n == 1 else "no") for n in range(5)]
-    assert said(Blind(0), key) == ["no"] * 5
-    assert said(Blind(0), key[:1]) == [""]
+    key = [make_sample(f"Is number {n} here?", "yes" if n == 1 else "no") for n in range(5)]
+    assert predict_all(Blind(0), key) == ["no"] * 5
+    assert predict_all(Blind(0), key[:1]) == [""]
 
 
 def test_blind_breaks_ties_by_the_alphabet() -> None:
     key = [
-        asked("Is it?", answer, traj=traj)
+        make_sample("Is it?", answer, traj=traj)
         for traj, answer in (("a", "yes"), ("b", "no"), ("c", "maybe"))
     ]
-    assert said(Blind(0), key) == ["maybe", "maybe", "no"]
+    assert predict_all(Blind(0), key) == ["maybe", "maybe", "no"]
 
 
 def test_the_number_of_frames_tells_blind_count_what_it_gives_away() -> None:
     text = "How many times did you move the mug?"
-    key = [asked(text, str(n), traj=f"t{t}", n_frames=n) for t in range(3) for n in (1, 2, 3)]
-    assert said(BlindCount(0), key) == ["1", "2", "3"] * 3
-    assert len(set(said(Blind(0), key))) == 1
+    key = [make_sample(text, str(n), traj=f"t{t}", n_frames=n) for t in range(3) for n in (1, 2, 3)]
+    assert predict_all(BlindCount(0), key) == ["1", "2", "3"] * 3
+    assert len(set(predict_all(Blind(0), key))) == 1
 
 
 # -- random
@@ -103,11 +103,11 @@ def test_the_number_of_frames_tells_blind_count_what_it_gives_away() -> None:
 def test_a_type_that_was_not_read_is_an_error() -> None:
     predict = Random(0).fit(KEY)
     with pytest.raises(ModelError, match="why is"):
-        predict(asked("Why is it?", "so"))
+        predict(make_sample("Why is it?", "so"))
 
 
 def test_random_is_the_same_for_a_seed_and_differs_between_seeds() -> None:
-    key = [asked(f"Is number {i} here?", "yes" if i % 2 else "no") for i in range(40)]
+    key = [make_sample(f"Is number {i} here?", "yes" if i % 2 else "no") for i in range(40)]
 
     def answers(seed: int, order: list[Sample]) -> dict[str, str]:
         predict = Random(seed).fit(order)
@@ -118,8 +118,8 @@ def test_random_is_the_same_for_a_seed_and_differs_between_seeds() -> None:
 
 
 def test_random_draws_answers_as_often_as_they_occur() -> None:
-    key = [asked(f"Is number {i} here?", "no" if i % 4 else "yes") for i in range(2000)]
-    drawn = Counter(said(Random(0), key))
+    key = [make_sample(f"Is number {i} here?", "no" if i % 4 else "yes") for i in range(2000)]
+    drawn = Counter(predict_all(Random(0), key))
     assert set(drawn) == {"yes", "no"}
     assert 430 < drawn["yes"] < 570
 
@@ -138,16 +138,16 @@ def test_baselines_keep_their_contract(name: str) -> None:
     there = [predict(sample) for sample in KEY]
     back = [predict(sample) for sample in reversed(KEY)][::-1]
     assert all(isinstance(answer, str) for answer in there)
-    assert there == back == said(baseline, KEY[::-1])[::-1]
+    assert there == back == predict_all(baseline, KEY[::-1])[::-1]
 
 
 @pytest.mark.parametrize("name", ["blind", "blind-count", "random"])
 def test_what_is_fitted_to_one_key_knows_nothing_of_another(name: str) -> None:
     baseline, other = (
         BASELINES[name](0),
-        [asked(f"Is {i}?", "yes", question_type="presence") for i in range(9)],
+        [make_sample(f"Is {i}?", "yes", question_type="presence") for i in range(9)],
     )
-    before = said(baseline, KEY)
+    before = predict_all(baseline, KEY)
     first, second = baseline.fit(KEY), baseline.fit(other)
     assert [first(sample) for sample in KEY] == before
     assert {second(sample) for sample in KEY[:3]} == {"yes"}

@@ -27,24 +27,24 @@ def small_windows(task_files):
 
 
 @pytest.fixture
-def asked(monkeypatch):
+def model_requests(monkeypatch):
     """Every request that a model answers: its parts, and how many tokens it may answer."""
-    found, answer_each = [], TransformersModel.answer_each
+    requests, answer_each = [], TransformersModel.answer_each
 
     def spying(model, conversations, decoding):
         for (turn,) in conversations:
-            found.append((turn.parts, decoding.max_new_tokens))
+            requests.append((turn.parts, decoding.max_new_tokens))
         return answer_each(model, conversations, decoding)
 
     monkeypatch.setattr(TransformersModel, "answer_each", spying)
-    return found
+    return requests
 
 
 @pytest.fixture
-def taking_notes(prepared):
+def taking_notes(prepare_run):
     def make(model="qwen2.5-vl-tiny", model_options=None, **changes):
         alone = {"batch_size": "1"} if model.endswith("-tiny") else None
-        return prepared(model, model_options or alone, tasks=(TASK,), **changes)
+        return prepare_run(model, model_options or alone, tasks=(TASK,), **changes)
 
     return make
 
@@ -57,7 +57,7 @@ def notes_of(outcome):
     return [artifact for artifact in artifacts if artifact["type"] == "nieh_note"]
 
 
-def told(outcome):
+def replies_by_key(outcome):
     """What a run found, without how long it took and what it found in its cache."""
     return {
         record.key: (record.payload.reply, record.failure, record.fingerprint)
@@ -70,18 +70,18 @@ def numbers(parts):
 
 
 def test_a_trajectory_is_read_once_window_by_window_and_every_question_sees_the_notes(
-    taking_notes, asked
+    taking_notes, model_requests
 ):
     outcome = execute(taking_notes())
-    of_a = asked[:6]
+    of_a = model_requests[:6]
     assert [numbers(parts) for parts, _ in of_a] == [[0, 1], [2, 3], [4, 5], [5], [5], [5]]
     assert [limit for _, limit in of_a] == [6, 6, 6, 50, 50, 50]
-    assert len(asked) == 2 * 3 + 5
+    assert len(model_requests) == 2 * 3 + 5
     notes = notes_of(outcome)
     assert [note["n_frames"] for note in notes] == [2] * 6
     windows = zip(("Steps 0-1", "Steps 2-3", "Steps 4-5"), notes[:3], strict=True)
-    shown = "".join(f"{steps}: {' '.join(note['note'].split())}\n" for steps, note in windows)
-    assert {parts[0] for parts, limit in of_a if limit == 50} == {shown}
+    notes_text = "".join(f"{steps}: {' '.join(note['note'].split())}\n" for steps, note in windows)
+    assert {parts[0] for parts, limit in of_a if limit == 50} == {notes_text}
     assert read_run(outcome.folder, RECORDS)[1] == outcome.records
 
 
@@ -97,13 +97,13 @@ def test_a_note_is_what_the_model_says_to_its_window_alone(taking_notes, data):
 
 @pytest.mark.parametrize("n_answered", [1, 2, 4, 7])
 def test_a_run_stopped_anywhere_goes_on_with_the_same_notes(
-    taking_notes, tmp_path, asked, monkeypatch, n_answered
+    taking_notes, tmp_path, model_requests, monkeypatch, n_answered
 ):
     whole = execute(taking_notes(output=tmp_path / "whole"))
-    n_all, answer_each = len(asked), TransformersModel.answer_each
+    n_all, answer_each = len(model_requests), TransformersModel.answer_each
 
     def stopping(*arguments):
-        if len(asked) - n_all == n_answered:
+        if len(model_requests) - n_all == n_answered:
             raise KeyboardInterrupt
         return answer_each(*arguments)
 
@@ -111,18 +111,18 @@ def test_a_run_stopped_anywhere_goes_on_with_the_same_notes(
         patch.setattr(TransformersModel, "answer_each", stopping)
         execute(taking_notes())
     resumed = execute(taking_notes())
-    assert len(asked) == 2 * n_all
-    assert told(resumed) == told(whole)
+    assert len(model_requests) == 2 * n_all
+    assert replies_by_key(resumed) == replies_by_key(whole)
     assert [note["note"] for note in notes_of(resumed)] == [
         note["note"] for note in notes_of(whole)
     ]
 
 
 def test_a_changed_frame_has_its_note_taken_again_and_its_questions_asked_again(
-    taking_notes, asked, data
+    taking_notes, model_requests, data
 ):
     execute(taking_notes())
-    asked.clear()
+    model_requests.clear()
     path = data / "metadata" / "traj_a" / "img" / "000000002.png"
     size = path.stat().st_size
     for shade in range(256):  # one of the same size, so that the run stays the same
@@ -130,7 +130,7 @@ def test_a_changed_frame_has_its_note_taken_again_and_its_questions_asked_again(
         if path.stat().st_size == size:
             break
     execute(taking_notes())
-    (note, limit), *others = asked
+    (note, limit), *others = model_requests
     assert (numbers(note), limit) == ([2, 3], 6)
     assert len(others) in (0, 3)  # none, where a model of random weights notes the same
 
@@ -161,7 +161,7 @@ def test_baselines_answer_without_notes(taking_notes):
 def test_batches_see_the_same_notes(taking_notes):
     alone = execute(taking_notes())
     together = execute(taking_notes(model_options={"batch_size": "4"}))
-    assert told(together) == told(alone)
+    assert replies_by_key(together) == replies_by_key(alone)
 
 
 def test_the_cost_says_that_what_is_recalled_is_not_counted(taking_notes):

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import SkippedQuestion
-from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings, Sample
 from infthor_eval.nieh.contexts.haystack import sampling_pool
+
+from ...helpers.questions import make_question
 
 GOLDEN = Path(__file__).parents[2] / "goldens" / "haystack_multi.jsonl.gz"
 DEPTHS = (0, 0.2, 0.4, 0.6, 0.8)
@@ -32,25 +33,23 @@ class Frames:
         return tuple(self.all[index] for index in question.clues)
 
 
-def question_on(clues):
-    return Question("t", "Where is it?", tuple(clues), ("Shelf",))
-
-
 def windows(n_frames, clues, seed=0, **settings):
     return CONTEXTS["haystack"].samples(
-        Frames(n_frames), question_on(clues), ContextSettings(seed=seed, **settings)
+        Frames(n_frames),
+        make_question("t", "Where is it?", "Shelf", clues),
+        ContextSettings(seed=seed, **settings),
     )
 
 
 def published(n_frames, clue, ctx_size, tokens_per_image):
     """The window at each depth, from the definition in the published code's description."""
     n = int(ctx_size * 1000) // tokens_per_image
-    found = []
+    windows_by_depth = []
     for d_index in range(5):
         start = clue - d_index * (n // 5)
         inside = start >= 0 and start + n <= n_frames
-        found.append(list(range(n_frames))[start : start + n] if inside else None)
-    return found
+        windows_by_depth.append(list(range(n_frames))[start : start + n] if inside else None)
+    return windows_by_depth
 
 
 def test_one_clue_gives_the_published_windows_on_a_thousand_random_cases():
@@ -77,17 +76,20 @@ def test_several_clues_give_the_published_windows():
     for case in cases:
         n = case["kilo_tokens"] * 1000 // case["tokens_per_frame"]
         sizes = {"ctx_size": case["kilo_tokens"], "tokens_per_frame": case["tokens_per_frame"]}
-        found = windows(case["frames"], case["clues"], **sizes)[case["depth"]]
-        clues, shown = set(case["clues"]), list(found.frames) if isinstance(found, Sample) else []
+        sample = windows(case["frames"], case["clues"], **sizes)[case["depth"]]
+        clues, frames = (
+            set(case["clues"]),
+            list(sample.frames) if isinstance(sample, Sample) else [],
+        )
         if case["drawn"]:
             assert sampling_pool(case["clues"], case["frames"], n) == case["pool"]
-            assert clues <= set(shown) <= clues | set(case["pool"])
+            assert clues <= set(frames) <= clues | set(case["pool"])
             inside = len(clues & set(case["pool"]))
             assert case["n_drawn"] == n - len(clues)
-            assert len(clues) - inside + case["n_drawn"] <= len(shown) <= n
+            assert len(clues) - inside + case["n_drawn"] <= len(frames) <= n
         else:
-            assert shown == case["window"]
-        n_of[bool(shown), case["drawn"]] += 1
+            assert frames == case["window"]
+        n_of[bool(frames), case["drawn"]] += 1
     assert len(cases) == 400
     assert min(n_of[True, True], n_of[True, False], n_of[False, False]) > 50
 
@@ -141,9 +143,9 @@ IN_A_ROW = [
 
 @pytest.mark.parametrize(("n_frames", "clues", "n", "expected"), IN_A_ROW)
 def test_clues_in_a_row_have_the_published_windows(n_frames, clues, n, expected):
-    found = windows(n_frames, clues, ctx_size=n, tokens_per_frame=1000)
-    shown = [sample.frames if isinstance(sample, Sample) else None for sample in found]
-    assert shown == [window and tuple(window) for window in expected]
+    samples = windows(n_frames, clues, ctx_size=n, tokens_per_frame=1000)
+    frames = [sample.frames if isinstance(sample, Sample) else None for sample in samples]
+    assert frames == [window and tuple(window) for window in expected]
 
 
 def test_two_adjacent_clues_are_one_needle():
@@ -167,17 +169,17 @@ def test_more_clues_that_follow_each_other_lie_at_the_last_depth_every_time():
 
 
 def test_a_question_without_a_needle_is_asked_once_outside_the_depths():
-    def found(n_frames):
-        question = Question("t", "Is there a mug?", (3, 60), ("no",), absence=True)
+    def find_only_sample(n_frames):
+        question = make_question(answer="no", clues=(3, 60), absence=True)
         settings = ContextSettings(ctx_size=10, tokens_per_frame=1000)
         (sample,) = CONTEXTS["haystack"].samples(Frames(n_frames), question, settings)
         return sample
 
-    assert found(100).variant == found(5).variant == "no needle"
-    assert found(100) == found(100)
-    assert len(found(100).frames) == 10
-    assert found(100).frames[-1] - found(100).frames[0] == 9
-    assert found(5).reason == "the window reaches outside the trajectory"
+    assert find_only_sample(100).variant == find_only_sample(5).variant == "no needle"
+    assert find_only_sample(100) == find_only_sample(100)
+    assert len(find_only_sample(100).frames) == 10
+    assert find_only_sample(100).frames[-1] - find_only_sample(100).frames[0] == 9
+    assert find_only_sample(5).reason == "the window reaches outside the trajectory"
 
 
 def test_the_smallest_and_the_fullest_windows():
@@ -191,7 +193,7 @@ def test_the_smallest_and_the_fullest_windows():
 
 @pytest.mark.parametrize(("n_frames", "starts"), [(10, {0}), (11, {0, 1})])
 def test_a_window_without_a_needle_lies_anywhere_inside_the_trajectory(n_frames, starts):
-    question = Question("t", "Is there a mug?", (3,), ("no",), absence=True)
+    question = make_question(answer="no", clues=(3,), absence=True)
     seeded = (ContextSettings(ctx_size=10, tokens_per_frame=1000, seed=seed) for seed in range(20))
     samples = [
         CONTEXTS["haystack"].samples(Frames(n_frames), question, settings)[0] for settings in seeded
@@ -218,7 +220,7 @@ def test_what_does_not_fit_says_why():
 
 def test_a_kilo_token_is_the_published_one_unless_told_otherwise():
     def n_frames(context, **settings):
-        question = Question("t", "q", (999,), ("a",))
+        question = make_question(clues=(999,))
         settings = ContextSettings(ctx_size=8, tokens_per_frame=121, **settings)
         samples = CONTEXTS[context].samples(Frames(1000), question, settings)
         return next(len(sample.frames) for sample in samples if isinstance(sample, Sample))

@@ -14,15 +14,17 @@ from infthor_eval.nieh.docs import doc_of, doc_parts, sample_of
 from infthor_eval.nieh.records import NiehRecall
 from infthor_eval.nieh.samples import find_samples, open_set
 
+from ...helpers.questions import make_question
+
 QUESTIONS = [
-    Question("t", "Is there a mug?", (1,), ("yes",)),
+    make_question(),
     Question("t", "Where was the plate?", (0, 5), ("Sink",)),
     Question("u", "Is there a mug?", (2,), ("no",)),
 ]
 
 
 @pytest.fixture
-def found(make_nieh_set):
+def find_memory_samples(make_nieh_set):
     root = make_nieh_set(QUESTIONS, n_frames=6, size=56)
 
     def find(memory="last", **settings):
@@ -31,7 +33,7 @@ def found(make_nieh_set):
     return find
 
 
-def shown(task_samples):
+def shown_parts(task_samples):
     """Names of the frames, and the texts, of each request."""
     requests = [task_samples.request(sample) for sample in recall_all(task_samples)]
     return [
@@ -40,16 +42,20 @@ def shown(task_samples):
     ]
 
 
-def test_the_last_view_is_shown_after_what_is_recalled_of_those_before(found):
-    assert shown(found(memory_args={"k": 2})) == [[3, 4, 5]] * 3
-    assert shown(found(memory_args={"k": 99})) == [[0, 1, 2, 3, 4, 5]] * 3
-    assert shown(found(budget=30, tokens_per_frame=10)) == [[2, 3, 4, 5]] * 3
-    assert shown(found(budget=9, tokens_per_frame=10)) == [[5]] * 3
-    assert shown(found("oracle", memory_args={"k": 1})) == [[1, 5], [0, 5], [2, 5]]
+def test_the_last_view_is_shown_after_what_is_recalled_of_those_before(find_memory_samples):
+    assert shown_parts(find_memory_samples(memory_args={"k": 2})) == [[3, 4, 5]] * 3
+    assert shown_parts(find_memory_samples(memory_args={"k": 99})) == [[0, 1, 2, 3, 4, 5]] * 3
+    assert shown_parts(find_memory_samples(budget=30, tokens_per_frame=10)) == [[2, 3, 4, 5]] * 3
+    assert shown_parts(find_memory_samples(budget=9, tokens_per_frame=10)) == [[5]] * 3
+    assert shown_parts(find_memory_samples("oracle", memory_args={"k": 1})) == [
+        [1, 5],
+        [0, 5],
+        [2, 5],
+    ]
 
 
-def test_words_tell_of_views_alone_or_of_what_was_recalled(found, own):
-    frames, texts = found(), found(own(recalled='"a mug"'))
+def test_words_tell_of_views_alone_or_of_what_was_recalled(find_memory_samples, own):
+    frames, texts = find_memory_samples(), find_memory_samples(own(recalled='"a mug"'))
     (_, of_frames), (parts, of_texts) = (
         item.request(recall_all(item)[0]) for item in (frames, texts)
     )
@@ -60,8 +66,8 @@ def test_words_tell_of_views_alone_or_of_what_was_recalled(found, own):
     assert (parts[0], len(parts)) == ("a mug", 2)
 
 
-def test_a_sample_that_nothing_was_recalled_for_has_a_mark(found):
-    task_samples = found()
+def test_a_sample_that_nothing_was_recalled_for_has_a_mark(find_memory_samples):
+    task_samples = find_memory_samples()
     parts, _ = task_samples.request(task_samples.samples[0])
     assert (parts[0], len(parts)) == ("<memory>", 2)
 
@@ -104,19 +110,19 @@ def own(tmp_path):
 
 @pytest.mark.parametrize("privileged", [False, True])
 def test_a_memory_sees_the_steps_before_the_question_and_metadata_only_if_privileged(
-    found, own, privileged
+    find_memory_samples, own, privileged
 ):
     from model_adapters.own_file import load_from_file
 
     name = own(privileged)
-    recall_all(found(name))
+    recall_all(find_memory_samples(name))
     seen = load_from_file(name).begin.__globals__["SEEN"]
     steps = [(number, f"{number:09d}", privileged) for number in range(5)]
-    asked = [
+    queries = [
         (question.text, 5, question.clues if privileged else None, privileged)
         for question in QUESTIONS
     ]
-    assert seen == [("begin", "t"), *steps, *asked[:2], ("begin", "u"), *steps, asked[2]]
+    assert seen == [("begin", "t"), *steps, *queries[:2], ("begin", "u"), *steps, queries[2]]
 
 
 @pytest.mark.parametrize(
@@ -129,25 +135,25 @@ def test_a_memory_sees_the_steps_before_the_question_and_metadata_only_if_privil
         ('"x" * 400', "recalls 100 tokens where the budget is 50"),
     ],
 )
-def test_a_wrong_recall_is_one_line(found, own, recalled, words):
+def test_a_wrong_recall_is_one_line(find_memory_samples, own, recalled, words):
     with pytest.raises(UsageError) as caught:
-        recall_all(found(own(recalled=recalled), budget=50, tokens_per_frame=10))
+        recall_all(find_memory_samples(own(recalled=recalled), budget=50, tokens_per_frame=10))
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_what_was_recalled_is_found_again_by_its_inputs(found):
+def test_what_was_recalled_is_found_again_by_its_inputs(find_memory_samples):
     kept = {}
 
     def recall(task_samples):
         recaller = Recaller(task_samples, None, kept.get, kept.__setitem__)
         return [recaller.recall(sample) for sample in task_samples.samples]
 
-    first = recall(found())
+    first = recall(find_memory_samples())
     assert len(kept) == 3
-    assert recall(found()) == first
+    assert recall(find_memory_samples()) == first
     assert len(kept) == 3
-    recall(found(memory_args={"k": 2}))
+    recall(find_memory_samples(memory_args={"k": 2}))
     assert len(kept) == 6
     assert all(isinstance(item, NiehRecall) and item.build_s >= 0 for item in kept.values())
 
@@ -155,23 +161,25 @@ def test_what_was_recalled_is_found_again_by_its_inputs(found):
 @pytest.mark.parametrize(
     ("frames", "same"), [("blank", False), ("other", False), ("shuffled", True), ("shown", True)]
 )
-def test_an_ablation_is_what_a_memory_observes(found, own, frames, same):
-    task_samples = found(own(recalled="str(query.present.frame.path)"), frames=frames)
+def test_an_ablation_is_what_a_memory_observes(find_memory_samples, own, frames, same):
+    task_samples = find_memory_samples(own(recalled="str(query.present.frame.path)"), frames=frames)
     true = str(task_samples.data.frames("t")[-1].path)
     for sample in recall_all(task_samples)[:2]:
         parts, _ = task_samples.request(sample)
         assert (parts[0] == true) == same
 
 
-def test_blank_frames_are_shown_in_place_of_those_recalled(found):
-    task_samples = found(frames="blank")
+def test_blank_frames_are_shown_in_place_of_those_recalled(find_memory_samples):
+    task_samples = find_memory_samples(frames="blank")
     parts, _ = task_samples.request(recall_all(task_samples)[0])
     assert len(parts) == 6
     assert {part.path.name for part in parts} == {"56x56.png"}
 
 
-def test_docs_carry_what_was_recalled_and_how(found):
-    task_samples = found("oracle", memory_args={"k": 2}, budget=40, tokens_per_frame=10)
+def test_docs_carry_what_was_recalled_and_how(find_memory_samples):
+    task_samples = find_memory_samples(
+        "oracle", memory_args={"k": 2}, budget=40, tokens_per_frame=10
+    )
     for sample in (task_samples.samples[0], *recall_all(task_samples)):
         doc = json.loads(json.dumps(doc_of(task_samples, sample)))
         assert sample_of(doc) == sample
@@ -179,26 +187,26 @@ def test_docs_carry_what_was_recalled_and_how(found):
         assert doc_parts(doc) == [*parts, text]
 
 
-def test_another_host_gets_docs_with_what_was_recalled(found, monkeypatch):
+def test_another_host_gets_docs_with_what_was_recalled(find_memory_samples, monkeypatch):
     monkeypatch.setattr(registration, "_references", False)
-    root = found().data.root
+    root = find_memory_samples().data.root
     docs = dataset(context="memory", memory="last", memory_args={"k": 2}, data=str(root))["test"]
     assert [doc["frames"] for doc in docs] == [[3, 4, 5]] * 3
     assert len(doc_to_image(docs[0])) == 3
     assert doc_to_text(docs[0]).startswith("<image><image><image>\nAnswer")
 
 
-def test_another_host_is_told_that_it_cannot_write_notes(found, monkeypatch):
+def test_another_host_is_told_that_it_cannot_write_notes(find_memory_samples, monkeypatch):
     monkeypatch.setattr(registration, "_references", False)
-    root = found().data.root
+    root = find_memory_samples().data.root
     with pytest.raises(UsageError, match="run the task with `infthor-eval run`") as caught:
         dataset(context="memory", memory="notes", data=str(root))
     assert "\n" not in str(caught.value)
 
 
-def test_our_model_under_another_host_recalls_itself(found, monkeypatch):
+def test_our_model_under_another_host_recalls_itself(find_memory_samples, monkeypatch):
     monkeypatch.setattr(registration, "_references", True)
-    root = found().data.root
+    root = find_memory_samples().data.root
     (doc, *_) = dataset(context="memory", memory="notes", data=str(root))["test"]
     assert doc_to_text(doc).startswith("<memory><image>\nAnswer the question")
     assert sample_of(doc).recalled is None
@@ -209,7 +217,7 @@ def test_a_task_without_a_memory_says_how_to_give_one(make_nieh_set):
         find_samples({"context": "memory", "data": str(make_nieh_set(QUESTIONS))})
 
 
-def test_actions_and_goals_come_from_log_and_trajectory(found):
+def test_actions_and_goals_come_from_log_and_trajectory(find_memory_samples):
     open_set.cache_clear()
     task_samples = find_samples(
         {"context": "memory", "memory": "text-log", "bundled": "nieh_mini"}, limit=1

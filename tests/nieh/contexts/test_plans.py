@@ -11,13 +11,13 @@ from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 QUESTION = Question("t", "Where is it?", (1,), ("Shelf",))
 
 
-def shown(context, root):
+def shown_parts(context, root):
     """What the context shows: texts, and frames by number."""
     data = NiehSet(root)
-    (found,) = CONTEXTS[context].samples(data, QUESTION, ContextSettings())
-    if isinstance(found, SkippedQuestion):
-        return found.reason
-    parts, _ = CONTEXTS[context].request(data, found)
+    (sample,) = CONTEXTS[context].samples(data, QUESTION, ContextSettings())
+    if isinstance(sample, SkippedQuestion):
+        return sample.reason
+    parts, _ = CONTEXTS[context].request(data, sample)
     return [int(part.path.stem) if isinstance(part, FrameRef) else part for part in parts]
 
 
@@ -32,7 +32,7 @@ def folder(make_nieh_set):
 
 
 def test_puts_each_frame_where_the_text_has_it(folder):
-    assert shown("interleaved_plans", folder.parents[1]) == [
+    assert shown_parts("interleaved_plans", folder.parents[1]) == [
         *("<|goal|>A<|goal|>", 0, "<|act|>Go<|act|>", 1),
         *("<|goal|>B<|goal|>", 1, "<|act|>Take<|act|>", 2),
     ]
@@ -47,9 +47,9 @@ def test_takes_the_last_of_several_frames_of_an_action(folder):
         ]
     }
     (folder / "expert_log.json").write_text(json.dumps(log))
-    assert shown("interleaved_plans", folder.parents[1]) == ["Goal", 0, "<|act|>Go<|act|>", 2]
+    assert shown_parts("interleaved_plans", folder.parents[1]) == ["Goal", 0, "<|act|>Go<|act|>", 2]
     (folder / "traj.txt").write_text("Goal<image>")
-    assert "traj.txt has 0 actions" in shown("interleaved_plans", folder.parents[1])
+    assert "traj.txt has 0 actions" in shown_parts("interleaved_plans", folder.parents[1])
     (folder / "expert_log.json").write_text("{}")
     with pytest.raises(DataError, match=r"expert_log\.json: not in its documented form"):
-        shown("interleaved_plans", folder.parents[1])
+        shown_parts("interleaved_plans", folder.parents[1])

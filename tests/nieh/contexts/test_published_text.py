@@ -60,11 +60,11 @@ INTERLEAVED = [
 
 def parts(context, data, **settings):
     """What the context shows and tells: texts, and frames by number."""
-    (found,) = CONTEXTS[context].samples(data, QUESTION, ContextSettings(**settings))
-    if isinstance(found, SkippedQuestion):
-        return found.reason
-    shown, text = CONTEXTS[context].request(data, found)
-    return [int(part.path.stem) if isinstance(part, FrameRef) else part for part in [*shown, text]]
+    (sample,) = CONTEXTS[context].samples(data, QUESTION, ContextSettings(**settings))
+    if isinstance(sample, SkippedQuestion):
+        return sample.reason
+    frames, text = CONTEXTS[context].request(data, sample)
+    return [int(part.path.stem) if isinstance(part, FrameRef) else part for part in [*frames, text]]
 
 
 @pytest.fixture
@@ -111,8 +111,8 @@ def test_contexts_equal_the_published_ones_part_for_part(make_set, tmp_path):
 def test_the_trajectory_in_the_set_is_read_where_no_folder_is_named(make_set):
     data = make_set(5, LOG, TRAJECTORY)
     inside = NiehSet(data.root)
-    said = "the trajectory's JSON is not in metadata/; give its folder with --trajectories"
-    assert parts("interleaved", inside) == parts("text_state", inside) == said
+    reason = "the trajectory's JSON is not in metadata/; give its folder with --trajectories"
+    assert parts("interleaved", inside) == parts("text_state", inside) == reason
     (data.folder("t") / "traj_data.json").write_text(json.dumps(TRAJECTORY))
     assert parts("interleaved", inside) == parts("interleaved", data)
 

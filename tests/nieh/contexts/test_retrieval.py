@@ -42,9 +42,9 @@ def noise(make_nieh_set):
     return make
 
 
-def shown(context, root, question=QUESTIONS[0], **settings):
-    (found,) = CONTEXTS[context].samples(NiehSet(root), question, ContextSettings(**settings))
-    return found if isinstance(found, SkippedQuestion) else list(found.frames)
+def frames_of(context, root, question=QUESTIONS[0], **settings):
+    (sample,) = CONTEXTS[context].samples(NiehSet(root), question, ContextSettings(**settings))
+    return sample if isinstance(sample, SkippedQuestion) else list(sample.frames)
 
 
 def recalled(root, k, clip, question=QUESTIONS[0], memory="clip-view"):
@@ -73,9 +73,9 @@ def similarities(clip, root):
         images=images, return_tensors="pt"
     )
     texts = AutoTokenizer.from_pretrained(clip)(list(TEXTS), padding=True, return_tensors="pt")
-    found = model(**pixels, **texts)
-    between = found.image_embeds @ found.image_embeds.T
-    return (found.logits_per_text / model.logit_scale.exp()).numpy(), between.numpy()
+    outputs = model(**pixels, **texts)
+    between = outputs.image_embeds @ outputs.image_embeds.T
+    return (outputs.logits_per_text / model.logit_scale.exp()).numpy(), between.numpy()
 
 
 def largest(row, k):
@@ -88,10 +88,14 @@ def largest(row, k):
 def test_the_frames_nearest_to_each_question_are_those_of_plain_transformers(noise, clip):
     root = noise(40)
     to_texts, _ = similarities(clip, root)
-    found = [shown("clip_retrieval", root, question, retriever=str(clip)) for question in QUESTIONS]
-    assert found == [largest(row, 10) for row in to_texts]
-    assert len({tuple(frames) for frames in found}) == len(QUESTIONS)
-    assert shown("clip_retrieval", root, retriever=str(clip), top_k=3) == largest(to_texts[0], 3)
+    nearest = [
+        frames_of("clip_retrieval", root, question, retriever=str(clip)) for question in QUESTIONS
+    ]
+    assert nearest == [largest(row, 10) for row in to_texts]
+    assert len({tuple(frames) for frames in nearest}) == len(QUESTIONS)
+    assert frames_of("clip_retrieval", root, retriever=str(clip), top_k=3) == largest(
+        to_texts[0], 3
+    )
 
 
 def test_a_memory_recalls_those_nearest_to_the_question_or_to_the_last_view_which_comes_after_them(
@@ -115,8 +119,8 @@ def test_a_memory_may_be_asked_with_the_goal(noise, clip):
     memory.begin(TrajectoryFacts(name="t"))
     for step in steps[:-1]:
         memory.observe(step)
-    found = memory.recall(Query(text=TEXTS[0], present=steps[-1]), None)
-    assert [step.number for step in found] == largest(to_texts[2, :-1], 5)
+    recalled_steps = memory.recall(Query(text=TEXTS[0], present=steps[-1]), None)
+    assert [step.number for step in recalled_steps] == largest(to_texts[2, :-1], 5)
     with pytest.raises(DataError, match="the goal at this step is not known; take query=question"):
         memory.recall(Query(text=TEXTS[0], present=replace(steps[-1], goal=None)), None)
     with pytest.raises(UsageError, match="the memory clip: query is 'view'"):
@@ -125,7 +129,7 @@ def test_a_memory_may_be_asked_with_the_goal(noise, clip):
 
 def test_a_short_trajectory_is_shown_whole(noise, clip):
     root = noise(4)
-    assert shown("clip_retrieval", root, retriever=str(clip)) == [0, 1, 2, 3]
+    assert frames_of("clip_retrieval", root, retriever=str(clip)) == [0, 1, 2, 3]
     assert recalled(root, 10, clip) == [0, 1, 2, 3]
     assert recalled(root, 2, clip)[-1] == 3
 
@@ -135,7 +139,7 @@ def test_of_equal_frames_the_earlier_are_taken(noise, clip):
     images = sorted((root / "metadata" / "t" / "img").iterdir())
     for path in images[1:]:
         shutil.copy(images[0], path)
-    assert shown("clip_retrieval", root, retriever=str(clip), top_k=5) == [0, 1, 2, 3, 4]
+    assert frames_of("clip_retrieval", root, retriever=str(clip), top_k=5) == [0, 1, 2, 3, 4]
     assert recalled(root, 3, clip) == [0, 1, 2, 39]
 
 
@@ -153,13 +157,13 @@ def test_each_frame_is_decoded_once_and_few_at_a_time(noise, make_clip, monkeypa
 
     monkeypatch.setattr(CLIPModel, "get_image_features", counted)
     for question in QUESTIONS:
-        first = shown("clip_retrieval", root, question, retriever=str(clip))
-        assert shown("clip_retrieval", root, question, retriever=str(clip)) == first
+        first = frames_of("clip_retrieval", root, question, retriever=str(clip))
+        assert frames_of("clip_retrieval", root, question, retriever=str(clip)) == first
         recalled(root, 10, clip, question)
     assert loaded == [f"{index:09d}.png" for index in range(70)]
     assert batches == [32, 32, 6]
     open_retriever.cache_clear()  # as in the next process
-    assert shown("clip_retrieval", root, question, retriever=str(clip)) == first
+    assert frames_of("clip_retrieval", root, question, retriever=str(clip)) == first
     assert len(loaded) == 70
 
 
@@ -169,7 +173,7 @@ def test_a_frame_that_cannot_be_decoded_has_the_question_skipped(noise, clip):
     broken.write_bytes(broken.read_bytes()[:60])
     assert (
         f"{broken}: not a readable image"
-        in shown("clip_retrieval", root, retriever=str(clip)).reason
+        in frames_of("clip_retrieval", root, retriever=str(clip)).reason
     )
     with pytest.raises(UsageError, match=f"{broken}: not a readable image"):
         recalled(root, 10, clip)
@@ -177,7 +181,7 @@ def test_a_frame_that_cannot_be_decoded_has_the_question_skipped(noise, clip):
 
 def test_a_question_beyond_clips_limit_is_cut(noise, clip):
     question = Question("t", "Is there a mug on the table? " * 40, (1,), ("yes",))
-    assert len(shown("clip_retrieval", noise(12), question, retriever=str(clip))) == 10
+    assert len(frames_of("clip_retrieval", noise(12), question, retriever=str(clip))) == 10
 
 
 def test_the_identity_tells_weights_apart_and_not_places(noise, make_clip, clip, tmp_path):
@@ -202,14 +206,14 @@ def test_a_retriever_that_cannot_be_had_says_what_to_do(noise, clip, tmp_path, m
     with pytest.raises(
         UsageError, match=r"not in the local cache .* `hf download .*` and give --retriever DIR"
     ):
-        shown("clip_retrieval", root)
+        frames_of("clip_retrieval", root)
     with pytest.raises(UsageError, match=r"--retriever \./nowhere: there is no such folder"):
-        shown("clip_retrieval", root, retriever="./nowhere")
+        frames_of("clip_retrieval", root, retriever="./nowhere")
     half = tmp_path / "half"
     shutil.copytree(clip, half)
     (half / "model.safetensors").write_bytes(b"no weights")
     with pytest.raises(UsageError, match="half cannot be loaded"):
-        shown("clip_retrieval", root, retriever=str(half))
+        frames_of("clip_retrieval", root, retriever=str(half))
 
 
 def test_a_checkpoint_of_another_kind_is_refused(noise, tmp_path):
@@ -217,7 +221,7 @@ def test_a_checkpoint_of_another_kind_is_refused(noise, tmp_path):
 
     save_tiny_checkpoint(tmp_path / "qwen", seed=0)
     with pytest.raises(UsageError, match="is a qwen2_5_vl checkpoint; retrieval needs one of CLIP"):
-        shown("clip_retrieval", noise(4), retriever=str(tmp_path / "qwen"))
+        frames_of("clip_retrieval", noise(4), retriever=str(tmp_path / "qwen"))
 
 
 def test_so_many_frames_cannot_be():

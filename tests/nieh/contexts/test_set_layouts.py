@@ -11,19 +11,12 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.runs import Catalog
 
-from ...bundled import BUNDLED, bundled_name
+from ...helpers.bundled import BUNDLED, bundled_name
 from ..test_requests import EXPECTED, as_text
 
 NAME = bundled_name("kitchen-1")
-LONG = (
-    "_16k",
-    "_32k",
-    "_64k",
-    "_128k",
-    "_256k",
-    "_512k",
-    "_1m",
-)  # haystacks of more frames than there are
+# Haystacks of more frames than there are.
+LONG = ("_16k", "_32k", "_64k", "_128k", "_256k", "_512k", "_1m")
 TASKS = sorted(task for task in EXPECTED if not task.endswith((*LONG, "_mini_gt", "_mini_full")))
 PUBLISHED_FIELDS = ("img_idx", "img_filename", "step", "object_log")
 
@@ -42,17 +35,17 @@ def folder(tmp_path):
 def requests(root: Path, task: str, **more) -> list[list[str]]:
     settings = dict(Catalog.find_packaged().tasks[task].settings["dataset_kwargs"])
     settings.pop("bundled", None)
-    found = find_samples(
+    task_samples = find_samples(
         {"data": str(root), "tokens_per_frame": 121, "seed": 0, **settings, **more}
     )
     assert not [
         item.reason
-        for item in found.skipped
+        for item in task_samples.skipped
         if "fit" not in item.reason and "window" not in item.reason
     ]
     rows = []
-    for sample in found.samples:
-        context, text = found.request(sample)
+    for sample in task_samples.samples:
+        context, text = task_samples.request(sample)
         rows.append([sample.variant.replace("img_768", "img"), *map(as_text, context), text])
     return rows
 
@@ -143,6 +136,6 @@ def test_objects_tell_the_frames_of_actions_but_for_action_0_as_published(folder
 def test_another_layout_without_a_log_of_actions_says_so(folder):
     as_columns(folder)
     (folder / "expert_log.json").unlink()
-    found = find_samples({"data": str(folder.parents[1]), "context": "interleaved"})
-    assert not found.samples
-    assert all("expert_log.json" in item.reason for item in found.skipped)
+    task_samples = find_samples({"data": str(folder.parents[1]), "context": "interleaved"})
+    assert not task_samples.samples
+    assert all("expert_log.json" in item.reason for item in task_samples.skipped)

@@ -10,10 +10,9 @@ from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 from infthor_eval.nieh.docs import doc_of, doc_parts, doc_prompt, sample_of
 from infthor_eval.nieh.samples import find_samples, open_set
 
-QUESTIONS = [
-    Question("a", "Is there a mug?", (1,), ("yes",)),
-    Question("b", "Is there a sink?", (0,), ("no",)),
-]
+from ...helpers.questions import make_question
+
+QUESTIONS = [make_question("a"), Question("b", "Is there a sink?", (0,), ("no",))]
 
 
 @pytest.fixture
@@ -32,13 +31,13 @@ def samples_of(root, **settings):
 
 def test_the_video_is_shown_where_there_is_one_and_else_the_frames(root, write_video):
     write_video(video_of(root, "a"), range(0, 250, 5))  # 5 s
-    context, found = CONTEXTS["video"], samples_of(root)
-    assert {sample.question.traj_id: sample.variant for sample in found.samples} == {
+    context, task_samples = CONTEXTS["video"], samples_of(root)
+    assert {sample.question.traj_id: sample.variant for sample in task_samples.samples} == {
         "a": "source=mp4",
         "b": "source=frames",
     }
-    with_video, without = found.samples
-    (video,), text = context.request(found.data, with_video)
+    with_video, without = task_samples.samples
+    (video,), text = context.request(task_samples.data, with_video)
     # Four of 50 frames, at least: the first, the last and two between them.
     assert [frame.load().getpixel((9, 9))[0] for frame in video.frames] == pytest.approx(
         [0, 80, 165, 245], abs=4
@@ -47,16 +46,18 @@ def test_the_video_is_shown_where_there_is_one_and_else_the_frames(root, write_v
     assert text.startswith(
         "\nAnswer the question given the video showing the agent's trajectory over time. Do not "
     )
-    (video,), _ = context.request(found.data, without)
-    assert video == Video(tuple(found.data.frames("b")[at] for at in (0, 1, 3, 4)), 4 / 5 * 10)
+    (video,), _ = context.request(task_samples.data, without)
+    assert video == Video(
+        tuple(task_samples.data.frames("b")[at] for at in (0, 1, 3, 4)), 4 / 5 * 10
+    )
 
 
 def test_the_rate_is_a_setting(root, write_video):
     write_video(video_of(root, "a"), range(80))
     n_frames = []
     for fps in (1, 2):
-        found = samples_of(root, fps=fps)
-        (video,), _ = CONTEXTS["video"].request(found.data, found.samples[0])
+        task_samples = samples_of(root, fps=fps)
+        (video,), _ = CONTEXTS["video"].request(task_samples.data, task_samples.samples[0])
         n_frames.append(len(video.frames))
     assert n_frames == [8, 16]
     for wrong in (0, 11, "x"):
@@ -67,18 +68,18 @@ def test_the_rate_is_a_setting(root, write_video):
 
 
 def test_frames_of_a_video_can_be_ablated(root):
-    shown, blank = (samples_of(root, frames=frames) for frames in ("shown", "blank"))
-    (video,), _ = shown.request(shown.samples[1])
+    plain, blank = (samples_of(root, frames=frames) for frames in ("shown", "blank"))
+    (video,), _ = plain.request(plain.samples[1])
     (grey,), _ = blank.request(blank.samples[1])
     assert (len(grey.frames), grey.fps) == (len(video.frames), video.fps)
     assert {frame.load().getcolors()[0][1] for frame in grey.frames} == {(128, 128, 128)}
 
 
 def test_docs_of_lm_eval_give_the_same_frames_as_images(root):
-    found = samples_of(root, fps=2)
-    for sample in found.samples:
-        (video,), text = found.request(sample)
-        doc = json.loads(json.dumps(doc_of(found, sample)))
+    task_samples = samples_of(root, fps=2)
+    for sample in task_samples.samples:
+        (video,), text = task_samples.request(sample)
+        doc = json.loads(json.dumps(doc_of(task_samples, sample)))
         assert sample_of(doc).fps == 2
         assert doc_parts(doc) == [*video.frames, text]
         assert doc_prompt(doc) == "<image>" * len(video.frames) + text
@@ -90,9 +91,9 @@ def test_a_broken_video_has_its_questions_skipped_by_name_and_is_looked_at_once(
     opened, capture = [], cv2.VideoCapture
     monkeypatch.setattr(cv2, "VideoCapture", lambda *where: opened.append(where) or capture(*where))
     video_of(root, "a").write_bytes(b"no video")
-    found = samples_of(root)
-    assert [sample.question.traj_id for sample in found.samples] == ["b"]
-    (skipped,) = found.skipped
+    task_samples = samples_of(root)
+    assert [sample.question.traj_id for sample in task_samples.samples] == ["b"]
+    (skipped,) = task_samples.skipped
     assert skipped.reason.startswith(f"{video_of(root, 'a')}: not a video that OpenCV can decode")
     assert skipped.variant == "source=mp4"
     assert len(opened) == 1
@@ -102,12 +103,12 @@ def test_the_identity_changes_with_a_video(root, write_video):
     def sources():
         return CONTEXTS["video"].sources(NiehSet(root), ContextSettings())
 
-    found = [sources()]
+    identities = [sources()]
     write_video(video_of(root, "a"), [9] * 20)
-    found.append(sources())
-    assert sources() == found[-1]
+    identities.append(sources())
+    assert sources() == identities[-1]
     write_video(video_of(root, "a"), [99] * 20)
-    found.append(sources())
+    identities.append(sources())
     video_of(root, "a").write_bytes(b"no video")
-    found.append(sources())
-    assert len({str(each) for each in found}) == 4
+    identities.append(sources())
+    assert len({str(each) for each in identities}) == 4

@@ -10,7 +10,7 @@ from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.nieh.guessing.audit import BY, AuditedQuestion, Group, audit, groups, sentences
 from infthor_eval.nieh.guessing.guessers import GUESSERS
 
-from .made import asked
+from ...helpers.questions import make_question
 
 PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
 SINGLE, MULTI = "qa_set_nieh_single_clue", "qa_set_nsieh_multi_clue"
@@ -21,7 +21,7 @@ PRESENCE, OPEN = "Is Mug on the Bed?", "Where is Mug now?"
 def audited(text, answer, *scores, file="", clues=(1,), number=0):
     """A question with the scores of the first guessers; the others get 0."""
     right = (*scores, *[0.0] * (len(GUESSERS) - len(scores)))
-    return AuditedQuestion(asked(f"t{number}", text, answer, clues, file), right)
+    return AuditedQuestion(make_question(f"t{number}", text, answer, clues, file=file), right)
 
 
 def test_a_group_tells_its_answers_and_its_best_guesser():
@@ -49,8 +49,8 @@ def test_groups_are_split_by_file_unless_they_are_files():
         audited(OPEN, "Bed", file="a", clues=(1, 2)),
         audited(PRESENCE, "no", file="b"),
     ]
-    found = {by: {group.name: len(group.questions) for group in groups(items, by)} for by in BY}
-    assert found == {
+    sizes = {by: {group.name: len(group.questions) for group in groups(items, by)} for by in BY}
+    assert sizes == {
         "file": {"a": 2, "b": 1},
         "answers": {"a: open-ended": 1, "a: yes/no": 1, "b: yes/no": 1},
         "clues": {"a: 1": 1, "a: 2": 1, "b: 1": 1},
@@ -79,19 +79,21 @@ def test_sentences_tell_what_is_striking():
 
 
 def test_a_set_is_audited_question_by_question(tmp_path):
-    questions = [asked(f"t{i}", PRESENCE, "yes" if i else "no") for i in range(4)]
+    questions = [make_question(f"t{i}", PRESENCE, "yes" if i else "no") for i in range(4)]
     write_questions(tmp_path / "qa_set_test.csv", questions)
-    found = audit(NiehSet(tmp_path))
-    assert [item.question for item in found] == questions
-    assert [item.scores for item in found] == [(float(i > 0),) * len(GUESSERS) for i in range(4)]
+    audited_questions = audit(NiehSet(tmp_path))
+    assert [item.question for item in audited_questions] == questions
+    assert [item.scores for item in audited_questions] == [
+        (float(i > 0),) * len(GUESSERS) for i in range(4)
+    ]
 
 
 @pytest.mark.skipif(
     not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data"
 )
 def test_what_the_published_files_give_without_a_frame():
-    found = audit(NiehSet(PUBLISHED))
-    single, multi = groups(found, "file")
+    audited_questions = audit(NiehSet(PUBLISHED))
+    single, multi = groups(audited_questions, "file")
     assert [(group.name, len(group.questions)) for group in (single, multi)] == [
         (SINGLE, 829),
         (MULTI, 474),
@@ -104,9 +106,9 @@ def test_what_the_published_files_give_without_a_frame():
         assert (means[constant], means[blind]) == (of_constant, of_blind)
         assert means[learner] >= of_blind
         assert group.best()[1] == max(group.means()) >= group.means()[learner]
-    said = list(sentences(found))
-    assert said[:2] == [
+    summary = list(sentences(audited_questions))
+    assert summary[:2] == [
         f"All 525 yes/no questions of {SINGLE} are yes.",
         f"All 213 yes/no questions of {MULTI} are no.",
     ]
-    assert f"{MULTI}: Is {{}} in/on {{}}? (213 questions): the answer is always no." in said
+    assert f"{MULTI}: Is {{}} in/on {{}}? (213 questions): the answer is always no." in summary

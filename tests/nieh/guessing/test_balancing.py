@@ -10,7 +10,7 @@ from infthor_eval.nieh.guessing import balancing
 from infthor_eval.nieh.guessing.balancing import MARGIN, balance
 from infthor_eval.nieh.guessing.guessers import GUESSERS
 
-from .made import asked, on_clues
+from ...helpers.questions import make_question, make_samples_on_clues
 
 FORM = "Is {} in/on {}?"
 ANSWERS = ("yes", "no")
@@ -18,7 +18,7 @@ OBJECTS = ("Mug", "Box", "Pan", "Pen")
 
 
 def presence(traj, thing, answer, clues=(1,)):
-    return asked(f"t{traj}", f"Is {thing} on the Bed?", answer, clues)
+    return make_question(f"t{traj}", f"Is {thing} on the Bed?", answer, clues)
 
 
 def fair(n_trajectories=4, things=OBJECTS):
@@ -36,7 +36,7 @@ def best_above_chance(questions):
     chance = 1 / len({question.answers for question in questions})
     shares = []
     for guesser in GUESSERS:
-        guesses = zip(questions, guesser.guess(on_clues(*questions)), strict=True)
+        guesses = zip(questions, guesser.guess(make_samples_on_clues(*questions)), strict=True)
         shares.append(
             sum(guess == question.answers[0] for question, guess in guesses) / len(questions)
         )
@@ -62,48 +62,52 @@ def test_of_a_set_with_a_leak_a_part_without_it_is_kept(leak):
     ]
     before = [*leaky, *fair(things=OBJECTS[:2])]
     assert best_above_chance(before) > MARGIN  # or there would be nothing to prune
-    found = balance(before)
-    kept = set(found.questions)
+    balanced = balance(before)
+    kept = set(balanced.questions)
     assert kept
-    assert best_above_chance(found.questions) <= MARGIN + 1e-9
+    assert best_above_chance(balanced.questions) <= MARGIN + 1e-9
     assert len(kept & set(leaky)) < len(leaky)
-    assert list(found.questions) == [question for question in before if question in kept]
-    assert found.kept == {FORM: (len(kept), len(before))}
-    assert (found.chance, found.best_score <= 0.5 + MARGIN) == (0.5, True)
+    assert list(balanced.questions) == [question for question in before if question in kept]
+    assert balanced.kept == {FORM: (len(kept), len(before))}
+    assert (balanced.chance, balanced.best_score <= 0.5 + MARGIN) == (0.5, True)
 
 
 def test_a_fair_set_is_kept_whole():
     questions = fair()
-    found = balance(questions)
-    assert (list(found.questions), found.chance, found.kept) == (questions, 0.5, {FORM: (16, 16)})
-    assert found.best in {guesser.name for guesser in GUESSERS}
-    assert found.best_score <= 0.5
+    balanced = balance(questions)
+    assert (list(balanced.questions), balanced.chance, balanced.kept) == (
+        questions,
+        0.5,
+        {FORM: (16, 16)},
+    )
+    assert balanced.best in {guesser.name for guesser in GUESSERS}
+    assert balanced.best_score <= 0.5
 
 
 def test_where_there_is_nothing_to_balance_the_part_is_empty():
     one_answer = [presence(traj, "Mug", "yes") for traj in range(4)]
     for questions, kept in ((one_answer, {FORM: (0, 4)}), ([], {})):
-        found = balance(questions)
-        assert (found.questions, found.chance, found.best, found.best_score) == (
+        balanced = balance(questions)
+        assert (balanced.questions, balanced.chance, balanced.best, balanced.best_score) == (
             (),
             0.0,
             "none",
             0.0,
         )
-        assert found.kept == kept
+        assert balanced.kept == kept
 
 
 def test_a_form_with_one_answer_goes_and_the_others_stay():
-    always = [asked(f"t{traj}", "Was Box open?", "yes") for traj in range(4)]
-    found = balance([*always, *fair()])
-    assert list(found.questions) == fair()
-    assert found.kept == {FORM: (16, 16), "Was {} open?": (0, 4)}
+    always = [make_question(f"t{traj}", "Was Box open?", "yes") for traj in range(4)]
+    balanced = balance([*always, *fair()])
+    assert list(balanced.questions) == fair()
+    assert balanced.kept == {FORM: (16, 16), "Was {} open?": (0, 4)}
 
 
 def test_files_are_counted_apart_but_balanced_together():
     """All yes in one file and all no in the other is no leak of the part, which is one file."""
     questions = [
-        asked(
+        make_question(
             question.traj_id,
             question.text,
             question.answers[0],
@@ -111,8 +115,8 @@ def test_files_are_counted_apart_but_balanced_together():
         )
         for question in fair()
     ]
-    found = balance(questions)
-    assert found.kept == {f"a: {FORM}": (8, 8), f"b: {FORM}": (8, 8)}
+    balanced = balance(questions)
+    assert balanced.kept == {f"a: {FORM}": (8, 8), f"b: {FORM}": (8, 8)}
 
 
 @settings(max_examples=50)

@@ -12,9 +12,9 @@ from infthor_eval.nieh.guessing.chains import (
     words_of,
 )
 
-from .made import asked, on_clues
+from ...helpers.questions import make_question, make_samples_on_clues
 
-QUESTION = asked("t", "Is Mug on-the Bed?", "yes", (250, 310))
+QUESTION = make_question("t", "Is Mug on-the Bed?", "yes", (250, 310))
 LEADING = [("leading", *words) for words in (["is"], ["is", "mug"], ["is", "mug", "on"])]
 
 
@@ -23,7 +23,7 @@ def test_words_are_in_lower_case_without_marks():
 
 
 def test_chains_go_from_the_general_to_the_particular():
-    (sample,) = on_clues(QUESTION)
+    (sample,) = make_samples_on_clues(QUESTION)
     leading, *later = chains_of_words(sample)
     assert leading[:3] == LEADING
     assert leading[3:] == [(*LEADING[2], "the"), (*LEADING[2], "the", "bed")]
@@ -31,7 +31,7 @@ def test_chains_go_from_the_general_to_the_particular():
 
 
 def test_number_and_place_follow_the_stem():
-    (sample,) = on_clues(QUESTION)
+    (sample,) = make_samples_on_clues(QUESTION)
     stem = ("stem", "is", "mug", "on")
     assert chains_of_words_and_count(sample) == [
         *chains_of_words(sample),
@@ -43,7 +43,9 @@ def test_number_and_place_follow_the_stem():
 
 
 def test_a_question_is_left_out_with_its_trajectory_or_alone_if_there_is_one():
-    several = on_clues(asked("t", "A?", "x"), asked("t", "B?", "x"), asked("u", "C?", "x"))
+    several = make_samples_on_clues(
+        make_question("t", "A?", "x"), make_question("t", "B?", "x"), make_question("u", "C?", "x")
+    )
     assert list(map(held_out(several), several)) == ["t", "t", "u"]
     alone = several[:2]
     assert list(map(held_out(alone), alone)) == [sample.question.id for sample in alone]
@@ -62,16 +64,16 @@ def test_a_context_counts_less_the_more_different_answers_it_has(n_y, guess):
     (1 + 2 * 18 / 20) / (3 + 2) = 0.56. With a third y it has (1 + 2 * 18 / 21) / (4 + 2) = 0.45.
     """
     key = [("a", "x"), *[("a", "y")] * n_y, *[("c", "x")] * 17]
-    samples = on_clues(
-        *(asked(f"t{number}", text, answer) for number, (text, answer) in enumerate(key))
+    samples = make_samples_on_clues(
+        *(make_question(f"t{number}", text, answer) for number, (text, answer) in enumerate(key))
     )
     guesser = Guesser(samples, chain_of(lambda sample: sample.question.text))
     assert [
-        guesser.guess(sample) for sample in on_clues(asked("new", "a", "?"), asked("new", "e", "?"))
-    ] == [
-        guess,
-        "x",
-    ]
+        guesser.guess(sample)
+        for sample in make_samples_on_clues(
+            make_question("new", "a", "?"), make_question("new", "e", "?")
+        )
+    ] == [guess, "x"]
 
 
 def test_own_answers_are_taken_away_before_counting():
@@ -79,7 +81,7 @@ def test_own_answers_are_taken_away_before_counting():
     elsewhere."""
     key = [("t", "a", "x")] * 5 + [("u", "a", "y"), ("u", "b", "x"), ("v", "b", "x")]
     samples = [
-        Sample(asked(traj, text, answer, (number,)), (1,))
+        Sample(make_question(traj, text, answer, (number,)), (1,))
         for number, (traj, text, answer) in enumerate(key)
     ]
     guesser = Guesser(samples, chain_of(lambda sample: sample.question.text))
@@ -89,16 +91,19 @@ def test_own_answers_are_taken_away_before_counting():
 
 
 def test_of_equally_likely_answers_the_first_in_the_alphabet_is_guessed():
-    samples = on_clues(
-        *(asked(f"t{i}", "Why?", answer) for i, answer in enumerate(("pear", "fig", "pear", "fig")))
+    samples = make_samples_on_clues(
+        *(
+            make_question(f"t{i}", "Why?", answer)
+            for i, answer in enumerate(("pear", "fig", "pear", "fig"))
+        )
     )
     guesser = Guesser(samples, chains_of_words)
-    assert guesser.guess(on_clues(asked("new", "Why?", "?"))[0]) == "fig"
+    assert guesser.guess(make_samples_on_clues(make_question("new", "Why?", "?"))[0]) == "fig"
 
 
 @pytest.mark.parametrize(
     "chains", [chains_of_words, chains_of_words_and_count, chains_of_words_and_place]
 )
 def test_of_one_question_nothing_is_learned(chains):
-    (sample,) = on_clues(asked("t", "Why?", "x"))
+    (sample,) = make_samples_on_clues(make_question("t", "Why?", "x"))
     assert Guesser([sample], chains).guess(sample) == ""

@@ -5,7 +5,7 @@ from infthor_eval.nieh.guessing.forms import form_of, question_type
 
 
 @pytest.mark.parametrize(
-    ("text", "given", "form", "kind"),
+    ("text", "type_in_file", "form", "kind"),
     [
         ("Is Mug on the Table?", None, "Is {} in/on {}?", "is mug"),
         ("is the mug in the sink?", "final_state", "Is {} in/on {}?", "final_state"),
@@ -17,7 +17,7 @@ from infthor_eval.nieh.guessing.forms import form_of, question_type
     ],
 )
 def test_a_question_has_the_form_of_its_words_else_its_type_else_its_first_words(
-    text, given, form, kind
+    text, type_in_file, form, kind
 ):
-    question = Question("t", text, (0,), ("yes",), given)
+    question = Question("t", text, (0,), ("yes",), type_in_file)
     assert (form_of(question), question_type(question)) == (form, kind)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
 
-from .made import asked, on_clues
+from ...helpers.questions import make_question, make_samples_on_clues
 
 UNIQUE = "an answer that nobody else gives"
 _TEXTS = st.sampled_from(
@@ -22,7 +22,7 @@ _EACH = pytest.mark.parametrize("guesser", GUESSERS, ids=lambda guesser: guesser
 
 def questions_of(rows):
     return [
-        asked(f"t{traj}", text, answer, tuple(range(number, number + n_clues)))
+        make_question(f"t{traj}", text, answer, tuple(range(number, number + n_clues)))
         for number, (traj, text, answer, n_clues) in enumerate(rows)
     ]
 
@@ -41,7 +41,10 @@ def test_answers_on_the_own_trajectory_change_no_guess_at_it(guesser, rows):
     own = before[0].traj_id
     after = [answered(question) if question.traj_id == own else question for question in before]
     guesses = zip(
-        before, guesser.guess(on_clues(*before)), guesser.guess(on_clues(*after)), strict=True
+        before,
+        guesser.guess(make_samples_on_clues(*before)),
+        guesser.guess(make_samples_on_clues(*after)),
+        strict=True,
     )
     assert all(
         first == second != UNIQUE for question, first, second in guesses if question.traj_id == own
@@ -56,13 +59,13 @@ def test_on_one_trajectory_alone_a_question_is_left_out_itself(guesser, rows, pl
     place %= len(questions)
     questions[place] = answered(questions[place])
     others = {question.answers[0] for question in questions} - {UNIQUE}
-    assert guesser.guess(on_clues(*questions))[place] in {*others, ""}
+    assert guesser.guess(make_samples_on_clues(*questions))[place] in {*others, ""}
 
 
 @_EACH
 def test_what_the_others_answer_is_guessed(guesser):
-    samples = on_clues(
-        *(asked(f"t{i}", "Is Mug on the Bed?", "yes" if i else "no") for i in range(5))
+    samples = make_samples_on_clues(
+        *(make_question(f"t{i}", "Is Mug on the Bed?", "yes" if i else "no") for i in range(5))
     )
     assert guesser.guess(samples) == ["yes"] * 5
 
@@ -75,20 +78,20 @@ def test_the_constant_of_a_file_is_the_commonest_answer_elsewhere():
     # t0 sees 1 yes and 2 no elsewhere; the others 3 yes, and 1 or 2 no; equals are taken by the
     # alphabet.
     key = [("t0", "yes"), ("t0", "yes"), ("t1", "yes"), ("t1", "no"), ("t2", "no")]
-    samples = on_clues(
-        *(asked(traj, f"{traj} {i}?", answer) for i, (traj, answer) in enumerate(key))
+    samples = make_samples_on_clues(
+        *(make_question(traj, f"{traj} {i}?", answer) for i, (traj, answer) in enumerate(key))
     )
     assert named("one answer a file").guess(samples) == ["no", "no", "yes", "yes", "yes"]
-    (alone,) = on_clues(asked("t", "Why?", "x"))
+    (alone,) = make_samples_on_clues(make_question("t", "Why?", "x"))
     assert named("one answer a file").guess([alone]) == [""]
 
 
 def test_the_constant_of_a_form_is_the_commonest_answer_to_it():
     key = [("Is Mug on the Bed?", "no"), ("Was Box open?", "yes")]
-    samples = on_clues(*(asked(f"t{i}", *key[i % 2]) for i in range(6)))
+    samples = make_samples_on_clues(*(make_question(f"t{i}", *key[i % 2]) for i in range(6)))
     assert named("one answer a form").guess(samples) == ["no", "yes"] * 3
     (_, new, *_) = named("one answer a form").guess(
-        [*on_clues(asked("t9", "Why?", "x"), asked("t8", "How?", "x"))]
+        [*make_samples_on_clues(make_question("t9", "Why?", "x"), make_question("t8", "How?", "x"))]
     )
     assert new == ""  # nobody else is asked in that form
 
@@ -99,11 +102,11 @@ def test_a_guesser_uses_what_it_says_it_knows(guesser):
     clues = {Knowledge.NUMBER: ((1, 9), (1, 5, 9)), Knowledge.PLACE: ((1,), (501,))}
     for kind, both in clues.items():
         questions = [
-            asked(f"t{i}", "Is it here?", ("yes", "no")[j], both[j])
+            make_question(f"t{i}", "Is it here?", ("yes", "no")[j], both[j])
             for i in range(8)
             for j in range(2)
         ]
-        guesses = guesser.guess(on_clues(*questions))
+        guesses = guesser.guess(make_samples_on_clues(*questions))
         right = sum(
             guess == question.answers[0] for guess, question in zip(guesses, questions, strict=True)
         )

@@ -19,8 +19,8 @@ from infthor_eval.nieh.guessing.guesses import (
 from infthor_eval.nieh.results.above_guessing import above_guessing
 from infthor_eval.storage.folders import user_cache
 
-from ..made import record
-from .made import asked, on_clues
+from ...helpers.nieh_runs import make_record
+from ...helpers.questions import make_question, make_samples_on_clues
 
 PRESENCE, OPEN = "Is Mug on the Bed?", "Was Box open?"
 
@@ -36,7 +36,7 @@ def make_set(tmp_path):
 
 
 def constant(text, answers, clues=(1,)):
-    return [asked(f"t{i}", text, answer, clues) for i, answer in enumerate(answers)]
+    return [make_question(f"t{i}", text, answer, clues) for i, answer in enumerate(answers)]
 
 
 def test_on_the_clue_frames_their_number_is_told_and_elsewhere_the_words_alone():
@@ -79,8 +79,8 @@ def test_a_file_is_guessed_from_itself_alone(make_set):
     data = make_set(
         a=constant(PRESENCE, ("yes",) * 3, (1,)), b=constant(PRESENCE, ("no",) * 3, (2,))
     )
-    found = find_guesses(data, Knowledge.WORDS)
-    assert {guess.scores["strict"] for guess in found.values()} == {1.0}
+    guesses = find_guesses(data, Knowledge.WORDS)
+    assert {guess.scores["strict"] for guess in guesses.values()} == {1.0}
     assert {name: len(questions) for name, questions in questions_by_file(data).items()} == {
         "qa_set_a": 3,
         "qa_set_b": 3,
@@ -89,19 +89,21 @@ def test_a_file_is_guessed_from_itself_alone(make_set):
 
 def test_what_a_guesser_may_not_know_does_not_help(make_set):
     key = [(f"t{i}", ("yes", "no")[j], ((1,), (1, 2))[j]) for i in range(6) for j in range(2)]
-    data = make_set(test=[asked(traj, PRESENCE, answer, clues) for traj, answer, clues in key])
-    told, untold = (
+    data = make_set(
+        test=[make_question(traj, PRESENCE, answer, clues) for traj, answer, clues in key]
+    )
+    with_clues, without_clues = (
         find_guesses(data, knowledge)
         for knowledge in map(visible_knowledge, ("clues", "trajectory"))
     )
-    assert {guess.form_scores["strict"] for guess in told.values()} == {1.0}
-    assert {guess.form_scores["strict"] for guess in untold.values()} == {0.5}
+    assert {guess.form_scores["strict"] for guess in with_clues.values()} == {1.0}
+    assert {guess.form_scores["strict"] for guess in without_clues.values()} == {0.5}
 
 
 def test_no_guesser_is_above_guessing_and_the_best_is_there(make_set):
     answers = ("yes", "yes", "no", "yes", "no", "no", "yes", "no", "yes")
     questions = [
-        asked(
+        make_question(
             f"t{i % 5}",
             f"Is {('Mug', 'Box', 'Pan')[i % 3]} on the Bed?",
             answer,
@@ -113,9 +115,9 @@ def test_no_guesser_is_above_guessing_and_the_best_is_there(make_set):
     guesses = find_guesses(data, ~Knowledge.FILE)
     scores = []
     for guesser in GUESSERS:
-        replies = zip(questions, guesser.guess(on_clues(*questions)), strict=True)
+        replies = zip(questions, guesser.guess(make_samples_on_clues(*questions)), strict=True)
         records = [
-            record(i, reply, question.answers, guess=guesses[question.id])
+            make_record(i, reply, question.answers, guess=guesses[question.id])
             for i, (question, reply) in enumerate(replies)
         ]
         scores.append(above_guessing(records, "strict").mean)
@@ -123,7 +125,7 @@ def test_no_guesser_is_above_guessing_and_the_best_is_there(make_set):
 
 
 def test_a_question_on_its_clue_frames_has_them_in_order():
-    assert sample_on_clues(asked("t", PRESENCE, "yes", (5, 2))).frames == (2, 5)
+    assert sample_on_clues(make_question("t", PRESENCE, "yes", (5, 2))).frames == (2, 5)
 
 
 def test_questions_that_are_asked_at_once_wait_for_the_one_that_learns(make_set, monkeypatch):

@@ -4,7 +4,7 @@ import pytest
 
 from infthor_eval.nieh.guessing.learner import guess_by_learning
 
-from .made import asked, on_clues
+from ...helpers.questions import make_question, make_samples_on_clues
 
 TEXTS = ("Is Mug on the Bed?", "Is Box on the Bed?")
 
@@ -21,14 +21,18 @@ def of_both(clues, answers=("yes", "no")):
     answers."""
     each = zip(clues, answers, strict=True)
     pairs = list(each)
-    return on_clues(
-        *(asked(f"t{i}", TEXTS[0], answer, of_one) for i in range(6) for of_one, answer in pairs)
+    return make_samples_on_clues(
+        *(
+            make_question(f"t{i}", TEXTS[0], answer, of_one)
+            for i in range(6)
+            for of_one, answer in pairs
+        )
     )
 
 
 def test_words_that_give_the_answer_away_are_learned():
-    questions = [asked(f"t{i}", TEXTS[i % 2], ("yes", "no")[i % 2]) for i in range(12)]
-    assert right(on_clues(*questions), number=False, place=False) == 12
+    questions = [make_question(f"t{i}", TEXTS[i % 2], ("yes", "no")[i % 2]) for i in range(12)]
+    assert right(make_samples_on_clues(*questions), number=False, place=False) == 12
 
 
 @pytest.mark.parametrize(
@@ -46,12 +50,14 @@ def test_number_and_place_are_learned_by_those_that_know_them_alone(clues, knowl
 
 
 def test_without_another_trajectory_or_answer_there_is_nothing_to_fit():
-    (alone,) = on_clues(asked("t", TEXTS[0], "yes"))
+    (alone,) = make_samples_on_clues(make_question("t", TEXTS[0], "yes"))
     assert guess_by_learning([alone], number=True, place=True) == [""]
-    same = on_clues(*(asked(f"t{i}", TEXTS[0], "yes") for i in range(3)))
+    same = make_samples_on_clues(*(make_question(f"t{i}", TEXTS[0], "yes") for i in range(3)))
     assert guess_by_learning(same, number=True, place=True) == ["yes"] * 3
 
 
 def test_on_one_trajectory_each_question_is_guessed_from_the_others():
-    samples = on_clues(*(asked("t", TEXTS[i % 2], ("yes", "no")[i % 2], (i,)) for i in range(12)))
+    samples = make_samples_on_clues(
+        *(make_question("t", TEXTS[i % 2], ("yes", "no")[i % 2], (i,)) for i in range(12))
+    )
     assert right(samples, number=False, place=False) == 12

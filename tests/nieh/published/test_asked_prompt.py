@@ -1,7 +1,6 @@
 """With which prompt the published logs were asked, by the public vocabulary and without it."""
 
 import base64
-import gzip
 import importlib.util
 import json
 import os
@@ -12,12 +11,14 @@ from pathlib import Path
 import pytest
 import regex
 
-from infthor_eval.formats.question import Question
 from infthor_eval.formats.reply_logs import LoggedReply, read_reply_log
 from infthor_eval.nieh.contexts import CONTEXTS
 from infthor_eval.nieh.prompts import PUBLISHED_LOGS, PUBLISHED_MAIN, question_text
 from infthor_eval.nieh.published import asked_prompt as module
 from infthor_eval.nieh.published.asked_prompt import asked_prompt
+
+from ...helpers.files import read_json_lines
+from ...helpers.questions import make_question
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "goldens" / "prompts.json").read_text())
 REPLIES = Path(__file__).parents[3] / "../shared/data/published_sets/replies"
@@ -46,16 +47,11 @@ VIEWS, FILM = CONTEXTS["trajectory"].intro, CONTEXTS["video"].intro
 
 # Qwen2's split of a text into pieces that are merged apart.
 PIECES = regex.compile(
-    r"(?i:'s|'t|'re|'ve|'m|'ll|'d)|[^\r\n\p{L}\p{N}]?\p{L}+|\p{N}| "
-    r"?[^\s\p{L}\p{N}]+[\r\n]*|\s*[\r\n]+|\s+(?!\S)|\s+"
+    r"(?i:'s|'t|'re|'ve|'m|'ll|'d)|[^\r\n\p{L}\p{N}]?\p{L}+|\p{N}"
+    r"| ?[^\s\p{L}\p{N}]+[\r\n]*|\s*[\r\n]+|\s+(?!\S)|\s+"
 )
-TEMPLATE = (
-    "system\nYou are a helpful assistant.",
-    "\n",
-    "user\n",
-    "\n",
-    "assistant\n",
-)  # between 5 special tokens
+# Between 5 special tokens.
+TEMPLATE = ("system\nYou are a helpful assistant.", "\n", "user\n", "\n", "assistant\n")
 N_SPECIAL = 5
 
 
@@ -85,24 +81,17 @@ def n_tokens(text):
     )
 
 
-def rows_of(log):
-    with gzip.open(log) as lines:
-        return [json.loads(line) for line in lines]
-
-
-def asked(text):
-    return Question("t", text, (0,), ("yes",))
-
-
 @pytest.mark.parametrize("case", GOLDEN["published-logs"], ids=lambda case: case["question"])
 def test_the_logs_prompt_is_the_published_text(case):
-    assert question_text(VIEWS, asked(case["question"]), PUBLISHED_LOGS) == case["text"]
+    assert (
+        question_text(VIEWS, make_question("t", case["question"]), PUBLISHED_LOGS) == case["text"]
+    )
 
 
 @pytest.mark.parametrize("case", GOLDEN["published-main"], ids=lambda case: case["mode"])
 def test_the_prompt_of_main_is_the_published_text(case):
     context = CONTEXTS[{"full_traj": "trajectory"}.get(case["mode"], case["mode"])]
-    assert question_text(context.intro, asked(case["question"])) == case["text"]
+    assert question_text(context.intro, make_question("t", case["question"])) == case["text"]
 
 
 @needs_logs
@@ -110,11 +99,14 @@ def test_the_prompt_of_main_is_the_published_text(case):
 def test_the_logs_prompt_has_the_logged_number_of_tokens_in_every_row():
     n = {PUBLISHED_LOGS: 0, PUBLISHED_MAIN: 0}
     n_rows = 0
-    for row in [row for log in REPLIES.glob("*.log.gz") for row in rows_of(log)]:
+    for row in [row for log in REPLIES.glob("*.log.gz") for row in read_json_lines(log)]:
         n_rows += 1
         n_text = row["ctx_n_tokens"] - 123 * row["n_imgs"]
         for prompt in n:
-            n[prompt] += n_tokens(question_text(VIEWS, asked(row["question"]), prompt)) == n_text
+            n[prompt] += (
+                n_tokens(question_text(VIEWS, make_question("t", row["question"]), prompt))
+                == n_text
+            )
     # All fourteen logs, by hand: 6,133 of 6,133 rows on images; 2,606 of 2,606 on videos are main's
     # prompt of films.
     assert (n_rows, n) == (3909, {PUBLISHED_LOGS: 3909, PUBLISHED_MAIN: 0})
@@ -125,10 +117,12 @@ def test_the_tokens_of_the_prompts_own_words_are_those_of_the_vocabulary():
     question = "Where is Statue now?"  # a token for each word and for the mark
     n_question = len(question.split()) + 1
     of_frames = {
-        name: n_tokens(question_text(VIEWS, asked(question), name)) for name in module._OF_FRAMES
+        name: n_tokens(question_text(VIEWS, make_question("t", question), name))
+        for name in module._OF_FRAMES
     }
     of_films = {
-        name: n_tokens(question_text(FILM, asked(question), name)) for name in module._OF_FILMS
+        name: n_tokens(question_text(FILM, make_question("t", question), name))
+        for name in module._OF_FILMS
     }
     assert {name: n - n_question for name, n in of_frames.items()} == module._OF_FRAMES
     assert {name: n - n_question for name, n in of_films.items()} == module._OF_FILMS
@@ -145,7 +139,7 @@ def reply(n_context_tokens, n_frames=10, mode="full_traj"):
     return LoggedReply(
         1,
         "yes",
-        published=asked("Where is Statue now?"),
+        published=make_question("t", "Where is Statue now?"),
         mode=mode,
         n_frames=n_frames,
         n_context_tokens=n_context_tokens,

@@ -52,29 +52,29 @@ def imported(tmp_path):
 
 
 def row(number, **more):
-    asked = QUESTIONS[number]
+    question = QUESTIONS[number]
     about = {
         "qidx": number,
-        "traj_id": asked.traj_id,
-        "question": asked.text,
-        "gt_img_idx": list(asked.clues),
+        "traj_id": question.traj_id,
+        "question": question.text,
+        "gt_img_idx": list(question.clues),
     }
-    return about | {"gt_answer": list(asked.answers), "llm_response": "bed"} | more
+    return about | {"gt_answer": list(question.answers), "llm_response": "bed"} | more
 
 
-def shown(run):
+def shown_clues_of(run):
     """Shown clues, clues and frames after the last one, by question; None if they are not known."""
-    found = {record.id: record.payload.shown_clues for record in run.records}
+    clues_by_question = {record.id: record.payload.shown_clues for record in run.records}
     return {
         name: clues and (clues.n_shown, clues.n_clues, clues.n_after)
-        for name, clues in found.items()
+        for name, clues in clues_by_question.items()
     }
 
 
 def test_whole_trajectories_show_all_and_tell_their_length(imported):
     rows = [row(0, n_imgs=10), row(1, n_imgs=10, eval_mode="full_traj"), row(2)]
     (run,) = imported(full_traj=rows)
-    assert (run.task, shown(run)) == (
+    assert (run.task, shown_clues_of(run)) == (
         "nieh_full",
         {"q0": (1, 1, 6), "q1": (1, 1, 1), "q2": (2, 2, None)},
     )
@@ -84,19 +84,23 @@ def test_the_end_of_a_trajectory_tells_its_length_and_what_was_shown(imported):
     end = {"eval_mode": "truncate_head", "ctx_size_k": 1, "n_imgs": 5}
     rows = [row(number, **end, selected_img_indices=[6, 7, 8, 9]) for number in range(3)]
     (run,) = imported(full_traj_truncate_head_1K=rows)
-    assert (run.task, shown(run)) == (
+    assert (run.task, shown_clues_of(run)) == (
         "nieh_truncate_head_1k",
         {"q0": (0, 1, 6), "q1": (1, 1, 1), "q2": (1, 2, 3)},
     )
 
 
 def test_lengths_serve_the_logs_of_other_modes(imported):
-    found = {"eval_mode": "clip_retrieval", "n_imgs": 2}
-    retrieved = [row(0, **found, selected_img_indices=[1, 3]), row(1, **found), row(2, **found)]
+    retrieved_columns = {"eval_mode": "clip_retrieval", "n_imgs": 2}
+    retrieved = [
+        row(0, **retrieved_columns, selected_img_indices=[1, 3]),
+        row(1, **retrieved_columns),
+        row(2, **retrieved_columns),
+    ]
     alone = imported(full_traj_clip_retrieval=retrieved)
-    assert [shown(run) for run in alone] == [{"q0": (1, 1, None), "q1": None, "q2": None}]
+    assert [shown_clues_of(run) for run in alone] == [{"q0": (1, 1, None), "q1": None, "q2": None}]
     run, _ = imported(full_traj_clip_retrieval=retrieved, full_traj=[row(1, n_imgs=10)])
-    assert (run.task, shown(run)) == (
+    assert (run.task, shown_clues_of(run)) == (
         "nieh_clip_retrieval",
         {"q0": (1, 1, 6), "q1": None, "q2": None},
     )
@@ -105,7 +109,7 @@ def test_lengths_serve_the_logs_of_other_modes(imported):
 def test_a_length_that_a_clue_lies_beyond_is_none(imported):
     # A model that takes only some of the frames logs these as n_imgs.
     (run,) = imported(full_traj=[row(0, n_imgs=5), row(1, n_imgs=5)])
-    assert shown(run)["q1"] == (1, 1, None)
+    assert shown_clues_of(run)["q1"] == (1, 1, None)
 
 
 def test_an_absence_has_no_evidence(tmp_path):
@@ -129,7 +133,7 @@ def test_neutral_rows_show_the_frames_that_they_name(tmp_path):
     ]
     log.write_text("".join(f"{json.dumps(one)}\n" for one in rows))
     (run,) = import_logs([log], NiehSet(tmp_path), "me")
-    assert shown(run) == {"q0": (0, 1, None), "q1": (0, 1, None), "q2": None}
+    assert shown_clues_of(run) == {"q0": (0, 1, None), "q1": (0, 1, None), "q2": None}
 
 
 @pytest.mark.parametrize(
@@ -207,15 +211,15 @@ def test_published_replies_at_32k_by_shown_clues():
     (run,) = import_logs(logs, data)
     ((_, task),) = summarise(run.header(data).config, run.records).tasks.items()
     cells = {name: evidence.by_shown_clues for name, evidence in task.evidence.items()}
-    found = {
+    scores = {
         name: {
             share: (cell.n, round(100 * cell.scores["reference"].mean, 1))
             for share, cell in of_file.items()
         }
         for name, of_file in cells.items()
     }
-    assert found[SINGLE] == {"all": (457, 57.9), "none": (372, 55.2)}
-    assert found[MULTI]["all"] == (105, 47.0)
+    assert scores[SINGLE] == {"all": (457, 57.9), "none": (372, 55.2)}
+    assert scores[MULTI]["all"] == (105, 47.0)
     assert all(record.payload.shown_clues for record in run.records)
     # Row 0 of the file: its clue is frame 785 of 886.
     first = next(record for record in run.records if record.id == data.files[SINGLE][0].id)

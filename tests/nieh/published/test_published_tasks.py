@@ -61,9 +61,9 @@ def test_windows_have_the_published_number_of_frames(make_nieh_set, task, tokens
     assert {sample.frames for sample in samples} == {tuple(range(600 - n, 600))}
 
 
-def ask(prepared, model, task, **options):
+def ask(prepare_run, model, task, **options):
     """Asks a question on the bundled set; returns its record."""
-    run = prepared(
+    run = prepare_run(
         model, tasks=(f"nieh_published_{task}",), data=BUNDLED, limit=1, suite_options=options
     )
     (record,) = execute(run).records
@@ -73,34 +73,33 @@ def ask(prepared, model, task, **options):
 def check(record, n_tokens):
     assert record.failure is None
     assert set(record.payload.scores) == {"reference"}
-    assert record.tokens.context == pytest.approx(
-        n_tokens, abs=150
-    )  # a text of about a hundred tiny tokens
+    # A text of about a hundred tiny tokens.
+    assert record.tokens.context == pytest.approx(n_tokens, abs=150)
 
 
 @MODELS
 @pytest.mark.parametrize(("task", "n"), [("last_32k", 2), ("last_64k", 4)])
-def test_windows_run_on_tiny_models(prepared, model, task, n):
-    record = ask(prepared, model, task, tokens_per_frame=16384)
+def test_windows_run_on_tiny_models(prepare_run, model, task, n):
+    record = ask(prepare_run, model, task, tokens_per_frame=16384)
     check(record, n * {"qwen2.5-vl-tiny": 123, "llava-onevision-tiny": 1485}[model])
 
 
 @MODELS
 @pytest.mark.parametrize(("task", "n"), [("clip_10", 10), ("clip_20", 20)])
-def test_retrieved_frames_run_on_tiny_models(prepared, make_clip, model, task, n):
-    record = ask(prepared, model, task, retriever=str(make_clip()))
+def test_retrieved_frames_run_on_tiny_models(prepare_run, make_clip, model, task, n):
+    record = ask(prepare_run, model, task, retriever=str(make_clip()))
     check(record, n * {"qwen2.5-vl-tiny": 123, "llava-onevision-tiny": 1485}[model])
 
 
 @pytest.mark.parametrize(("task", "n_frames"), [("video_1fps", 8), ("video_2fps", 16)])
-def test_films_run_on_a_tiny_model(prepared, task, n_frames):
-    check(ask(prepared, "qwen2.5-vl-tiny", task), n_frames // 2 * 144)
+def test_films_run_on_a_tiny_model(prepare_run, task, n_frames):
+    check(ask(prepare_run, "qwen2.5-vl-tiny", task), n_frames // 2 * 144)
 
 
-def test_whole_trajectories_run_where_they_fit_and_are_refused_where_they_do_not(prepared):
+def test_whole_trajectories_run_where_they_fit_and_are_refused_where_they_do_not(prepare_run):
     """As in the README: "fail to handle long contexts beyond their pretraining limits"."""
-    check(ask(prepared, "qwen2.5-vl-tiny", "full"), 89 * 123)
-    refused = ask(prepared, "llava-onevision-tiny", "readme")
+    check(ask(prepare_run, "qwen2.5-vl-tiny", "full"), 89 * 123)
+    refused = ask(prepare_run, "llava-onevision-tiny", "readme")
     assert refused.task == "nieh_published_full"
     assert "is beyond the 32768 tokens of llava-onevision-tiny" in refused.failure
 
@@ -108,16 +107,16 @@ def test_whole_trajectories_run_where_they_fit_and_are_refused_where_they_do_not
 # -- the option
 
 
-def asked(prepared, **options):
+def first_prompt(prepare_run, **options):
     """The prompt of the first request as samples tell it, and the run."""
-    outcome = execute(prepared(**options))
+    outcome = execute(prepare_run(**options))
     return next(iter(outcome.samples)).prompt.rpartition("<image>")[2], outcome
 
 
-def test_the_option_sets_the_words_and_the_runs_identity(prepared, data):
-    default, without = asked(prepared)
-    same, named = asked(prepared, suite_options={"prompt": "published-main"})
-    other, logs = asked(prepared, suite_options={"prompt": "published-logs"})
+def test_the_option_sets_the_words_and_the_runs_identity(prepare_run, data):
+    default, without = first_prompt(prepare_run)
+    same, named = first_prompt(prepare_run, suite_options={"prompt": "published-main"})
+    other, logs = first_prompt(prepare_run, suite_options={"prompt": "published-logs"})
     assert default == same == question_text(CONTEXTS["clues"].intro, QUESTIONS[0])
     assert other == question_text("", QUESTIONS[0], "published-logs")
     assert named.folder == without.folder != logs.folder
@@ -142,7 +141,7 @@ def test_lm_evals_docs_keep_the_words(make_nieh_set):
 
 
 @pytest.mark.parametrize(
-    ("tasks", "prompt", "said"),
+    ("tasks", "prompt", "expected"),
     [
         (
             ("nieh_published_full",),
@@ -156,6 +155,6 @@ def test_lm_evals_docs_keep_the_words(make_nieh_set):
         ),
     ],
 )
-def test_a_prompt_without_effect_is_refused(prepared, tasks, prompt, said):
-    with pytest.raises(UsageError, match=said):
-        prepared(tasks=tasks, suite_options={"prompt": prompt})
+def test_a_prompt_without_effect_is_refused(prepare_run, tasks, prompt, expected):
+    with pytest.raises(UsageError, match=expected):
+        prepare_run(tasks=tasks, suite_options={"prompt": prompt})

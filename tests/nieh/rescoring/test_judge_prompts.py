@@ -18,7 +18,7 @@ def test_the_published_prompt_is_the_published_text(case):
 
 
 @pytest.mark.parametrize(
-    ("said", "score"),
+    ("verdict", "score"),
     [
         ('{"score": 1.0}', 1.0),
         ('{"score": 0}', 0.0),
@@ -28,24 +28,22 @@ def test_the_published_prompt_is_the_published_text(case):
         ('{"score": true}', None),
         ('{"score": "1"}', None),
         ('{"score": NaN}', None),
-        (
-            '{"correct": true}',
-            None,
-        ),  # what the published parser reads, and its prompt never asks for
+        # What the published parser reads, and its prompt never asks for.
+        ('{"correct": true}', None),
         ("{score: 1}", None),
         ("1.0", None),
         ("", None),
     ],
 )
-def test_a_score_is_read_as_the_published_prompt_asks_for_it(said, score):
-    assert JUDGE_PROMPTS["published"].read(said) == score
+def test_a_score_is_read_as_the_published_prompt_asks_for_it(verdict, score):
+    assert JUDGE_PROMPTS["published"].read(verdict) == score
 
 
 @pytest.mark.parametrize(
-    ("said", "score"), [("Yes.", 1.0), ("no", 0.0), ("yes and no", None), ("perhaps", None)]
+    ("verdict", "score"), [("Yes.", 1.0), ("no", 0.0), ("yes and no", None), ("perhaps", None)]
 )
-def test_yes_and_no_are_scores(said, score):
-    assert JUDGE_PROMPTS["yes-no"].read(said) == score
+def test_yes_and_no_are_scores(verdict, score):
+    assert JUDGE_PROMPTS["yes-no"].read(verdict) == score
 
 
 def test_the_command_has_all_prompts():

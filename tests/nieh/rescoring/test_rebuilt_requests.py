@@ -11,6 +11,8 @@ from infthor_eval.nieh.samples import open_set
 from infthor_eval.runs import read_run
 from infthor_eval.storage.folders import packaged_folder
 
+from ...helpers.command_line import option_words
+
 DATA = packaged_folder("sets/nieh_mini")
 SIZED = "nieh_haystack_8k,nieh_truncate_head_8k"
 TOLD = (
@@ -19,24 +21,15 @@ TOLD = (
 
 
 @pytest.fixture
-def ask(run, tmp_path):
+def ask(run_cli, tmp_path):
     """Runs the answer key on some tasks and returns the run's header and records."""
 
     def ask(tasks, *options, model="oracle"):
         words = (
-            "--model",
-            model,
-            "--tasks",
-            tasks,
-            "--data",
-            DATA,
-            "--limit",
-            "6",
-            "--output",
-            tmp_path,
+            *option_words(model=model, tasks=tasks, data=DATA, limit="6", output=tmp_path),
             *options,
         )
-        assert run(*words)[0] == 0
+        assert run_cli(*words)[0] == 0
         (folder,) = (tmp_path / model).iterdir()
         return read_run(folder, RECORDS)
 
@@ -66,10 +59,10 @@ def test_every_context_comes_out_as_it_was_sent(ask, tasks, options):
     for record, request in rebuilt(header, records):
         assert request.text.endswith(f"Question: {record.payload.question}")
         assert request.context
-        shown = record.payload.shown_clues
-        if shown is not None:
+        shown_clues = record.payload.shown_clues
+        if shown_clues is not None:
             question = next(it for it in open_set(str(DATA)).questions if it.id == record.id)
-            assert len(set(question.clues) & set(request.positions)) == shown.n_shown
+            assert len(set(question.clues) & set(request.positions)) == shown_clues.n_shown
 
 
 def test_what_a_memory_recalled_is_taken_from_the_record(ask):

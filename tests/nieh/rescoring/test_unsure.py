@@ -4,21 +4,21 @@ import pytest
 
 from infthor_eval.nieh.rescoring.unsure import KnownAnswers
 
-from ..made import record
+from ...helpers.nieh_runs import make_record
 
 # The other questions of the run: containers for one type, things for another.
 PLACES = [
-    record(n, "?", (name,), question_type="where")
+    make_record(n, "?", (name,), question_type="where")
     for n, name in enumerate(("Sofa", "Desk", "CoffeeTable", "Bed"))
 ]
 THINGS = [
-    record(n, "?", (name,), question_type="what")
+    make_record(n, "?", (name,), question_type="what")
     for n, name in enumerate(("Box", "Mug", "Plate"), 10)
 ]
-FAILED = record(20, None, ("TVStand",), question_type="where")
+FAILED = make_record(20, None, ("TVStand",), question_type="where")
 COUNTS = [
-    record(30, "3", (3,), question_type="where"),
-    record(31, "no", ("No",), question_type="where"),
+    make_record(30, "3", (3,), question_type="where"),
+    make_record(31, "no", ("No",), question_type="where"),
 ]
 
 UNSURE = [
@@ -60,8 +60,8 @@ SURE = [
 
 
 def is_unsure(reply, answers):
-    asked = record(99, reply, answers, question_type="what" if len(answers) > 1 else "where")
-    return KnownAnswers([*PLACES, *THINGS, FAILED, *COUNTS, asked]).is_unsure(asked)
+    record = make_record(99, reply, answers, question_type="what" if len(answers) > 1 else "where")
+    return KnownAnswers([*PLACES, *THINGS, FAILED, *COUNTS, record]).is_unsure(record)
 
 
 @pytest.mark.parametrize(("reply", "answers"), UNSURE)
@@ -75,5 +75,5 @@ def test_right_or_plainly_wrong(reply, answers):
 
 
 def test_what_is_known_is_what_the_run_asks():
-    alone = record(99, "Sofa", ("SideTable",), question_type="where")
+    alone = make_record(99, "Sofa", ("SideTable",), question_type="where")
     assert KnownAnswers([alone]).is_unsure(alone)

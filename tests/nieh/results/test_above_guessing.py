@@ -12,7 +12,7 @@ from infthor_eval.nieh.results.above_guessing import (
     score_above_guessing,
 )
 
-from ..made import record
+from ...helpers.nieh_runs import make_record
 
 # Scores and guesses in quarters; a mean guess of a form that is above SOLVED can only be 1.
 _QUARTERS = st.integers(0, 4).map(lambda quarters: quarters / 4)
@@ -34,7 +34,7 @@ def answered(forms):
         mean = sum(guessed for _, guessed in pairs) / len(pairs)
         items += [(score, guess(guessed, mean, form)) for score, guessed in pairs]
     return [
-        record(number, "?", scores={"strict": score}, guess=at)
+        make_record(number, "?", scores={"strict": score}, guess=at)
         for number, (score, at) in enumerate(items)
     ]
 
@@ -42,17 +42,17 @@ def answered(forms):
 @settings(max_examples=40)
 @given(_FORMS)
 def test_it_is_the_mean_of_the_forms_weighted_by_their_questions(forms):
-    found = above_guessing(answered(forms), "strict")
+    above = above_guessing(answered(forms), "strict")
     total = n = 0
     for pairs in forms.values():
         score, guessed = (sum(column) / len(pairs) for column in zip(*pairs, strict=True))
         if guessed <= SOLVED:
             total += len(pairs) * (score - guessed) / (1 - guessed)
             n += len(pairs)
-    assert found.n == n
-    assert found.mean == (pytest.approx(total / n) if n else None)
-    assert found.n_solved == sum(map(len, forms.values())) - n
-    assert found.forms.keys() == forms.keys()
+    assert above.n == n
+    assert above.mean == (pytest.approx(total / n) if n else None)
+    assert above.n_solved == sum(map(len, forms.values())) - n
+    assert above.forms.keys() == forms.keys()
 
 
 @settings(max_examples=40)
@@ -69,19 +69,21 @@ def test_by_hand():
     # Form a: 3 of 4 right where the guess is 1 of 2; (0.75 - 0.5) / 0.5 = 0.5. Form b: 0 of 1,
     # guess 0.2; -0.25.
     records = [
-        record(i, "?", scores={"strict": float(i > 0)}, guess=guess(i % 2, 0.5)) for i in range(4)
+        make_record(i, "?", scores={"strict": float(i > 0)}, guess=guess(i % 2, 0.5))
+        for i in range(4)
     ]
-    records.append(record(4, "?", scores={"strict": 0.0}, guess=guess(0.2, form="b")))
-    found = above_guessing(records, "strict")
-    assert found.mean == pytest.approx((4 * 0.5 - 0.25) / 5)
-    assert found.low < found.mean < found.high
-    assert found.forms == {"a": FormScore(4, 0.75, 0.5), "b": FormScore(1, 0.0, 0.2)}
-    assert (found.n, found.n_solved, found.n_unknown, found.solved_forms) == (5, 0, 0, [])
+    records.append(make_record(4, "?", scores={"strict": 0.0}, guess=guess(0.2, form="b")))
+    above = above_guessing(records, "strict")
+    assert above.mean == pytest.approx((4 * 0.5 - 0.25) / 5)
+    assert above.low < above.mean < above.high
+    assert above.forms == {"a": FormScore(4, 0.75, 0.5), "b": FormScore(1, 0.0, 0.2)}
+    assert (above.n, above.n_solved, above.n_unknown, above.solved_forms) == (5, 0, 0, [])
 
 
 def test_a_form_that_guessing_solves_is_left_out_and_counted():
     records = [
-        record(i, "?", scores={"strict": 0.0}, guess=guess(1.0, 0.96, "easy")) for i in range(3)
+        make_record(i, "?", scores={"strict": 0.0}, guess=guess(1.0, 0.96, "easy"))
+        for i in range(3)
     ]
     alone = above_guessing(records, "strict")
     assert (alone.mean, alone.low, alone.n, alone.n_solved, alone.solved_forms) == (
@@ -92,7 +94,7 @@ def test_a_form_that_guessing_solves_is_left_out_and_counted():
         ["easy"],
     )
     assert alone.forms == {"easy": FormScore(3, 0.0, 1.0)}
-    border = record(3, "?", scores={"strict": 1.0}, guess=guess(0.0, SOLVED, "hard"))
+    border = make_record(3, "?", scores={"strict": 1.0}, guess=guess(0.0, SOLVED, "hard"))
     both = above_guessing([*records, border], "strict")
     assert (both.mean, both.n, both.n_solved, both.solved_forms) == (
         pytest.approx(20.0),
@@ -103,26 +105,33 @@ def test_a_form_that_guessing_solves_is_left_out_and_counted():
 
 
 def test_a_question_on_which_the_model_failed_counts_as_wrong():
-    failed = record(0, None, failure="too long", guess=guess(0.25))
-    found = above_guessing(
-        [failed, record(1, "?", scores={"strict": 1.0}, guess=guess(0.25))], "strict"
+    failed = make_record(0, None, failure="too long", guess=guess(0.25))
+    above = above_guessing(
+        [failed, make_record(1, "?", scores={"strict": 1.0}, guess=guess(0.25))], "strict"
     )
-    assert found.forms == {"a": FormScore(2, 0.5, 0.25)}
-    assert found.mean == pytest.approx((0.5 - 0.25) / 0.75)
+    assert above.forms == {"a": FormScore(2, 0.5, 0.25)}
+    assert above.mean == pytest.approx((0.5 - 0.25) / 0.75)
 
 
 def test_questions_whose_guess_is_not_known_are_counted():
     other = guess(0.5, scorer="reference")
-    records = [record(0, "mug"), record(1, "mug", guess=other), record(2, "mug", guess=guess(0.5))]
-    found = above_guessing(records, "strict")
-    assert (found.mean, found.n, found.n_unknown) == (1.0, 1, 2)
+    records = [
+        make_record(0, "mug"),
+        make_record(1, "mug", guess=other),
+        make_record(2, "mug", guess=guess(0.5)),
+    ]
+    above = above_guessing(records, "strict")
+    assert (above.mean, above.n, above.n_unknown) == (1.0, 1, 2)
     assert [score_above_guessing(item.payload, "strict") for item in records] == [None, None, 1.0]
     assert above_guessing([], "strict").mean is None
 
 
 def test_a_form_in_two_files_is_two_forms():
     easy, hard = guess(0.75), guess(0.5)
-    records = [record(0, "mug", guess=easy, file="f"), record(1, "mug", guess=hard, file="g")]
+    records = [
+        make_record(0, "mug", guess=easy, file="f"),
+        make_record(1, "mug", guess=hard, file="g"),
+    ]
     assert above_guessing(records, "strict").forms == {
         "f: a": FormScore(1, 1.0, 0.75),
         "g: a": FormScore(1, 1.0, 0.5),
@@ -130,6 +139,8 @@ def test_a_form_in_two_files_is_two_forms():
 
 
 def test_one_trajectory_gives_no_interval():
-    records = [record(4 * i, "?", scores={"strict": float(i)}, guess=guess(0.5)) for i in range(2)]
-    found = above_guessing(records, "strict")
-    assert (found.mean, found.low, found.high) == (0.0, None, None)
+    records = [
+        make_record(4 * i, "?", scores={"strict": float(i)}, guess=guess(0.5)) for i in range(2)
+    ]
+    above = above_guessing(records, "strict")
+    assert (above.mean, above.low, above.high) == (0.0, None, None)

@@ -11,14 +11,14 @@ from infthor_eval.nieh.results.evidence_tables import (
     short_name,
 )
 
-from ..made import identity, record, run_of
+from ...helpers.nieh_runs import make_config, make_record, make_run
 
 SINGLE, MULTI = "qa_set_nieh_single_clue", "qa_set_nsieh_multi_clue"
 
 
-def asked(number, reply, n_shown, n_after=None, file="", **changes):
+def make_evidence_record(number, reply, n_shown, n_after=None, file="", **changes):
     clues = ShownClues(n_shown=n_shown, n_clues=2, n_after=n_after)
-    return record(number, reply, shown_clues=clues, file=file, **changes)
+    return make_record(number, reply, shown_clues=clues, file=file, **changes)
 
 
 def strict(table):
@@ -27,13 +27,15 @@ def strict(table):
 
 def test_by_shown_clues_and_by_distance():
     records = [
-        asked(0, "mug", 2, 10),
-        asked(1, "cup", 0, 120),
-        asked(2, "mug", 0, 120),
-        asked(4, "cup", 0, 130),
+        make_evidence_record(0, "mug", 2, 10),
+        make_evidence_record(1, "cup", 0, 120),
+        make_evidence_record(2, "mug", 0, 120),
+        make_evidence_record(4, "cup", 0, 130),
     ]
-    shown, far = evidence_tables([run_of(identity(context="truncate_head", ctx_size=32), records)])
-    assert [column.name for column in shown.columns] == [
+    by_clues, by_distance = evidence_tables(
+        [make_run(make_config(context="truncate_head", ctx_size=32), records)]
+    )
+    assert [column.name for column in by_clues.columns] == [
         "model",
         "task",
         "file",
@@ -42,20 +44,23 @@ def test_by_shown_clues_and_by_distance():
         "some",
         "none",
     ]
-    ((*about, whole, some, none),) = strict(shown)
+    ((*about, whole, some, none),) = strict(by_clues)
     assert about == ["a run", "nieh_gt", "total", "strict"]
     assert (whole, some) == ("100.0 (1)", "-")  # one trajectory has no interval
     assert (none.numbers[""], none.numbers["questions"]) == ("33.3", "3")
     assert none == f"33.3 [{none.numbers['low']}, {none.numbers['high']}] (3)"
     assert some.numbers == {"": "", "low": "", "high": "", "questions": ""}
-    assert [column.name for column in far.columns[4:]] == ["0-49", "100-199"]
-    ((*_, near, distant),) = strict(far)
+    assert [column.name for column in by_distance.columns[4:]] == ["0-49", "100-199"]
+    ((*_, near, distant),) = strict(by_distance)
     assert (near, distant.numbers[""], distant.numbers["questions"]) == ("100.0 (1)", "33.3", "3")
 
 
 def test_files_have_their_rows_under_short_names():
-    records = [asked(0, "mug", 1, file=SINGLE), asked(1, "cup", 2, file=MULTI)]
-    (table,) = evidence_tables([run_of(identity(context="trajectory"), records)])
+    records = [
+        make_evidence_record(0, "mug", 1, file=SINGLE),
+        make_evidence_record(1, "cup", 2, file=MULTI),
+    ]
+    (table,) = evidence_tables([make_run(make_config(context="trajectory"), records)])
     assert [(row[2], *row[4:]) for row in strict(table)] == [
         ("total", "0.0 (1)", "100.0 (1)", "-"),
         ("nieh_single_clue", "-", "100.0 (1)", "-"),
@@ -65,15 +70,18 @@ def test_files_have_their_rows_under_short_names():
 
 
 def test_what_says_nothing_is_left_out():
-    everything = [asked(0, "mug", 2, 10)]
-    (far,) = evidence_tables([run_of(identity(context="trajectory"), everything)])
+    everything = [make_evidence_record(0, "mug", 2, 10)]
+    (far,) = evidence_tables([make_run(make_config(context="trajectory"), everything)])
     assert "end of the trajectory" in far.title
-    assert evidence_tables([run_of(identity(context="clues"), everything)]) == []
-    assert evidence_tables([run_of(identity(context="trajectory"), [record(0, "mug")])]) == []
+    assert evidence_tables([make_run(make_config(context="clues"), everything)]) == []
+    assert (
+        evidence_tables([make_run(make_config(context="trajectory"), [make_record(0, "mug")])])
+        == []
+    )
 
 
 def guessed(number, reply, score, mean=0.5, form="f"):
-    return record(
+    return make_record(
         number,
         reply,
         guess=Guess(form=form, scores={"strict": score}, form_scores={"strict": mean}),
@@ -94,7 +102,7 @@ def test_a_cell_has_the_score_above_guessing_with_its_interval():
 @pytest.mark.parametrize("n_solved", [0, 2])
 def test_the_note_tells_what_is_not_counted(n_solved):
     solved = [guessed(10 + i, "mug", 1.0, 1.0, f"easy {i}") for i in range(n_solved)]
-    (note,) = above_guessing_notes([run_of(identity(), [guessed(0, "mug", 0.5), *solved])])
-    said = " Not counted, as guessing solves their forms (above 95%): 2 questions of 2 forms."
-    assert note.endswith(said) == bool(n_solved)
-    assert above_guessing_notes([run_of(identity(), [record(0, "mug"), *solved])]) == []
+    (note,) = above_guessing_notes([make_run(make_config(), [guessed(0, "mug", 0.5), *solved])])
+    expected = " Not counted, as guessing solves their forms (above 95%): 2 questions of 2 forms."
+    assert note.endswith(expected) == bool(n_solved)
+    assert above_guessing_notes([make_run(make_config(), [make_record(0, "mug"), *solved])]) == []

@@ -11,8 +11,7 @@ from infthor_eval.nieh.results.memory_tables import memory_tables
 from infthor_eval.nieh.results.tables import overview, tables
 from infthor_eval.runs import Tokens
 
-from .. import made
-from ..made import identity, record
+from ...helpers.nieh_runs import make_config, make_record, make_run
 
 
 def recall(n_frames, build_s=2.0, recall_s=0.5):
@@ -26,14 +25,14 @@ def run_of(
     budget="1k",
     scores=(1, 0, 1, 0),
 ):
-    config = identity(context="memory")
+    config = make_config(context="memory")
     config["tasks"]["nieh_gt"]["sources"] = {
         "memory": {"name": memory, "options": {}, "privileged": privileged}
     }
     if budget is not None:
         config["budget"] = budget
     records = [
-        record(
+        make_record(
             number,
             "mug" if score else "no",
             recall=recall(number, build_s=2.0 if number % 4 else 4.0),
@@ -42,7 +41,7 @@ def run_of(
         )
         for number, score in enumerate(scores)
     ]
-    return made.run_of(config, records, name)
+    return make_run(config, records, name)
 
 
 def test_a_run_is_summed_up_with_its_memory_and_what_that_took():
@@ -51,7 +50,7 @@ def test_a_run_is_summed_up_with_its_memory_and_what_that_took():
         name="last", privileged=False, budget=1000, n_frames=1.5, n_tokens=150.0
     )
     assert summary.took == {"nieh_gt": MemoryTimes(build_s=2.5, recall_s=0.5)}
-    without = made.run_of(identity(), [record(1, "mug")]).summary
+    without = make_run(make_config(), [make_record(1, "mug")]).summary
     assert without.took == {}
     assert without.tasks["nieh_gt"].memory is None
 
@@ -80,7 +79,7 @@ def test_the_table_has_what_was_right_recalled_and_spent():
 def test_it_is_among_all_tables_only_where_there_is_a_memory():
     for of_runs in (overview, tables):
         assert "Memories" in [table.title for table in of_runs([run_of()])]
-        plain = made.run_of(identity(), [record(1, "mug")], "x")
+        plain = make_run(make_config(), [make_record(1, "mug")], "x")
         assert "Memories" not in [table.title for table in of_runs([plain])]
 
 
@@ -110,7 +109,4 @@ def test_the_picture_has_a_curve_for_each_memory_over_its_budgets():
     assert chart.title == "nieh_gt: accuracy by tokens of what a memory recalls"
     assert re.findall(
         r"(?:^|; )(\S+) 50\.0 % at 150 tokens, 50\.0 % at 150 tokens", chart.description
-    ) == [
-        "last",
-        "oracle*",
-    ]
+    ) == ["last", "oracle*"]

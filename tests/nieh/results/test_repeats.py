@@ -13,13 +13,14 @@ from infthor_eval.report.comparison import compare, comparison_table
 from infthor_eval.report.suites.nieh import NiehPresenter
 from infthor_eval.runs.journals.shards import FOLDER
 
-from ..made import identity, record, run_of
+from ...helpers.command_line import assert_refused, option_words
+from ...helpers.nieh_runs import make_config, make_record, make_run
 
 MODEL = ("--model", "qwen2.5-vl-nano", "--tasks", "nieh_gt")
 
 
-def asked(number, *replies, **fields):
-    return [record(number, reply, repeat=at, **fields) for at, reply in enumerate(replies, 1)]
+def make_repeats(number, *replies, **fields):
+    return [make_record(number, reply, repeat=at, **fields) for at, reply in enumerate(replies, 1)]
 
 
 def journal_of(output):
@@ -35,7 +36,7 @@ def replies_of(output):
     }
 
 
-def test_each_answer_has_its_record_and_is_drawn_by_its_seed(make_nieh_set, tmp_path, run):
+def test_each_answer_has_its_record_and_is_drawn_by_its_seed(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
     for name, options in (
         ("three", ["--repeats", 3]),
@@ -43,7 +44,7 @@ def test_each_answer_has_its_record_and_is_drawn_by_its_seed(make_nieh_set, tmp_
         ("second", ["--temperature", 1, "--seed", 1]),
         ("cold", ["--repeats", 2, "--temperature", 1e-6]),
     ):
-        assert run(*MODEL, "--data", data, "--output", tmp_path / name, *options)[0] == 0
+        assert run_cli(*MODEL, "--data", data, "--output", tmp_path / name, *options)[0] == 0
     three = replies_of(tmp_path / "three")
     assert len(three) == 15 and {repeat for _, repeat in three} == {1, 2, 3}
     for repeat, name in ((1, "first"), (2, "second")):
@@ -56,11 +57,11 @@ def test_each_answer_has_its_record_and_is_drawn_by_its_seed(make_nieh_set, tmp_
     assert all(cold[question, 1] == cold[question, 2] for question, repeat in cold if repeat == 1)
 
 
-def test_one_repeat_is_a_run_without_the_option(make_nieh_set, tmp_path, run):
+def test_one_repeat_is_a_run_without_the_option(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
-    assert run(*MODEL, "--data", data, "--output", tmp_path)[0] == 0
+    assert run_cli(*MODEL, "--data", data, "--output", tmp_path)[0] == 0
     before = {path: path.read_bytes() for path in tmp_path.rglob("*.json*") if FOLDER in path.parts}
-    _, _, err = run(*MODEL, "--data", data, "--output", tmp_path, "--repeats", 1)
+    _, _, err = run_cli(*MODEL, "--data", data, "--output", tmp_path, "--repeats", 1)
     assert "0 evaluated now, 5 resumed" in err
     assert before == {
         path: path.read_bytes() for path in tmp_path.rglob("*.json*") if FOLDER in path.parts
@@ -71,19 +72,10 @@ def test_one_repeat_is_a_run_without_the_option(make_nieh_set, tmp_path, run):
     assert "repeats" not in json.loads(results.read_text())["summary"]
 
 
-def test_a_baseline_says_the_same_every_time(make_nieh_set, tmp_path, run):
+def test_a_baseline_says_the_same_every_time(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
-    code, out, _ = run(
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path,
-        "--repeats",
-        2,
+    code, out, _ = run_cli(
+        *option_words(model="oracle", tasks="nieh_gt", data=data, output=tmp_path, repeats=2)
     )
     assert code == 0 and "Answers that repeat" in out
     (rows,) = tmp_path.rglob("samples_nieh_gt_*.jsonl")
@@ -104,20 +96,21 @@ def test_a_baseline_says_the_same_every_time(make_nieh_set, tmp_path, run):
         (["--temperature", "nan"], "above 0"),
     ],
 )
-def test_what_draws_nothing_is_refused(make_nieh_set, tmp_path, run, options, message):
-    code, _, err = run(*MODEL, "--data", make_nieh_set(size=56), "--output", tmp_path, *options)
-    assert (code, len(err.strip().splitlines())) == (2, 1) and message in err
+def test_what_draws_nothing_is_refused(make_nieh_set, tmp_path, run_cli, options, message):
+    assert_refused(
+        run_cli(*MODEL, "--data", make_nieh_set(size=56), "--output", tmp_path, *options), message
+    )
 
 
 def test_the_figures_are_those_of_a_calculation_by_hand():
     # Question 0 is always right, 1 in two of four answers, 2 never; one answer to it failed.
     records = [
-        *asked(0, "mug", "Mug", "mug", "mug"),
-        *asked(1, "cup", "mug", "mug", "bowl"),
-        *asked(2, "cup", "cup", "bowl"),
-        record(2, None, repeat=4, failure="out of memory"),
+        *make_repeats(0, "mug", "Mug", "mug", "mug"),
+        *make_repeats(1, "cup", "mug", "mug", "bowl"),
+        *make_repeats(2, "cup", "cup", "bowl"),
+        make_record(2, None, repeat=4, failure="out of memory"),
     ]
-    summary = run_of(identity(), records).summary
+    summary = make_run(make_config(), records).summary
     task, repeats = summary.tasks["nieh_gt"], summary.repeats["nieh_gt"]
     assert (task.n, task.by_clues["total"].n, task.by_clues["total"].n_failed) == (3, 3, 1)
     assert task.by_clues["total"].scores["strict"].mean == repeats.mean == 0.5
@@ -131,14 +124,24 @@ def test_the_figures_are_those_of_a_calculation_by_hand():
     noise = (1 / 3 / 4) / 3
     assert repeats.variance_between == pytest.approx(0.25 - noise)
     assert repeats.drawing == pytest.approx(1.96 * math.sqrt(1 / 3 / 4) / 3)
-    assert summarise_repeats(by_question([record(0, "mug"), record(1, "mug")]), "strict") is None
-    (table,) = [table for table in tables([run_of(identity(), records)]) if "repeat" in table.title]
+    assert (
+        summarise_repeats(by_question([make_record(0, "mug"), make_record(1, "mug")]), "strict")
+        is None
+    )
+    (table,) = [
+        table for table in tables([make_run(make_config(), records)]) if "repeat" in table.title
+    ]
     assert table.rows[0].cells[2:5] == ("4x", "3", "50.0")
 
 
 def test_repeated_runs_are_compared_by_the_means_of_their_questions():
-    once = [record(0, "mug"), record(1, "cup"), record(2, "mug"), record(3, "cup")]
-    often = [answer for number in range(4) for answer in asked(number, "mug", "cup")]
+    once = [
+        make_record(0, "mug"),
+        make_record(1, "cup"),
+        make_record(2, "mug"),
+        make_record(3, "cup"),
+    ]
+    often = [answer for number in range(4) for answer in make_repeats(number, "mug", "cup")]
     strict = {one.metric: one for one in compare(NiehSuite(), NiehPresenter(), once, often)}[
         "strict"
     ]

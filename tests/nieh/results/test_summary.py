@@ -5,35 +5,35 @@ import pytest
 
 from infthor_eval.distances import DISTANCES, LENGTHS
 from infthor_eval.nieh.records import Guess, ShownClues
-from infthor_eval.nieh.results.summary import NiehSummary, summarise
+from infthor_eval.nieh.results.summary import NiehSummary
 from infthor_eval.runs import Tokens
 
-from ..made import header, identity, record
+from ...helpers.nieh_runs import make_config, make_record, make_run
 
 
-def summarised(config, records):
-    return summarise(header(config).config, records)
+def summarise(config, records):
+    return make_run(config, records).summary
 
 
 def test_the_same_records_in_another_order_give_the_same_summary():
     records = [
-        record(number, "mug" if number % 3 else "cup", n_clues=1 + number % 4)
+        make_record(number, "mug" if number % 3 else "cup", n_clues=1 + number % 4)
         for number in range(20)
     ]
-    summary = summarised(identity(), records)
-    assert summary == summarised(identity(), records[::-1])
+    summary = summarise(make_config(), records)
+    assert summary == summarise(make_config(), records[::-1])
     assert msgspec.json.decode(msgspec.json.encode(summary), type=NiehSummary) == summary
 
 
 def test_columns_are_those_of_table_4_and_both_denominators_are_told():
     records = [
-        record(0, "mug"),
-        record(1, "cup"),
-        record(2, "mug", n_clues=2),
-        record(3, "mug", n_clues=7),
+        make_record(0, "mug"),
+        make_record(1, "cup"),
+        make_record(2, "mug", n_clues=2),
+        make_record(3, "mug", n_clues=7),
     ]
-    records.append(record(4, "no", answers=("no",), n_clues=0))
-    result = summarised(identity(skipped=("no clue frame", "no clue frame")), records).tasks[
+    records.append(make_record(4, "no", answers=("no",), n_clues=0))
+    result = summarise(make_config(skipped=("no clue frame", "no clue frame")), records).tasks[
         "nieh_gt"
     ]
     by_clues = {
@@ -55,12 +55,12 @@ def test_columns_are_those_of_table_4_and_both_denominators_are_told():
 
 def test_open_ended_is_what_begins_with_a_text_that_is_neither_yes_nor_no():
     golds = [("mug",), ("Mug", "yes"), ("3",), ("yes",), ("No",), (3,), (2, "mug")]
-    records = [record(number, "?", answers=answers) for number, answers in enumerate(golds)]
-    assert summarised(identity(), records).tasks["nieh_gt"].by_clues["open-ended"].n == 3
+    records = [make_record(number, "?", answers=answers) for number, answers in enumerate(golds)]
+    assert summarise(make_config(), records).tasks["nieh_gt"].by_clues["open-ended"].n == 3
 
 
 def test_a_column_without_a_question_has_no_score():
-    result = summarised(identity(), [record(0, "mug")]).tasks["nieh_gt"]
+    result = summarise(make_config(), [make_record(0, "mug")]).tasks["nieh_gt"]
     assert (result.by_clues["2"].n, result.by_clues["2"].scores) == (0, {})
     alone = result.by_clues["total"].scores["strict"]
     assert (alone.mean, alone.n_trajectories) == (1.0, 1)
@@ -68,9 +68,9 @@ def test_a_column_without_a_question_has_no_score():
 
 
 def test_a_failed_question_counts_as_wrong_and_is_named():
-    result = summarised(identity(), [record(0, "mug"), record(1, None, failure="too long")]).tasks[
-        "nieh_gt"
-    ]
+    result = summarise(
+        make_config(), [make_record(0, "mug"), make_record(1, None, failure="too long")]
+    ).tasks["nieh_gt"]
     assert result.by_clues["total"].scores["strict"].mean == 0.5
     assert result.by_clues["total"].n_failed == 1
     assert [(failure.question, failure.reason) for failure in result.failures] == [
@@ -79,15 +79,18 @@ def test_a_failed_question_counts_as_wrong_and_is_named():
 
 
 def test_an_interval_is_not_zero_wide_where_all_are_right():
-    records = [record(number, "mug") for number in range(40)]
-    strict = summarised(identity(), records).tasks["nieh_gt"].by_clues["total"].scores["strict"]
+    records = [make_record(number, "mug") for number in range(40)]
+    strict = summarise(make_config(), records).tasks["nieh_gt"].by_clues["total"].scores["strict"]
     assert (strict.mean, strict.stderr, strict.high) == (1.0, 0.0, 1.0)
     assert strict.low < 0.9
 
 
 def test_scores_are_those_of_the_tasks_own_metrics():
-    records = [record(0, "mug", scores={"length": 3.0}), record(1, "cups", scores={"length": 4.0})]
-    result = summarised(identity(metrics=("length",)), records).tasks["nieh_gt"]
+    records = [
+        make_record(0, "mug", scores={"length": 3.0}),
+        make_record(1, "cups", scores={"length": 4.0}),
+    ]
+    result = summarise(make_config(metrics=("length",)), records).tasks["nieh_gt"]
     assert {name: score.mean for name, score in result.by_clues["total"].scores.items()} == {
         "length": 3.5
     }
@@ -96,10 +99,10 @@ def test_scores_are_those_of_the_tasks_own_metrics():
 
 def test_types_and_variants_are_apart():
     records = [
-        record(0, "mug", question_type="", variant="depth=0"),
-        record(1, "cup", variant="depth=0.2"),
+        make_record(0, "mug", question_type="", variant="depth=0"),
+        make_record(1, "cup", variant="depth=0.2"),
     ]
-    result = summarised(identity(), records).tasks["nieh_gt"]
+    result = summarise(make_config(), records).tasks["nieh_gt"]
     assert {name: cell.n for name, cell in result.by_question_type.items()} == {
         "put_action": 1,
         "untyped": 1,
@@ -114,10 +117,11 @@ def test_types_and_variants_are_apart():
 def test_a_leaning_to_yes_and_a_reply_that_is_neither_show():
     replies = ["yes", "Yes.", "yes", "maybe"]
     records = [
-        record(i, reply, answers=("yes",) if i < 1 else ("no",)) for i, reply in enumerate(replies)
+        make_record(i, reply, answers=("yes",) if i < 1 else ("no",))
+        for i, reply in enumerate(replies)
     ]
-    found = summarised(identity(), [*records, record(9, "mug")]).tasks["nieh_gt"].yes_no
-    assert msgspec.to_builtins(found) == {
+    yes_no = summarise(make_config(), [*records, make_record(9, "mug")]).tasks["nieh_gt"].yes_no
+    assert msgspec.to_builtins(yes_no) == {
         "n": 4,
         "share_gold_yes": 0.25,
         "share_said_yes": 0.75,
@@ -128,15 +132,15 @@ def test_a_leaning_to_yes_and_a_reply_that_is_neither_show():
 @pytest.mark.parametrize("shuffled", [1, -1])
 def test_replies_that_are_not_of_the_form_asked_for_are_counted_by_reason(shuffled):
     records = [
-        record(0, "yes", answers=("yes",)),
-        record(1, "perhaps", answers=("no",)),
-        record(2, "four", answers=("4",)),
-        record(3, "many", answers=("4",)),
-        record(4, "some text\n", answers=("mug", "plate"), n_reply_tokens=50),
-        record(5, " \n", answers=("no",)),
-        record(6, None, answers=("no",), failure="too long"),
+        make_record(0, "yes", answers=("yes",)),
+        make_record(1, "perhaps", answers=("no",)),
+        make_record(2, "four", answers=("4",)),
+        make_record(3, "many", answers=("4",)),
+        make_record(4, "some text\n", answers=("mug", "plate"), n_reply_tokens=50),
+        make_record(5, " \n", answers=("no",)),
+        make_record(6, None, answers=("no",), failure="too long"),
     ]
-    assert summarised(identity(), records[::shuffled]).tasks["nieh_gt"].format_failures == {
+    assert summarise(make_config(), records[::shuffled]).tasks["nieh_gt"].format_failures == {
         "cut off at the token limit": 1,
         "empty": 1,
         "neither yes nor no": 1,
@@ -148,10 +152,10 @@ def test_replies_that_are_not_of_the_form_asked_for_are_counted_by_reason(shuffl
 
 
 def task_of(records):
-    return summarised(identity(), records).tasks["nieh_gt"]
+    return summarise(make_config(), records).tasks["nieh_gt"]
 
 
-def shown(n_shown, n_clues=2, n_after=None):
+def make_shown_clues(n_shown, n_clues=2, n_after=None):
     return ShownClues(n_shown=n_shown, n_clues=n_clues, n_after=n_after)
 
 
@@ -160,20 +164,24 @@ def means(cells):
 
 
 def test_files_are_apart_in_a_set_of_several():
-    records = [record(0, "mug", file="b"), record(1, "cup", file="b"), record(2, "mug", file="a")]
+    records = [
+        make_record(0, "mug", file="b"),
+        make_record(1, "cup", file="b"),
+        make_record(2, "mug", file="a"),
+    ]
     assert list(means(task_of(records).by_file).items()) == [("a", (1, 1.0)), ("b", (2, 0.5))]
-    alone = task_of([record(0, "mug")])
+    alone = task_of([make_record(0, "mug")])
     assert (alone.by_file, list(alone.evidence)) == ({}, ["total"])
 
 
 def test_samples_are_apart_by_the_share_of_their_clues_that_was_shown():
     states = ((0, "a"), (2, "a"), (1, "b"), (0, "b"), (1, "a"))
     records = [
-        record(i, "mug" if i else "cup", file=file, shown_clues=shown(n))
+        make_record(i, "mug" if i else "cup", file=file, shown_clues=make_shown_clues(n))
         for i, (n, file) in enumerate(states)
     ]
     evidence = task_of(
-        [*records, record(9, "mug", file="a")]
+        [*records, make_record(9, "mug", file="a")]
     ).evidence  # of the last it is not known
     assert {
         name: list(means(cells.by_shown_clues).items()) for name, cells in evidence.items()
@@ -198,7 +206,10 @@ def test_samples_are_apart_by_the_share_of_their_clues_that_was_shown():
 )
 def test_samples_are_apart_by_the_distance_of_their_last_clue(n_after, name):
     evidence = task_of(
-        [record(0, "mug", shown_clues=shown(2, n_after=n_after)), record(1, "cup")]
+        [
+            make_record(0, "mug", shown_clues=make_shown_clues(2, n_after=n_after)),
+            make_record(1, "cup"),
+        ]
     ).evidence["total"]
     assert means(evidence.by_distance) == {name: (1, 1.0)}
 
@@ -215,33 +226,34 @@ def test_samples_are_apart_by_the_distance_of_their_last_clue(n_after, name):
     ],
 )
 def test_samples_are_apart_by_the_length_of_their_context(tokens, name):
-    found = task_of([record(0, "mug", tokens=Tokens(context=tokens)), record(1, "cup")]).by_length
-    assert means({length: at.cell for length, at in found.items()}) == {name: (1, 1.0)}
+    by_length = task_of(
+        [make_record(0, "mug", tokens=Tokens(context=tokens)), make_record(1, "cup")]
+    ).by_length
+    assert means({length: at.cell for length, at in by_length.items()}) == {name: (1, 1.0)}
 
 
 def test_lengths_have_their_own_scores_above_guessing():
     guess = Guess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.5})
     lengths = (("mug", 500), ("cup", 500), ("mug", 70_000), ("mug", 3000))
     records = [
-        record(i, reply, tokens=Tokens(context=n), guess=guess)
+        make_record(i, reply, tokens=Tokens(context=n), guess=guess)
         for i, (reply, n) in enumerate(lengths[:3])
     ]
-    found = task_of([*records, record(3, "mug", tokens=Tokens(context=3000))])
-    assert {name: at.above_guessing["strict"] for name, at in found.by_length.items()} == {
+    summary = task_of([*records, make_record(3, "mug", tokens=Tokens(context=3000))])
+    assert {name: at.above_guessing["strict"] for name, at in summary.by_length.items()} == {
         "0-1": 0.0,
         "2-4": None,  # its guess is not known
         "64-128": 1.0,
     }
-    assert list(found.by_length) == ["0-1", "2-4", "64-128"]
-    assert found.above_guessing["strict"].mean == pytest.approx(1 / 3)
-    assert found.above_guessing["strict"].n_unknown == 1
+    assert list(summary.by_length) == ["0-1", "2-4", "64-128"]
+    assert summary.above_guessing["strict"].mean == pytest.approx(1 / 3)
+    assert summary.above_guessing["strict"].n_unknown == 1
 
 
 @pytest.mark.parametrize("names", [DISTANCES, LENGTHS])
 def test_bins_follow_each_other_without_a_gap(names):
     ends = [tuple(map(int, name.split("-"))) for name in names[:-1]]
-    step = (
-        1 if names is DISTANCES else 0
-    )  # the last frame of a bin is in its name, the last token is not
+    # The last frame of a bin is in its name, the last token is not.
+    step = 1 if names is DISTANCES else 0
     assert all(before[1] + step == after[0] for before, after in pairwise(ends))
     assert (ends[0][0], names[-1]) == (0, f">={ends[-1][1] + step}")

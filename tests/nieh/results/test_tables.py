@@ -6,10 +6,10 @@ from infthor_eval.report.comparison import compare
 from infthor_eval.report.suites.nieh import NiehPresenter
 from infthor_eval.report.terminal import print_table
 
-from ..made import identity, record, run_of
+from ...helpers.nieh_runs import make_config, make_record, make_run
 
 
-def shown(*runs):
+def clues_lines(*runs):
     return lines(clues_table(runs))
 
 
@@ -20,22 +20,28 @@ def lines(table):
 
 
 def minus(*runs):
-    return [row for row in shown(*runs) if "minus" in row]
+    return [row for row in clues_lines(*runs) if "minus" in row]
 
 
 def right_but_every(nth, n):
-    return [record(i, "cup" if i % nth == 0 else "mug", cluster=f"t{i // 10}") for i in range(n)]
+    return [
+        make_record(i, "cup" if i % nth == 0 else "mug", cluster=f"t{i // 10}") for i in range(n)
+    ]
 
 
 def test_a_row_has_every_column_of_the_table():
     records = [
-        record(number, "mug" if number % 4 else "cup", cluster=f"t{number}") for number in range(8)
+        make_record(number, "mug" if number % 4 else "cup", cluster=f"t{number}")
+        for number in range(8)
     ]
-    records += [record(8, "mug", n_clues=2), record(9, None, n_clues=5, failure="too long")]
-    run = run_of(identity(skipped=("why",)), records)
-    (row,) = [row for row in shown(run) if row[:2] == ["a", "run"] and "strict" in row]
+    records += [
+        make_record(8, "mug", n_clues=2),
+        make_record(9, None, n_clues=5, failure="too long"),
+    ]
+    run = make_run(make_config(skipped=("why",)), records)
+    (row,) = [row for row in clues_lines(run) if row[:2] == ["a", "run"] and "strict" in row]
     total = run.summary.tasks["nieh_gt"].by_clues["total"].scores["strict"]
-    said = [
+    intervals = [
         f"{100 * low:.1f}–{100 * high:.1f}"
         for low, high in ((total.low, total.high), total.bootstrap)
     ]
@@ -46,7 +52,7 @@ def test_a_row_has_every_column_of_the_table():
         "strict",
         *("75.00", "(8)", "100.00", "(1)", "0.00", "(1)"),
         "70.00",
-        *said,
+        *intervals,
         *("70.00", "(10)"),
         *("-", "-"),
         "10",
@@ -57,17 +63,17 @@ def test_a_row_has_every_column_of_the_table():
 
 def test_a_leaning_to_yes_and_the_form_of_replies_have_a_table():
     records = [
-        record(0, "yes", answers=("yes",)),
-        record(1, "perhaps", answers=("no",)),
-        record(2, "four", answers=("4",)),
-        record(3, "many", answers=("4",)),
-        record(4, "some text\n", answers=("mug", "plate"), n_reply_tokens=50),
-        record(5, " \n", answers=("no",)),
-        record(6, None, answers=("no",), failure="too long"),
+        make_record(0, "yes", answers=("yes",)),
+        make_record(1, "perhaps", answers=("no",)),
+        make_record(2, "four", answers=("4",)),
+        make_record(3, "many", answers=("4",)),
+        make_record(4, "some text\n", answers=("mug", "plate"), n_reply_tokens=50),
+        make_record(5, " \n", answers=("no",)),
+        make_record(6, None, answers=("no",), failure="too long"),
     ]
     (table,) = [
         table
-        for table in tables([run_of(identity(), records)])
+        for table in tables([make_run(make_config(), records)])
         if table.title == "Form of the replies"
     ]
     (row,) = [row for row in table.rows if row.cells[0] == "a run"]
@@ -79,7 +85,7 @@ def test_a_leaning_to_yes_and_the_form_of_replies_have_a_table():
 
 def test_a_run_of_a_published_checkpoint_is_set_against_its_row_unless_its_frames_are_simulated():
     records = right_but_every(20, 200)
-    (row,) = minus(run_of(identity(), records))
+    (row,) = minus(make_run(make_config(), records))
     # 95 % on one clue against 85.94, 95 % in total against 82.20; the other columns are empty.
     assert row == [
         "ours",
@@ -93,33 +99,35 @@ def test_a_run_of_a_published_checkpoint_is_set_against_its_row_unless_its_frame
         "+12.80",
     ]
     for other in (
-        identity(simulator="embedded"),
-        identity(model="oracle", checkpoint=None, n_parameters=None),
-        identity(context="trajectory"),
-        identity(metrics=("strict",)),
-        identity(checkpoint="Qwen/Qwen2.5-VL-3B-Instruct", n_parameters=3_754_622_976),
-        identity(n_parameters=3_754_622_976),
+        make_config(simulator="embedded"),
+        make_config(model="oracle", checkpoint=None, n_parameters=None),
+        make_config(context="trajectory"),
+        make_config(metrics=("strict",)),
+        make_config(checkpoint="Qwen/Qwen2.5-VL-3B-Instruct", n_parameters=3_754_622_976),
+        make_config(n_parameters=3_754_622_976),
     ):
-        assert minus(run_of(other, records)) == []
+        assert minus(make_run(other, records)) == []
 
 
 def test_a_local_folder_with_the_checkpoints_name_and_size_is_that_checkpoint():
-    run = run_of(
-        identity(model="hf-vlm", checkpoint="/models/qwen2.5-VL-7b-instruct/"),
+    run = make_run(
+        make_config(model="hf-vlm", checkpoint="/models/qwen2.5-VL-7b-instruct/"),
         right_but_every(20, 200),
     )
     assert len(minus(run)) == 1
 
 
 def test_a_published_value_inside_the_interval_is_marked():
-    (row,) = minus(run_of(identity(), right_but_every(7, 210)))
+    (row,) = minus(make_run(make_config(), right_but_every(7, 210)))
     assert row[5:7] == ["-0.23", "="]
 
 
 def test_each_difference_stands_below_its_own_published_row():
-    qwen = run_of(identity(), right_but_every(20, 200), "ours")
-    llava = run_of(
-        identity(checkpoint="llava-hf/llava-onevision-qwen2-7b-ov-hf", n_parameters=8_030_348_832),
+    qwen = make_run(make_config(), right_but_every(20, 200), "ours")
+    llava = make_run(
+        make_config(
+            checkpoint="llava-hf/llava-onevision-qwen2-7b-ov-hf", n_parameters=8_030_348_832
+        ),
         right_but_every(20, 200),
     )
     rows = [row.cells[0] for row in clues_table([qwen, llava]).rows]
@@ -131,14 +139,18 @@ def test_each_difference_stands_below_its_own_published_row():
 
 
 def test_simulated_frames_are_said_not_to_be_comparable():
-    assert "embedded" not in " ".join(clues_table([run_of(identity(), [record(0, "mug")])]).notes)
-    (*_, note) = clues_table([run_of(identity(simulator="embedded"), [record(0, "mug")])]).notes
+    assert "embedded" not in " ".join(
+        clues_table([make_run(make_config(), [make_record(0, "mug")])]).notes
+    )
+    (*_, note) = clues_table(
+        [make_run(make_config(simulator="embedded"), [make_record(0, "mug")])]
+    ).notes
     assert "embedded simulator: not comparable with the published rows" in note
 
 
 def test_what_is_in_a_name_is_shown_as_text():
-    run = run_of(identity(), [record(0, "mug")], "[red]run[/red]")
-    assert any(row[:1] == ["[red]run[/red]"] for row in shown(run))
+    run = make_run(make_config(), [make_record(0, "mug")], "[red]run[/red]")
+    assert any(row[:1] == ["[red]run[/red]"] for row in clues_lines(run))
 
 
 def beside(*runs):
@@ -146,7 +158,7 @@ def beside(*runs):
 
 
 def test_published_rows_by_file_are_a_table_of_their_own_beside_runs_in_their_context():
-    (table,) = beside(run_of(identity(context="trajectory"), [record(0, "mug")]))
+    (table,) = beside(make_run(make_config(context="trajectory"), [make_record(0, "mug")]))
     assert [column.name for column in table.columns] == [
         "model",
         "task",
@@ -167,9 +179,9 @@ def test_published_rows_by_file_are_a_table_of_their_own_beside_runs_in_their_co
         == "nieh_published_full, logs eval_qa_set_*_full_traj.log, branch nieh_dev"
     )
     assert "Both stand" in table.notes[0]
-    assert beside(run_of(identity(), [record(0, "mug")])) == []
+    assert beside(make_run(make_config(), [make_record(0, "mug")])) == []
     (simulated,) = beside(
-        run_of(identity(context="trajectory", simulator="embedded"), [record(0, "mug")])
+        make_run(make_config(context="trajectory", simulator="embedded"), [make_record(0, "mug")])
     )
     assert "not comparable" in simulated.notes[-1]
 
@@ -183,8 +195,8 @@ def gains(*runs):
 
 def test_a_run_is_set_against_the_same_models_run_on_blank_frames():
     seeing, blank = (
-        run_of(identity(), right_but_every(4, 40)),
-        run_of(identity(frames="blank"), right_but_every(2, 40)),
+        make_run(make_config(), right_but_every(4, 40)),
+        make_run(make_config(frames="blank"), right_but_every(2, 40)),
     )
     (table,) = gains(seeing, blank)
     # Two or three more of the ten questions of each of four trajectories are right: spread 0.0289,
@@ -201,9 +213,11 @@ def test_a_run_is_set_against_the_same_models_run_on_blank_frames():
 
 def test_the_interval_of_a_gain_is_that_of_the_comparison_of_both_runs():
     ours, theirs = (
-        [*right_but_every(nth, 37), record(40, None, failure="too long")] for nth in (5, 3)
+        [*right_but_every(nth, 37), make_record(40, None, failure="too long")] for nth in (5, 3)
     )
-    (table,) = gains(run_of(identity(), ours[::-1]), run_of(identity(frames="blank"), theirs))
+    (table,) = gains(
+        make_run(make_config(), ours[::-1]), make_run(make_config(frames="blank"), theirs)
+    )
     for compared in compare(NiehSuite(), NiehPresenter(), theirs, ours):
         (row,) = [row for row in table.rows if row.cells[2] == compared.metric]
         estimate = compared.difference.estimate
@@ -215,7 +229,7 @@ def test_the_interval_of_a_gain_is_that_of_the_comparison_of_both_runs():
 
 def test_a_gain_on_one_trajectory_has_no_interval():
     runs = [
-        run_of(identity(frames=frames), [record(0, "mug"), record(4, "cup")])
+        make_run(make_config(frames=frames), [make_record(0, "mug"), make_record(4, "cup")])
         for frames in ("shown", "blank")
     ]
     (table,) = gains(*runs)
@@ -223,17 +237,17 @@ def test_a_gain_on_one_trajectory_has_no_interval():
 
 
 def test_a_gain_is_over_the_same_run_alone():
-    blank = run_of(identity(frames="blank"), right_but_every(2, 40))
+    blank = make_run(make_config(frames="blank"), right_but_every(2, 40))
     for other in (
-        identity(model="other"),
-        identity(frames="blank"),
-        identity(context="trajectory"),
+        make_config(model="other"),
+        make_config(frames="blank"),
+        make_config(context="trajectory"),
     ):
-        assert gains(run_of(other, right_but_every(4, 40)), blank) == []
-    shuffled = run_of(identity(frames="shuffled"), right_but_every(4, 40))
+        assert gains(make_run(other, right_but_every(4, 40)), blank) == []
+    shuffled = make_run(make_config(frames="shuffled"), right_but_every(4, 40))
     (table,) = gains(shuffled, blank)
     assert {row.cells[0] for row in table.rows} == {"a run, shuffled frames"}
 
 
 def test_only_what_saw_its_frames_is_set_against_the_published_row():
-    assert minus(run_of(identity(frames="shuffled"), right_but_every(20, 200))) == []
+    assert minus(make_run(make_config(frames="shuffled"), right_but_every(20, 200))) == []

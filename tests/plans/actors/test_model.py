@@ -17,17 +17,14 @@ from infthor_eval.plans.plan import plans_of, tasks_of
 from infthor_eval.runs import execute
 from model_adapters.backend import BackendConversation
 
-from ..cut import CANDLE, FORK, cut, write
-from ..scripting import ScriptedModel, done_so_far, goal_asked, plan_asked
+from ...helpers.prompts import join_parts
+from ...helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
+from ..scripting import ScriptedModel, actions_in_prompt, goal_in_prompt, plan_in_prompt
 
-pytestmark = pytest.mark.usefixtures("shared_simulator")
+pytestmark = pytest.mark.usefixtures("shared_simulators")
 
 QWEN, LLAVA = "qwen2.5-vl-tiny", "llava-onevision-tiny"
 FIRST = "<|goal|>Your main goal: put a fork in the drawer<|goal|>"
-
-
-def text(parts):
-    return "".join(part if isinstance(part, str) else "<image>" for part in parts)
 
 
 def frames(parts):
@@ -43,15 +40,15 @@ def endings(outcome):
 
 
 @pytest.fixture
-def acting(prepared, monkeypatch):
+def run_scripted(prepare_run, monkeypatch):
     """A run of a scripted model: what it said to whom, and the outcome."""
 
-    def acting(say, **changes):
+    def run_scripted(say, **changes):
         model = ScriptedModel(say)
         monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
-        return execute(prepared(QWEN, **changes)), model
+        return execute(prepare_run(QWEN, **changes)), model
 
-    return acting
+    return run_scripted
 
 
 def as_expert(folder):
@@ -66,7 +63,7 @@ def as_expert(folder):
             known[key] = expert_texts(trajectory, plan, Words.PUBLISHED)
 
     def say(parts, decoding):
-        return known[goal_asked(parts), plan_asked(parts)][len(done_so_far(parts))]
+        return known[goal_in_prompt(parts), plan_in_prompt(parts)][len(actions_in_prompt(parts))]
 
     return say
 
@@ -82,58 +79,61 @@ def brief(task_files):
 # -- what a model is asked, and what its words do
 
 
-def test_the_experts_own_words_carry_every_plan_out(acting, tmp_path):
+def test_the_experts_own_words_carry_every_plan_out(run_scripted, tmp_path):
     """Ten cabinets and drawers, two candles: the words mean the plan's own."""
-    folder = write(tmp_path / "two", cut(FORK, 6), cut(CANDLE, 4))
-    outcome, model = acting(as_expert(folder), data=folder)
+    folder = write_trajectories(
+        tmp_path / "two", cut_trajectory(FORK, 6), cut_trajectory(CANDLE, 4)
+    )
+    outcome, model = run_scripted(as_expert(folder), data=folder)
     assert set(endings(outcome)) == {"done"}
     assert all(record.payload.reward == record.payload.max_reward for record in outcome.records)
-    assert len(model.asked) == sum(len(record.payload.steps) for record in outcome.records)
+    assert len(model.requests) == sum(len(record.payload.steps) for record in outcome.records)
 
 
-def test_a_model_reads_the_sequence_that_it_was_trained_on(acting, data):
-    outcome, model = acting(as_expert(data))
+def test_a_model_reads_the_sequence_that_it_was_trained_on(run_scripted, data):
+    outcome, model = run_scripted(as_expert(data))
     (trajectory,) = iter_trajectories(data)
     plans = plans_of(trajectory, Words.PUBLISHED)
-    beginnings = [parts for parts, _ in model.asked if not done_so_far(parts)]
+    beginnings = [parts for parts, _ in model.requests if not actions_in_prompt(parts)]
     whole = FIRST + "<image>"
     for plan, parts in zip(plans, beginnings, strict=True):
-        assert text(parts) == f"{whole}<|plan|>Plan: {plan.text}<|plan|><|act|>"
+        assert join_parts(parts) == f"{whole}<|plan|>Plan: {plan.text}<|plan|><|act|>"
         whole += f"<|plan|>Plan: {plan.text}<|plan|>"
         whole += "".join(
             f"<|act|>{action}<|act|><image>"
             for action in expert_texts(trajectory, plan, Words.PUBLISHED)
         )
-    for (before, _), (after, _) in pairwise(model.asked):
-        if done_so_far(after):  # within a plan it grows by the action and what is seen then
-            action = done_so_far(after)[-1]
-            assert text(after) == f"{text(before)}{action}<|act|><image><|act|>"
+    for (before, _), (after, _) in pairwise(model.requests):
+        if actions_in_prompt(after):  # within a plan it grows by the action and what is seen then
+            action = actions_in_prompt(after)[-1]
+            assert join_parts(after) == f"{join_parts(before)}{action}<|act|><image><|act|>"
             assert frames(after)[:-1] == frames(before)
-    assert {(asked.max_new_tokens, asked.temperature, asked.stop) for _, asked in model.asked} == {
-        (10, 1.0, ("<|act|>",))
-    }
-    assert len({asked.seed for _, asked in model.asked}) == len(
-        model.asked
-    )  # each action has draws of its own
+    assert {
+        (decoding.max_new_tokens, decoding.temperature, decoding.stop)
+        for _, decoding in model.requests
+    } == {(10, 1.0, ("<|act|>",))}
+    # Each action has draws of its own.
+    assert len({decoding.seed for _, decoding in model.requests}) == len(model.requests)
     tokens = [record.tokens for record in outcome.records]
     assert [(count.reply, count.cached) for count in tokens] == [
         (len(record.payload.steps), 0) for record in outcome.records
     ]
 
 
-def test_the_history_is_the_true_one_whatever_the_model_did(acting, data, tmp_path):
-    _, right = acting(as_expert(data))
-    _, wrong = acting(
-        lambda parts, decoding: "RotateLeft" if not done_so_far(parts) else "",
+def test_the_history_is_the_true_one_whatever_the_model_did(run_scripted, data, tmp_path):
+    _, right = run_scripted(as_expert(data))
+    _, wrong = run_scripted(
+        lambda parts, decoding: "RotateLeft" if not actions_in_prompt(parts) else "",
         output=tmp_path / "b",
     )
 
     def beginnings(model):
-        return [parts for parts, _ in model.asked if not done_so_far(parts)]
+        return [parts for parts, _ in model.requests if not actions_in_prompt(parts)]
 
     def seen(model):
         return [
-            [text(parts), *(frame.digest for frame in frames(parts))] for parts in beginnings(model)
+            [join_parts(parts), *(frame.digest for frame in frames(parts))]
+            for parts in beginnings(model)
         ]
 
     assert len(seen(right)) == 4
@@ -153,40 +153,40 @@ FAULTS = [
 ]
 
 
-def test_replies_that_are_no_action_here_are_counted_by_their_fault(acting, tmp_path):
-    data = write(tmp_path / "one", cut(FORK, 1))
+def test_replies_that_are_no_action_here_are_counted_by_their_fault(run_scripted, tmp_path):
+    data = write_trajectories(tmp_path / "one", cut_trajectory(FORK, 1))
     for number, (reply, ended, message) in enumerate(FAULTS):
-        outcome, model = acting(
-            lambda *_, said=reply: said, data=data, output=tmp_path / str(number)
+        outcome, model = run_scripted(
+            lambda *_, text=reply: text, data=data, output=tmp_path / str(number)
         )
         (record,) = outcome.records
         assert outcome.summary.summary.tasks["infthor_plans"].endings == {ended: 1}
         (step,) = record.payload.steps
         assert (step.reply, step.action, step.call, step.reward) == (reply, "", None, 0)
         assert step.message.endswith(message)
-        assert len(model.asked) == 1
+        assert len(model.requests) == 1
         assert [sample.reply for sample in outcome.samples] == [reply]
 
 
 def test_a_reply_with_white_space_around_it_is_the_action_and_goes_into_the_history_without(
-    acting, data
+    run_scripted, data
 ):
-    _, model = acting(
-        lambda parts, _: " RotateRight \n" if len(done_so_far(parts)) < 2 else "", limit=1
+    _, model = run_scripted(
+        lambda parts, _: " RotateRight \n" if len(actions_in_prompt(parts)) < 2 else "", limit=1
     )
-    first = [parts for parts, _ in model.asked[:3]]
-    assert text(first[2]).endswith(
+    first = [parts for parts, _ in model.requests[:3]]
+    assert join_parts(first[2]).endswith(
         "<|act|>RotateRight<|act|><image><|act|>RotateRight<|act|><image><|act|>"
     )
 
 
-def test_a_model_that_fails_fails_its_plan_alone(acting):
+def test_a_model_that_fails_fails_its_plan_alone(run_scripted):
     def say(parts, _):
-        if plan_asked(parts) == "pick up the Fork":
+        if plan_in_prompt(parts) == "pick up the Fork":
             raise ZeroDivisionError("of its own")
-        return "RotateLeft" if not done_so_far(parts) else ""
+        return "RotateLeft" if not actions_in_prompt(parts) else ""
 
-    outcome, _ = acting(say)
+    outcome, _ = run_scripted(say)
     assert [record.failure and record.failure.split(" (")[0] for record in outcome.records] == [
         None,
         f"{QWEN} fails on the request",
@@ -196,9 +196,9 @@ def test_a_model_that_fails_fails_its_plan_alone(acting):
     assert outcome.records[1].payload.max_reward == 2
 
 
-def test_replies_are_held_to_what_is_possible_where_that_is_asked(acting, brief):
-    outcome, model = acting(lambda parts, decoding: decoding.choices[-1], constrained=True)
-    for _, decoding in model.asked:
+def test_replies_are_held_to_what_is_possible_where_that_is_asked(run_scripted, brief):
+    outcome, model = run_scripted(lambda parts, decoding: decoding.choices[-1], constrained=True)
+    for _, decoding in model.requests:
         assert {"MoveAhead", "RotateLeft", "NoOp"} <= set(decoding.choices)
         assert decoding.max_new_tokens >= 64
     assert not {"no action", "unknown object", "not in view", "not possible"} & set(
@@ -207,8 +207,8 @@ def test_replies_are_held_to_what_is_possible_where_that_is_asked(acting, brief)
 
 
 @pytest.mark.parametrize(("trained", "n_warnings"), [("natural", 1), ("published", 0), (None, 0)])
-def test_a_checkpoint_that_was_trained_on_other_words_is_told_of(prepared, trained, n_warnings):
-    run, model = prepared(QWEN), ScriptedModel(lambda *_: "")
+def test_a_checkpoint_that_was_trained_on_other_words_is_told_of(prepare_run, trained, n_warnings):
+    run, model = prepare_run(QWEN), ScriptedModel(lambda *_: "")
     model.identity = lambda: {} if trained is None else {"trained_words": trained}
     warnings = run.evaluation.bind(model).workload.warnings
     assert len(warnings) == n_warnings
@@ -218,51 +218,55 @@ def test_a_checkpoint_that_was_trained_on_other_words_is_told_of(prepared, train
 
 
 @pytest.mark.parametrize("words", ["published", "natural"])
-def test_plans_and_actions_are_in_the_words_that_are_asked_for(acting, data, words):
+def test_plans_and_actions_are_in_the_words_that_are_asked_for(run_scripted, data, words):
     (trajectory,) = iter_trajectories(data)
     plans = plans_of(trajectory, Words(words))
     known = {plan.text: expert_texts(trajectory, plan, Words(words)) for plan in plans}
-    outcome, model = acting(
-        lambda parts, _: known[plan_asked(parts)][len(done_so_far(parts))], words=words
+    outcome, model = run_scripted(
+        lambda parts, _: known[plan_in_prompt(parts)][len(actions_in_prompt(parts))], words=words
     )
     assert set(endings(outcome)) == {"done"}
-    assert {plan_asked(parts) for parts, _ in model.asked} == set(known)
+    assert {plan_in_prompt(parts) for parts, _ in model.requests} == set(known)
     assert [record.payload.plan for record in outcome.records] == list(known)
 
 
-def test_a_preamble_is_told_before_everything_else(acting, task_files, data):
+def test_a_preamble_is_told_before_everything_else(run_scripted, task_files, data):
     (task_files / "plans" / "infthor_plans.yaml").write_text(
-        "include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {preamble: 'You are a robot. "
-        "'}\n"
+        "include: _plans.yaml\n"
+        "task: infthor_plans\n"
+        "dataset_kwargs: {preamble: 'You are a robot. '}\n"
     )
-    _, model = acting(lambda *_: "")
+    _, model = run_scripted(lambda *_: "")
     assert all(
-        text(parts).startswith(f"You are a robot. {FIRST}<image>") for parts, _ in model.asked
+        join_parts(parts).startswith(f"You are a robot. {FIRST}<image>")
+        for parts, _ in model.requests
     )
 
 
-def test_grey_frames_take_the_places_of_all(acting, data):
-    _, shown = acting(as_expert(data))
-    _, blank = acting(as_expert(data), frames="blank")
-    assert [text(parts) for parts, _ in blank.asked] == [text(parts) for parts, _ in shown.asked]
-    assert len({frame.digest for parts, _ in blank.asked for frame in frames(parts)}) == 1
-    assert frames(blank.asked[0][0])[0].load().size == (300, 300)
+def test_grey_frames_take_the_places_of_all(run_scripted, data):
+    _, plain = run_scripted(as_expert(data))
+    _, blank = run_scripted(as_expert(data), frames="blank")
+    assert [join_parts(parts) for parts, _ in blank.requests] == [
+        join_parts(parts) for parts, _ in plain.requests
+    ]
+    assert len({frame.digest for parts, _ in blank.requests for frame in frames(parts)}) == 1
+    assert frames(blank.requests[0][0])[0].load().size == (300, 300)
 
 
 # -- what a model is given of the past
 
 
-def test_the_last_plans_that_fit_are_whole_and_begin_with_their_goal(acting, tmp_path):
-    data = write(tmp_path / "six", cut(FORK, 6))
-    _, full = acting(lambda *_: "", data=data)
-    wholes = [text(parts) for parts, _ in full.asked]
+def test_the_last_plans_that_fit_are_whole_and_begin_with_their_goal(run_scripted, tmp_path):
+    data = write_trajectories(tmp_path / "six", cut_trajectory(FORK, 6))
+    _, full = run_scripted(lambda *_: "", data=data)
+    wholes = [join_parts(parts) for parts, _ in full.requests]
     second = "<|goal|>Your main goal: put two slices of tomato on the dining table<|goal|>"
     for limit in (25, 60, 10_000):
-        _, model = acting(
+        _, model = run_scripted(
             lambda *_: "", data=data, history=f"last:{limit}", output=tmp_path / str(limit)
         )
-        for number, (parts, _) in enumerate(model.asked):
-            window, whole = text(parts), wholes[number]
+        for number, (parts, _) in enumerate(model.requests):
+            window, whole = join_parts(parts), wholes[number]
             assert count(parts) <= limit
             assert window.endswith("<|plan|><|act|>")
             goal = FIRST if window.startswith(FIRST) else second
@@ -277,95 +281,84 @@ def test_the_last_plans_that_fit_are_whole_and_begin_with_their_goal(acting, tmp
                     segments[-n_shown - 1 :]
                 )
                 assert len(more.replace("<image>", " image ").split()) > limit
-    assert [text(parts) for parts, _ in model.asked] == wholes
+    assert [join_parts(parts) for parts, _ in model.requests] == wholes
 
 
 def count(parts):
     return sum(1 if isinstance(part, FrameRef) else len(part.split()) for part in parts)
 
 
-def test_a_plan_that_does_not_fit_alone_fails_and_says_so(acting):
-    outcome, _ = acting(lambda *_: "", history="last:5")
+def test_a_plan_that_does_not_fit_alone_fails_and_says_so(run_scripted):
+    outcome, _ = run_scripted(lambda *_: "", history="last:5")
     assert {record.failure for record in outcome.records} == {
         "the plan alone takes more than 5 tokens; give --history last:N a larger N"
     }
 
 
-def test_tokens_that_nobody_counts_cannot_be_limited(acting, monkeypatch):
+def test_tokens_that_nobody_counts_cannot_be_limited(run_scripted, monkeypatch):
     monkeypatch.setattr("tests.plans.scripting.Talk.n_tokens", None)
-    outcome, _ = acting(lambda *_: "", history="last:500")
+    outcome, _ = run_scripted(lambda *_: "", history="last:500")
     assert {record.failure for record in outcome.records} == {
         "the model counts no tokens, so --history last:N cannot be used; use full"
     }
 
 
-def test_the_state_in_words_takes_the_place_of_the_history(acting, tmp_path):
-    data = write(tmp_path / "six", cut(FORK, 6))
-    _, model = acting(as_expert(data), data=data, history="text")
-    beginnings = [parts for parts, _ in model.asked if not done_so_far(parts)]
+def test_the_state_in_words_takes_the_place_of_the_history(run_scripted, tmp_path):
+    data = write_trajectories(tmp_path / "six", cut_trajectory(FORK, 6))
+    _, model = run_scripted(as_expert(data), data=data, history="text")
+    beginnings = [parts for parts, _ in model.requests if not actions_in_prompt(parts)]
     assert [len(frames(parts)) for parts in beginnings] == [1] * 6
-    assert text(beginnings[0]).startswith(f"{FIRST} State: ")
+    assert join_parts(beginnings[0]).startswith(f"{FIRST} State: ")
     for parts, plan in zip(beginnings, ("go to the cabinet", "pick up the Fork"), strict=False):
-        assert text(parts).endswith(
+        assert join_parts(parts).endswith(
             f"; Last agent's view: <image><|plan|>Plan: {plan}<|plan|><|act|>"
         )
-    assert "fork" in text(beginnings[3]).partition("State: ")[2].lower()  # it is in the hand
-    assert text(beginnings[4]).startswith("<|goal|>Your main goal: put two slices of tomato")
+    assert "fork" in join_parts(beginnings[3]).partition("State: ")[2].lower()  # it is in the hand
+    assert join_parts(beginnings[4]).startswith("<|goal|>Your main goal: put two slices of tomato")
     assert beginnings[1][1].digest != beginnings[0][1].digest
 
 
-def test_the_frames_nearest_to_the_present_one_are_shown_in_time_order(acting, data, make_clip):
-    _, full = acting(as_expert(data))
-    histories = [frames(parts) for parts, _ in full.asked if not done_so_far(parts)]
-    _, model = acting(as_expert(data), history="frames:3", retriever=str(make_clip()))
-    beginnings = [parts for parts, _ in model.asked if not done_so_far(parts)]
+def test_the_frames_nearest_to_the_present_one_are_shown_in_time_order(
+    run_scripted, data, make_clip
+):
+    _, full = run_scripted(as_expert(data))
+    histories = [frames(parts) for parts, _ in full.requests if not actions_in_prompt(parts)]
+    _, model = run_scripted(as_expert(data), history="frames:3", retriever=str(make_clip()))
+    beginnings = [parts for parts, _ in model.requests if not actions_in_prompt(parts)]
     for parts, history in zip(beginnings, histories, strict=True):
         earlier, now = [frame.digest for frame in history[:-1]], history[-1].digest
-        *shown, present = [frame.digest for frame in frames(parts)]
+        *digests, present = [frame.digest for frame in frames(parts)]
         assert present == now
-        assert len(shown) == min(3, len(earlier))
+        assert len(digests) == min(3, len(earlier))
         rest = iter(earlier)
-        assert all(frame in rest for frame in shown)
-        assert text(parts).startswith("<image>" * len(shown) + FIRST + "<image><|plan|>")
+        assert all(frame in rest for frame in digests)
+        assert join_parts(parts).startswith("<image>" * len(digests) + FIRST + "<image><|plan|>")
 
 
-HISTORIES = {
-    "last:0": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
-    "and plans",
-    "last:": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
-    "and plans",
-    "last:-5": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
-    "and plans",
-    "last:many": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, "
-    "goals and plans",
-    "last:²": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
-    "and plans",
-    "frames:0": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, "
-    "goals and plans",
-    "all": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and "
-    "plans",
-    "full:3": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
-    "and plans",
-    "text:3": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
-    "and plans",
-}
+THERE_ARE = (
+    "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans"
+)
+BAD_HISTORIES = (
+    *("last:0", "last:", "last:-5", "last:many", "last:²"),
+    *("frames:0", "all", "full:3", "text:3"),
+)
 
 
-@pytest.mark.parametrize("history", HISTORIES)
-def test_a_history_that_there_is_not_is_refused(prepared, history):
-    with pytest.raises(UsageError, match=HISTORIES[history]) as caught:
-        prepared("random", history=history)
+@pytest.mark.parametrize("history", BAD_HISTORIES)
+def test_a_history_that_there_is_not_is_refused(prepare_run, history):
+    with pytest.raises(UsageError, match=THERE_ARE) as caught:
+        prepare_run("random", history=history)
     assert str(caught.value).startswith(f"--history {history}: ")
 
 
-def test_a_retriever_is_for_frames_alone_and_must_be_there(prepared):
+def test_a_retriever_is_for_frames_alone_and_must_be_there(prepare_run):
     with pytest.raises(
         UsageError,
         match="--history full retrieves no frames; leave it out, or use --history frames:K",
     ):
-        prepared("random", retriever="somewhere")
+        prepare_run("random", retriever="somewhere")
     with pytest.raises(UsageError, match=r"--retriever \./nowhere: there is no such folder"):
-        prepared("random", history="frames:2", retriever="./nowhere")
+        prepare_run("random", history="frames:2", retriever="./nowhere")
     assert isinstance(history_named("last:7", MemoryChoice()), LastTokens)
 
 
@@ -378,9 +371,9 @@ def watched(monkeypatch):
     seen, reply = [], BackendConversation.reply
 
     def kept(talk, decoding):
-        found = reply(talk, decoding)
-        seen.append((list(talk.turns[-1].parts), found))
-        return found
+        answer = reply(talk, decoding)
+        seen.append((list(talk.turns[-1].parts), answer))
+        return answer
 
     monkeypatch.setattr(BackendConversation, "reply", kept)
     return seen
@@ -389,17 +382,18 @@ def watched(monkeypatch):
 @pytest.fixture
 def short(tmp_path):
     """Two plans of a few actions."""
-    return write(tmp_path / "short", cut(CANDLE, 2))
+    return write_trajectories(tmp_path / "short", cut_trajectory(CANDLE, 2))
 
 
 @pytest.mark.parametrize(
-    ("model", "ways"),
-    [(QWEN, ("greedy", "constrained")), (LLAVA, ("constrained",))],
+    ("model", "ways"), [(QWEN, ("greedy", "constrained")), (LLAVA, ("constrained",))]
 )
-def test_sharing_what_was_encoded_changes_no_reply(prepared, tmp_path, short, brief, model, ways):
+def test_sharing_what_was_encoded_changes_no_reply(
+    prepare_run, tmp_path, short, brief, model, ways
+):
     for way in ways:  # replies are drawn unless they are greedy
         shared, plain = (
-            execute(prepared(model, options, data=short, **{way: True}))
+            execute(prepare_run(model, options, data=short, **{way: True}))
             for options in ({}, {"share_prefix": "false"})
         )
         assert shared.folder != plain.folder
@@ -408,21 +402,21 @@ def test_sharing_what_was_encoded_changes_no_reply(prepared, tmp_path, short, br
         assert endings(shared) == endings(plain)
 
 
-def test_a_seed_draws_the_same_replies_and_another_others(prepared, tmp_path):
-    data = write(tmp_path / "one", cut(FORK, 3))
+def test_a_seed_draws_the_same_replies_and_another_others(prepare_run, tmp_path):
+    data = write_trajectories(tmp_path / "one", cut_trajectory(FORK, 3))
 
     def drawn(seed, folder):
-        return says(execute(prepared(QWEN, data=data, seed=seed, output=tmp_path / folder)))
+        return says(execute(prepare_run(QWEN, data=data, seed=seed, output=tmp_path / folder)))
 
     first = drawn(0, "a")
     assert drawn(0, "b") == first
     assert drawn(1, "c") != first
-    greedy = says(execute(prepared(QWEN, data=data, greedy=True, output=tmp_path / "greedy")))
+    greedy = says(execute(prepare_run(QWEN, data=data, greedy=True, output=tmp_path / "greedy")))
     assert greedy != first
 
 
-def test_replies_that_are_held_to_possible_actions_can_be_tried(prepared, short, brief):
-    outcome = execute(prepared(QWEN, data=short, constrained=True))
+def test_replies_that_are_held_to_possible_actions_can_be_tried(prepare_run, short, brief):
+    outcome = execute(prepare_run(QWEN, data=short, constrained=True))
     steps = [step for record in outcome.records for step in record.payload.steps]
     assert all(step.action == step.reply for step in steps)
     assert all(step.call for step in steps)
@@ -430,12 +424,12 @@ def test_replies_that_are_held_to_possible_actions_can_be_tried(prepared, short,
 
 
 @pytest.mark.parametrize("model", [QWEN, LLAVA])
-def test_what_was_seen_is_encoded_once(prepared, short, monkeypatch, watched, brief, model):
+def test_what_was_seen_is_encoded_once(prepare_run, short, monkeypatch, watched, brief, model):
     """The model turns about: nothing that it saw before an action is encoded again for the next."""
     act = ModelActor.act
     monkeypatch.setattr(ModelActor, "act", lambda actor: replace(act(actor), action="RotateLeft"))
-    execute(prepared(model, {"chunk_tokens": "64"}, data=short, greedy=True))
-    assert [len(done_so_far(parts)) for parts, _ in watched] == [0, 1, 2, 3] * 2
+    execute(prepare_run(model, {"chunk_tokens": "64"}, data=short, greedy=True))
+    assert [len(actions_in_prompt(parts)) for parts, _ in watched] == [0, 1, 2, 3] * 2
     for number, ((_, first), (_, second)) in enumerate(pairwise(watched), 1):
         if number != 4:
             # All but the end of the prompt, where the reply was asked for, is there.
@@ -444,14 +438,16 @@ def test_what_was_seen_is_encoded_once(prepared, short, monkeypatch, watched, br
             assert watched[0][1].n_context_tokens - second.n_cached_tokens < 30
 
 
-def test_histories_of_a_tiny_model(prepared, tmp_path, watched, make_clip):
-    data = write(tmp_path / "few", cut(CANDLE, 5))
+def test_histories_of_a_tiny_model(prepare_run, tmp_path, watched, make_clip):
+    data = write_trajectories(tmp_path / "few", cut_trajectory(CANDLE, 5))
     options = {"retriever": str(make_clip())}
     for history, more in (("full", {}), ("last:700", {}), ("text", {}), ("frames:2", options)):
         watched.clear()
-        outcome = execute(prepared(QWEN, data=data, greedy=True, history=history, **more))
+        outcome = execute(prepare_run(QWEN, data=data, greedy=True, history=history, **more))
         assert not any(record.failure for record in outcome.records)
-        firsts = [reply.n_context_tokens for parts, reply in watched if not done_so_far(parts)]
+        firsts = [
+            reply.n_context_tokens for parts, reply in watched if not actions_in_prompt(parts)
+        ]
         assert len(firsts) == len(outcome.records) == 4  # one of five belongs to no task
         if history == "full":
             whole = firsts
@@ -460,8 +456,8 @@ def test_histories_of_a_tiny_model(prepared, tmp_path, watched, make_clip):
         assert [record.payload.steps[0].n_context_tokens for record in outcome.records] == firsts
 
 
-def test_a_context_that_is_full_fails_the_plan_in_one_line(prepared, short):
-    outcome = execute(prepared(QWEN, {"max_tokens": "200"}, data=short))
+def test_a_context_that_is_full_fails_the_plan_in_one_line(prepare_run, short):
+    outcome = execute(prepare_run(QWEN, {"max_tokens": "200"}, data=short))
     first, second = outcome.records
     assert second.failure
     assert "200" in second.failure
@@ -469,25 +465,25 @@ def test_a_context_that_is_full_fails_the_plan_in_one_line(prepared, short):
     assert first.payload.max_reward is not None
 
 
-def test_a_model_that_loses_its_conversation_is_an_error(acting, monkeypatch):
+def test_a_model_that_loses_its_conversation_is_an_error(run_scripted, monkeypatch):
     def full(*_):
         raise ModelError("too long")
 
     monkeypatch.setattr("infthor_eval.plans.history.forms.FullHistory.recall", full)
-    outcome, _ = acting(lambda *_: "")
+    outcome, _ = run_scripted(lambda *_: "")
     assert {record.failure for record in outcome.records} == {"too long"}
 
 
-def test_a_memory_stands_in_for_the_history(acting, data):
-    _, full = acting(as_expert(data))
-    _, model = acting(as_expert(data), history="memory", memory="last", memory_args="k=2")
+def test_a_memory_stands_in_for_the_history(run_scripted, data):
+    _, full = run_scripted(as_expert(data))
+    _, model = run_scripted(as_expert(data), history="memory", memory="last", memory_args="k=2")
     histories, beginnings = (
-        [parts for parts, _ in asked if not done_so_far(parts)]
-        for asked in (full.asked, model.asked)
+        [parts for parts, _ in model_requests if not actions_in_prompt(parts)]
+        for model_requests in (full.requests, model.requests)
     )
-    for history, given in zip(histories, beginnings, strict=True):
+    for history, beginning in zip(histories, beginnings, strict=True):
         seen = [frame.digest for frame in frames(history)]
-        shown = [frame.digest for frame in frames(given)]
-        assert shown[-1] == seen[-1]
-        assert len(shown) <= 3
-        assert set(shown) <= set(seen)
+        digests = [frame.digest for frame in frames(beginning)]
+        assert digests[-1] == seen[-1]
+        assert len(digests) <= 3
+        assert set(digests) <= set(seen)

@@ -16,8 +16,8 @@ from infthor_eval.storage.folders import packaged_folder
 @pytest.fixture(scope="module")
 def bundled():
     with gzip.open(packaged_folder("sets/plans_mini") / "trajectories.jsonl.gz") as lines:
-        found = [msgspec.json.decode(line, type=Trajectory) for line in lines]
-    return {trajectory.traj_id: trajectory for trajectory in found}
+        trajectories = [msgspec.json.decode(line, type=Trajectory) for line in lines]
+    return {trajectory.traj_id: trajectory for trajectory in trajectories}
 
 
 def final_plans(trajectory):
@@ -31,12 +31,12 @@ def test_a_clue_is_the_last_frame_with_what_the_plan_needs(bundled):
     wanted = ["Cabinet", "Tomato", "Fridge", "Fridge", "Drawer", "Knife", "Fridge", "Tomato"]
     for plan, name in zip(plans, wanted, strict=True):
         frame = clue_step(logs, trajectory, plan, first)
-        shown = [
+        frames_with_it = [
             number
             for number in range(first + 1)
             if name in trajectory.object_log[number]["visible"]
         ]
-        assert frame == (shown[-1] if shown else None), plan.text
+        assert frame == (frames_with_it[-1] if frames_with_it else None), plan.text
         assert (frame is None) == (name == "Knife"), "what was never in view has no clue"
 
 

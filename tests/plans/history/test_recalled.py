@@ -73,8 +73,8 @@ def no_count(parts):
 
 
 def test_an_agent_is_given_what_is_recalled_then_goal_frame_and_plan(own):
-    given = RecalledHistory(own).recall(past(2), no_count)
-    assert names(given) == [
+    parts = RecalledHistory(own).recall(past(2), no_count)
+    assert names(parts) == [
         "before: ",
         "a2",
         "a3",

@@ -12,7 +12,7 @@ from infthor_eval.plans.history.recalled import MemoryChoice
 from infthor_eval.plans.history.retrieved import retrieved_steps
 from infthor_eval.plans.history.segments import PlanSegment
 
-from ..cut import FORK, cut, write
+from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
 
 # The first frame is in no entry. Action 1 has two frames, of which the last one shows its outcome.
 IMAGES = [
@@ -30,8 +30,8 @@ def trajectory(tmp_path):
 
     def make(retrieved, images=IMAGES):
         listed = [{"low_idx": action, "image_name": name, "high_idx": 0} for action, name in images]
-        document = cut(FORK) | {"retrieved_image": retrieved, "images": listed}
-        (read,) = iter_trajectories(write(tmp_path / "data", document))
+        document = cut_trajectory(FORK) | {"retrieved_image": retrieved, "images": listed}
+        (read,) = iter_trajectories(write_trajectories(tmp_path / "data", document))
         return read
 
     return make
@@ -45,7 +45,7 @@ def test_names_are_looked_up_in_images_with_the_suffix_of_either_format(trajecto
 
 
 @pytest.mark.parametrize(
-    ("retrieved", "said"),
+    ("retrieved", "expected"),
     [
         (
             None,
@@ -72,10 +72,10 @@ def test_names_are_looked_up_in_images_with_the_suffix_of_either_format(trajecto
         ({"3": [1]}, "is no list of frame names (Expected `object`, got `array`"),
     ],
 )
-def test_what_is_missing_or_wrong_is_told_with_its_place(trajectory, retrieved, said):
+def test_what_is_missing_or_wrong_is_told_with_its_place(trajectory, retrieved, expected):
     with pytest.raises(DataError) as caught:
         retrieved_steps(trajectory(retrieved), 3, 20)
-    assert said in str(caught.value)
+    assert expected in str(caught.value)
     assert f"trajectory {FORK}: " in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -102,10 +102,10 @@ def test_they_are_shown_in_the_files_order_and_the_published_size(trajectory, tm
     )
     assert (goal, plan) == ("<|goal|>Your main goal: a goal<|goal|>", "<|plan|>Plan: pick<|plan|>")
     assert present == frames[3]
-    for shown, number in ((first, 2), (second, 0)):
+    for resized, number in ((first, 2), (second, 0)):
         expected = frames[number].load().resize((336, 336), Image.Resampling.LANCZOS)
-        assert shown.size == (336, 336)
-        assert ImageChops.difference(shown.load(), expected).getbbox() is None
+        assert resized.size == (336, 336)
+        assert ImageChops.difference(resized.load(), expected).getbbox() is None
     with pytest.raises(DataError, match="file is not known, which --history retrieved:K reads"):
         history_named("retrieved:2", MemoryChoice()).recall(
             Past(segments, past.present), lambda _: None

@@ -13,7 +13,8 @@ from infthor_eval.plans.history.segments import PlanSegment
 from infthor_eval.plans.published.final_protocol import chat_form, present_parts
 from infthor_eval.runs import execute
 
-from ..cut import FORK, cut, write
+from ...helpers.prompts import join_parts
+from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
 from ..scripting import ScriptedModel
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "goldens" / "chat_prompts.json").read_text())
@@ -22,10 +23,6 @@ OF_PLANS = [item for item in GOLDEN if "plans" in item]
 
 def frame(name):
     return FrameRef(Path(f"{name}.png"))
-
-
-def text_of(parts):
-    return "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
 
 
 def frames_of(parts):
@@ -47,7 +44,7 @@ def test_the_plans_before_are_told_as_published(item):
     form = form_named("plans")
     past = Past([*before, outside], present)
     parts = [*form.history.recall(past, lambda _: None), *present_parts(frame("last"))]
-    assert [["system", form.system], ["user", text_of(parts)]] == item["messages"]
+    assert [["system", form.system], ["user", join_parts(parts)]] == item["messages"]
     assert frames_of(parts) == item["frames"][-1:]
 
 
@@ -61,11 +58,11 @@ def test_goals_and_actions_are_told_as_published():
         PlanSegment("pick", None, frame("x"), tuple(pick)),
     ]
     form = form_named("goals")
-    given = form.history.recall(
+    recalled = form.history.recall(
         Past(segments, PlanSegment("go", next_goal, frame("y"))), lambda _: None
     )
-    parts = [*given, "<|act|>"]  # where an agent that is not asked anew goes on
-    assert [["system", form.system], ["user", text_of(parts)]] == item["messages"]
+    parts = [*recalled, "<|act|>"]  # where an agent that is not asked anew goes on
+    assert [["system", form.system], ["user", join_parts(parts)]] == item["messages"]
     assert frames_of(parts) == item["frames"]
 
 
@@ -73,25 +70,27 @@ def test_other_histories_are_no_chat():
     assert form_named("full") is None
 
 
-@pytest.mark.usefixtures("shared_simulator")
-def test_every_plan_is_asked_from_the_true_state(prepared, monkeypatch, tmp_path):
+@pytest.mark.usefixtures("shared_simulators")
+def test_every_plan_is_asked_from_the_true_state(prepare_run, monkeypatch, tmp_path):
     model = ScriptedModel(lambda *_: "fly")
     monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
-    data = write(tmp_path / "trajectories", cut(FORK))
+    data = write_trajectories(tmp_path / "trajectories", cut_trajectory(FORK))
     outcome = execute(
-        prepared("qwen2.5-vl-tiny", tasks=("infthor_plans",), data=data, history="plans")
+        prepare_run("qwen2.5-vl-tiny", tasks=("infthor_plans",), data=data, history="plans")
     )
     assert [record.payload.ended for record in outcome.records] == ["no action"] * 4
-    told = [text_of(parts) for parts, _ in model.asked]
+    prompts = [join_parts(parts) for parts, _ in model.requests]
     plans = [record.payload.plan for record in outcome.records]
     expected = ["No history is available.", *("; ".join(plans[:n]) + ";" for n in (1, 2, 3))]
-    assert told == [
-        f"Action history: {said}\nCurrent state: <image> Next action: " for said in expected
+    assert prompts == [
+        f"Action history: {history}\nCurrent state: <image> Next action: " for history in expected
     ]
-    assert {(decoding.max_new_tokens, decoding.stop) for _, decoding in model.asked} == {(32, ())}
+    assert {(decoding.max_new_tokens, decoding.stop) for _, decoding in model.requests} == {
+        (32, ())
+    }
     outcome = execute(
-        prepared("qwen2.5-vl-tiny", tasks=("infthor_plans",), data=data, history="goals")
+        prepare_run("qwen2.5-vl-tiny", tasks=("infthor_plans",), data=data, history="goals")
     )
-    assert text_of(model.asked[-1][0]).endswith("<image><|act|>")
-    assert (model.asked[-1][1].max_new_tokens, model.asked[-1][1].stop) == (32, ("<|act|>",))
-    assert "<|plan|>" not in text_of(model.asked[-1][0])
+    assert join_parts(model.requests[-1][0]).endswith("<image><|act|>")
+    assert (model.requests[-1][1].max_new_tokens, model.requests[-1][1].stop) == (32, ("<|act|>",))
+    assert "<|plan|>" not in join_parts(model.requests[-1][0])

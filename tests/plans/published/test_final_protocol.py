@@ -12,23 +12,20 @@ from infthor_eval.plans.actors.habits import expert_texts
 from infthor_eval.plans.plan import plans_of
 from infthor_eval.runs import execute
 
-from ..cut import FORK, cut, write
+from ...helpers.prompts import join_parts
+from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
 from ..scripting import ScriptedModel
 
-pytestmark = pytest.mark.usefixtures("shared_simulator")
+pytestmark = pytest.mark.usefixtures("shared_simulators")
 
 QWEN = "qwen2.5-vl-tiny"
 FIRST = "<|goal|>Your main goal: put a fork in the drawer<|goal|><image>"
 
 
-def text(parts):
-    return "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
-
-
 @pytest.fixture
 def final(tmp_path):
     """A kitchen whose final task has two plans, after a task of four."""
-    return write(tmp_path / "final", cut(FORK, 6, final=True))
+    return write_trajectories(tmp_path / "final", cut_trajectory(FORK, 6, final=True))
 
 
 @pytest.fixture
@@ -42,11 +39,11 @@ def experts(final):
 
 
 @pytest.fixture
-def acting(prepared, monkeypatch, final):
+def run_scripted(prepare_run, monkeypatch, final):
     """Runs a model that says these texts one after the other; gives the payloads and the model."""
 
-    def acting(said, **changes):
-        rest = iter(said)
+    def run_scripted(replies, **changes):
+        rest = iter(replies)
         model = ScriptedModel(lambda *_: next(rest))
         monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
         settings = {
@@ -55,87 +52,90 @@ def acting(prepared, monkeypatch, final):
             "protocol": "published",
             "rewards": "published",
         }
-        outcome = execute(prepared(QWEN, **settings | changes))
+        outcome = execute(prepare_run(QWEN, **settings | changes))
         return [record.payload for record in outcome.records], model, outcome
 
-    return acting
+    return run_scripted
 
 
-def test_the_interleaved_form_ends_after_its_first_plan(acting, experts):
-    (first, second), model, outcome = acting(experts[4])
+def test_the_interleaved_form_ends_after_its_first_plan(run_scripted, experts):
+    (first, second), model, outcome = run_scripted(experts[4])
     assert (first.ended, second.ended) == ("done", "not attempted")
     (task,) = outcome.summary.summary.tasks.values()
     assert (task.n_plans, task.n_tried, task.success["total"].mean) == (2, 1, 0.5)
-    parts, decoding = model.asked[0]
-    shown = text(parts)
-    assert shown.startswith(f"{FIRST}<|act|><|act|>")
-    assert "<|plan|>" not in shown
-    assert shown.count("<|goal|>Your main goal: ") == 2
-    assert shown.endswith("<|goal|><image><|act|>")
+    parts, decoding = model.requests[0]
+    prompt = join_parts(parts)
+    assert prompt.startswith(f"{FIRST}<|act|><|act|>")
+    assert "<|plan|>" not in prompt
+    assert prompt.count("<|goal|>Your main goal: ") == 2
+    assert prompt.endswith("<|goal|><image><|act|>")
     frames = [part for part in parts if isinstance(part, FrameRef)]
     assert frames[0].digest == frames[-1].digest  # the scene's first frame stands behind each goal
     assert (decoding.max_new_tokens, decoding.temperature, decoding.stop) == (32, 0.0, ("<|act|>",))
     assert decoding.repetition_penalty is None
-    assert [told.startswith("You are an embodied AI agent") for told in model.told] == [True]
-    grown = text(model.asked[1][0])
-    assert grown == f"{shown}{experts[4][0]}<|act|><image><|act|>"
+    assert [
+        system_text.startswith("You are an embodied AI agent") for system_text in model.system_parts
+    ] == [True]
+    grown = join_parts(model.requests[1][0])
+    assert grown == f"{prompt}{experts[4][0]}<|act|><image><|act|>"
 
 
-def test_a_failed_first_plan_ends_it_too(acting):
-    (first, second), model, _ = acting(["fly"])
+def test_a_failed_first_plan_ends_it_too(run_scripted):
+    (first, second), model, _ = run_scripted(["fly"])
     assert (first.ended, second.ended) == ("no action", "not attempted")
-    assert len(model.asked) == 1
+    assert len(model.requests) == 1
 
 
-def test_with_a_memory_the_next_plan_follows_in_the_world_as_it_is(acting):
-    (first, second), model, _ = acting(
+def test_with_a_memory_the_next_plan_follows_in_the_world_as_it_is(run_scripted):
+    (first, second), model, _ = run_scripted(
         ["RotateLeft", "fly", *["RotateRight"] * 201], history="text"
     )
     assert (first.ended, second.ended) == ("no action", "step limit")
     assert len(second.steps) == 201
-    prompts = [text(parts) for parts, _ in model.asked]
-    assert (
-        len({prompt.partition("Current state: ")[0] for prompt in prompts}) == 1
-    )  # the memory is not renewed
+    prompts = [join_parts(parts) for parts, _ in model.requests]
+    # The memory is not renewed.
+    assert len({prompt.partition("Current state: ")[0] for prompt in prompts}) == 1
     for prompt in prompts:
         assert prompt.startswith("Your task is: put two slices of tomato")
         assert ".\nState: You are in the middle of a room. Your hands are free." in prompt
         assert prompt.endswith(";\nCurrent state: <image> Next action: ")
-    assert model.asked[0][1].stop == ()
-    shown = [parts[-2].digest for parts, _ in model.asked]
-    assert shown[0] != shown[1]  # it has turned left,
-    assert shown[1] == shown[2]  # and the next plan begins there
-    assert any("Available actions: RotateLeft" in told for told in model.told)
+    assert model.requests[0][1].stop == ()
+    digests = [parts[-2].digest for parts, _ in model.requests]
+    assert digests[0] != digests[1]  # it has turned left,
+    assert digests[1] == digests[2]  # and the next plan begins there
+    assert any("Available actions: RotateLeft" in system_text for system_text in model.system_parts)
 
 
-def test_the_state_in_the_file_is_taken_where_there_is_one(acting, final):
+def test_the_state_in_the_file_is_taken_where_there_is_one(run_scripted, final):
     path = final / f"{FORK}.json"
     document = json.loads(path.read_text())
     first = document["sub_trajs"][-1]["low_pddl_idx"][0]
     path.write_text(json.dumps(document | {"state_summary": {str(first): "All is well"}}))
-    _, model, _ = acting(["fly", "fly"], history="text")
-    assert "State: You are in the middle of a room. All is well;\n" in text(model.asked[0][0])
+    _, model, _ = run_scripted(["fly", "fly"], history="text")
+    assert "State: You are in the middle of a room. All is well;\n" in join_parts(
+        model.requests[0][0]
+    )
 
 
-def test_frames_are_remembered_by_clip(acting, make_clip):
-    _, model, _ = acting(["fly", "fly"], history="frames:3", retriever=str(make_clip()))
-    shown = text(model.asked[0][0])
-    assert shown.startswith("Your task is: ")
-    assert shown.endswith(
+def test_frames_are_remembered_by_clip(run_scripted, make_clip):
+    _, model, _ = run_scripted(["fly", "fly"], history="frames:3", retriever=str(make_clip()))
+    prompt = join_parts(model.requests[0][0])
+    assert prompt.startswith("Your task is: ")
+    assert prompt.endswith(
         ".\nPrevious states: <image><image><image>Current state: <image> Next action: "
     )
 
 
-def test_frames_that_the_file_names_are_remembered_in_the_published_size(acting, final):
+def test_frames_that_the_file_names_are_remembered_in_the_published_size(run_scripted, final):
     path = final / f"{FORK}.json"
     document = json.loads(path.read_text())
     first = document["sub_trajs"][-1]["low_pddl_idx"][0]
     images = [{"low_idx": number, "image_name": f"{number + 1:09d}.png"} for number in range(first)]
     retrieved = {str(first): {"top20": ["000000000.png", "000000002.png", "000000005.png"]}}
     path.write_text(json.dumps(document | {"images": images, "retrieved_image": retrieved}))
-    _, model, _ = acting(["fly", "fly"], history="retrieved:20")
-    parts = model.asked[0][0]
-    assert text(parts).endswith(
+    _, model, _ = run_scripted(["fly", "fly"], history="retrieved:20")
+    parts = model.requests[0][0]
+    assert join_parts(parts).endswith(
         ".\nPrevious states: <image><image><image>Current state: <image> Next action: "
     )
     assert [part.path.stem for part in parts if isinstance(part, FrameRef)][:3] == [
@@ -143,16 +143,18 @@ def test_frames_that_the_file_names_are_remembered_in_the_published_size(acting,
         "000000002-336",
         "000000005-336",
     ]
-    assert [told.count("previous states (history)") for told in model.told] == [1]
+    assert [
+        system_text.count("previous states (history)") for system_text in model.system_parts
+    ] == [1]
 
 
-def test_a_file_that_names_no_frames_for_an_action_is_told_in_its_records(acting, final):
+def test_a_file_that_names_no_frames_for_an_action_is_told_in_its_records(run_scripted, final):
     path = final / f"{FORK}.json"
     path.write_text(
         json.dumps(json.loads(path.read_text()) | {"retrieved_image": {"0": {"top20": []}}})
     )
-    _, model, outcome = acting([], history="retrieved:20")
-    assert model.asked == []
+    _, model, outcome = run_scripted([], history="retrieved:20")
+    assert model.requests == []
     for record in outcome.records:
         assert record.failure.startswith(f'trajectory {FORK}: retrieved_image["')
         assert record.failure.endswith(
@@ -160,13 +162,13 @@ def test_a_file_that_names_no_frames_for_an_action_is_told_in_its_records(acting
         )
 
 
-def test_files_that_name_no_frames_are_refused_before_the_work(acting):
+def test_files_that_name_no_frames_are_refused_before_the_work(run_scripted):
     with pytest.raises(DataError, match="infthor_final: no trajectory there has retrieved_image"):
-        acting([], history="retrieved:20")
+        run_scripted([], history="retrieved:20")
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "expected"),
     [
         (
             {"history": "last:100"},
@@ -179,13 +181,13 @@ def test_files_that_name_no_frames_are_refused_before_the_work(acting):
         ),
     ],
 )
-def test_what_the_scripts_have_not_is_refused(acting, changes, said):
+def test_what_the_scripts_have_not_is_refused(run_scripted, changes, expected):
     with pytest.raises(UsageError) as caught:
-        acting([], **changes)
-    assert str(caught.value) == said
+        run_scripted([], **changes)
+    assert str(caught.value) == expected
 
 
-def test_a_run_that_was_stopped_goes_on_to_the_same_end(prepared, final, experts, monkeypatch):
+def test_a_run_that_was_stopped_goes_on_to_the_same_end(prepare_run, final, experts, monkeypatch):
     rest = iter([*experts[4], "fly", *experts[4], "fly"])
     model = ScriptedModel(lambda *_: next(rest))
     monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
@@ -195,17 +197,19 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_end(prepared, final, experts
         "protocol": "published",
         "history": "text",
     }
-    whole = execute(prepared(QWEN, **settings))
+    whole = execute(prepare_run(QWEN, **settings))
     (journal,) = (whole.folder / "journal").glob("*.jsonl")
     lines = journal.read_text().splitlines(keepends=True)
     journal.write_text("".join(lines[:-1]))
-    again = execute(prepared(QWEN, **settings))
+    again = execute(prepare_run(QWEN, **settings))
     assert [record.payload for record in again.records] == [
         record.payload for record in whole.records
     ]
 
 
-def test_how_far_back_a_clue_is_stands_in_the_record_in_frames_and_tokens(acting, experts, final):
+def test_how_far_back_a_clue_is_stands_in_the_record_in_frames_and_tokens(
+    run_scripted, experts, final
+):
     (trajectory,) = iter_trajectories(final)
     plan = plans_of(trajectory, Words.PUBLISHED)[4]
     name = trajectory.plan.high_pddl[plan.high].discrete_action.args[0]
@@ -215,22 +219,17 @@ def test_how_far_back_a_clue_is_stands_in_the_record_in_frames_and_tokens(acting
         {"visible": [name.capitalize()] if number in (1, seen) else []}
         for number in range(first + 1)
     ]
-    entries += [{"visible": [name]}] * (
-        len(trajectory.plan.low_actions) - first
-    )  # later than anybody may know
+    # Later than anybody may know.
+    entries += [{"visible": [name]}] * (len(trajectory.plan.low_actions) - first)
     path.write_text(json.dumps(json.loads(path.read_text()) | {"object_log": entries}))
 
-    said = [text for texts in experts[4:] for text in texts]
-    plans, model, outcome = acting(said, protocol="default", rewards="default")
-    assert plans[0].ended == "done" and {plan.conditions[1] for plan in plans} == {
-        4
-    }  # two slices, both there
-    n_tokens, after_goal, up_to = (
-        0,
-        False,
-        [],
-    )  # tokens up to each frame: a word is one, a frame is one
-    for part in model.asked[0][0]:
+    replies = [text for texts in experts[4:] for text in texts]
+    plans, model, outcome = run_scripted(replies, protocol="default", rewards="default")
+    # Two slices, both there.
+    assert plans[0].ended == "done" and {plan.conditions[1] for plan in plans} == {4}
+    # Tokens up to each frame: a word is one, a frame is one.
+    n_tokens, after_goal, up_to = (0, False, [])
+    for part in model.requests[0][0]:
         n_tokens += 1 if isinstance(part, FrameRef) else len(part.split())
         if isinstance(part, FrameRef) and (not up_to or not after_goal):
             up_to.append(n_tokens)

@@ -38,9 +38,8 @@ from infthor_eval.thor.published_actions import ground_published, published_call
 from infthor_eval.thor.view import ThorObject, Vector
 
 GOLDENS = Path(__file__).parents[3] / "../shared/data/published_goldens"
-OURS = (
-    Path(__file__).parents[2] / "goldens"
-)  # outputs of the same functions on inputs made for these tests
+# Outputs of the same functions on inputs made for these tests.
+OURS = Path(__file__).parents[2] / "goldens"
 RULES = reward_rules("published")
 
 
@@ -53,8 +52,8 @@ def lines(name: str, folder: Path = GOLDENS) -> Iterator[dict[str, Any]]:
 
 
 def thing(record: dict[str, Any]) -> ThorObject:
-    given = {"name": "", "position": Vector(), "objectType": record["objectId"].split("|")[0]}
-    return msgspec.convert(given | record, ThorObject)
+    required = {"name": "", "position": Vector(), "objectType": record["objectId"].split("|")[0]}
+    return msgspec.convert(required | record, ThorObject)
 
 
 def test_every_text_is_the_published_one():
@@ -98,9 +97,8 @@ class _Story:
         )
 
 
-@pytest.mark.parametrize(
-    "every", [20, 1]
-)  # a part of them each time, all of them with the slow tests
+# A part of them each time, all of them with the slow tests.
+@pytest.mark.parametrize("every", [20, 1])
 def test_every_step_earns_and_ends_as_published(every):
     check_rewards(islice(lines("plan_rewards"), None, None, every))
 
@@ -140,11 +138,8 @@ def check_rewards(stories: Iterable[dict[str, Any]]) -> None:
 def read(document: dict[str, Any]) -> Any:
     """A golden trajectory, with what its lines leave out."""
     scene = {"floor_plan": "FloorPlan1"} | document["scene"]
-    goal = {
-        "goal": "pick_and_place_simple",
-        "pickup": "Mug",
-        "receptacle": "CounterTop",
-    }  # read, and not asked for
+    # Read, and not asked for.
+    goal = {"goal": "pick_and_place_simple", "pickup": "Mug", "receptacle": "CounterTop"}
     tasks = [task | {"task_info": task["task_info"] | goal} for task in document["sub_tasks"]]
     parts = [part | {"sub_traj_idx": number} for number, part in enumerate(document["sub_trajs"])]
     whole = document | {"scene": scene, "sub_tasks": tasks, "sub_trajs": parts}
@@ -202,16 +197,15 @@ class _Loop:
             self.line["agent"][str(plan.high)], 1
         ):
             frames = [int(str(part.path)) for part in parts if isinstance(part, FrameRef)]
-            shown = "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
-            self.prompts.append([plan.high, shown, frames])
+            prompt = "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
+            self.prompts.append([plan.high, prompt, frames])
             try:
                 call = published_call(text, self.objects, self.held)
             except LookupError:
                 call = None
             self.sent.append([] if call is None else [call])
-            if (
-                answer == "done"
-            ):  # after an error of the service, the loop takes the last event for the present one
+            # After an error of the service, the loop takes the last event for the present one.
+            if answer == "done":
                 last = frame(1000 * (plan.high + 1) + number)
             failed = answer == "refused" or call is None or "receptacleObjectId" in call
             steps.append(StepRecord(reply=text, reward=0.0 if failed else reward))
@@ -268,7 +262,7 @@ def by_hand(document: dict[str, Any]) -> list[tuple[str, list[int]]]:
     def name(object_id: str) -> str:
         return object_id[: object_id.index("|")]
 
-    def said(high: dict[str, Any]) -> str:
+    def plan_in_words(high: dict[str, Any]) -> str:
         kind, planner = high["discrete_action"]["action"], high["planner_action"]
         if kind == "GotoLocation":
             return f"go to the {high['discrete_action']['args'][0]}"
@@ -296,7 +290,8 @@ def by_hand(document: dict[str, Any]) -> list[tuple[str, list[int]]]:
         text += f"<|goal|>Your main goal: {task['task_desc']}<|goal|><image>"
         frames.append(0)
         for place in range(*part["high_pddl_idx"]):
-            text += f"<|plan|>Plan: {said(document['plan']['high_pddl'][place])}<|plan|><|act|>"
+            plan = plan_in_words(document["plan"]["high_pddl"][place])
+            text += f"<|plan|>Plan: {plan}<|plan|><|act|>"
             before.append((text, list(frames)))
             for low in document["plan"]["low_actions"]:
                 if low["high_idx"] == place:
@@ -329,5 +324,5 @@ def test_the_history_of_a_published_trajectory_is_the_published_one():
         assert [int(str(part.path)) for part in parts if isinstance(part, FrameRef)] == numbers
         done = zip(expert_texts(trajectory, plan, Words.PUBLISHED), range(*plan.low), strict=True)
         segments.append(
-            replace(segment, steps=tuple((said, frame(number + 1)) for said, number in done))
+            replace(segment, steps=tuple((action, frame(number + 1)) for action, number in done))
         )

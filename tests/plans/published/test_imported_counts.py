@@ -9,7 +9,8 @@ import pytest
 from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import read_run
 
-from ..made_runs import plan, planner_run, write_run
+from ...helpers.journals import write_run
+from ...helpers.plan_runs import make_plan_record, make_planner_run
 
 LOG = "eval_longhrz_checkpoints_some-model-hf_yarn_4.0.log"
 PUBLISHED = sorted(
@@ -32,7 +33,7 @@ ROWS = row("t0", (1, 2), (0, 1), (0, 1)) + row("t1") + row("t2", (0, 1), (1, 1),
 
 
 @pytest.fixture
-def import_log(tmp_path, run):
+def import_log(tmp_path, run_cli):
     """Imports a text as a log; returns exit code, what was said, and the run's folder."""
 
     def import_log(content, *options, name=LOG):
@@ -40,17 +41,17 @@ def import_log(tmp_path, run):
         path.write_bytes(
             gzip.compress(content.encode()) if name.endswith(".gz") else content.encode()
         )
-        code, out, err = run("import-replies", path, "--output", tmp_path / "out", *options)
+        code, out, err = run_cli("import-replies", path, "--output", tmp_path / "out", *options)
         return code, out + err, next((tmp_path / "out").glob("*/*"), None)
 
     return import_log
 
 
 @pytest.mark.parametrize("name", [LOG, f"{LOG}.gz"])
-def test_a_log_becomes_a_run_of_its_plans(import_log, run, name):
-    code, said, folder = import_log(ROWS, name=name)
+def test_a_log_becomes_a_run_of_its_plans(import_log, run_cli, name):
+    code, output, folder = import_log(ROWS, name=name)
     assert (code, folder.parent.name) == (0, "some-model-hf_yarn_4.0")
-    assert "7 plans of 2 trajectories imported; the set-up of 1 more failed" in said
+    assert "7 plans of 2 trajectories imported; the set-up of 1 more failed" in output
     header, records = read_run(folder, RECORDS)
     assert list(header.config.tasks) == ["infthor_final"]
     assert [(record.id, record.payload.kind, record.payload.ended) for record in records] == [
@@ -85,25 +86,25 @@ def test_what_is_not_in_the_log_is_not_in_the_results(import_log):
     ] == [None] * 5
 
 
-def test_the_run_is_shown_and_compared_like_any_other(import_log, run):
+def test_the_run_is_shown_and_compared_like_any_other(import_log, run_cli):
     _, _, folder = import_log(ROWS)
-    code, out, _ = run("show", folder, "--full")
+    code, out, _ = run_cli("show", folder, "--full")
     assert code == 0
     assert "published, final long-horizon tasks" in out
     assert "Both stand" in out
-    assert run("compare", folder, folder)[0] == 0
+    assert run_cli("compare", folder, folder)[0] == 0
 
 
-def test_a_page_says_that_there_is_nothing_to_draw(import_log, run, tmp_path):
+def test_a_page_says_that_there_is_nothing_to_draw(import_log, run_cli, tmp_path):
     _, _, folder = import_log(ROWS)
-    code, _, _ = run("report", folder, "--out", tmp_path / "r.html")
+    code, _, _ = run_cli("report", folder, "--out", tmp_path / "r.html")
     assert (code, "imported counts have no steps" in (tmp_path / "r.html").read_text()) == (0, True)
 
 
 @pytest.mark.parametrize("words", [("watch",), ("report", "--figure", "7", "--out", "figure")])
-def test_what_needs_steps_says_that_there_are_none(import_log, run, words):
+def test_what_needs_steps_says_that_there_are_none(import_log, run_cli, words):
     _, _, folder = import_log(ROWS)
-    code, out, err = run(words[0], folder, *words[1:])
+    code, out, err = run_cli(words[0], folder, *words[1:])
     assert (code, out) == (2, "")
     assert err.splitlines() == [
         "infthor-eval: some-model-hf_yarn_4.0: imported counts have no steps and no rewards; give "
@@ -111,22 +112,23 @@ def test_what_needs_steps_says_that_there_are_none(import_log, run, words):
     ]
 
 
-def test_imported_counts_stand_beside_a_run_made_here(import_log, run, tmp_path):
+def test_imported_counts_stand_beside_a_run_made_here(import_log, run_cli, tmp_path):
     _, _, folder = import_log(ROWS)
-    own = planner_run(
-        [plan("t0", 0, (0, 3), 5.0, most=5.0, task="infthor_final")], task="infthor_final"
+    own = make_planner_run(
+        [make_plan_record("t0", 0, (0, 3), 5.0, most=5.0, task="infthor_final")],
+        task="infthor_final",
     )
-    code, out, _ = run("show", folder, write_run(own, tmp_path / "own", "infthor_final-0123"))
+    code, out, _ = run_cli("show", folder, write_run(own, tmp_path / "own", "infthor_final-0123"))
     assert code == 0
     assert "100.0" in out and "28.6" in out
 
 
 def test_lines_that_are_not_imported_are_counted_and_named(import_log):
-    code, said, folder = import_log(ROWS + row("t3", (1, 1), more=2) + '{"traj_id": "t4"\n')
+    code, output, folder = import_log(ROWS + row("t3", (1, 1), more=2) + '{"traj_id": "t4"\n')
     assert code == 1
-    assert "some-model-hf_yarn_4.0: 2 row(s) not imported" in said
-    assert f"{LOG}, line 4: counts plans of other kinds than goto, pick and put" in said
-    assert f"{LOG}, line 5: has no counts of plans (" in said
+    assert "some-model-hf_yarn_4.0: 2 row(s) not imported" in output
+    assert f"{LOG}, line 4: counts plans of other kinds than goto, pick and put" in output
+    assert f"{LOG}, line 5: has no counts of plans (" in output
     (task,) = json.loads((folder / "results.json").read_text())["summary"]["tasks"].values()
     assert sum(task["skipped"].values()) == 3
 
@@ -156,9 +158,9 @@ def test_lines_that_are_not_imported_are_counted_and_named(import_log):
     ],
 )
 def test_a_log_that_cannot_be_imported_is_one_line(import_log, content, options, name, reason):
-    code, said, folder = import_log(content, *options, name=name)
-    assert (code, folder, said.count("\n")) == (2, None, 1)
-    assert reason in said
+    code, output, folder = import_log(content, *options, name=name)
+    assert (code, folder, output.count("\n")) == (2, None, 1)
+    assert reason in output
 
 
 def test_a_name_can_be_given(import_log):
@@ -166,9 +168,9 @@ def test_a_name_can_be_given(import_log):
 
 
 @pytest.mark.skipif(not PUBLISHED, reason="the published plan logs are not at ../shared/data")
-def test_the_published_logs_give_the_published_totals(tmp_path, run):
+def test_the_published_logs_give_the_published_totals(tmp_path, run_cli):
     logs = [path for path in PUBLISHED if "yarn" not in path.name and "infini-ft" in path.name]
-    assert run("import-replies", *logs, "--output", tmp_path)[0] == 0
+    assert run_cli("import-replies", *logs, "--output", tmp_path)[0] == 0
     totals = {}
     for results in tmp_path.glob("*/*/results.json"):
         success = json.loads(results.read_text())["summary"]["tasks"]["infthor_final"]["success"]

@@ -1,7 +1,5 @@
 """Curves of reward, with numbers made by hand."""
 
-from dataclasses import replace
-
 import msgspec
 import pytest
 
@@ -10,13 +8,19 @@ from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.plans.recorded.curves import Axis, plan_curves
 from infthor_eval.plans.recorded.runs import PlansRun
+from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import RunConfig
 
-from ..made_runs import TASK, made_run, plan, planner_run, write_run
+from ...helpers.journals import write_journal
+from ...helpers.plan_runs import TASK, make_plan_record, make_planner_run, make_plans_run
 
 T = 12.7062  # quantile of the t interval over two trajectories
 # Two trajectories: one of two plans that ends at step 20, one of a plan that ends at step 30.
-PLANS = (plan("a", 0, (0, 10), 1.0), plan("a", 1, (10, 20), 2.0), plan("b", 0, (0, 30), 4.0))
+PLANS = (
+    make_plan_record("a", 0, (0, 10), 1.0),
+    make_plan_record("a", 1, (10, 20), 2.0),
+    make_plan_record("b", 0, (0, 30), 4.0),
+)
 
 
 def curve_of(curves, label, axis=Axis.STEPS):
@@ -36,18 +40,18 @@ def means(curve):
 
 
 def test_a_step_function_has_the_last_value():
-    found = StepFunction.of([(10, 1.0), (20, 2.0)], start=5)
-    assert [found.at(place) for place in (0, 5, 9, 10, 19, 20, 99)] == [0, 0, 0, 1, 1, 3, 3]
+    function = StepFunction.of([(10, 1.0), (20, 2.0)], start=5)
+    assert [function.at(place) for place in (0, 5, 9, 10, 19, 20, 99)] == [0, 0, 0, 1, 1, 3, 3]
 
 
 def test_a_place_that_is_unknown_or_before_an_earlier_one_is_the_earlier_one():
-    found = StepFunction.of([(None, 0.0), (100, 1.0), (None, 0.0), (90, 2.0), (120, 4.0)])
-    assert found.places == (100, 100, 100, 100, 120)
-    assert (found.at(99), found.at(100), found.at(120)) == (0, 3, 7)
+    function = StepFunction.of([(None, 0.0), (100, 1.0), (None, 0.0), (90, 2.0), (120, 4.0)])
+    assert function.places == (100, 100, 100, 100, 120)
+    assert (function.at(99), function.at(100), function.at(120)) == (0, 3, 7)
 
 
 def test_the_mean_over_trajectories_of_different_lengths_keeps_the_shorter_ones_end():
-    curve = curve_of(plan_curves([made_run("m", PLANS)]), "m")
+    curve = curve_of(plan_curves([make_plans_run("m", PLANS)]), "m")
     assert curve.places == (0, 10, 20, 30)
     assert means(curve) == [0, 0.5, 1.5, 3.5]
     reaches = [estimate.high - estimate.mean for estimate in curve.means]
@@ -58,8 +62,10 @@ def test_the_mean_over_trajectories_of_different_lengths_keeps_the_shorter_ones_
 
 
 def test_an_excluded_plan_is_left_out_of_all_runs_and_counted():
-    refused = plan("a", 1, (10, 20), excluded="refused")
-    curves = plan_curves([made_run("m", [PLANS[0], refused, PLANS[2]]), made_run("n", PLANS)])
+    refused = make_plan_record("a", 1, (10, 20), excluded="refused")
+    curves = plan_curves(
+        [make_plans_run("m", [PLANS[0], refused, PLANS[2]]), make_plans_run("n", PLANS)]
+    )
     for label in "mn":
         assert curve_of(curves, label).places == (0, 10, 30)
         assert means(curve_of(curves, label)) == [0, 0.5, 2.5]
@@ -69,11 +75,11 @@ def test_an_excluded_plan_is_left_out_of_all_runs_and_counted():
 
 def test_failed_plans_and_those_not_come_to_earn_nothing_and_are_counted():
     records = [
-        plan("a", 0, (0, 10), 1.0),
-        plan("a", 1, (10, 20), 9.0, failure="out of memory"),
-        plan("a", 2, (20, 40), ended=NOT_ATTEMPTED),
+        make_plan_record("a", 0, (0, 10), 1.0),
+        make_plan_record("a", 1, (10, 20), 9.0, failure="out of memory"),
+        make_plan_record("a", 2, (20, 40), ended=NOT_ATTEMPTED),
     ]
-    curves = plan_curves([made_run("m", records)])
+    curves = plan_curves([make_plans_run("m", records)])
     assert means(curve_of(curves, "m")) == [0, 1, 1, 1]
     assert curve_of(curves, "m").places == (0, 10, 20, 40)
     run = curves.runs[0]
@@ -84,22 +90,27 @@ def test_failed_plans_and_those_not_come_to_earn_nothing_and_are_counted():
 
 
 def test_a_final_task_begins_where_its_first_plan_does():
-    curve = curve_of(plan_curves([made_run("m", [plan("a", 7, (300, 310), 1.0)])]), "m")
+    curve = curve_of(
+        plan_curves([make_plans_run("m", [make_plan_record("a", 7, (300, 310), 1.0)])]), "m"
+    )
     assert (curve.places, means(curve)) == ((300, 310), [0, 1])
 
 
 def test_tokens_are_those_of_the_envelope_or_of_the_last_step():
     records = [
-        plan("a", 0, (0, 10), 1.0, context=500),
-        plan("a", 1, (10, 20), 2.0, context_of_step=900),
+        make_plan_record("a", 0, (0, 10), 1.0, context=500),
+        make_plan_record("a", 1, (10, 20), 2.0, context_of_step=900),
     ]
-    curve = curve_of(plan_curves([made_run("m", records)]), "m", Axis.TOKENS)
+    curve = curve_of(plan_curves([make_plans_run("m", records)]), "m", Axis.TOKENS)
     assert (curve.places, means(curve)) == ((500, 900), [1, 3])
 
 
 def test_a_run_that_tells_no_tokens_has_no_curve_over_them():
-    told, untold = [plan("a", 0, (0, 10), 1.0, context=500)], [plan("a", 0, (0, 10), 3.0)]
-    curves = plan_curves([made_run("m", told), made_run("n", untold)])
+    with_tokens, without_tokens = (
+        [make_plan_record("a", 0, (0, 10), 1.0, context=500)],
+        [make_plan_record("a", 0, (0, 10), 3.0)],
+    )
+    curves = plan_curves([make_plans_run("m", with_tokens), make_plans_run("n", without_tokens)])
     assert [list(run.curves) for run in curves.runs[:2]] == [
         [Axis.STEPS, Axis.TOKENS],
         [Axis.STEPS],
@@ -109,9 +120,9 @@ def test_a_run_that_tells_no_tokens_has_no_curve_over_them():
 
 @pytest.mark.parametrize("bound", ["planner", AT_MOST])
 def test_the_bound_over_tokens_is_where_the_first_of_the_runs_has_each_plan(bound):
-    def told(*contexts):
+    def make_records(*contexts):
         return [
-            plan(
+            make_plan_record(
                 "a",
                 number,
                 (10 * number, 10 * number + 10),
@@ -122,11 +133,15 @@ def test_the_bound_over_tokens_is_where_the_first_of_the_runs_has_each_plan(boun
             for number, context in enumerate(contexts)
         ]
 
-    runs = [made_run("m", told(500, 800, 1400)), made_run("n", told(480, None, 1500))]
-    planned = [
-        plan("a", number, (10 * number, 10 * number + 10), 3.0 + number) for number in range(3)
+    runs = [
+        make_plans_run("m", make_records(500, 800, 1400)),
+        make_plans_run("n", make_records(480, None, 1500)),
     ]
-    curves = plan_curves([*runs, planner_run(planned)] if bound == "planner" else runs)
+    planned = [
+        make_plan_record("a", number, (10 * number, 10 * number + 10), 3.0 + number)
+        for number in range(3)
+    ]
+    curves = plan_curves([*runs, make_planner_run(planned)] if bound == "planner" else runs)
     curve = curve_of(curves, bound, Axis.TOKENS)
     assert [curve.places[0], curve.places[-1]] == [480, 1400]
     assert dict(zip(curve.places, means(curve), strict=True)) == {480: 3, 500: 3, 800: 7, 1400: 12}
@@ -136,15 +151,18 @@ def test_the_bound_over_tokens_is_where_the_first_of_the_runs_has_each_plan(boun
 
 
 def test_the_planner_is_the_bound_and_comes_last():
-    curves = plan_curves([planner_run(PLANS), made_run("m", PLANS)])
+    curves = plan_curves([make_planner_run(PLANS), make_plans_run("m", PLANS)])
     assert [(run.label, run.is_bound) for run in curves.runs] == [("m", False), ("planner", True)]
 
 
 def test_of_several_planners_none_is_the_bound():
-    worse = [plan("a", 0, (0, 10), 0.5, most=1.0), *(replace_most(record) for record in PLANS[1:])]
+    worse = [
+        make_plan_record("a", 0, (0, 10), 0.5, most=1.0),
+        *(replace_most(record) for record in PLANS[1:]),
+    ]
     planners = [
-        planner_run(list(map(replace_most, PLANS)), label="one"),
-        planner_run(worse, label="two"),
+        make_planner_run(list(map(replace_most, PLANS)), label="one"),
+        make_planner_run(worse, label="two"),
     ]
     curves = plan_curves(planners)
     assert [(run.label, run.is_bound) for run in curves.runs] == [
@@ -156,62 +174,74 @@ def test_of_several_planners_none_is_the_bound():
 
 
 def test_without_a_planner_the_bound_is_what_the_rules_allow():
-    one = [plan("a", 0, (0, 10), 1.0, most=2.0), plan("a", 1, (10, 20), ended=NOT_ATTEMPTED)]
-    two = [plan("a", 0, (0, 10), 0.0, most=2.0), plan("a", 1, (10, 20), 1.0, most=3.0)]
-    curves = plan_curves([made_run("one", one), made_run("two", two)])
+    one = [
+        make_plan_record("a", 0, (0, 10), 1.0, most=2.0),
+        make_plan_record("a", 1, (10, 20), ended=NOT_ATTEMPTED),
+    ]
+    two = [
+        make_plan_record("a", 0, (0, 10), 0.0, most=2.0),
+        make_plan_record("a", 1, (10, 20), 1.0, most=3.0),
+    ]
+    curves = plan_curves([make_plans_run("one", one), make_plans_run("two", two)])
     assert curves.runs[-1].is_bound
     assert means(curve_of(curves, AT_MOST)) == [0, 2, 5]
     assert not any(AT_MOST in note for note in curves.notes)
-    alone = plan_curves([made_run("one", one)])
+    alone = plan_curves([make_plans_run("one", one)])
     assert means(curve_of(alone, AT_MOST)) == [0, 2, 2]
     assert "plans that no run attempted, which add nothing to 'at most': 1" in alone.notes
 
 
 def test_only_trajectories_that_all_runs_have_in_full_are_drawn():
     stopped_amid_a = [
-        plan("a", 0, (0, 10), 7.0),
-        plan("b", 0, (0, 30), 2.0),
-        plan("c", 0, (0, 30), 2.0),
+        make_plan_record("a", 0, (0, 10), 7.0),
+        make_plan_record("b", 0, (0, 30), 2.0),
+        make_plan_record("c", 0, (0, 30), 2.0),
     ]
-    curves = plan_curves([made_run("m", PLANS), made_run("n", stopped_amid_a)])
+    curves = plan_curves([make_plans_run("m", PLANS), make_plans_run("n", stopped_amid_a)])
     assert curves.n_trajectories == 1
     assert (means(curve_of(curves, "m"))[-1], means(curve_of(curves, "n"))[-1]) == (4, 2)
     assert curves.notes[0].startswith("1 of 3 trajectories are drawn")
 
 
 def test_a_long_grid_is_thinned_and_keeps_its_ends():
-    many = [plan("a", index, (index, index + 1), 1.0) for index in range(1000)]
-    curve = curve_of(plan_curves([made_run("m", many)]), "m")
+    many = [make_plan_record("a", index, (index, index + 1), 1.0) for index in range(1000)]
+    curve = curve_of(plan_curves([make_plans_run("m", many)]), "m")
     assert len(curve.places) == 400
     assert (curve.places[0], curve.places[-1], curve.end.mean) == (0, 1000, 1000)
 
 
 def test_runs_differ_in_simulator_and_course_in_a_note():
-    other = made_run("n", PLANS, simulator="unity", after_failure="stop")
-    notes = "\n".join(plan_curves([made_run("m", PLANS), other]).notes)
+    other = make_plans_run("n", PLANS, simulator="unity", after_failure="stop")
+    notes = "\n".join(plan_curves([make_plans_run("m", PLANS), other]).notes)
     assert "simulator: embedded (m), unity (n)" in notes
     assert "after a failed plan: continue (m), stop (n)" in notes
 
 
 REFUSED = {
     "another task": (
-        made_run("n", [plan("a", 0, (0, 10), task="other")], task="other"),
+        make_plans_run("n", [make_plan_record("a", 0, (0, 10), task="other")], task="other"),
         "share no task",
     ),
-    "another trajectory": (made_run("n", [plan("z", 0, (0, 10))]), "share no trajectory"),
-    "other rules": (made_run("n", PLANS, rewards={"name": "published"}), "different reward rules"),
+    "another trajectory": (
+        make_plans_run("n", [make_plan_record("z", 0, (0, 10))]),
+        "share no trajectory",
+    ),
+    "other rules": (
+        make_plans_run("n", PLANS, rewards={"name": "published"}),
+        "different reward rules",
+    ),
 }
 
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_cannot_be_drawn_together_is_refused(case):
-    other, said = REFUSED[case]
-    with pytest.raises((DataError, UsageError), match=said):
-        plan_curves([made_run("m", PLANS), other])
+    other, expected = REFUSED[case]
+    with pytest.raises((DataError, UsageError), match=expected):
+        plan_curves([make_plans_run("m", PLANS), other])
 
 
 def test_of_several_shared_tasks_one_is_to_be_named():
-    run = made_run("m", PLANS)
+    run = make_plans_run("m", PLANS)
     run.config.tasks["other"] = run.config.tasks[TASK]
     with pytest.raises(UsageError, match=f"--task: {TASK}, other"):
         plan_curves([run])
@@ -221,8 +251,8 @@ def test_of_several_shared_tasks_one_is_to_be_named():
 
 
 def test_a_journal_of_another_form_is_refused(tmp_path):
-    run = made_run("m", PLANS)
+    run = make_plans_run("m", PLANS)
     other = msgspec.structs.replace(run.header, config=RunConfig(tasks={TASK: {}}))
-    folder = write_run(replace(run, header=other), tmp_path)
+    folder = write_journal(tmp_path / "run", other, run.records, RECORDS)
     with pytest.raises(DataError, match="line 1: not the config of a run of plans"):
         PlansRun.read(folder)

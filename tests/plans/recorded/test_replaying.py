@@ -13,8 +13,8 @@ from infthor_eval.plans.recorded.runs import PlansRun
 from infthor_eval.plans.records import RECORDS, StepRecord
 from infthor_eval.runs import read_run
 
-from ..cut import FORK, cut, write
-from ..cut import MUG as NAME
+from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
+from ...helpers.trajectories import MUG as NAME
 
 
 @pytest.fixture(scope="module")
@@ -51,29 +51,29 @@ def opened(recorded, data):
 
 def test_a_plan_is_its_start_and_its_actions_as_they_were_recorded(recorded, session):
     plans = recorded.between(1, 2)
-    found = list(session.frames(plans))
-    assert [frame.number for frame in found] == [
+    replayed = list(session.frames(plans))
+    assert [frame.number for frame in replayed] == [
         n for plan in plans for n in range(len(plan.payload.steps) + 1)
     ]
-    assert [frame.note for frame in found] == [""] * len(found)  # the world went where it went then
-    assert all(frame.observation.frame.shape == (300, 300, 3) for frame in found)
-    first, walk, end = found[0], found[1 : len(plans[0].payload.steps)], found[-1]
+    # The world went where it went then.
+    assert [frame.note for frame in replayed] == [""] * len(replayed)
+    assert all(frame.observation.frame.shape == (300, 300, 3) for frame in replayed)
+    first, walk, end = replayed[0], replayed[1 : len(plans[0].payload.steps)], replayed[-1]
     assert (first.title.number, first.title.n_plans, first.title.text) == (1, 12, "go to the mug")
     assert (first.action, first.rewards.step, first.rewards.max_of_plan) == (
         "",
         None,
         plans[0].payload.max_reward,
     )
-    assert [len(frame.observation.walked) for frame in walk] == list(
-        range(2, len(walk) + 2)
-    )  # MoveAhead each time
+    # MoveAhead each time.
+    assert [len(frame.observation.walked) for frame in walk] == list(range(2, len(walk) + 2))
     assert (end.action, end.ending, end.done, end.observation.held) == (
         "PickupObject Mug",
         "done",
         True,
         ("Mug",),
     )
-    refused = found[len(plans[0].payload.steps)]
+    refused = replayed[len(plans[0].payload.steps)]
     assert (refused.ending, refused.done) == ("refused by the simulator", False)
     assert refused.wrong.startswith("Wall is blocking")
 
@@ -86,9 +86,8 @@ def test_the_map_has_what_the_plan_is_about_and_where_it_leads(recorded, session
     assert going.goal.at in going.floor
     assert putting.goal is None
     assert {"Bed", "Dresser", "ArmChair"} <= {thing.name for thing in putting.objects}
-    assert not {"Floor", "Pillow", "Mug"} & {
-        thing.name for thing in putting.objects
-    }  # the mug is in the hand
+    # The mug is in the hand.
+    assert not {"Floor", "Pillow", "Mug"} & {thing.name for thing in putting.objects}
 
 
 def test_rewards_add_up_over_the_trajectory(recorded, session):
@@ -120,9 +119,9 @@ def test_what_differs_is_told_once_and_it_goes_on(recorded, session):
     *_, last = session.frames([changed(plan, steps=ended)])
     assert last.note.startswith("plan 1, action 7: MoveAhead is refused (Wall is blocking")
     longer = (*steps, steps[0])  # here the plan is over before
-    found = list(session.frames([changed(plan, steps=longer)]))
-    assert len(found) == len(longer) + 1
-    assert found[-2].note == "plan 1, action 7: the plan ends now, and goes on in the run"
+    replayed = list(session.frames([changed(plan, steps=longer)]))
+    assert len(replayed) == len(longer) + 1
+    assert replayed[-2].note == "plan 1, action 7: the plan ends now, and goes on in the run"
 
 
 def test_a_reply_that_could_not_be_tried_shows_the_world_as_it_was(recorded, session):
@@ -135,8 +134,8 @@ def test_a_reply_that_could_not_be_tried_shows_the_world_as_it_was(recorded, ses
         "no action",
     )
     assert np.array_equal(start.observation.frame, end.observation.frame)
-    said = msgspec.structs.replace(recorded.records[0].payload.steps[0], reply=" MoveAhead ")
-    _, frame = session.frames([changed(recorded.records[0], steps=(said,))])
+    spaced = msgspec.structs.replace(recorded.records[0].payload.steps[0], reply=" MoveAhead ")
+    _, frame = session.frames([changed(recorded.records[0], steps=(spaced,))])
     assert frame.reply == ""  # it is the action
 
 
@@ -152,9 +151,9 @@ def test_of_plans_that_were_never_begun_only_the_words_are_there(recorded, sessi
     idle = changed(recorded.records[0], steps=(), ended="not attempted")
     failed = msgspec.structs.replace(idle, failure="the model broke")
     excluded = msgspec.structs.replace(idle, excluded="the expert is refused")
-    found = list(session.frames([idle, failed, excluded]))
-    assert [frame.observation for frame in found] == [None] * 3
-    assert [frame.ending for frame in found] == [
+    replayed = list(session.frames([idle, failed, excluded]))
+    assert [frame.observation for frame in replayed] == [None] * 3
+    assert [frame.ending for frame in replayed] == [
         "not attempted",
         "failed: the model broke",
         "excluded: the expert is refused",
@@ -192,7 +191,7 @@ def test_only_the_runs_own_trajectory_will_do(recorded, scripted_data, tmp_path)
         opened(with_identity(recorded, change), scripted_data)
     with pytest.raises(UsageError, match="give them as --data FILE or FOLDER"):
         opened(recorded, None)
-    kitchen = write(tmp_path / "kitchen", cut(FORK))
+    kitchen = write_trajectories(tmp_path / "kitchen", cut_trajectory(FORK))
     with pytest.raises(
         DataError, match=f"{NAME}: not among the trajectories of --data \\(kitchen-2-seed4\\)"
     ):

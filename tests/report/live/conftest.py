@@ -10,16 +10,16 @@ from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.report.live.state import LiveRun
 from infthor_eval.runs import RunHeader
 from infthor_eval.runs.journals.journal import Journal
-from tests.nieh.made import header, identity
+from tests.helpers.nieh_runs import make_config, make_header
 
 N_UNITS = 8
 
 
 def header_of(name: str = "m") -> RunHeader:
     """The header of a run of as many questions."""
-    config = identity(model=name, checkpoint=None, n_parameters=None, simulator="embedded")
+    config = make_config(model=name, checkpoint=None, n_parameters=None, simulator="embedded")
     config["tasks"]["nieh_gt"]["n_samples"] = N_UNITS
-    return msgspec.structs.replace(header(config, name), n_units=N_UNITS)
+    return msgspec.structs.replace(make_header(config, name), n_units=N_UNITS)
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import pytest
 
 from infthor_eval.errors import UsageError
 from infthor_eval.pages.server import PageServer, require_page_extra, serve_pages
-from tests.nieh.made import record
+from tests.helpers.nieh_runs import make_record
 from tests.report.web.conftest import HOSTILE
 
 try:
@@ -54,11 +54,11 @@ def test_a_page_that_is_open_before_the_run_grows_with_it(tab: Any, open_journal
     wait_for(tab, "#status", "has not started")
     with open_journal() as journal:
         wait_for(tab, "#count", "0 of 8 (0 %)")
-        journal.append(record(0, "Sofa", ("Sofa",)))
+        journal.append(make_record(0, "Sofa", ("Sofa",)))
         wait_for(tab, "#count", "1 of 8 (12 %)")
         wait_for(tab, "#metrics", "100.0")
-        journal.append(record(1, "Bed", ("Sofa",)))
-        journal.append(record(2, None, ("Bed",), failure="the model fell over"))
+        journal.append(make_record(1, "Bed", ("Sofa",)))
+        journal.append(make_record(2, None, ("Bed",), failure="the model fell over"))
         wait_for(tab, "#count", "3 of 8 (37 %), 1 failed")
         wait_for(tab, "#failures", "the model fell over")
         wait_for(tab, "#reasons", "1 × the model fell over")
@@ -73,13 +73,13 @@ def test_a_killed_run_is_said_to_be_none_that_goes_on(tab: Any, tmp_path: Path) 
     if not Path("/proc/locks").is_file():
         pytest.skip("this system has no list of locks")
     program = (
-        "import sys, time\nfrom pathlib import Path\nfrom infthor_eval.nieh.records import "
-        "RECORDS\n"
-        "from infthor_eval.runs.journals.journal import Journal\nfrom tests.nieh.made import "
-        "record\n"
+        "import sys, time\nfrom pathlib import Path\n"
+        "from infthor_eval.nieh.records import RECORDS\n"
+        "from infthor_eval.runs.journals.journal import Journal\n"
+        "from tests.helpers.nieh_runs import make_record\n"
         "from tests.report.live.conftest import header_of\n"
         "with Journal(Path(sys.argv[1]), header_of(), RECORDS) as journal:\n"
-        "    journal.append(record(0, 'Sofa', ('Sofa',)))\n    time.sleep(600)\n"
+        "    journal.append(make_record(0, 'Sofa', ('Sofa',)))\n    time.sleep(600)\n"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", program, str(tmp_path / "results/m/nieh-1")],
@@ -98,8 +98,8 @@ def test_a_killed_run_is_said_to_be_none_that_goes_on(tab: Any, tmp_path: Path) 
 
 def test_hostile_text_is_text(tab: Any, open_journal) -> None:
     with open_journal(name="m") as journal:
-        journal.append(record(0, HOSTILE, (HOSTILE,), question=HOSTILE))
-        journal.append(record(1, None, ("Bed",), failure=HOSTILE))
+        journal.append(make_record(0, HOSTILE, (HOSTILE,), question=HOSTILE))
+        journal.append(make_record(1, None, ("Bed",), failure=HOSTILE))
         wait_for(tab, "#count", "2 of 8")
     assert tab.evaluate("window.hacked") is None
     assert tab.locator("main img, main script").count() == 0
@@ -110,7 +110,7 @@ def test_a_wrong_token_shows_nothing_of_the_run(
     browser: Any, server: PageServer, open_journal
 ) -> None:
     with open_journal() as journal:
-        journal.append(record(0, "Sofa", ("Sofa",)))
+        journal.append(make_record(0, "Sofa", ("Sofa",)))
     opened = browser.new_page()
     for path in ("wrong/", "", "wrong/state.json"):
         answer = opened.goto(f"http://127.0.0.1:{server.port}/{path}")
@@ -122,7 +122,7 @@ def test_a_wrong_token_shows_nothing_of_the_run(
 
 def test_a_page_whose_server_has_ended_says_so(browser: Any, live, open_journal) -> None:
     with open_journal() as journal:
-        journal.append(record(0, "Sofa", ("Sofa",)))
+        journal.append(make_record(0, "Sofa", ("Sofa",)))
     with serve_pages(live_routes(live)) as server:
         opened = browser.new_page()
         opened.goto(server.address)
@@ -138,9 +138,9 @@ def test_nothing_is_wider_than_a_phone(
     browser: Any, server: PageServer, open_journal, scheme: str
 ) -> None:
     with open_journal(name="a-model-with-a-long-name" * 3) as journal:
-        journal.append(record(0, "Sofa " * 200, ("Sofa",)))
-        journal.append(record(1, "x" * 500, ("Sofa",)))
-        journal.append(record(2, None, ("Sofa",), failure="x" * 500))
+        journal.append(make_record(0, "Sofa " * 200, ("Sofa",)))
+        journal.append(make_record(1, "x" * 500, ("Sofa",)))
+        journal.append(make_record(2, None, ("Sofa",), failure="x" * 500))
         opened = browser.new_page(viewport={"width": 420, "height": 900}, color_scheme=scheme)
         opened.goto(server.address)
         wait_for(opened, "#count", "3 of 8")

@@ -9,7 +9,7 @@ import pytest
 from infthor_eval.report.live.state import LiveRun
 from infthor_eval.runs.journals import journal as journals
 from infthor_eval.runs.journals.following import is_written
-from tests.nieh.made import record
+from tests.helpers.nieh_runs import make_record
 
 from .conftest import N_UNITS
 
@@ -39,10 +39,10 @@ def test_a_run_that_has_not_started_is_waited_for(live, tmp_path, open_journal) 
 @needs_locks
 def test_what_is_appended_is_seen_and_summed_up(live, open_journal) -> None:
     with open_journal() as journal:
-        journal.append(record(0, "Sofa", ("Sofa",)))
+        journal.append(make_record(0, "Sofa", ("Sofa",)))
         first = live.state()
-        journal.append(record(1, "Bed", ("Sofa",)))
-        journal.append(record(2, None, ("Bed",), failure="m fails"))
+        journal.append(make_record(1, "Bed", ("Sofa",)))
+        journal.append(make_record(2, None, ("Bed",), failure="m fails"))
         live._metrics_due = 0.0  # a moment later
         second = live.state()
     assert (first.status, first.totals.n_done, [sample.reply for sample in first.newest]) == (
@@ -58,12 +58,12 @@ def test_what_is_appended_is_seen_and_summed_up(live, open_journal) -> None:
     assert (rate.mean, rate.n) == (pytest.approx(1 / 3), 3)
 
 
-def test_the_metrics_at_the_end_are_those_of_the_results(run, tmp_path, make_nieh_set) -> None:
+def test_the_metrics_at_the_end_are_those_of_the_results(run_cli, tmp_path, make_nieh_set) -> None:
     data = make_nieh_set(size=56)
     assert (
-        run("--model", "blind", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")[
-            0
-        ]
+        run_cli(
+            "--model", "blind", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
+        )[0]
         == 0
     )
     state = LiveRun(tmp_path / "out").state()
@@ -75,10 +75,10 @@ def test_the_metrics_at_the_end_are_those_of_the_results(run, tmp_path, make_nie
 
 def test_a_half_written_line_is_left_for_later(live, open_journal, tmp_path) -> None:
     with open_journal() as journal:
-        journal.append(record(0, "Sofa", ("Sofa",)))
+        journal.append(make_record(0, "Sofa", ("Sofa",)))
     shard = folder_of(tmp_path) / "journal" / "worker-0.jsonl"
     whole = shard.read_bytes()
-    line = msgspec.json.encode(record(1, "Bed", ("Sofa",)))
+    line = msgspec.json.encode(make_record(1, "Bed", ("Sofa",)))
     for end in (0, 1, len(line) // 2, len(line)):
         shard.write_bytes(whole + line[:end])
         state = live.state()
@@ -104,7 +104,7 @@ def test_a_header_that_is_not_whole_is_a_run_that_has_not_started(
 @needs_locks
 def test_a_killed_run_is_not_called_running(live, open_journal) -> None:
     with open_journal() as journal:
-        journal.append(record(0, "Sofa", ("Sofa",)))
+        journal.append(make_record(0, "Sofa", ("Sofa",)))
         assert live.state().status == "running"
     state = live.state()  # no lock, and no results
     assert (state.status, state.totals.n_done) == ("ended", 1)
@@ -114,17 +114,17 @@ def test_a_killed_run_is_not_called_running(live, open_journal) -> None:
 
 def test_a_stopped_run_is_called_stopped(live, open_journal, tmp_path) -> None:
     with open_journal() as journal:
-        journal.append(record(0, "Sofa", ("Sofa",)))
+        journal.append(make_record(0, "Sofa", ("Sofa",)))
     (folder_of(tmp_path) / "results.json").write_text('{"n_missing": 7, "primary_metrics": {}}')
     assert live.state().status == "stopped"
 
 
 def test_all_workers_shards_are_read(live, open_journal) -> None:
     with open_journal() as first, open_journal(worker=1) as second:
-        first.append(record(0, "Sofa", ("Sofa",)))
+        first.append(make_record(0, "Sofa", ("Sofa",)))
         assert live.state().totals.n_done == 1
-        second.append(record(1, "Sofa", ("Sofa",)))
-        first.append(record(2, "Sofa", ("Sofa",)))
+        second.append(make_record(1, "Sofa", ("Sofa",)))
+        first.append(make_record(2, "Sofa", ("Sofa",)))
         state = live.state()
     assert state.totals.n_done == 3
     assert {sample.id for sample in state.newest} == {"q0", "q1", "q2"}
@@ -132,9 +132,9 @@ def test_all_workers_shards_are_read(live, open_journal) -> None:
 
 def test_a_unit_that_is_tried_again_is_counted_once(live, open_journal) -> None:
     with open_journal() as journal:
-        journal.append(record(0, None, ("Sofa",), failure="m fails"))
+        journal.append(make_record(0, None, ("Sofa",), failure="m fails"))
         assert live.state().totals.n_failed == 1
-        journal.append(record(0, "Sofa", ("Sofa",)))
+        journal.append(make_record(0, "Sofa", ("Sofa",)))
         state = live.state()
     assert (state.totals.n_done, state.totals.n_failed, state.failures) == (1, 0, ())
 
@@ -142,18 +142,18 @@ def test_a_unit_that_is_tried_again_is_counted_once(live, open_journal) -> None:
 def test_a_run_that_starts_again_is_read_again(live, open_journal, tmp_path) -> None:
     with open_journal() as journal:
         for number in range(3):
-            journal.append(record(number, "Sofa", ("Sofa",)))
+            journal.append(make_record(number, "Sofa", ("Sofa",)))
     assert live.state().totals.n_done == 3
     journals.set_aside(folder_of(tmp_path))  # --fresh
     with open_journal() as journal:
-        journal.append(record(0, "Bed", ("Sofa",)))
+        journal.append(make_record(0, "Bed", ("Sofa",)))
         state = live.state()
     assert (state.totals.n_done, [sample.reply for sample in state.newest]) == (1, ["Bed"])
 
 
 def test_a_bad_line_is_told_in_one_line(live, open_journal, tmp_path) -> None:
     with open_journal() as journal:
-        journal.append(record(0, "Sofa", ("Sofa",)))
+        journal.append(make_record(0, "Sofa", ("Sofa",)))
     shard = folder_of(tmp_path) / "journal" / "worker-0.jsonl"
     shard.write_bytes(shard.read_bytes() + b"no record\n")
     for _ in range(2):
@@ -164,7 +164,7 @@ def test_watching_leaves_the_folder_as_it_was_and_holds_no_lock(
     live, open_journal, tmp_path
 ) -> None:
     with open_journal() as journal:
-        journal.append(record(0, "Sofa", ("Sofa",)))
+        journal.append(make_record(0, "Sofa", ("Sofa",)))
     paths = sorted((tmp_path / "results").rglob("*"))
     before = [
         (path, path.stat().st_mtime_ns, path.is_file() and path.read_bytes()) for path in paths
@@ -187,14 +187,14 @@ def test_watching_leaves_the_folder_as_it_was_and_holds_no_lock(
 
 def test_long_texts_are_cut(live, open_journal) -> None:
     with open_journal() as journal:
-        journal.append(record(0, "x" * 100_000, ("Sofa",)))
+        journal.append(make_record(0, "x" * 100_000, ("Sofa",)))
     (sample,) = live.state().newest
     assert len(sample.reply) == 2001
 
 
 def test_a_run_that_is_moved_away_is_waited_for(live, open_journal, tmp_path) -> None:
     with open_journal() as journal:
-        journal.append(record(0, "Sofa", ("Sofa",)))
+        journal.append(make_record(0, "Sofa", ("Sofa",)))
     assert live.state().totals.n_done == 1
     (tmp_path / "results").rename(tmp_path / "elsewhere")
     assert (live.state().status, live.state().totals.n_done) == ("waiting", 0)
@@ -206,7 +206,7 @@ def test_what_the_system_refuses_is_told_in_one_line(
     live, open_journal, tmp_path, monkeypatch
 ) -> None:
     with open_journal() as journal:
-        journal.append(record(0, "Sofa", ("Sofa",)))
+        journal.append(make_record(0, "Sofa", ("Sofa",)))
 
     def refuse(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied")

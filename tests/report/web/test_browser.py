@@ -141,8 +141,8 @@ def test_a_sample_has_an_address_that_opens_it(page, open_page):
     tab.keyboard.press("k")
     before = page.samples[-2]
     address = tab.url
-    asked = parse_qs(address.partition("#")[2])
-    assert (asked["sample"], asked["task"]) == ([before.id], [before.task])
+    in_address = parse_qs(address.partition("#")[2])
+    assert (in_address["sample"], in_address["task"]) == ([before.id], [before.task])
     tab.goto("about:blank")
     tab.goto(address)
     assert title(tab) == before.title
@@ -222,17 +222,13 @@ def test_a_frame_opens_large_with_its_step_and_the_arrows_go_on(page, open_page)
     assert enlarged(tab)["succeeded"] == "yes"
     assert enlarged(tab)["in view"] == ", ".join(facts.objects)
     assert enlarged(tab)["agent"] == facts.pose
-    shown = [enlarged(tab)["frame"]]
-    for key in (
-        "ArrowRight",
-        "ArrowLeft",
-        "ArrowLeft",
-        "ArrowLeft",
-    ):  # the first one has none before it
+    enlarged_frames = [enlarged(tab)["frame"]]
+    # The first one has none before it.
+    for key in ("ArrowRight", "ArrowLeft", "ArrowLeft", "ArrowLeft"):
         tab.keyboard.press(key)
-        shown.append(enlarged(tab)["frame"])
+        enlarged_frames.append(enlarged(tab)["frame"])
     at = [f"{frame.index}, a clue" if frame.is_clue else str(frame.index) for frame in frames]
-    assert shown == [at[1], at[2], at[1], at[0], at[0]]
+    assert enlarged_frames == [at[1], at[2], at[1], at[0], at[0]]
     tab.keyboard.press("j")  # a key of the page behind it
     assert title(tab) == page.samples[0].title
     tab.keyboard.press("Escape")

@@ -12,6 +12,8 @@ from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
 from infthor_eval.storage.folders import packaged_folder
 
+from ...helpers.command_line import option_words
+
 DATA = packaged_folder("sets/nieh_mini")
 
 
@@ -22,9 +24,9 @@ def page(make_page, nieh_runs):
 
 def test_every_sample_of_every_run_is_there_with_its_frames(page, nieh_runs):
     questions = {question.id: question for question in open_set(str(DATA)).questions}
-    asked = [sample for sample in page.samples if sample.task == "nieh_mini_gt"]
-    assert {sample.id for sample in asked} == set(questions)
-    assert len(page.samples) > len(asked)  # the haystack's too, at each depth
+    samples = [sample for sample in page.samples if sample.task == "nieh_mini_gt"]
+    assert {sample.id for sample in samples} == set(questions)
+    assert len(page.samples) > len(samples)  # the haystack's too, at each depth
     for sample in page.samples:
         question = questions[sample.id]
         assert (sample.title, len(sample.results)) == (question.text, len(nieh_runs))
@@ -41,8 +43,10 @@ def test_every_sample_of_every_run_is_there_with_its_frames(page, nieh_runs):
 
 
 def test_absences_show_five_frames_evenly_spaced_and_none_is_a_clue(page):
-    asked = {question.id for question in open_set(str(DATA)).questions if question.absence}
-    absences = [sample for sample in page.samples if sample.id in asked]
+    absence_questions = {
+        question.id for question in open_set(str(DATA)).questions if question.absence
+    }
+    absences = [sample for sample in page.samples if sample.id in absence_questions]
     assert absences
     for sample in absences:
         places = [frame.index for frame in sample.timeline.frames]
@@ -82,18 +86,9 @@ def test_the_sections_have_their_pictures_and_tables(page):
     assert primary_metrics["oracle", "nieh_mini_gt"] == "100.0"
 
 
-def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path, run):
-    words = (
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_mini_gt",
-        "--limit",
-        "12",
-        "--frames",
-        "shown,blank",
-    )
-    assert run(*words, "--output", tmp_path)[0] == 0
+def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path, run_cli):
+    words = option_words(model="oracle", tasks="nieh_mini_gt", limit="12", frames="shown,blank")
+    assert run_cli(*words, "--output", tmp_path)[0] == 0
     page = make_page(*sorted((tmp_path / "oracle").iterdir()))
     (questions,) = (section for section in page.sections if section.key == "nieh")
     (chart,) = (chart for chart in questions.charts if chart.title == "Gain over blank frames")
@@ -139,9 +134,9 @@ def test_a_run_that_was_stopped_and_has_failures_says_so(make_page, nieh_runs, t
     (copy / "results.json").write_text(json.dumps(results | {"n_missing": 3}))
     page = make_page(copy)
     (table,) = next(section.tables for section in page.sections if section.key == "left-out")
-    told = {row.cells[2]: row.cells[3:] for row in table.rows}
-    assert told["failed"] == ("1", "the frame is gone")
-    assert told["not attempted"][0] == "3"
+    facts = {row.cells[2]: row.cells[3:] for row in table.rows}
+    assert facts["failed"] == ("1", "the frame is gone")
+    assert facts["not attempted"][0] == "3"
     assert sum(sample.results[0].outcome == "failed" for sample in page.samples) == 1
 
 

@@ -25,9 +25,8 @@ def test_equal_prompts_are_there_once_and_none_is_guessed(page):
     assert used == set(range(len(page.prompts)))
     assert not any(prompt.problem for prompt in page.prompts)
     for sample in page.samples:
-        assert (
-            len({result.prompt for result in sample.results}) == 1
-        )  # both runs were asked the same
+        # Both runs were asked the same.
+        assert len({result.prompt for result in sample.results}) == 1
 
 
 def test_without_the_set_the_page_says_that_the_prompt_is_not_known(

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from infthor_eval.runs import StoredCommand, TaskRequest, execute, prepare, read_stored_command
 from infthor_eval.runs.stored.command import write_command
 from infthor_eval.workers import WorkerSettings
-from tests.faults.told import refused
-from tests.runs.toy import ToySuite
+from tests.helpers.refusals import assert_raises_one_line
+from tests.helpers.toy_suite import ToySuite
 from tests.runs.toy_command import request
 
 
@@ -24,11 +24,11 @@ class Options:
     history: str = "full"
 
 
-def written(folder: Path, asked: object) -> StoredCommand:
-    write_command(folder, asked)
-    found = read_stored_command(folder)
-    assert found is not None
-    return found
+def written(folder: Path, run_request: object) -> StoredCommand:
+    write_command(folder, run_request)
+    stored = read_stored_command(folder)
+    assert stored is not None
+    return stored
 
 
 def test_every_run_leaves_it_and_equal_runs_leave_the_same(tmp_path: Path) -> None:
@@ -36,19 +36,19 @@ def test_every_run_leaves_it_and_equal_runs_leave_the_same(tmp_path: Path) -> No
     first = (folder / "run.yaml").read_bytes()
     execute(prepare(request(tmp_path), ToySuite()))
     assert (folder / "run.yaml").read_bytes() == first
-    found = read_stored_command(folder)
-    assert found is not None
-    assert found.options == {
+    stored = read_stored_command(folder)
+    assert stored is not None
+    assert stored.options == {
         "model": "adder",
         "tasks": ["sums"],
         "seed": 0,
         "output": str(tmp_path),
     }
     assert (
-        found.line == "infthor-eval run --model adder --tasks sums --seed 0 --output "
+        stored.line == "infthor-eval run --model adder --tasks sums --seed 0 --output "
         f"{shlex.quote(str(tmp_path))}"
     )
-    assert found.data is None
+    assert stored.data is None
 
 
 def test_options_that_are_as_by_default_are_left_out_and_places_are_found_from_anywhere(
@@ -59,7 +59,7 @@ def test_options_that_are_as_by_default_are_left_out_and_places_are_found_from_a
         (tmp_path / name).mkdir()
     tasks = TaskRequest([], Options(scenes="plans of floors", greedy=True), Path("set"), 3, 7)
     model_options = {"pretrained": "weights", "dtype": "float32"}
-    asked = request(
+    run_request = request(
         Path("out"),
         tasks=tasks,
         model="m",
@@ -67,8 +67,8 @@ def test_options_that_are_as_by_default_are_left_out_and_places_are_found_from_a
         name="a name",
         worker_settings=WorkerSettings(workers=2),
     )
-    found = written(tmp_path, asked)
-    assert found.options == {
+    stored = written(tmp_path, run_request)
+    assert stored.options == {
         "model": "m",
         "model_args": {"pretrained": str(tmp_path / "weights"), "dtype": "float32"},
         "tasks": ["sums"],
@@ -81,18 +81,18 @@ def test_options_that_are_as_by_default_are_left_out_and_places_are_found_from_a
         "greedy": True,
         "workers": 2,
     }
-    assert found.data == tmp_path / "set"
-    words = shlex.split(found.line)
+    assert stored.data == tmp_path / "set"
+    words = shlex.split(stored.line)
     assert words[:4] == ["infthor-eval", "run", "--model", "m"]
     assert words[words.index("--scenes") + 1] == str(tmp_path / "plans of floors")
     assert words[-3:] == ["--greedy", "--workers", "2"]
 
 
 def test_a_hub_id_stays_one(tmp_path: Path) -> None:
-    found = written(
+    stored = written(
         tmp_path, request(tmp_path, model_options={"pretrained": "Qwen/Qwen2.5-VL-7B-Instruct"})
     )
-    assert found.options["model_args"] == {"pretrained": "Qwen/Qwen2.5-VL-7B-Instruct"}
+    assert stored.options["model_args"] == {"pretrained": "Qwen/Qwen2.5-VL-7B-Instruct"}
 
 
 @given(
@@ -102,9 +102,9 @@ def test_whatever_the_options_of_a_model_are_they_come_back(
     tmp_path_factory, options: dict[str, str]
 ) -> None:
     folder = tmp_path_factory.mktemp("run")
-    found = written(folder, request(folder, model_options=options))
-    assert found.options.get("model_args", {}) == options
-    words = shlex.split(found.line)
+    stored = written(folder, request(folder, model_options=options))
+    assert stored.options.get("model_args", {}) == options
+    words = shlex.split(stored.line)
     if any("," in value for value in options.values()):  # which cannot be typed
         assert words == ["infthor-eval", "run", "--config", str(folder / "run.yaml")]
     elif options:
@@ -120,7 +120,7 @@ def test_a_run_of_an_earlier_version_has_none(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["- a\n", "1: 2\n", "", "a: [\n", "model_args: [1]\n"])
 def test_a_file_without_options_is_named(tmp_path: Path, text: str) -> None:
     (tmp_path / "run.yaml").write_text(text)
-    refused(lambda: read_stored_command(tmp_path), str(tmp_path / "run.yaml"))
+    assert_raises_one_line(lambda: read_stored_command(tmp_path), str(tmp_path / "run.yaml"))
 
 
 def test_the_file_is_plain_yaml(tmp_path: Path) -> None:

@@ -57,7 +57,7 @@ def test_what_the_table_shows_itself_is_left_out(stored):
 
 
 @pytest.mark.parametrize(
-    ("paths", "shown"),
+    ("paths", "labels"),
     [
         (["/r/a/model", "/r/b/model"], ["A (pretrained=a/model)", "A (pretrained=b/model)"]),
         (["/r/model", None], ["A (pretrained=model)", "A"]),
@@ -65,10 +65,13 @@ def test_what_the_table_shows_itself_is_left_out(stored):
         (["org/model", "/r/model"], ["A (pretrained=org/model)", "A (pretrained=/r/model)"]),
     ],
 )
-def test_paths_are_shown_from_where_they_part(stored, paths, shown):
-    given = [{} if path is None else {"model_args": {"pretrained": path}} for path in paths]
+def test_paths_are_shown_from_where_they_part(stored, paths, labels):
+    options_of_runs = [
+        {} if path is None else {"model_args": {"pretrained": path}} for path in paths
+    ]
     assert (
-        label_runs([stored(str(place), **options) for place, options in enumerate(given)]) == shown
+        label_runs([stored(str(place), **options) for place, options in enumerate(options_of_runs)])
+        == labels
     )
 
 

@@ -28,10 +28,10 @@ from infthor_eval.runs.journals.tracebacks import StoredTracebacks
 from infthor_eval.runs.work.scheduling import run_groups
 from infthor_eval.workers import WorkerSettings
 from model_adapters import Capabilities
-from tests.runs.toy import Adder, Sum, Sums, ToySuite, is_broken, suite_of
+from tests.helpers.toy_suite import Adder, Sum, Sums, ToySuite, is_broken, make_suite
 from tests.runs.toy_command import request
 
-from ...waiting import PATIENCE_S, wait_until
+from ...helpers.waiting import PATIENCE_S, wait_until
 
 TOY = Path(__file__).parents[1] / "toy_command.py"
 
@@ -50,9 +50,9 @@ class Watching:
         raise AssertionError(text)
 
 
-def run(asked: RunRequest, suite=None):
+def run(run_request: RunRequest, suite=None):
     watching = Watching()
-    return execute(prepare(asked, suite or ToySuite()), watching), watching
+    return execute(prepare(run_request, suite or ToySuite()), watching), watching
 
 
 def start(output, *arguments):
@@ -72,7 +72,7 @@ def test_a_group_that_fails_takes_no_other_with_it_and_its_units_are_named(tmp_p
         def close(self):
             closed.append(self)
 
-    outcome, watching = run(request(tmp_path), suite_of(Closing))
+    outcome, watching = run(request(tmp_path), make_suite(Closing))
     assert watching.begun == (4, 1, 0)
     broken = "the abacus is broken"
     assert watching.seen == [
@@ -86,12 +86,8 @@ def test_a_group_that_fails_takes_no_other_with_it_and_its_units_are_named(tmp_p
     assert read_run(outcome.folder, ToySuite.records) == (outcome.summary.header, outcome.records)
     assert len(closed) == 1
     assert [sample.reply for sample in outcome.samples] == ["4", "5", "None", "None"]
-    assert [sample.number for sample in outcome.samples] == [
-        13,
-        14,
-        23,
-        24,
-    ]  # they can be read again
+    # They can be read again.
+    assert [sample.number for sample in outcome.samples] == [13, 14, 23, 24]
 
 
 def broken_by(error, answered=0):
@@ -107,7 +103,7 @@ def broken_by(error, answered=0):
             if error is not None:
                 raise error
 
-    return suite_of(Broken)
+    return make_suite(Broken)
 
 
 FAULTS = {
@@ -137,12 +133,12 @@ FAULTS = {
 def test_a_programming_error_in_a_group_fails_its_units_alone_with_type_place_and_message(
     tmp_path, name, answered
 ):
-    error, said, why = FAULTS[name]
+    error, expected, why = FAULTS[name]
     outcome, watching = run(request(tmp_path), broken_by(error, answered))
     assert outcome.summary.summary.numbers == (2 + answered, 2 - answered)
     assert len(watching.seen) == 4
     for failure in (record.failure for record in outcome.records[2 + answered :]):
-        assert said in failure
+        assert expected in failure
         assert why in failure
         assert "\n" not in failure
     assert [resumed for _, _, resumed in run(request(tmp_path))[1].seen[:2]] == [True, True]
@@ -165,11 +161,11 @@ def test_tracebacks_are_kept_beside_the_shards_by_unit_and_attempt(tmp_path):
     assert file.read_text().count("== sums: 2+3, attempt ") == 2
     assert "== sums: 2+4, attempt 2\nas for sums: 2+3, attempt 2\n" in file.read_text()
     stored = StoredTracebacks(first.folder / "journal")
-    told = [
+    texts = [
         stored.find(UnitKey("sums", name), attempt) for name in ("2+3", "2+4") for attempt in (1, 2)
     ]
-    assert all(text.endswith("ZeroDivisionError: of its own") for text in told)
-    assert told[:2] == told[2:]
+    assert all(text.endswith("ZeroDivisionError: of its own") for text in texts)
+    assert texts[:2] == texts[2:]
     assert stored.find(UnitKey("sums", "1+3"), 1) == ""
     assert StoredTracebacks(tmp_path).find(UnitKey("sums", "2+3"), 1) == ""
 
@@ -186,7 +182,7 @@ def test_a_record_that_cannot_be_written_fails_alone(tmp_path):
             for unit in group.units:
                 yield unit.record("f", Sum((object(), 0)) if is_broken(group) else unit.payload)
 
-    outcome, _ = run(request(tmp_path), suite_of(Odd))
+    outcome, _ = run(request(tmp_path), make_suite(Odd))
     assert outcome.summary.summary.numbers == (2, 2)
     assert outcome.records[3].failure.startswith("TypeError in ")
     assert "Encoding objects of type object is unsupported" in outcome.records[3].failure
@@ -214,12 +210,13 @@ def test_a_programming_error_is_counted_and_told_at_the_end(tmp_path, capfd):
         evaluate([(request(tmp_path), broken_by(ZeroDivisionError("of its own")))], ShowOptions())
         == 1
     )
-    shown, said = capfd.readouterr()
-    assert ["adder", "2"] in [line.split() for line in shown.splitlines()]
+    output, error_text = capfd.readouterr()
+    assert ["adder", "2"] in [line.split() for line in output.splitlines()]
     assert (
-        "sums: 2 sample(s) failed, counted as wrong: ZeroDivisionError in test_driver.py:" in said
+        "sums: 2 sample(s) failed, counted as wrong: ZeroDivisionError in test_driver.py:"
+        in error_text
     )
-    assert "Traceback" not in said
+    assert "Traceback" not in error_text
 
 
 def test_what_is_known_is_not_done_again_and_what_failed_is_tried_again(tmp_path):
@@ -323,12 +320,12 @@ def test_a_killed_command_goes_on_and_shows_progress_table_results_and_export(tm
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
     again = start(tmp_path)
-    shown, said = again.communicate(timeout=PATIENCE_S)
-    assert again.returncode == 1, said  # a group failed
-    assert "adder: 3 evaluated now, 1 resumed from the journal" in said
-    assert "sums: 1 sample(s) skipped: nothing to add" in said
-    assert "sums: 2 sample(s) failed, counted as wrong: the abacus is broken" in said
-    assert ["adder", "2"] in [line.split() for line in shown.splitlines()]
+    output, error_text = again.communicate(timeout=PATIENCE_S)
+    assert again.returncode == 1, error_text  # a group failed
+    assert "adder: 3 evaluated now, 1 resumed from the journal" in error_text
+    assert "sums: 1 sample(s) skipped: nothing to add" in error_text
+    assert "sums: 2 sample(s) failed, counted as wrong: the abacus is broken" in error_text
+    assert ["adder", "2"] in [line.split() for line in output.splitlines()]
     (folder,) = (tmp_path / "adder").iterdir()
     results = json.loads((folder / "results.json").read_text())
     assert (results["suite"], results["summary"]["numbers"]) == ("toy", [2, 2])
@@ -402,9 +399,9 @@ def test_groups_in_flight_are_done_at_the_same_time_and_each_in_its_order():
 def test_a_thread_that_finds_the_last_group_taken_ends(monkeypatch):
     class Slow(SimpleQueue):
         def empty(self):
-            found = super().empty()
+            is_empty = super().empty()
             time.sleep(0.02)
-            return found
+            return is_empty
 
     monkeypatch.setattr("infthor_eval.runs.work.scheduling.SimpleQueue", Slow)
     records = list(
@@ -446,7 +443,7 @@ def test_a_suite_that_refuses_its_work_ends_before_a_journal_is_begun(tmp_path):
             super().__init__(seed)
             self.close = lambda: closed.append(self)
 
-    suite = suite_of(refuse)
+    suite = make_suite(refuse)
     suite.baselines = {"adder": Held}
     with pytest.raises(ModelError, match="no"):
         run(request(tmp_path), suite)

@@ -10,7 +10,8 @@ from infthor_eval.errors import ModelError
 from infthor_eval.runs import Group, RunConfig, Unit, UnitKey, Usage, Workload, estimate_run
 from infthor_eval.runs.work.estimate import Quantities, _MeasuredGroup, estimate_tasks
 
-from ..toy import Sum, Sums, ToySuite, suite_of
+from ...helpers.command_line import option_words
+from ...helpers.toy_suite import Sum, Sums, ToySuite, make_suite
 from ..toy_command import request
 
 
@@ -69,9 +70,9 @@ class Costly(Sums):
             [group("sums", f"{a}.", 5, 10 * a) for a in range(1, 7)], (), RunConfig()
         )
 
-    def run(self, asked, session):
-        time.sleep(0.002 * asked.frames)
-        for unit in asked.units:
+    def run(self, costly_group, session):
+        time.sleep(0.002 * costly_group.frames)
+        for unit in costly_group.units:
             time.sleep(0.01)
             yield unit.record(
                 "f", unit.payload, usage=Usage(requests=2, context=100, cached=40, reply=3)
@@ -79,8 +80,8 @@ class Costly(Sums):
 
 
 def test_a_few_units_tell_what_all_take_and_nothing_is_written(tmp_path):
-    found = estimate_run(request(tmp_path), suite_of(Costly), 9, lambda: None)
-    (sums,) = found.tasks
+    estimated = estimate_run(request(tmp_path), make_suite(Costly), 9, lambda: None)
+    (sums,) = estimated.tasks
     assert (sums.n_units, sums.n_measured, sums.frames) == (30, 9, 210)
     assert (
         sums.total.requests,
@@ -93,59 +94,47 @@ def test_a_few_units_tell_what_all_take_and_nothing_is_written(tmp_path):
 
 
 def test_units_that_fail_are_told_and_the_others_tell_what_it_takes(tmp_path):
-    found = estimate_run(request(tmp_path), ToySuite(), 6, lambda: None)
-    assert found.failures == [("sums", "the abacus is broken")] * 2
-    assert [(item.n_units, item.n_measured) for item in found.tasks] == [(4, 2)]
+    estimated = estimate_run(request(tmp_path), ToySuite(), 6, lambda: None)
+    assert estimated.failures == [("sums", "the abacus is broken")] * 2
+    assert [(item.n_units, item.n_measured) for item in estimated.tasks] == [(4, 2)]
 
 
 def test_where_every_unit_fails_nothing_is_told(tmp_path, capfd):
     from infthor_eval.cli.commands.plan import plan
 
     class Broken(Sums):
-        def run(self, asked, session):
+        def run(self, failing_group, session):
             raise ModelError("no memory for a single frame")
 
     with pytest.raises(ModelError, match="every measured sample failed; fix the failures above"):
-        plan(request(tmp_path), suite_of(Broken), 6, None)
+        plan(request(tmp_path), make_suite(Broken), 6, None)
     assert (
         "sums: 4 measured sample(s) failed: no memory for a single frame" in capfd.readouterr().err
     )
 
 
-def test_the_command_prints_units_tokens_time_memory_and_money(run, tmp_path):
-    words = (
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_mini_gt",
-        "--output",
-        tmp_path / "out",
-        "--workers",
-        2,
+def test_the_command_prints_units_tokens_time_memory_and_money(run_cli, tmp_path):
+    words = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_mini_gt", output=tmp_path / "out", workers=2
     )
-    code, said, err = run("plan", *words, "--measure", 9, "--price-per-hour", 2.5, "--limit", 6)
+    code, output, err = run_cli(
+        "plan", *words, "--measure", 9, "--price-per-hour", 2.5, "--limit", 6
+    )
     assert code == 0, err
-    (row,) = [line.split() for line in said.splitlines() if line.startswith("  nieh_mini_gt")]
+    (row,) = [line.split() for line in output.splitlines() if line.startswith("  nieh_mini_gt")]
     assert (row[1], row[2], row[4]) == ("6", "3", "6")
-    assert "by 2 workers, loading not counted" in said
-    assert " MB at most while measuring" in said
-    assert "US dollars of machines at 2.5 an hour" in said
+    assert "by 2 workers, loading not counted" in output
+    assert " MB at most while measuring" in output
+    assert "US dollars of machines at 2.5 an hour" in output
     assert "contexts, the longest request" in err
     assert not (tmp_path / "out").exists() or not list((tmp_path / "out").rglob("*.jsonl"))
 
 
-def test_a_cap_on_what_is_spent_holds_for_one_process_and_says_so(run, tmp_path):
-    words = (
-        "--model",
-        "openai",
-        "--model-args",
-        "model=m",
-        "--tasks",
-        "nieh_mini_gt",
-        "--output",
-        tmp_path,
+def test_a_cap_on_what_is_spent_holds_for_one_process_and_says_so(run_cli, tmp_path):
+    words = option_words(
+        model="openai", model_args="model=m", tasks="nieh_mini_gt", output=tmp_path
     )
-    code, _, err = run(*words, "--max-tokens-total", 100, "--workers", 2)
+    code, _, err = run_cli(*words, "--max-tokens-total", 100, "--workers", 2)
     assert code == 2
     assert (
         "max_tokens_total counts the requests of one process; leave out --workers, or the cap"

@@ -20,9 +20,9 @@ from infthor_eval.runs import execute, prepare, read_run
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.workers import WorkerSettings
 
-from ...clusters import two_nodes
-from ...waiting import wait_until
-from ..toy import Adder, Prepared, Sum, Sums, ToySuite, suite_of
+from ...helpers.clusters import two_nodes
+from ...helpers.toy_suite import Adder, Prepared, Sum, Sums, ToySuite, make_suite
+from ...helpers.waiting import wait_until
 from ..toy_command import request
 
 TWO = WorkerSettings(2)
@@ -79,9 +79,8 @@ class Deadly(Sums):
                 if len(list(self.folder.glob(f"{unit.key.id}-*"))) < self.kills[unit.key.id]:
                     counted.touch()
                     os.kill(os.getpid(), signal.SIGKILL)
-            time.sleep(
-                0.0 if known else 0.1
-            )  # or one worker would be done before the other is there
+            # Or one worker would be done before the other is there.
+            time.sleep(0.0 if known else 0.1)
             yield known or unit.record("f", Sum(unit.payload.numbers, sum(unit.payload.numbers)))
 
 
@@ -92,13 +91,13 @@ class DeadlySuite(ToySuite):
     folder: Path
     kills: dict
 
-    def prepare(self, asked):
+    def prepare(self, run_request):
         return Prepared(partial(Deadly, self.folder, self.kills))
 
 
-def run(asked, suite, should_stop=lambda: False):
+def run(run_request, suite, should_stop=lambda: False):
     watching = Watching()
-    return execute(prepare(asked, suite), watching, should_stop), watching
+    return execute(prepare(run_request, suite), watching, should_stop), watching
 
 
 def plain(records):
@@ -139,7 +138,7 @@ class Faulty(Sums):
 class FaultySuite(ToySuite):
     """Gives `Faulty`."""
 
-    def prepare(self, asked):
+    def prepare(self, run_request):
         return Prepared(Faulty)
 
 
@@ -211,8 +210,8 @@ def test_a_cluster_that_loses_a_node_finds_what_one_process_finds(tmp_path):
     suite = DeadlySuite(tmp_path, {"4+1": 1})
     with two_nodes() as (cluster, node):
         watching = _Losing(cluster, node)
-        asked = request(tmp_path / "2", worker_settings=WorkerSettings(2, cluster.address))
-        shared = execute(prepare(asked, suite), watching)
+        run_request = request(tmp_path / "2", worker_settings=WorkerSettings(2, cluster.address))
+        shared = execute(prepare(run_request, suite), watching)
     alone, _ = run(request(tmp_path / "1"), suite)
     assert plain(shared.records) == plain(alone.records)
     assert (shared.folder / "results.json").read_bytes() == (
@@ -276,14 +275,10 @@ def test_a_result_from_other_inputs_is_named_in_the_record_that_takes_its_place(
                 yield session.find_record(unit, "g") or unit.record("g", unit.payload)
 
     run(request(tmp_path), ToySuite())
-    records = run(request(tmp_path), suite_of(Changed))[0].records
+    records = run(request(tmp_path), make_suite(Changed))[0].records
     changed = "its inputs changed since attempt 1: a frame, a text or a trajectory is another now"
-    assert [record.faults for record in records] == [
-        (changed,),
-        (changed,),
-        (),
-        (),
-    ]  # the others had failed
+    # The others had failed.
+    assert [record.faults for record in records] == [(changed,), (changed,), (), ()]
 
 
 @pytest.mark.parametrize("again", [False, True])
@@ -309,11 +304,11 @@ def test_ctrl_c_finishes_the_unit_in_hand_and_shows_what_is_there_and_again_stop
         process.send_signal(signal.SIGINT)
     else:
         (gate / "open-1").touch()
-    shown, said = process.communicate()
+    printed, error_text = process.communicate()
     assert process.returncode == (-signal.SIGINT if again else 130)
     (folder,) = (output / "adder").iterdir()
     results = json.loads((folder / "results.json").read_text())
     assert results["n_missing"] == (3 if again else 2)
     if not again:
-        assert "2 not attempted; run the same command to continue" in said
-        assert ["adder", "2"] in [line.split() for line in shown.splitlines()]
+        assert "2 not attempted; run the same command to continue" in error_text
+        assert ["adder", "2"] in [line.split() for line in printed.splitlines()]

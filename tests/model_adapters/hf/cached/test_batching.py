@@ -80,11 +80,11 @@ def test_a_window_slides_over_the_prefix_and_each_continuation(frames: list[Fram
         talk.append(
             *frames[:2], "\nWhere was the mug before it was put into the sink of the kitchen?"
         )
-        asked = [
+        continuations = [
             ["\nOne."],
             ["\nOr was it the plate on the table, which is larger than the window is wide?"],
         ]
-        heard.append([reply.token_ids for reply in talk.replies(asked, up_to(8))])
+        heard.append([reply.token_ids for reply in talk.replies(continuations, up_to(8))])
     assert heard[0] == heard[1] != heard[2]
 
 

@@ -103,9 +103,13 @@ def test_the_penalty_is_for_tokens_of_context_and_reply() -> None:
 
 def test_a_request_may_have_a_penalty_of_its_own() -> None:
     logits = torch.tensor([0.0, 0.0, 0.0, 2.0, 1.9, 2.1, 0.0, 0.0, 0.0, 0.0])
-    for own, asked, written in ((1.2, 1.0, [5, 5]), (1.0, 1.2, [3, 4]), (1.2, None, [3, 4])):
-        generation = Generation(frozenset(), repetition_penalty=own)
-        reply = _writing(up_to(2, repetition_penalty=asked), generation, context=[5])
+    for of_checkpoint, of_request, written in (
+        (1.2, 1.0, [5, 5]),
+        (1.0, 1.2, [3, 4]),
+        (1.2, None, [3, 4]),
+    ):
+        generation = Generation(frozenset(), repetition_penalty=of_checkpoint)
+        reply = _writing(up_to(2, repetition_penalty=of_request), generation, context=[5])
         assert _written(reply, logits, lambda token: logits) == written
 
 

@@ -26,8 +26,8 @@ def test_holds_what_a_dynamic_cache_holds(operations: list[int]) -> None:
                 ours.reserve(length + count + 5)
             for layer in range(2):
                 states = _states(count, generator)
-                got, want = ours.update(*states, layer), theirs.update(*states, layer)
-                assert all(torch.equal(a, b) for a, b in zip(got, want, strict=True))
+                kept, expected = ours.update(*states, layer), theirs.update(*states, layer)
+                assert all(torch.equal(a, b) for a, b in zip(kept, expected, strict=True))
         elif -length <= count < 0:
             ours.truncate(length + count)
             theirs.crop(count)

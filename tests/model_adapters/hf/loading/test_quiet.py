@@ -50,11 +50,11 @@ def test_a_model_is_loaded_asked_and_exported_in_silence(
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    given = {"device": "cpu", **options} | (
+    settings = {"device": "cpu", **options} | (
         {"pretrained": str(checkpoints[checkpoint])} if checkpoint else {}
     )
     capfd.readouterr()
-    model: Any = load(name, given, seed=0)
+    model: Any = load(name, settings, seed=0)
     talk = model.conversation()
     talk.append(frames[0], "\nWhat is it?")
     talk.reply(up_to(2))

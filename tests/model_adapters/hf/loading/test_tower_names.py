@@ -28,14 +28,10 @@ from ...checkpoints import twin
             "vision_tower.vision_model.encoder.layers.0.bias",
             "vision_tower.vision_model.encoder.layers.0.bias",
         ),
-        (
-            "vision_tower.transformer.layers.0.bias",
-            "vision_tower.transformer.layers.0.bias",
-        ),  # Pixtral
-        (
-            "model.vision_model.encoder.layers.0.bias",
-            "model.vision_model.encoder.layers.0.bias",
-        ),  # Idefics 3
+        # Pixtral.
+        ("vision_tower.transformer.layers.0.bias", "vision_tower.transformer.layers.0.bias"),
+        # Idefics 3.
+        ("model.vision_model.encoder.layers.0.bias", "model.vision_model.encoder.layers.0.bias"),
         ("language_model.model.embed_tokens.weight", "language_model.model.embed_tokens.weight"),
     ],
 )

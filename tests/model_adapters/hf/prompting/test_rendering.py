@@ -125,9 +125,8 @@ def test_a_text_that_is_said_twice_and_written_once_is_left_out(tokenizer: Any) 
 def test_the_systems_words_are_a_string_where_the_template_joins_them(tokenizer: Any) -> None:
     text = "[Be brief.\n]<user>What?<assistant>A mug.<user>Sure?"
     assert _render(tokenizer, JOINED, SAID) == text.replace("Be brief.", "")
-    with pytest.raises(
-        ModelError, match="drops"
-    ):  # a string is no list of texts for the assistant's turn
+    # A string is no list of texts for the assistant's turn.
+    with pytest.raises(ModelError, match="drops"):
         _render(tokenizer, JOINED, (SYSTEM, *SAID))
     strings = BODY.replace(
         "{%- for", "{%- if message.content is string -%}{{- message.content -}}{%- else -%}{%- for"

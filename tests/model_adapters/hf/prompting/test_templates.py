@@ -67,14 +67,14 @@ def conversations(frames: list[FrameRef]) -> list[tuple[Turn, ...]]:
 
 
 def _load(name: str, folder: Path, **options: str) -> Any:
-    given = {
+    defaults = {
         "pretrained": str(folder),
         "device": "cpu",
         "dtype": "float32",
         "max_tokens": "0",
         "prompt": "plain",
     }
-    return load(name if name in FAMILIES else "hf-vlm", given | options, seed=0)
+    return load(name if name in FAMILIES else "hf-vlm", defaults | options, seed=0)
 
 
 def _without_template(checkpoint: Path, folder: Path) -> Path:
@@ -103,10 +103,8 @@ def test_ids_and_replies_are_those_of_transformers_on_the_bare_sequence(
     conversations: list[tuple[Turn, ...]],
     answer_plainly: Any,
 ) -> None:
-    names = (
-        *FAMILIES,
-        *OTHERS.keys() - {"gemma3-line-breaks"},
-    )  # like gemma3 but for its vocabulary
+    # Like gemma3 but for its vocabulary.
+    names = (*FAMILIES, *OTHERS.keys() - {"gemma3-line-breaks"})
     folders = {name: _without_template(checkpoints[name], tmp_path / name) for name in names}
     models = {name: [_load(name, folders[name], share_prefix="false")] for name in names}
     for name in (*FAMILIES, "llava", "idefics3", "deepseek-vl-1.3b"):
@@ -134,13 +132,16 @@ def test_a_checkpoint_without_a_template_is_asked_plainly_or_not_at_all(
 def test_the_way_of_asking_is_part_of_the_identity(checkpoints: dict[str, Path]) -> None:
     for share_prefix in ("true", "false"):
         identities = [
-            _load("llava", checkpoints["llava"], share_prefix=share_prefix, **asked).identity()
-            for asked in ({}, {"prompt": "chat"})
+            _load(
+                "llava", checkpoints["llava"], share_prefix=share_prefix, **prompt_option
+            ).identity()
+            for prompt_option in ({}, {"prompt": "chat"})
         ]
         assert [identity["prompt"] for identity in identities] == ["plain", "chat"]
         assert identities[0]["chat_template"] != identities[1]["chat_template"]
     default, chat = (
-        load("qwen2.5-vl-tiny", asked, seed=0).identity() for asked in ({}, {"prompt": "chat"})
+        load("qwen2.5-vl-tiny", prompt_option, seed=0).identity()
+        for prompt_option in ({}, {"prompt": "chat"})
     )
     assert default == chat
 

@@ -15,7 +15,7 @@ from model_adapters import check_adapter, load
 from model_adapters.policies.http import client
 from model_adapters.policies.policy import VlaPolicy
 
-from ..servers import Answer, asked_image, policy_answers, send, serving
+from ..servers import Answer, policy_answers, read_image, send, serve
 
 Frames = tuple[FrameRef, FrameRef]
 ACTION = [0.1, 0.2, 0.3, -0.1, -0.2, -0.3, 1.0]
@@ -27,14 +27,14 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(client, "_FIRST_WAIT_S", 0.001)
 
 
-def _act(url: str, frame: FrameRef, **given: str) -> Any:
-    policy: Any = load("vla-http", {"url": url, "timeout_s": "600", **given}, 0)
+def _act(url: str, frame: FrameRef, **settings: str) -> Any:
+    policy: Any = load("vla-http", {"url": url, "timeout_s": "600", **settings}, 0)
     return policy.act(frame, "pick up the mug")
 
 
-def _refused(answer: Answer, frame: FrameRef, **given: str) -> str:
-    with serving(answer) as url, pytest.raises(ModelError) as caught:
-        _act(url, frame, **given)
+def _refused(answer: Answer, frame: FrameRef, **settings: str) -> str:
+    with serve(answer) as url, pytest.raises(ModelError) as caught:
+        _act(url, frame, **settings)
     assert f"{url}/act" in str(caught.value)
     assert "\n" not in str(caught.value)
     return str(caught.value)
@@ -45,35 +45,35 @@ def _refused(answer: Answer, frame: FrameRef, **given: str) -> str:
 def test_a_frame_and_an_instruction_are_sent_and_an_action_comes_back(
     image: str, ending: str, plain_frames: Frames
 ) -> None:
-    asked: list[dict[str, Any]] = []
+    requests: list[dict[str, Any]] = []
 
     def answer(request: dict[str, Any], _handler: Any) -> Any:
-        asked.append(request)
+        requests.append(request)
         return ACTION
 
-    with serving(answer) as url:
+    with serve(answer) as url:
         (step,) = _act(url + ending, plain_frames[1], image=image, unnorm_key="bridge_orig")
     assert (step.translation, step.rotation, step.gripper) == (
         (0.1, 0.2, 0.3),
         (-0.1, -0.2, -0.3),
         1.0,
     )
-    (request,) = asked
+    (request,) = requests
     assert request.keys() == {"image", "instruction", "unnorm_key"}
     assert (request["instruction"], request["unnorm_key"]) == ("pick up the mug", "bridge_orig")
-    seen = asked_image(request)
+    seen = read_image(request)
     assert (seen.shape, seen.dtype, np.unique(seen).tolist()) == ((300, 300, 3), np.uint8, [255])
 
 
 def test_without_a_key_none_is_sent(plain_frames: Frames) -> None:
-    asked = []
-    with serving(lambda request, _: asked.append(request) or ACTION) as url:
+    requests = []
+    with serve(lambda request, _: requests.append(request) or ACTION) as url:
         _act(url, plain_frames[0])
-    assert "unnorm_key" not in asked[0]
+    assert "unnorm_key" not in requests[0]
 
 
 def test_chunks_are_taken_and_cut(plain_frames: Frames) -> None:
-    with serving(lambda *_: [ACTION] * 4) as url:
+    with serve(lambda *_: [ACTION] * 4) as url:
         assert len(_act(url, plain_frames[0])) == 4
         assert len(_act(url, plain_frames[0], execute="2")) == 2
 
@@ -81,7 +81,7 @@ def test_chunks_are_taken_and_cut(plain_frames: Frames) -> None:
 def test_a_policy_behind_a_server_acts_as_it_does_here(
     policies: dict[str, VlaPolicy], plain_frames: Frames
 ) -> None:
-    with serving(policy_answers(policies["openvla"])) as url:
+    with serve(policy_answers(policies["openvla"])) as url:
         policy: Any = load("vla-http", {"url": url}, 0)
         check_adapter(policy)
         assert policy.act(plain_frames[1], "close the fridge") == policies["openvla"].act(
@@ -180,7 +180,7 @@ def test_a_lost_connection_is_tried_again(
             return None
         return ACTION
 
-    with serving(answer) as url:
+    with serve(answer) as url:
         assert _act(url, plain_frames[0], retries="2")
         assert n_asked == 3
         n_asked = 0
@@ -214,7 +214,7 @@ def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames: Frames) 
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("settings", "message"),
     [
         ({"url": "localhost:8000"}, "url is not the address of a server"),
         ({"url": "file:///etc/passwd"}, "url is not the address of a server"),
@@ -228,9 +228,9 @@ def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames: Frames) 
         ({"execute": "0"}, "execute=0"),
     ],
 )
-def test_misuse_is_refused_and_no_secret_told(given: dict[str, str], message: str) -> None:
+def test_misuse_is_refused_and_no_secret_told(settings: dict[str, str], message: str) -> None:
     with pytest.raises(UsageError, match=message) as caught:
-        load("vla-http", given, 0)
+        load("vla-http", settings, 0)
     assert "secret" not in str(caught.value)
 
 

@@ -23,20 +23,8 @@ def test_points_of_a_wall_lie_on_the_rays_through_the_middles_of_cells() -> None
         [2 * (u - 14) / 10 for u in (3.5, 10.5, 17.5, 24.5)],
         [2 * (v - 14) / 20 for v in (3.5, 10.5, 17.5, 24.5)],
     )
-    first = [
-        x[0],
-        y[0],
-        2,
-        x[1],
-        y[0],
-        2,
-        x[0],
-        y[1],
-        2,
-        x[1],
-        y[1],
-        2,
-    ]  # row by row within the patch
+    # Row by row within the patch.
+    first = [x[0], y[0], 2, x[1], y[0], 2, x[0], y[1], 2, x[1], y[1], 2]
     second = [x[2], y[0], 2, x[3], y[0], 2, x[2], y[1], 2, x[3], y[1], 2]  # the patch to its right
     assert points[0, 0].tolist() == pytest.approx(first)
     assert points[0, 1].tolist() == pytest.approx(second)

@@ -25,10 +25,8 @@ SHAPES: dict[str, Shape] = {
     "language_model.model.layers.0.mlp.gate_proj.weight": (9216, 2304),
     "spatial_embed_tokens.weight": (8194, 2304),
     "multi_modal_projector.linear.weight": (2304, 1152),
-    "position_embedding_3d.position_embedding_head.0.weight": (
-        1152,
-        204,
-    ),  # 4 points, 3 axes, 17 numbers each
+    # 4 points, 3 axes, 17 numbers each.
+    "position_embedding_3d.position_embedding_head.0.weight": (1152, 204),
     "position_embedding_3d.position_embedding_head.1.weight": (1152,),
     "position_embedding_3d.position_embedding_head.3.weight": (1152, 1152),
     f"{SIGLIP}.embeddings.patch_embedding.weight": (1152, 3, 14, 14),
@@ -39,10 +37,8 @@ SHAPES: dict[str, Shape] = {
     "vision_zoe_model.backbone.embeddings.patch_embeddings.projection.weight": (1024, 3, 16, 16),
     f"{BEIT}.attention.attention.query.bias": (1024,),
     f"{BEIT}.attention.attention.key.weight": (1024, 1024),
-    f"{BEIT}.attention.attention.relative_position_bias.relative_position_bias_table": (
-        2212,
-        16,
-    ),  # (2 * 24 - 1) ** 2 + 3
+    # A row for each of (2 * 24 - 1) ** 2 offsets, and three more.
+    f"{BEIT}.attention.attention.relative_position_bias.relative_position_bias_table": (2212, 16),
     f"{BEIT}.attention.output.dense.weight": (1024, 1024),
     f"{BEIT}.intermediate.dense.weight": (4096, 1024),
     f"{BEIT}.output.dense.weight": (1024, 4096),

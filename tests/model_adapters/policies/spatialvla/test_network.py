@@ -99,12 +99,12 @@ def test_the_camera_changes_what_is_seen(
 ) -> None:
     seen = []
     for intrinsics in ("default", "thor:60", "thor:90"):
-        given = {
+        settings = {
             "pretrained": str(policy_checkpoints["spatialvla"]),
             "device": "cpu",
             "intrinsics": intrinsics,
         }
-        policy = load("spatialvla", given, 0)
+        policy = load("spatialvla", settings, 0)
         assert policy.identity()["intrinsics"] == intrinsics
         with torch.inference_mode():
             seen.append(policy._network.features(plain_frames[0].load()))  # type: ignore[union-attr]

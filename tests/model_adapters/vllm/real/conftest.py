@@ -26,14 +26,14 @@ def start(
     started: list[Any] = []
 
     def start(family: str = "qwen2.5-vl", name: str | None = None, **options: object) -> Any:
-        given = {
+        settings = {
             "pretrained": checkpoints[family],
             "dtype": "float32",
             "enforce_eager": True,
             **options,
         }
         started.append(
-            load(f"{name or family}@vllm", {key: str(value) for key, value in given.items()}, 0)
+            load(f"{name or family}@vllm", {key: str(value) for key, value in settings.items()}, 0)
         )
         return started[-1]
 

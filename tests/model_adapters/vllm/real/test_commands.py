@@ -5,7 +5,6 @@ import os
 import random
 import signal
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,50 +14,44 @@ import pytest
 from infthor_eval.runs import UnitRecord
 from infthor_eval.storage.folders import packaged_folder
 from model_adapters.hf.families.qwen2_5_vl import NANO_FOLDER
-from tests.plans.cut import CANDLE, FORK, cut, write
-from tests.waiting import PATIENCE_S, wait_until
+from tests.helpers.command_line import option_words
+from tests.helpers.journals import read_records
+from tests.helpers.processes import cli_words
+from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
+from tests.helpers.waiting import PATIENCE_S, wait_until
 
-from ...serving import records_in
-
-OURS = "from infthor_eval.cli import main; main()"
 ENGINES = ("vllm", "transformers")
 Run = Callable[..., list[UnitRecord[Any]]]
 
 
 def _arguments(engine: str, output: Path, *more: object) -> list[str]:
-    given = f"pretrained={packaged_folder(NANO_FOLDER)},dtype=float32"
-    given += ",enforce_eager=true" if engine == "vllm" else ",device=cpu"
+    model_args = f"pretrained={packaged_folder(NANO_FOLDER)},dtype=float32"
+    model_args += ",enforce_eager=true" if engine == "vllm" else ",device=cpu"
     typed = [
-        "--model",
-        "qwen2.5-vl",
-        "--engine",
-        engine,
-        "--model-args",
-        given,
-        "--output",
-        output,
+        *option_words(model="qwen2.5-vl", engine=engine, model_args=model_args, output=output),
         *more,
     ]
     return list(map(str, typed))
 
 
 @pytest.fixture
-def asked(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+def run_engine(run_cli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     """Runs a command with one of the engines; its records."""
     monkeypatch.setenv("VLLM_CPU_KVCACHE_SPACE", "1")
 
-    def asked(engine: str, *more: object) -> list[UnitRecord[Any]]:
+    def run_engine(engine: str, *more: object) -> list[UnitRecord[Any]]:
         output = tmp_path / engine / str(random.getrandbits(32))
-        code, _, err = run(*_arguments(engine, output, *more))
+        code, _, err = run_cli(*_arguments(engine, output, *more))
         assert code == 0, err
-        return records_in(output)
+        return read_records(output)
 
-    return asked
+    return run_engine
 
 
-def test_questions_are_answered_alike(asked: Run) -> None:
+def test_questions_are_answered_alike(run_engine: Run) -> None:
     ours, theirs = (
-        asked(engine, "--tasks", "nieh_mini_gt,nieh_mini_full", "--limit", 40) for engine in ENGINES
+        run_engine(engine, "--tasks", "nieh_mini_gt,nieh_mini_full", "--limit", 40)
+        for engine in ENGINES
     )
     assert [record.payload for record in ours] == [record.payload for record in theirs]
     assert [record.tokens.context for record in ours] == [
@@ -71,18 +64,20 @@ def test_questions_are_answered_alike(asked: Run) -> None:
 
 
 @pytest.mark.parametrize("more", [("--greedy",), ("--greedy", "--constrained")])
-def test_plans_are_carried_out_alike(more: tuple[str, ...], asked: Run, tmp_path: Path) -> None:
-    data = write(tmp_path / "data", cut(FORK, 6), cut(CANDLE, 4))
+def test_plans_are_carried_out_alike(
+    more: tuple[str, ...], run_engine: Run, tmp_path: Path
+) -> None:
+    data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 6), cut_trajectory(CANDLE, 4))
     ours, theirs = (
-        asked(engine, "--tasks", "infthor_plans", "--data", data, *more) for engine in ENGINES
+        run_engine(engine, "--tasks", "infthor_plans", "--data", data, *more) for engine in ENGINES
     )
     assert len(ours) == 10
     assert [record.payload for record in ours] == [record.payload for record in theirs]
 
 
-def test_two_workers_answer_as_one(asked: Run) -> None:
+def test_two_workers_answer_as_one(run_engine: Run) -> None:
     one, two = (
-        asked("vllm", "--tasks", "nieh_mini_gt", "--limit", 24, *more)
+        run_engine("vllm", "--tasks", "nieh_mini_gt", "--limit", 24, *more)
         for more in ((), ("--workers", 2))
     )
     assert {record.key: record.payload for record in one} == {
@@ -90,20 +85,20 @@ def test_two_workers_answer_as_one(asked: Run) -> None:
     }
 
 
-def test_plans_are_carried_out_by_workers(asked: Run, tmp_path: Path) -> None:
-    data = write(tmp_path / "data", cut(FORK, 3), cut(CANDLE, 3))
+def test_plans_are_carried_out_by_workers(run_engine: Run, tmp_path: Path) -> None:
+    data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 3), cut_trajectory(CANDLE, 3))
     words = ("--tasks", "infthor_plans", "--data", data, "--greedy")
-    one, two = (asked("vllm", *words, *more) for more in ((), ("--workers", 2)))
+    one, two = (run_engine("vllm", *words, *more) for more in ((), ("--workers", 2)))
     assert {record.key: record.payload for record in one} == {
         record.key: record.payload for record in two
     }
 
 
-def test_a_run_that_was_killed_goes_on(asked: Run, tmp_path: Path) -> None:
+def test_a_run_that_was_killed_goes_on(run_engine: Run, tmp_path: Path) -> None:
     words = ("--tasks", "nieh_mini_full", "--limit", 40)
     output = tmp_path / "killed"
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[4])}
-    command = [sys.executable, "-c", OURS, *_arguments("vllm", output, *words)]
+    command = cli_words(*_arguments("vllm", output, *words))
 
     def n_lines() -> int:
         return sum(path.read_bytes().count(b"\n") for path in output.rglob("worker-0.jsonl"))
@@ -120,6 +115,6 @@ def test_a_run_that_was_killed_goes_on(asked: Run, tmp_path: Path) -> None:
     )
     assert again.returncode == 0, again.stderr
     assert "resumed from the journal" in again.stderr + again.stdout
-    assert [record.payload for record in records_in(output)] == [
-        record.payload for record in asked("vllm", *words)
+    assert [record.payload for record in read_records(output)] == [
+        record.payload for record in run_engine("vllm", *words)
     ]

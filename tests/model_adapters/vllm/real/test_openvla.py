@@ -53,12 +53,12 @@ def test_actions_are_those_of_the_native_port(
     options = {"pretrained": str(folder), "dtype": "float32"}
     ours: Any = load("openvla@vllm", {**options, "enforce_eager": "true"}, 0)
     theirs: Any = load("openvla", {**options, "device": "cpu"}, 0)
-    asked = [
+    requests = [
         (frame, text)
         for frame in make_frames(2, 300, 300)
         for text in ("pick up the Mug", "close the fridge")
     ]
-    actions = [[each.act(frame, text) for frame, text in asked] for each in (ours, theirs)]
+    actions = [[each.act(frame, text) for frame, text in requests] for each in (ours, theirs)]
     ours.close()
     assert actions[0] == actions[1]
     assert len(set(actions[0])) > 1

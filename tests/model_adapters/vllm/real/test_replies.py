@@ -47,8 +47,8 @@ def test_replies_in_small_steps_and_blocks_are_the_same(
         "mm_encoder_tp_mode": "data",
     }
     models = (start(**small, threads=2), in_process("qwen2.5-vl"))
-    asked = [[*parts] for parts in _prompts(frames)]
-    replies = [model.conversation().replies(asked, up_to(50)) for model in models]
+    continuations = [[*parts] for parts in _prompts(frames)]
+    replies = [model.conversation().replies(continuations, up_to(50)) for model in models]
     assert [facts(reply) for reply in replies[0]] == [facts(reply) for reply in replies[1]]
 
 
@@ -60,17 +60,16 @@ def test_it_keeps_the_contract(family: str, start: Start) -> None:
 def test_of_continuations_the_others_find_the_prefix_of_the_first(
     start: Start, in_process: Start, frames: list[FrameRef]
 ) -> None:
-    asked = [[f"\nQuestion {number}: what is it?"] for number in range(5)]
+    continuations = [[f"\nQuestion {number}: what is it?"] for number in range(5)]
     models, replies = (start(), in_process("qwen2.5-vl")), []
     for model in models:
         talk = model.conversation()
         talk.append(*frames, "It is a long way. " * 40)
-        replies.append(talk.replies(asked, up_to(8)))
+        replies.append(talk.replies(continuations, up_to(8)))
     assert [facts(reply) for reply in replies[0]] == [facts(reply) for reply in replies[1]]
     assert replies[0][0].n_cached_tokens == 0
-    assert all(
-        reply.n_cached_tokens >= 128 for reply in replies[0][1:]
-    )  # a block of vLLM's on a CPU
+    # A block of vLLM's on a CPU.
+    assert all(reply.n_cached_tokens >= 128 for reply in replies[0][1:])
 
 
 def test_a_reply_is_held_to_choices(

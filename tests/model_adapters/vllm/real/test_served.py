@@ -17,13 +17,15 @@ from infthor_eval.runs import UnitRecord
 from infthor_eval.storage.folders import packaged_folder
 from model_adapters import load
 from model_adapters.hf.families.qwen2_5_vl import NANO_FOLDER
-from tests.plans.cut import CANDLE, FORK, cut, write
-from tests.waiting import PATIENCE_S, wait_until
+from tests.helpers.command_line import option_words
+from tests.helpers.journals import read_records
+from tests.helpers.processes import cli_words
+from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
+from tests.helpers.waiting import PATIENCE_S, wait_until
 
 from ...asking import up_to
-from ...serving import free_port, records_in, wait_for_server
+from ...serving import free_port, wait_for_server
 
-OURS = "from infthor_eval.cli import main; main()"
 SERVER = "vllm.entrypoints.openai.api_server"
 MODEL = str(packaged_folder(NANO_FOLDER))
 MOST_FRAMES = 200  # more than a context of `nieh_mini_full` has
@@ -44,10 +46,7 @@ def _server(port: int, log: Path) -> Iterator["subprocess.Popen[bytes]"]:
         sys.executable,
         "-m",
         SERVER,
-        "--model",
-        MODEL,
-        "--dtype",
-        "float32",
+        *option_words(model=MODEL, dtype="float32"),
         "--enforce-eager",
         *limits,
     ]
@@ -55,9 +54,9 @@ def _server(port: int, log: Path) -> Iterator["subprocess.Popen[bytes]"]:
         "VLLM_CPU_KVCACHE_SPACE": "1",
         "VLLM_CPU_OMP_THREADS_BIND": "nobind",
     }
-    with log.open("w") as said:
+    with log.open("w") as log_file:
         server = subprocess.Popen(
-            [*command, *pixels, *where], stdout=said, stderr=said, env=environment
+            [*command, *pixels, *where], stdout=log_file, stderr=log_file, env=environment
         )
         try:
             wait_for_server(f"http://127.0.0.1:{port}/health", server, log)
@@ -77,30 +76,21 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]
 
 @pytest.fixture
 def both(
-    served: dict[str, str], tmp_path: Path, run: Any
+    served: dict[str, str], tmp_path: Path, run_cli: Any
 ) -> Callable[..., list[list[UnitRecord[Any]]]]:
     """Runs the same tasks behind the server and in this process; the records of both."""
 
     def both(*arguments: object, **more: str) -> list[list[UnitRecord[Any]]]:
         here = {"pretrained": served["model"], "device": "cpu", "dtype": "float32"}
         records = []
-        for model, given in (("openai", served | more), ("qwen2.5-vl", here)):
-            options = ",".join(f"{name}={value}" for name, value in given.items())
-            code, _, err = run(
-                *(
-                    "--model",
-                    model,
-                    "--model-args",
-                    options,
-                    "--name",
-                    model,
-                    "--output",
-                    tmp_path / "out",
-                ),
+        for model, settings in (("openai", served | more), ("qwen2.5-vl", here)):
+            options = ",".join(f"{name}={value}" for name, value in settings.items())
+            code, _, err = run_cli(
+                *option_words(model=model, model_args=options, name=model, output=tmp_path / "out"),
                 *arguments,
             )
             assert code == 0, err
-            records.append(records_in(tmp_path / "out" / model))
+            records.append(read_records(tmp_path / "out" / model))
         return records
 
     return both
@@ -117,7 +107,7 @@ def test_questions_are_answered_as_in_this_process(
 def test_plans_stop_at_special_tokens(
     both: Callable[..., list[list[UnitRecord[Any]]]], tmp_path: Path
 ) -> None:
-    data = write(tmp_path / "data", cut(FORK, 3), cut(CANDLE, 2))
+    data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 3), cut_trajectory(CANDLE, 2))
     behind, here = both("--tasks", "infthor_plans", "--data", data, "--greedy")
     assert [record.payload for record in behind] == [record.payload for record in here]
 
@@ -147,21 +137,12 @@ def test_more_frames_than_the_server_takes_are_refused_with_its_option(
 
 
 def test_a_server_that_dies_costs_nothing_that_was_answered_and_goes_on_once_it_is_back(
-    tmp_path: Path, run: Any
+    tmp_path: Path, run_cli: Any
 ) -> None:
     port, output = free_port(), tmp_path / "out"
-    given = f"base_url=http://127.0.0.1:{port}/v1,model={MODEL},retries=1,max_in_flight=1"
-    words = [
-        "--model",
-        "openai",
-        "--model-args",
-        given,
-        "--tasks",
-        "nieh_mini_full",
-        "--limit",
-        "40",
-    ]
-    command = [sys.executable, "-c", OURS, *words, "--output", str(output)]
+    model_args = f"base_url=http://127.0.0.1:{port}/v1,model={MODEL},retries=1,max_in_flight=1"
+    words = option_words(model="openai", model_args=model_args, tasks="nieh_mini_full", limit="40")
+    command = cli_words(*words, "--output", output)
 
     def n_answered() -> int:
         lines = [
@@ -178,15 +159,15 @@ def test_a_server_that_dies_costs_nothing_that_was_answered_and_goes_on_once_it_
         wait_until(lambda: n_answered() >= 5)
         for each in [*psutil.Process(server.pid).children(recursive=True), server]:
             each.kill()
-        said = asking.communicate(timeout=PATIENCE_S)[0]
-    assert asking.returncode == 1, said
-    assert "Traceback" not in said
-    before = {record.key: record for record in records_in(output) if record.failure is None}
+        output_text = asking.communicate(timeout=PATIENCE_S)[0]
+    assert asking.returncode == 1, output_text
+    assert "Traceback" not in output_text
+    before = {record.key: record for record in read_records(output) if record.failure is None}
     assert 5 <= len(before) < 40, "it did not die in the middle"
     with _server(port, tmp_path / "second"):
-        code, _, err = run(*words, "--output", output)
+        code, _, err = run_cli(*words, "--output", output)
     assert code == 0, err
-    records = records_in(output)
+    records = read_records(output)
     assert len(records) == 40
     assert [record.failure for record in records] == [None] * 40
     assert all(

@@ -1,0 +1,20 @@
+"""Files of runs and of published logs."""
+
+import gzip
+import json
+from pathlib import Path
+from typing import Any
+
+__all__ = ["find_one", "read_json_lines"]
+
+
+def find_one(folder: Path, pattern: str) -> Path:
+    """The one path below a folder that matches."""
+    (path,) = folder.rglob(pattern)
+    return path
+
+
+def read_json_lines(path: Path) -> list[Any]:
+    """The rows of a compressed file of JSON lines."""
+    with gzip.open(path) as lines:
+        return [json.loads(line) for line in lines]

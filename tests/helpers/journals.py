@@ -1,0 +1,43 @@
+"""Journals: those of runs that nobody ran, and what is in those of runs."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+from infthor_eval.runs import RecordTypes, RunHeader, UnitRecord, read_header, read_run
+from infthor_eval.runs.journals.journal import Journal
+from infthor_eval.suites import find_suite
+
+__all__ = ["RecordedRun", "read_records", "write_journal", "write_run"]
+
+
+class RecordedRun(Protocol):
+    """A run of episodes as reports read it."""
+
+    label: str
+    header: RunHeader
+    records: Sequence[UnitRecord[Any]]
+
+
+def write_journal(
+    folder: Path, header: RunHeader, records: Sequence[UnitRecord[Any]], types: RecordTypes[Any]
+) -> Path:
+    """Write the journal of a run as the driver does; returns the run's folder."""
+    with Journal(folder, header, types) as journal:
+        for record in records:
+            journal.append(record)
+    return folder
+
+
+def write_run(run: RecordedRun, output: Path, name: str | None = None) -> Path:
+    """Write the journal of a run below its label; returns the run's folder, `name` or one of the
+    suite."""
+    folder = output / run.label / (name or f"{run.header.suite}-0123")
+    return write_journal(folder, run.header, run.records, find_suite(run.header.suite).records)
+
+
+def read_records(output: Path) -> list[UnitRecord[Any]]:
+    """The records of the one run below a folder."""
+    (journal,) = output.rglob("journal")
+    suite = find_suite(read_header(journal.parent).suite)
+    return read_run(journal.parent, suite.records)[1]

@@ -1,0 +1,182 @@
+"""hf-vlm on checkpoints that transformers' own `save_pretrained` wrote, of families this project
+has no code for."""
+
+import json
+import shutil
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from transformers import LlamaConfig, Qwen2VLConfig
+
+from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import check_adapter, load
+from model_adapters.hf.cached.model import TransformersModel
+from model_adapters.hf.prompting.prompt import token_ids
+from model_adapters.hf.uncached import UncachedModel, process_turns
+from model_adapters.tiny.pixtral import PixtralTiny
+from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny, save_tiny_checkpoint
+from model_adapters.tiny.twin import HIDDEN
+
+from ...asking import up_to, user
+
+
+def _load(folder: Path, **options: str) -> Any:
+    return load("hf-vlm", {"pretrained": str(folder), "device": "cpu", **options}, seed=0)
+
+
+@pytest.mark.parametrize("name", ["llava", "idefics3", "deepseek-vl-1.3b"])
+def test_an_unknown_family_shares_prefixes_and_replies_as_generate(
+    name: str, checkpoints: dict[str, Path], frames: list[FrameRef]
+) -> None:
+    shared, whole = _load(checkpoints[name]), _load(checkpoints[name], share_prefix="false")
+    assert isinstance(shared, TransformersModel)
+    assert isinstance(whole, UncachedModel)
+    check_adapter(shared)
+    check_adapter(whole)
+    replies = []
+    for model in (shared, whole):
+        talk = model.conversation()
+        talk.append("Look:\n", *frames[:3], "\n\nmug")
+        start, heard = talk.mark(), []
+        for question in ("\nWhat is it?", frames[4]):
+            talk.append(question)
+            heard.append((talk.n_tokens, talk.reply(up_to(6)).token_ids))
+            talk.rewind(start)
+        replies.append(heard)
+    assert replies[0] == replies[1]
+    assert shared.tokens_per_frame(frames[0]) == whole.tokens_per_frame(frames[0])
+
+
+def test_an_architecture_that_would_be_run_wrongly_is_refused(checkpoints: dict[str, Path]) -> None:
+    with pytest.raises(ModelError, match=r"logits differ .* gemma3 .* use share_prefix=false"):
+        _load(checkpoints["gemma3"])
+
+
+def test_what_is_refused_runs_without_sharing(
+    checkpoints: dict[str, Path], frames: list[FrameRef]
+) -> None:
+    model = _load(checkpoints["gemma3"], share_prefix="false")
+    parts = (frames[0], "\nWhat is it?")
+    talk = model.conversation()
+    talk.append(*parts)
+    inputs = process_turns(model._processor, model._loaded.template, talk.turns)
+    output = model._loaded.model.generate(**inputs, do_sample=False, max_new_tokens=6)
+    expected = [
+        token
+        for token in output[0, talk.n_tokens :].tolist()
+        if token not in model._loaded.generation.end_ids
+    ]
+    reply = talk.reply(up_to(6))
+    assert list(reply.token_ids) == expected
+    assert reply.n_cached_tokens == 0
+    assert model.identity()["share_prefix"] is False
+
+
+def test_the_end_token_is_no_part_of_a_reply_without_sharing(
+    checkpoints: dict[str, Path], tmp_path: Path, frames: list[FrameRef]
+) -> None:
+    model = _load(checkpoints["llava"], share_prefix="false")
+    talk = model.conversation()
+    talk.append(frames[0], "\nWhat is it?")
+    whole = talk.reply(up_to(6)).token_ids
+    folder = shutil.copytree(checkpoints["llava"], tmp_path / "llava")
+    (folder / "generation_config.json").write_text(json.dumps({"eos_token_id": whole[3]}))
+    ended = _load(folder, share_prefix="false").conversation()
+    ended.append(*talk.turns[0].parts)
+    assert ended.reply(up_to(6)).token_ids == whole[: whole.index(whole[3])]
+
+
+def test_known_families_need_no_processor(tmp_path: Path, frames: list[FrameRef]) -> None:
+    save_tiny_checkpoint(tmp_path / "qwen", seed=0)
+    PixtralTiny.twin.save(tmp_path / "pixtral", seed=0)
+    for folder in ("qwen", "pixtral"):
+        (tmp_path / folder / "processor_config.json").unlink()
+        model = _load(tmp_path / folder)
+        assert isinstance(model, TransformersModel)
+        talk = model.conversation()
+        talk.append(*frames[:2], "?")
+        assert talk.reply(up_to(2)).n_context_tokens == talk.n_tokens
+
+
+def _qwen2_vl_config(ids: Mapping[str, int], vocab_size: int) -> Qwen2VLConfig:
+    newer = Qwen25VLTiny.twin.config(ids, vocab_size)
+    text = newer.text_config.to_dict()
+    del text["model_type"]
+    names = ("image_token_id", "video_token_id", "vision_start_token_id", "vision_end_token_id")
+    return Qwen2VLConfig(
+        text_config=text,
+        vision_config={
+            "depth": 2,
+            "embed_dim": 32,
+            "hidden_size": HIDDEN,
+            "num_heads": 2,
+            "mlp_ratio": 2,
+        },
+        **{name: getattr(newer, name) for name in names},
+    )
+
+
+def test_qwen2_vl_runs_as_its_successor_and_as_transformers_has_it(
+    tmp_path: Path, frames: list[FrameRef]
+) -> None:
+    replace(Qwen25VLTiny.twin, config=_qwen2_vl_config).save(tmp_path, seed=0)
+    model = _load(tmp_path, chunk_tokens="30")
+    parts = ("Goal.", *frames[:3], "\nWhat is it?")
+    pieces = model.pieces(user(*parts))
+    ids = torch.tensor([list(token_ids(pieces))])
+    pixels = model._loaded.family._image_processor(
+        images=[ref.load() for ref in frames[:3]], return_tensors="pt"
+    )
+    bare = model._loaded.model
+    with torch.inference_mode():
+        plain = bare(
+            input_ids=ids, mm_token_type_ids=(ids == bare.config.image_token_id).int(), **pixels
+        )
+    torch.testing.assert_close(model.encode(pieces), plain.logits[0, -1], atol=1e-4, rtol=1e-4)
+    assert type(bare).__name__ == "Qwen2VLForConditionalGeneration"
+
+
+def test_no_checkpoint_is_a_usage_error() -> None:
+    with pytest.raises(UsageError, match=r"hf-vlm needs pretrained=\.\.\."):
+        load("hf-vlm", {}, seed=0)
+
+
+def test_a_model_without_images_is_refused(tmp_path: Path) -> None:
+    LlamaConfig(vocab_size=10).save_pretrained(tmp_path)
+    with pytest.raises(ModelError, match="is a llama checkpoint, which has no vision"):
+        _load(tmp_path)
+
+
+def test_a_processor_that_disagrees_with_the_model_is_refused(
+    checkpoints: dict[str, Path], tmp_path: Path
+) -> None:
+    folder = shutil.copytree(checkpoints["llava"], tmp_path / "llava")
+    file = folder / "processor_config.json"
+    settings = json.loads(file.read_text())
+    file.write_text(json.dumps(settings | {"patch_size": 28}))
+    with pytest.raises(
+        ModelError, match=r"image tokens of .* frames and the model .* do not belong"
+    ):
+        _load(folder)
+
+
+@pytest.mark.parametrize(
+    ("piece", "complaint"),
+    [
+        ("'<image>'", "0 image placeholders for 3 frames"),
+        ("part.text", "drops the text 'The first view:'"),
+    ],
+)
+def test_a_template_without_images_or_texts_is_refused(
+    checkpoints: dict[str, Path], tmp_path: Path, piece: str, complaint: str
+) -> None:
+    folder = shutil.copytree(checkpoints["llava"], tmp_path / "llava")
+    file = folder / "chat_template.jinja"
+    file.write_text(file.read_text().replace(piece, "''"))
+    with pytest.raises(ModelError, match=complaint):
+        _load(folder)

@@ -1,0 +1,100 @@
+"""Figures of arms: success by radius, and reward over steps, from numbers made by hand."""
+
+from dataclasses import replace
+
+from PIL import Image
+
+from infthor_eval.manipulation.recorded.curves import arm_curves
+from infthor_eval.manipulation.recorded.radii import success_by_radius
+from infthor_eval.report.figures.curve_tables import curves_table, one_panel
+from infthor_eval.report.figures.curves import draw_curves
+from infthor_eval.report.figures.radius import draw_radii, radii_table
+
+from ...helpers.arm_runs import make_arm_planner_run, make_arm_run, make_episode_record
+from .drawings import read_texts
+
+
+def runs():
+    records = [
+        make_episode_record(name, number, kind)
+        for name in "ab"
+        for number, kind in enumerate(("pickup", "put"))
+    ]
+    lost = [
+        make_episode_record(name, number, kind, done=False)
+        for name in "ab"
+        for number, kind in enumerate(("pickup", "put"))
+    ]
+    return [
+        make_arm_run("m", lost, radius=0.1),
+        make_arm_run("m", records),
+        make_arm_planner_run(records),
+    ]
+
+
+def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
+    curves = arm_curves([replace(run, label=f"run {number}") for number, run in enumerate(runs())])
+    _, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure6")
+    words_drawn = read_texts(svg)
+    for words in (
+        "Pick-up and put",
+        "Pick-up",
+        "Put",
+        "run 0",
+        "Cumulative reward on arm_pickup and arm_put",
+        "mean over 2 trajectories, 95 % intervals shaded",
+        "embedded simulator: not comparable with the paper's curves",
+        "the runs differ in the radius of the hand's sphere: 0.1, 0.5 m",
+    ):
+        assert words in words_drawn
+    assert words_drawn.count("the expert's step (low-level action)") == 3
+    table = curves_table(curves)
+    names = [
+        "run",
+        "reward",
+        "95 % interval",
+        "of the bound, %",
+        "of pick-ups",
+        "of puts",
+        "at step",
+    ]
+    assert [column.name for column in table.columns] == [*names, "episodes", "failed"]
+    assert table.rows[1].cells == (
+        "run 1",
+        "4.00",
+        "[4.00, 4.00]",
+        "100.0",
+        "2.00",
+        "2.00",
+        "1",
+        "4",
+        "0",
+    )
+
+
+def test_success_by_radius_is_drawn_with_its_floor(tmp_path):
+    curves = success_by_radius(runs())
+    one, other = (draw_radii(curves, tmp_path, name)[1] for name in ("one", "other"))
+    assert one.read_bytes() == other.read_bytes()
+    for words in (
+        "Pick-up",
+        "Put",
+        "m",
+        "planner-arm",
+        "in the sphere at the start",
+        "success (%)",
+    ):
+        assert words in read_texts(one)
+    with Image.open(tmp_path / "one.png") as picture:
+        assert min(picture.size) > 300
+    table = radii_table(curves)
+    assert [column.name for column in table.columns][2:] == ["0.1 m", "0.5 m", "episodes", "failed"]
+    assert [row.cells[:2] for row in table.rows] == [
+        ("m", "Pick-up"),
+        ("planner-arm", "Pick-up"),
+        ("m", "Put"),
+        ("planner-arm", "Put"),
+        ("(in the sphere at the start)", "Pick-up"),
+    ]
+    assert table.rows[1].cells[2] == "-"
+    assert table.notes[0] == "embedded simulator: not comparable with the paper's results"

@@ -1,0 +1,306 @@
+"""Training of the small model on two scenes and a few steps: its data, and that the loss falls."""
+
+import random
+import shutil
+from collections import defaultdict
+
+import msgspec
+import pytest
+import torch
+from safetensors.torch import load_file
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.object_ids import Words
+from infthor_eval.formats.qa_csv import write_questions
+from infthor_eval.formats.step_log import ObjectInFrame, read_steps
+from infthor_eval.training.encoding import Encoder
+from infthor_eval.training.export import export
+from infthor_eval.training.nano.architecture import TOKENS, build_untrained, image_processor
+from infthor_eval.training.nano.frame_dataset import _cell_coverage, _type, read_frame_dataset
+from infthor_eval.training.nano.network import NanoNetwork, spellings
+from infthor_eval.training.nano.sampler import (
+    SequenceSampler,
+    SyntheticPlans,
+    corpus_texts,
+    question_intro,
+)
+from infthor_eval.training.nano.settings import NanoRecipe
+from infthor_eval.training.nano.stages import train_small_model
+from model_adapters import check_adapter, load
+
+from ...helpers.bundled import bundled_name
+
+SMALL = NanoRecipe(
+    title="small",
+    hidden=64,
+    layers=2,
+    vision_steps=20,
+    text_steps=3,
+    joint_steps=6,
+    frames_per_step=16,
+    questions_per_step=8,
+    windows_per_step=1,
+    window_tokens=600,
+    lr=1e-2,
+    threads=1,
+)
+
+
+@pytest.fixture(scope="module")
+def small_set(bundled_set, tmp_path_factory):
+    """Two trajectories of the bundled set, and the questions on them."""
+    root, names = (
+        tmp_path_factory.mktemp("small"),
+        (bundled_name("bedroom-1"), bundled_name("kitchen-2")),
+    )
+    for name in names:
+        shutil.copytree(bundled_set / "metadata" / name, root / "metadata" / name)
+    questions = [item for item in NiehSet(bundled_set).questions if item.traj_id in names]
+    write_questions(root / "qa_set_small.csv", questions)
+    return root
+
+
+@pytest.fixture(scope="module")
+def blank(small_set):
+    """The untrained model and its frames."""
+    dataset = read_frame_dataset([small_set], image_processor())
+    return build_untrained(
+        SMALL, corpus_texts([small_set], dataset.types), [question_intro()]
+    ), dataset
+
+
+def test_labels_of_frames_are_those_of_the_logs(small_set, blank):
+    _, dataset = blank
+    data = NiehSet(small_set)
+    index = dataset.index_by_digest()
+    for folder in sorted((small_set / "metadata").iterdir()):
+        for frame, step in list(zip(data.frames(folder.name), read_steps(folder), strict=True))[
+            ::20
+        ]:
+            at = index[frame.digest]
+            present = {
+                name
+                for name, there in zip(dataset.types, dataset.present[at], strict=True)
+                if there
+            }
+            labels = {
+                name
+                for name, there in zip(dataset.types, dataset.visible[at], strict=True)
+                if there
+            }
+            assert present == {_type(key) for key in step.seen}
+            assert labels <= set(step.object_log.visible) | present
+
+
+def test_frames_are_what_the_familys_own_features_are_made_of(blank):
+    loaded, dataset = blank
+    network = NanoNetwork(loaded, dataset)
+    frames = [FrameRef(frame.path) for frame in dataset.frames[:5]]
+    with torch.no_grad():
+        theirs = torch.stack(loaded.family.features([frame.load() for frame in frames]))
+        ours = network.frame_features(range(5))
+    assert ours.shape == (5, TOKENS, 64)
+    assert torch.allclose(ours, theirs, atol=5e-3)  # pixels are kept in half precision
+
+
+@pytest.mark.parametrize(
+    ("box", "cells"),
+    [
+        ((0, 0, 299, 299), set(range(16))),
+        ((0, 0, 74, 74), {0}),
+        ((225, 225, 299, 299), {15}),
+        ((100, 30, 110, 40), {1}),  # small, whole in one part
+        ((70, 0, 80, 10), {0, 1}),  # small, half in each of two: of 11 columns 5 and 6
+    ],
+)
+def test_where_a_box_lies(box, cells):
+    cells_of_box = {
+        at for at, there in enumerate(_cell_coverage(torch.tensor([box]), (300, 300))[0]) if there
+    }
+    assert cells_of_box <= cells
+    assert cells_of_box
+
+
+def test_types_are_those_of_parts_and_slices():
+    ids = (
+        "Mug|+01.00|+00.90|-02.00",
+        "Sink|-01.00|+00.50|+01.00|SinkBasin",
+        "Apple|+1|+2|+3|AppleSliced_2",
+    )
+    assert [_type(key) for key in ids] == ["Mug", "SinkBasin", "AppleSliced"]
+    assert ObjectInFrame(pixels=1, box=(0, 0, 1, 1)).visible is False
+
+
+def test_words_are_tokens(blank):
+    loaded, dataset = blank
+    tokens = loaded.tokenizer.tokenize(f"{question_intro()} Have you seen a mug?")
+    assert len(tokens) == 1 + 6
+    names = [spelling for name in dataset.types for spelling in spellings(name)]
+    lengths = [len(loaded.tokenizer.tokenize(name)) for name in names]
+    assert sum(lengths) / len(lengths) < 1.6
+
+
+def test_synthetic_questions_are_true_and_their_names_do_not_give_away_the_answer(small_set, blank):
+    loaded, dataset = blank
+    sampler = SequenceSampler(
+        Encoder(loaded), [small_set], dataset, window_tokens=2048, words=Words.PUBLISHED, seed=0
+    )
+    index, counts = dataset.index_by_digest(), {"yes": 0, "no": 0}
+    from infthor_eval.household.wording import noun
+
+    words = {noun(name): at for at, name in enumerate(dataset.types)}
+    for sequence in sampler.questions(200, synthetic_share=1.0, recalled_share=0.0, n_others=0):
+        (frame,) = sequence.frames
+        text = loaded.tokenizer.decode(
+            [piece for piece in sequence.pieces if isinstance(piece, int)]
+        )
+        answer = text.rpartition("?")[2].removesuffix("<|im_end|>")
+        about = max((name for name in words if f" {name}" in text), key=len)
+        counts[answer] += 1
+        here = index[frame.digest]
+        assert bool(dataset.visible[here, words[about]]) == (answer == "yes")
+        assert answer == "yes" or not dataset.present[here, words[about]]
+    assert min(counts.values()) > 70
+
+
+def test_recalled_questions_have_their_clues_among_other_frames_and_end_with_the_last_view(
+    small_set, blank
+):
+    loaded, dataset = blank
+    sampler = SequenceSampler(
+        Encoder(loaded), [small_set], dataset, window_tokens=2048, words=Words.PUBLISHED, seed=0
+    )
+    data = NiehSet(small_set)
+    clues = defaultdict(list)  # by text, which questions on two trajectories may share
+    for question in data.questions:
+        clues[question.text].append({frame.digest for frame in data.clue_frames(question)})
+    absences = {question.text for question in data.questions if question.absence}
+    lasts = {data.frames(question.traj_id)[-1].digest for question in data.questions}
+    n_others = set()
+    for sequence in sampler.questions(60, synthetic_share=0.0, recalled_share=1.0, n_others=4):
+        digests = [frame.digest for frame in sequence.frames]
+        text = loaded.tokenizer.decode(
+            [piece for piece in sequence.pieces if isinstance(piece, int)]
+        )
+        question_text = max((known for known in clues if known in text), key=len)
+        assert digests[-1] in lasts
+        if question_text not in absences:
+            own = next(frames for frames in clues[question_text] if frames <= set(digests))
+            n_others.add(len(set(digests) - own - lasts))
+    assert n_others <= set(range(5))
+    assert len(n_others) > 2
+
+
+def test_synthetic_plans_replace_objects_in_plan_and_actions():
+    recorded = [
+        ("pick up the mug", ["PickupObject Mug"]),
+        ("pick up the butterknife", ["PickupObject ButterKnife"]),
+        (
+            "put the mug in the fridge",
+            ["OpenObject Fridge", "PutObject Mug Fridge", "CloseObject Fridge"],
+        ),
+        (
+            "put the egg in the microwave",
+            ["OpenObject Microwave", "PutObject Egg Microwave", "CloseObject Microwave"],
+        ),
+        ("put the egg in the sinkbasin", ["PutObject Egg SinkBasin"]),
+        ("go to the fridge", ["MoveAhead", "RotateLeft"]),
+    ]
+    rng, plans = random.Random(0), SyntheticPlans(recorded)
+    assert {(plan, *actions) for plan, actions in (plans.sample(rng) for _ in range(200))} == {
+        ("pick up the mug", "PickupObject Mug"),
+        ("pick up the butterknife", "PickupObject ButterKnife"),
+        (
+            "put the mug in the fridge",
+            "OpenObject Fridge",
+            "PutObject Mug Fridge",
+            "CloseObject Fridge",
+        ),
+        (
+            "put the egg in the fridge",
+            "OpenObject Fridge",
+            "PutObject Egg Fridge",
+            "CloseObject Fridge",
+        ),
+        (
+            "put the mug in the microwave",
+            "OpenObject Microwave",
+            "PutObject Mug Microwave",
+            "CloseObject Microwave",
+        ),
+        (
+            "put the egg in the microwave",
+            "OpenObject Microwave",
+            "PutObject Egg Microwave",
+            "CloseObject Microwave",
+        ),
+        ("put the egg in the sinkbasin", "PutObject Egg SinkBasin"),
+    }
+    assert not SyntheticPlans(recorded[-1:])
+
+
+def test_synthetic_plans_have_no_frame_and_loss_on_their_actions(small_set, blank):
+    loaded, dataset = blank
+    sampler = SequenceSampler(
+        Encoder(loaded), [small_set], dataset, window_tokens=600, words=Words.PUBLISHED, seed=0
+    )
+    for plan in sampler.synthetic_plans(20):
+        assert not plan.frames
+        ends = [
+            at
+            for at, piece in enumerate(plan.pieces)
+            if piece == loaded.tokenizer.convert_tokens_to_ids("<|plan|>")
+        ]
+        assert plan.has_loss == tuple(at > ends[1] for at in range(len(plan.pieces)))
+
+
+def test_histories_are_windows_or_single_plans(small_set, blank):
+    loaded, dataset = blank
+    sampler = SequenceSampler(
+        Encoder(loaded), [small_set], dataset, window_tokens=600, words=Words.PUBLISHED, seed=0
+    )
+    assert len(sampler.histories(2, 5, single_plan_share=0.0)) == 2
+    plans = sampler.histories(2, 5, single_plan_share=1.0)
+    assert len(plans) == 5
+    mark = loaded.tokenizer.convert_tokens_to_ids("<|plan|>")
+    assert all(plan.pieces.count(mark) == 2 for plan in plans)
+
+
+def test_what_cannot_be_read_is_skipped_and_reported(small_set, tmp_path):
+    shutil.copytree(small_set, tmp_path / "set")
+    (tmp_path / "set/metadata" / bundled_name("kitchen-2") / "traj_data.json").unlink()
+    notes = []
+    train_small_model(
+        msgspec.structs.replace(SMALL, vision_steps=1, text_steps=1, joint_steps=1),
+        [tmp_path / "set"],
+        lambda _: None,
+        notes.append,
+    )
+    assert any("trajectory is not in the set" in line for line in notes)
+
+
+def test_a_set_without_questions_is_refused(small_set, tmp_path):
+    shutil.copytree(small_set, tmp_path / "set")
+    (tmp_path / "set/qa_set_small.csv").unlink()
+    write_questions(tmp_path / "set/qa_set_none.csv", [])
+    with pytest.raises(DataError, match="no question"):
+        train_small_model(SMALL, [tmp_path / "set"], lambda _: None)
+
+
+def test_training_is_the_same_for_a_seed_and_lowers_the_loss(small_set, tmp_path):
+    losses = []
+    for name in ("a", "b"):
+        steps = []
+        model = train_small_model(SMALL, [small_set], steps.append)
+        export(model, tmp_path / name, title=SMALL.title, words=SMALL.words)
+        losses.append([step.loss for step in steps])
+        assert [step.stage for step in steps] == ["vision"] * 20 + ["text"] * 3 + ["joint"] * 6
+    assert losses[0] == losses[1]
+    assert sum(losses[0][15:20]) < 0.95 * sum(losses[0][:5])
+    first, second = (load_file(tmp_path / name / "model.safetensors") for name in ("a", "b"))
+    assert all(first[name].equal(second[name]) for name in first)
+    options = {"pretrained": str(tmp_path / "a"), "dtype": "float32"}
+    check_adapter(load("qwen2.5-vl-nano", options, seed=0))
+    check_adapter(load("qwen2.5-vl", options, seed=0))
