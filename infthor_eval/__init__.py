@@ -34,5 +34,5 @@ def load_run(folder: str | os.PathLike[str]) -> DataFrame:
         import_target,  # by name: every module imports this one, and few need pandas
     )
 
-    frame: DataFrame = import_target("infthor_eval.data_frames:load_run")(folder)
+    frame: DataFrame = import_target("infthor_eval.report.sample_table:load_run")(folder)
     return frame

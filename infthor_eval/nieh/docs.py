@@ -12,8 +12,8 @@ from typing import Any
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import PublishedColumns, Question
 from infthor_eval.formats.video import Video
-from infthor_eval.nieh.asking.recall_settings import RecallSettings
 from infthor_eval.nieh.contexts import ContextPart, Sample, context_named
+from infthor_eval.nieh.contexts.base import RecallSettings
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.frame_ablations import FrameAblation
 from infthor_eval.nieh.samples import TaskSamples, open_set

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Sequence
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from infthor_eval.formats.csv_files import shield
-from infthor_eval.report.presented import PresentedRun
+from infthor_eval.report.presented import PresentedRun, read_report_runs
 from infthor_eval.report.sample_columns import ENVELOPE, SampleColumn
 from infthor_eval.runs import UnitRecord
 from infthor_eval.terminal import printable
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
     from pyarrow import Table
 
-__all__ = ["FORMS", "encode_samples", "sample_table"]
+__all__ = ["FORMS", "encode_samples", "load_run", "sample_table"]
 
 FORMS = ("csv", "parquet")
 
@@ -69,6 +72,11 @@ def _score(run: PresentedRun, metric: str, record: UnitRecord[Any]) -> float | N
     """Return a score as the run's summary counts it: 0 for a failed unit, none for one that does
     not count."""
     return None if record.excluded is not None else run.suite.scores(record).get(metric, 0.0)
+
+
+def load_run(folder: str | os.PathLike[str]) -> DataFrame:
+    """See `infthor_eval.load_run`."""
+    return sample_table(read_report_runs([Path(folder)])).to_pandas()
 
 
 def encode_samples(table: Table, form: str) -> bytes:

@@ -32,9 +32,10 @@ from infthor_eval.runs.journals.records import (
 )
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.tables import Table
-from model_adapters import Subject
+from model_adapters import Capabilities, Subject
 
 __all__ = [
+    "BaselineSubject",
     "BoundEvaluation",
     "Cost",
     "Evaluation",
@@ -275,3 +276,21 @@ class RunSummary:
 
     header: RunHeader
     summary: Any
+
+
+class BaselineSubject:
+    """A subject without options that sees no frame and holds no resource."""
+
+    name = ""
+    capabilities = Capabilities(counts_tokens=False, token_ids=False)
+
+    def __init__(self, seed: int) -> None:
+        """Take the seed of the run."""
+        self._seed = seed
+
+    def identity(self) -> dict[str, Any]:
+        """Return the name; what is drawn depends on the seed, which the run's config has anyway."""
+        return {"baseline": self.name}
+
+    def close(self) -> None:
+        """Nothing is held."""

@@ -26,9 +26,8 @@ from infthor_eval.nieh.contexts import ContextPart
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.metrics import MetricError
 from infthor_eval.nieh.records import NiehAnswer, NiehRecall
-from infthor_eval.nieh.shown_clues import shown_clues
 from infthor_eval.nieh.task import PreparedTask
-from infthor_eval.nieh.units import NiehUnit
+from infthor_eval.nieh.units import NiehUnit, shown_clues
 from infthor_eval.runs import NOTHING, Session, Tokens, UnitRecord, Usage
 from infthor_eval.storage.digests import fingerprint
 from model_adapters import (

@@ -15,9 +15,9 @@ from infthor_eval.nieh.guessing.chains import (
     Guesser,
     chains_of_words,
     chains_of_words_and_count,
+    question_type,
 )
-from infthor_eval.nieh.guessing.forms import question_type
-from infthor_eval.runs.baseline import BaselineSubject
+from infthor_eval.runs.suite import BaselineSubject
 from infthor_eval.storage.digests import seed_of
 from model_adapters import Subject
 

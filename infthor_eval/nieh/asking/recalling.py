@@ -25,9 +25,8 @@ from infthor_eval.memory import (
     open_memory,
     wrap_memory_errors,
 )
-from infthor_eval.nieh.asking.recall_settings import RecallSettings
 from infthor_eval.nieh.contexts import Sample
-from infthor_eval.nieh.contexts.base import clue_positions
+from infthor_eval.nieh.contexts.base import RecallSettings, clue_positions
 from infthor_eval.nieh.records import NiehRecall
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.storage.digests import fingerprint

@@ -6,7 +6,6 @@ from infthor_eval.nieh.contexts import (
     memory,
     plans,
     retrieval,
-    text_state,
     video,
     views,
 )
@@ -49,10 +48,10 @@ CONTEXTS = {
         plans.interleaved_plans, intro=_INTERLEAVED, parts=plans.plans_parts
     ),
     "text_state": Context(
-        text_state.text_state,
+        views.text_state,
         intro="Answer the question given the description of the environment and the agent's state "
         "(the last image).",
-        parts=text_state.state_parts,
+        parts=views.state_parts,
         sources=trajectories_identity,
     ),
     "clip_retrieval": Context(

@@ -11,7 +11,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.video import FILM_FPS, Video
-from infthor_eval.nieh.asking.recall_settings import RecallSettings
+from infthor_eval.memory import MemoryOptions
 from infthor_eval.nieh.options import FRAMES
 from infthor_eval.nieh.prompts import PROMPTS, PUBLISHED_MAIN, question_text
 from infthor_eval.storage.digests import digest_of_file, fingerprint
@@ -20,6 +20,7 @@ __all__ = [
     "Context",
     "ContextPart",
     "ContextSettings",
+    "RecallSettings",
     "Sample",
     "clue_positions",
     "trajectories_identity",
@@ -64,6 +65,30 @@ _VALUES: dict[str, tuple[Callable[[Any], bool] | None, str]] = {
     "frames": (lambda value: value in FRAMES, f"one of {', '.join(FRAMES)}"),
     "prompt": (lambda value: value in PROMPTS, f"one of {', '.join(PROMPTS)}"),
 }
+
+
+@dataclass(frozen=True)
+class RecallSettings:
+    """How a memory recalls what a sample shows.
+
+    Attributes:
+        memory: name of the memory, or FILE.py:CLASS.
+        options: options of its class, sorted pairs.
+        budget: most tokens of what is recalled; None for the memory's own limit.
+        tokens_per_frame: tokens of a frame for the model under test; None if there is no budget.
+        seed: seed of what the memory draws.
+    """
+
+    memory: str
+    options: MemoryOptions = ()
+    budget: int | None = None
+    tokens_per_frame: int | None = None
+    seed: int = 0
+
+    @classmethod
+    def of(cls, document: Mapping[str, Any]) -> "RecallSettings":
+        """Return the settings of a mapping of their fields."""
+        return cls(**{**document, "options": tuple(sorted(dict(document["options"]).items()))})
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.memory import accepted_options, memory_identity
-from infthor_eval.nieh.asking.recall_settings import RecallSettings
-from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
+from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, RecallSettings, Sample
 
 __all__ = ["memory", "memory_sources", "recalled_parts"]
 

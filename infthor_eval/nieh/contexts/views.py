@@ -1,11 +1,13 @@
-"""Contexts that show frames of the trajectory without choosing by the needle: clues, whole, its
-end."""
+"""Contexts without a search: the clues, the whole trajectory, its end, its last state in words."""
 
+from collections.abc import Sequence
+
+from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.nieh.contexts.base import ContextSettings, Sample
+from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
-__all__ = ["clues", "trajectory", "truncate_head"]
+__all__ = ["clues", "state_parts", "text_state", "trajectory", "truncate_head"]
 
 _K_TOKENS = 1024  # truncate_head's published kilo-token
 
@@ -39,3 +41,23 @@ def truncate_head(
         return [SkippedQuestion(question, "no frame fits the context")]
     n_cut = max(0, n_all - n)
     return [Sample(question, tuple(range(n_cut, n_all)), n_cut=n_cut)]
+
+
+def text_state(
+    data: NiehSet, question: Question, _settings: ContextSettings
+) -> list[Sample | SkippedQuestion]:
+    """Ask on the last frame, beside the text of the last state (published under the same name)."""
+    if not data.states(question.traj_id):
+        reason = (
+            "the trajectory has no state_summary"
+            if data.outline(question.traj_id)
+            else data.missing_outline
+        )
+        return [SkippedQuestion(question, reason)]
+    return [Sample(question, (len(data.frames(question.traj_id)) - 1,))]
+
+
+def state_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
+    """Return the text of the last state, then the last frame."""
+    states = data.states(sample.question.traj_id)
+    return [f" State: {states[max(states)]}; Last agent's view: ", *frames]

@@ -9,7 +9,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
 from infthor_eval.nieh.docs import doc_target
-from infthor_eval.nieh.guessing.forms import form_of
+from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS
 from infthor_eval.nieh.guessing.guesses import questions_by_file, score_guesses
 from infthor_eval.nieh.scoring import Scorer

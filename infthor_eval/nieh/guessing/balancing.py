@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.docs import doc_target
-from infthor_eval.nieh.guessing.forms import form_of
+from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS
 from infthor_eval.nieh.guessing.guesses import score_guesses
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Hashable, Sequence
 import numpy as np
 
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.question_forms import find_form
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
 
@@ -22,11 +23,14 @@ __all__ = [
     "chains_of_words",
     "chains_of_words_and_count",
     "chains_of_words_and_place",
+    "form_of",
     "held_out",
+    "question_type",
     "words_of",
 ]
 
 Chain = Sequence[Hashable]
+_LEADING_WORDS = 2  # the type of a question whose file names none
 _STEM = 3  # leading words that tell the forms of questions apart
 _PLACE = 100  # frames that count as one place
 # of a log probability; what is beyond is rounding, which must not decide between equal answers
@@ -128,3 +132,14 @@ class Guesser:
         vector = np.zeros(len(self._answers))
         vector[list(counts)] = list(counts.values())
         return vector
+
+
+def form_of(question: Question) -> str:
+    """Return the question's form ("Is {} in/on {}?"), or its `question_type` if it has none."""
+    form = find_form(question.text)
+    return question_type(question) if form is None else form.words
+
+
+def question_type(question: Question) -> str:
+    """Return the question's type, or its leading words in lower case if the file names no type."""
+    return question.question_type or " ".join(question.text.lower().split()[:_LEADING_WORDS])

@@ -15,9 +15,9 @@ from infthor_eval.nieh.guessing.chains import (
     chains_of_words,
     chains_of_words_and_count,
     chains_of_words_and_place,
+    form_of,
     held_out,
 )
-from infthor_eval.nieh.guessing.forms import form_of
 from infthor_eval.nieh.guessing.learner import guess_by_learning
 
 __all__ = ["GUESSERS", "Knowledge", "NamedGuesser"]

@@ -14,7 +14,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import NOT_JSON
 from infthor_eval.nieh.contexts import Sample
-from infthor_eval.nieh.guessing.forms import form_of
+from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
 from infthor_eval.nieh.records import Guess
 from infthor_eval.nieh.scoring import SCORERS, Scorer, score, scores

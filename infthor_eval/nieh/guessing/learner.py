@@ -13,8 +13,7 @@ import numpy as np
 
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
-from infthor_eval.nieh.guessing.chains import held_out, words_of
-from infthor_eval.nieh.guessing.forms import form_of
+from infthor_eval.nieh.guessing.chains import form_of, held_out, words_of
 
 __all__ = ["guess_by_learning"]
 

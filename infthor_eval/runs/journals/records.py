@@ -12,8 +12,7 @@ import msgspec
 
 from infthor_eval.errors import InfthorError, describe_exception
 from infthor_eval.runs.config import Config, RunConfig
-from infthor_eval.runs.counts import Count
-from infthor_eval.runs.usage import NOTHING, Usage
+from infthor_eval.runs.usage import NOTHING, Count, Usage
 
 __all__ = [
     "FORMAT",

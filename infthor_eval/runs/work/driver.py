@@ -1,24 +1,26 @@
-"""One run of any suite: its journal, and the order of its work."""
+"""One run of any suite: its journal, the order of its work, its samples for other readers."""
 
-from collections.abc import Callable, Iterable
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol
+
+import msgspec
 
 from infthor_eval.runs.journals import journal as journals
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.records import P, U, Unit, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.results import write_run_files
-from infthor_eval.runs.samples import StoredSamples
 from infthor_eval.runs.stored.command import write_command
 from infthor_eval.runs.suite import RunSummary, UnitSample, Workload
 from infthor_eval.runs.usage import Usage
 from infthor_eval.runs.work.executor import Executor, LocalExecutor
 from infthor_eval.runs.work.worker_executor import WorkerPoolExecutor
 
-__all__ = ["Observer", "RunOutcome", "Silent", "execute"]
+__all__ = ["Observer", "RunOutcome", "Silent", "StoredSamples", "execute"]
 
 
 class Observer(Protocol):
@@ -144,3 +146,21 @@ def _write_results(
     )
     write_run_files(folder, summary, run.suite, records, n_missing, usage)
     return summary, records, usage
+
+
+class StoredSamples:
+    """Samples in a temporary file, read as often as needed.
+
+    The evaluation that converts records to samples is closed with its run, but readers come later.
+    In memory the prompts of long trajectories would take gigabytes.
+    """
+
+    def __init__(self, samples: Iterable[UnitSample]) -> None:
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the last reference to this
+        for sample in samples:
+            self._file.write(msgspec.json.encode(sample) + b"\n")
+
+    def __iter__(self) -> Iterator[UnitSample]:
+        self._file.seek(0)
+        for line in self._file:
+            yield msgspec.json.decode(line, type=UnitSample)

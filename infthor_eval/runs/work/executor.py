@@ -4,16 +4,18 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Generic, Protocol
 
+import msgspec
+
+from infthor_eval.errors import ModelError
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.records import P, RunHeader, U, Unit, UnitRecord
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.suite import UnitSample, Workload
+from infthor_eval.runs.suite import BoundEvaluation, Group, Session, UnitSample, Workload
 from infthor_eval.runs.work.binding import bind_run
-from infthor_eval.runs.work.groups import group_records
 from infthor_eval.runs.work.scheduling import run_groups
 
-__all__ = ["Executor", "LocalExecutor", "Recorded"]
+__all__ = ["Executor", "LocalExecutor", "Recorded", "group_records"]
 
 
 Recorded = tuple[
@@ -79,3 +81,29 @@ class LocalExecutor(Generic[U, P]):
     def close(self) -> None:
         """See `Executor`."""
         self._bound.close()
+
+
+def group_records(
+    evaluation: BoundEvaluation[U, P], group: Group[U], session: Session[P]
+) -> Iterator[UnitRecord[P]]:
+    """Yield the records of a group; units without a record when it ends have failed.
+
+    Raises:
+        MemoryError: the machine has no more memory; the run ends.
+    """
+    waiting = {unit.key: unit for unit in group.units}
+    fault: Exception = ModelError("the suite gives no record of it; fix the suite")
+    try:
+        for record in evaluation.run(group, session):
+            msgspec.json.encode(
+                record
+            )  # a record that cannot be written must fail here, not in the journal
+            waiting.pop(record.key, None)
+            yield record
+    except MemoryError:  # the next group would have no more memory than this one
+        raise
+    except Exception as error:  # noqa: BLE001 - a suite is anybody's code, and may raise anything
+        fault = error
+    yield from (
+        unit.record_failure(session.describe_failure(unit, fault)) for unit in waiting.values()
+    )

@@ -18,7 +18,7 @@ from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Group, UnitSample, Workload
 from infthor_eval.runs.work.binding import bind_run
-from infthor_eval.runs.work.groups import group_records
+from infthor_eval.runs.work.executor import group_records
 from infthor_eval.workers import (
     Event,
     JobFailed,
