@@ -1,5 +1,4 @@
-"""The suites by the names that task files use, with their presenters and their adapters for
-lm-eval's requests.
+"""The suites by the names in task files, with their presenters and lm-eval adapters.
 
 Each class is imported only when needed, so that `--help` stays quick. Other packages add theirs
 through entry points, as "module:Class" under the suite's name: the suite in `infthor_eval.suites`,

@@ -1,5 +1,4 @@
-"""Frame ablations: other frames in the places of the true ones, to measure what a model gains from
-seeing them."""
+"""Frame ablations: other frames instead of the true ones, to measure what seeing them gains."""
 
 import random
 from collections.abc import Sequence

@@ -1,5 +1,4 @@
-"""Scorers that are not this package's: a function in a user's file, or one that another package
-names.
+"""Scorers that are not this package's: a function in a user's file, or in another package.
 
 A scorer is given a whole reply and the gold answers, and returns its score, or several by name.
 """

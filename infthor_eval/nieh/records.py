@@ -1,5 +1,4 @@
-"""Payloads of NIEH's records in the journal: replies, what memories recalled and models wrote, a
-judge's verdicts."""
+"""Payloads of NIEH records: replies, what memories recalled and models wrote, judges' verdicts."""
 
 from typing import Annotated, Any
 

@@ -1,5 +1,4 @@
-"""The samples of a task: every question of its set in every variant of its context, and the skipped
-ones."""
+"""The samples of a task: each question in every variant of its context, and the skipped ones."""
 
 import re
 from collections.abc import Mapping, Sequence

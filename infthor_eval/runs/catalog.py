@@ -1,5 +1,4 @@
-"""The catalog of tasks that `--tasks` can name: this package's, those of other packages, and the
-user's own.
+"""The tasks that `--tasks` can name: this package's, other packages', and the user's own.
 
 The files are lm-eval's own format, and say which suite evaluates them (`metadata: {suite: NAME}`).
 lm-eval passes over a broken file without a word, so they are read and checked here first, without

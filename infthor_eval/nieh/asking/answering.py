@@ -1,5 +1,4 @@
-"""Having questions answered, by a model through its conversation or by a baseline from the answer
-key.
+"""Having questions answered: by a model's conversation, or by a baseline from the answer key.
 
 This is the one way from a sample to its record, whoever drives it: our own run, or lm-eval as the
 host.

@@ -1,5 +1,4 @@
-"""Baselines that see no frame: the answer key itself, the best guess from the question alone, and
-chance."""
+"""Baselines without frames: the answer key, the best guess from the question alone, and chance."""
 
 import random
 from collections import Counter, defaultdict

@@ -1,5 +1,4 @@
-"""The whole trajectory as agents are trained on it (`traj.txt`): goals, plans, actions, special
-tokens and frames."""
+"""A trajectory as agents are trained on it (`traj.txt`): goals, plans, actions, tokens, frames."""
 
 from collections.abc import Sequence
 from itertools import zip_longest

@@ -1,5 +1,4 @@
-"""Guessers that see no frame, from what they know: each guesses the questions of a file from other
-trajectories."""
+"""Guessers without frames: each guesses the questions of a file from other trajectories."""
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence

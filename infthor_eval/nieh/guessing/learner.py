@@ -1,5 +1,4 @@
-"""A strong guesser: logistic regression on the words of a question, and on the number and place of
-its clues.
+"""A strong guesser: logistic regression on a question's words, and number and place of its clues.
 
 As in the stress test of test sets by Brown et al. (arXiv:2511.04655), it is trained on the
 questions alone, and guesses those of a tenth of the trajectories from the others. What it gets

@@ -1,5 +1,4 @@
-"""The prompt that a published log was asked with, from the tokens of its requests as Qwen2.5-VL
-counts them.
+"""The prompt of a published log, from the tokens of its requests as Qwen2.5-VL counts them.
 
 A request is frames, the chat template, the words of a prompt, and the question. The tokens of all
 but the question are known; the question has at least one for each word and one for its mark. So

@@ -1,5 +1,4 @@
-"""The published NIEH data: downloading it from the Hugging Face hub, and the folder where it is
-kept."""
+"""The published NIEH data: their download from the Hugging Face hub, and their folder."""
 
 from pathlib import Path
 

@@ -1,5 +1,4 @@
-"""Replies that others made, as runs: scored, with a journal and results like those of our own
-runs."""
+"""Replies that others made, as runs: scored, with journal and results like runs of our own."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence

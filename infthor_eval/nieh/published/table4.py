@@ -1,5 +1,4 @@
-"""The paper's Table 4 from the published question files: means of their columns `match1` to
-`match4`."""
+"""The paper's Table 4 from the published questions: means of columns `match1` to `match4`."""
 
 from collections import Counter
 from collections.abc import Sequence

@@ -1,5 +1,4 @@
-"""What a judge is asked, and how its verdict is read: by a yes or no, or by the published judge's
-score."""
+"""What a judge is asked, and how its verdict is read: yes or no, or the published judge's score."""
 
 import json
 import re

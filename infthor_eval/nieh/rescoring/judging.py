@@ -1,5 +1,4 @@
-"""A judge: a model that is asked whether a reply is right where the rules are unsure, and how far
-it can be trusted.
+"""A judge: a model asked whether a reply is right where the rules are unsure, and its reliability.
 
 The metric `judged` is the strict score, or the judge's where the rules are unsure
 (`infthor_eval.nieh.rescoring.unsure`) and it gives more: 1 for a yes. A no leaves what the rules

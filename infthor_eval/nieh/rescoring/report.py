@@ -1,5 +1,4 @@
-"""What scoring replies again has changed, and how a judge agrees with the rules: `rescored.json`,
-and tables."""
+"""What scoring again has changed, and how judge and rules agree: `rescored.json`, and tables."""
 
 from collections.abc import Iterator, Mapping, Sequence
 

@@ -1,5 +1,4 @@
-"""The form of replies, apart from whether they are right: a leaning to yes, and replies that are no
-answer at all."""
+"""The form of replies, right or wrong: a leaning to yes, and replies that are no answer at all."""
 
 from collections import Counter
 from collections.abc import Sequence

@@ -1,5 +1,4 @@
-"""The effective length of a model's context: the longest at which it keeps 85 % of its score on the
-clue frames.
+"""A model's effective context length: the longest at which it keeps 85 % of its score on clues.
 
 The rule is NoLiMa's (Modarressi et al. 2025), with the model's own score on the clue frames alone
 as its base. It is applied to windows of growing size around the evidence (`nieh_haystack`), to the

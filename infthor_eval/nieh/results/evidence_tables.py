@@ -1,5 +1,4 @@
-"""Tables on the evidence: was it among the shown frames, and how far from the end; and what was got
-above guessing."""
+"""Tables on the evidence: how much was shown, how far from the end, and scores above guessing."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 

@@ -1,5 +1,4 @@
-"""Gains over blank frames: how much higher a model scores with frames than without, by the wording
-alone."""
+"""Gains over blank frames: how much higher a model scores with frames than by the wording alone."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

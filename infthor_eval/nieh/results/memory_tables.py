@@ -1,5 +1,4 @@
-"""The table of memories: what each got right, what it recalled of the evidence, and what that
-took."""
+"""The table of memories: what each got right, what it recalled of the evidence, what that took."""
 
 from collections.abc import Iterator, Sequence
 

@@ -1,5 +1,4 @@
-"""NIEH results as tables: accuracy by clues beside the published rows, by depth, gain by frames,
-form of replies."""
+"""NIEH results as tables: by clues beside the published rows, by depth, gains, form of replies."""
 
 from collections.abc import Iterator, Sequence
 

@@ -1,5 +1,4 @@
-"""Cross-validation of questions (paper, A.1.3): a filter over the replies of several models to the
-clue frames.
+"""Cross-validation of questions (paper, A.1.3): a filter over several models' replies to clues.
 
 A question is kept if at least one model answers it correctly: with full marks by default, with any
 part of them in the published filter (of its 829 questions with one clue 20 have partial credit

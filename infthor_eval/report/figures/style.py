@@ -1,5 +1,4 @@
-"""The style of all figures: colours and lines of runs, texts around panels, files in PNG and
-SVG."""
+"""The style of all figures: colours and lines of runs, texts around panels, PNG and SVG files."""
 
 import io
 import re

@@ -1,5 +1,4 @@
-"""Frames of an arm's replayed episodes as pictures: the view beside the arm's reach, and the
-request below."""
+"""Replayed frames of an arm as pictures: the view beside the arm's reach, the request below."""
 
 from collections.abc import Iterable, Iterator
 from functools import partial

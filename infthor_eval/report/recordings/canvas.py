@@ -1,5 +1,4 @@
-"""The layout of a recording's pictures: two panes side by side, with text and numbers below
-them."""
+"""The layout of a recording's pictures: two panes side by side, text and numbers below them."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple

@@ -1,5 +1,4 @@
-"""An arm and the objects near it, from above and from the side; the agent looks to the right in
-both views."""
+"""An arm and objects near it, from above and the side; the agent looks to the right in both."""
 
 from PIL import Image, ImageDraw
 

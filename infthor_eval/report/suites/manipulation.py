@@ -1,5 +1,4 @@
-"""Presenter of manipulation: what an arm did step by step, its reward, and its success by
-radius."""
+"""Presenter of manipulation: an arm's episodes step by step, its reward, its success by radius."""
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence

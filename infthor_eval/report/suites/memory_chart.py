@@ -1,5 +1,4 @@
-"""Chart of memories: accuracy against the tokens of a question, a curve for each memory over its
-budgets."""
+"""Chart of memories: accuracy against tokens per question, a curve over budgets for each memory."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple

@@ -1,5 +1,4 @@
-"""Charts of NIEH results: accuracy by clues, type, evidence shown and depth, and gains over frames
-and guessing."""
+"""Charts of NIEH: accuracy by clues, type, evidence and depth, gains over frames and guessing."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,2 +1,1 @@
-"""Runs as one page that works offline: their results, and every sample with its frames and
-replies."""
+"""Runs as one page that works offline: results, and every sample with its frames and replies."""

@@ -1,5 +1,4 @@
-"""Reading the journal of a run while the run writes it: nothing is locked or written, so the run
-does not notice."""
+"""Reading the journal of a run while it goes on, without locks or writes that it would notice."""
 
 import os
 from collections import deque

@@ -1,5 +1,4 @@
-"""Tracebacks of exceptions in adapters and suites, in a text file beside the shards of the
-journal."""
+"""Tracebacks of exceptions in adapters and suites, in a text file beside the journal's shards."""
 
 import re
 import traceback

@@ -1,5 +1,4 @@
-"""The command of a run: its options in `run.yaml` beside the results, with which it can be
-repeated."""
+"""The command of a run: its options in `run.yaml` beside the results, to repeat it."""
 
 import shlex
 from collections.abc import Iterator, Mapping

@@ -1,5 +1,4 @@
-"""Labels of runs that are shown beside each other: their names, and the options that differ where
-names are equal."""
+"""Labels of runs shown together: their names, and options that differ where names are equal."""
 
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence

@@ -1,5 +1,4 @@
-"""Runs whose records are made without a driver, as replies are there already: stored like any other
-run."""
+"""Runs made without a driver, as replies are there already: stored like any other run."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

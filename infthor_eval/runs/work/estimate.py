@@ -1,5 +1,4 @@
-"""Estimates of a run's time, requests, tokens and money: a few units are done, and the rest is
-estimated from them.
+"""Estimates of a run's time, requests, tokens and money, from a few units that are done.
 
 The first unit of a group pays for what the group shares (encoding or replaying a trajectory), the
 others only for themselves. So each quantity of a group with n units on f frames is estimated as
