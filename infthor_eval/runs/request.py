@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Generic
 
 from infthor_eval.errors import UsageError, unknown_name
-from infthor_eval.runs.journals.records import P, RunHeader, U
+from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit
 from infthor_eval.runs.suite import Evaluation, Suite, TaskRequest
 from infthor_eval.storage.files import require_writable
 from infthor_eval.workers import WorkerSettings
@@ -62,16 +62,18 @@ def run_folder(output: Path, header: RunHeader, tasks: Iterable[str]) -> Path:
 
 
 @dataclass(frozen=True)
-class PreparedRun(Generic[U, P]):
+class PreparedRun(Generic[SuiteUnit, Payload]):
     """A request whose names, files and data are in order, with its suite set up; it is pickled and
     sent to workers."""
 
     request: RunRequest
-    suite: Suite[U, P]
-    evaluation: Evaluation[U, P]
+    suite: Suite[SuiteUnit, Payload]
+    evaluation: Evaluation[SuiteUnit, Payload]
 
 
-def prepare(request: RunRequest, suite: Suite[U, P]) -> PreparedRun[U, P]:
+def prepare(
+    request: RunRequest, suite: Suite[SuiteUnit, Payload]
+) -> PreparedRun[SuiteUnit, Payload]:
     """Check a request before anything expensive is loaded.
 
     Raises:

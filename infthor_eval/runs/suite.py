@@ -7,7 +7,7 @@ and tables. Each further object exists only once all that it needs is known:
     Evaluation.bind(subject) -> BoundEvaluation    groups that share expensive work; simulators
     BoundEvaluation.run(group, session)            a record per unit
 
-`U` is the suite's unit, `P` the payload of its records.
+`SuiteUnit` is the suite's unit, `Payload` the payload of its records.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,11 +21,11 @@ from infthor_eval.rates import Rate
 from infthor_eval.runs.catalog import TaskFile
 from infthor_eval.runs.config import RunConfig
 from infthor_eval.runs.journals.records import (
-    A,
-    P,
+    Artifact,
+    Payload,
     RecordTypes,
     RunHeader,
-    U,
+    SuiteUnit,
     Unit,
     UnitKey,
     UnitRecord,
@@ -52,12 +52,12 @@ __all__ = [
 
 Need = Literal["conversation", "policy"]
 
-O_co = TypeVar("O_co", covariant=True)
-U_co = TypeVar("U_co", bound=Unit[Any], covariant=True)
+Options_co = TypeVar("Options_co", covariant=True)
+SuiteUnit_co = TypeVar("SuiteUnit_co", bound=Unit[Any], covariant=True)
 
 
 @dataclass(frozen=True)
-class TaskRequest(Generic[O_co]):
+class TaskRequest(Generic[Options_co]):
     """The request of a run to a suite.
 
     Attributes:
@@ -70,14 +70,14 @@ class TaskRequest(Generic[O_co]):
     """
 
     tasks: Sequence[TaskFile]
-    options: O_co
+    options: Options_co
     data: Path | None = None
     limit: int | None = None
     seed: int = 0
 
 
 @dataclass(frozen=True)
-class Group(Generic[U_co]):
+class Group(Generic[SuiteUnit_co]):
     """Units that share work, done one after the other in one place.
 
     Attributes:
@@ -86,7 +86,7 @@ class Group(Generic[U_co]):
             with it.
     """
 
-    units: Sequence[U_co]
+    units: Sequence[SuiteUnit_co]
     frames: int = 1
 
 
@@ -107,7 +107,7 @@ class Cost:
 
 
 @dataclass(frozen=True)
-class Workload(Generic[U_co]):
+class Workload(Generic[SuiteUnit_co]):
     """All the work of a run.
 
     Attributes:
@@ -120,7 +120,7 @@ class Workload(Generic[U_co]):
             trained otherwise.
     """
 
-    groups: Sequence[Group[U_co]]
+    groups: Sequence[Group[SuiteUnit_co]]
     skipped: Sequence[Skipped] = ()
     config: RunConfig[Any] = field(default_factory=RunConfig)
     costs: Sequence[Cost] = ()
@@ -132,18 +132,18 @@ class Workload(Generic[U_co]):
         return sum(len(group.units) for group in self.groups)
 
 
-class Session(Protocol[P]):
+class Session(Protocol[Payload]):
     """The results of a run so far, as a suite sees them while it does a group; several threads may
     use it at once."""
 
-    def find_record(self, unit: Unit[P], fingerprint: str) -> UnitRecord[P] | None:
+    def find_record(self, unit: Unit[Payload], fingerprint: str) -> UnitRecord[Payload] | None:
         """Return the record of a unit that already has a result from these very inputs, or None."""
 
-    def describe_failure(self, unit: Unit[P], error: Exception) -> str:
+    def describe_failure(self, unit: Unit[Payload], error: Exception) -> str:
         """Return the reason why a unit failed by an exception, and keep the traceback of an
         unexpected one."""
 
-    def find_artifact(self, fingerprint: str, kind: type[A]) -> A | None:
+    def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
         """Return the cached artifact of these inputs, or None."""
 
     def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
@@ -171,15 +171,17 @@ class UnitSample:
     reply: str
 
 
-class BoundEvaluation(Protocol[U, P]):
+class BoundEvaluation(Protocol[SuiteUnit, Payload]):
     """An evaluation of one subject. It owns whatever depends on the subject, its simulators among
     it."""
 
     @property
-    def workload(self) -> Workload[U]:
+    def workload(self) -> Workload[SuiteUnit]:
         """All the work; the same object every time."""
 
-    def run(self, group: Group[U], session: Session[P]) -> Iterator[UnitRecord[P]]:
+    def run(
+        self, group: Group[SuiteUnit], session: Session[Payload]
+    ) -> Iterator[UnitRecord[Payload]]:
         """Do a group: yield a record per unit as soon as it is there; records found in the session
         as they are.
 
@@ -189,7 +191,7 @@ class BoundEvaluation(Protocol[U, P]):
                 only MemoryError ends the run.
         """
 
-    def to_sample(self, record: UnitRecord[P]) -> UnitSample:
+    def to_sample(self, record: UnitRecord[Payload]) -> UnitSample:
         """Convert a record of this workload for other readers; not after `close`."""
 
     def close(self) -> None:
@@ -197,11 +199,11 @@ class BoundEvaluation(Protocol[U, P]):
         not."""
 
 
-class Evaluation(Protocol[U, P]):
+class Evaluation(Protocol[SuiteUnit, Payload]):
     """A suite set up for one run. It holds only what was read from files, and may be bound more
     than once."""
 
-    def bind(self, subject: Subject) -> BoundEvaluation[U, P]:
+    def bind(self, subject: Subject) -> BoundEvaluation[SuiteUnit, Payload]:
         """Find all the work for a subject.
 
         Raises:
@@ -211,7 +213,7 @@ class Evaluation(Protocol[U, P]):
         """
 
 
-class Suite(Protocol[U, P]):
+class Suite(Protocol[SuiteUnit, Payload]):
     """A kind of evaluation.
 
     Attributes:
@@ -227,7 +229,7 @@ class Suite(Protocol[U, P]):
     baselines: ClassVar[Mapping[str, Callable[[int], Subject]]]
 
     @property
-    def records(self) -> RecordTypes[P]:
+    def records(self) -> RecordTypes[Payload]:
         """Payloads of the suite's records."""
 
     def check_task(self, task: TaskFile) -> None:
@@ -238,7 +240,7 @@ class Suite(Protocol[U, P]):
             DataError: the file does not match its format.
         """
 
-    def prepare(self, request: TaskRequest[Any]) -> Evaluation[U, P]:
+    def prepare(self, request: TaskRequest[Any]) -> Evaluation[SuiteUnit, Payload]:
         """Set up a run. Whatever can be refused without the subject is refused here, before it is
         loaded.
 
@@ -247,14 +249,16 @@ class Suite(Protocol[U, P]):
             DataError: the data do not match their format.
         """
 
-    def summarise(self, header: RunHeader, records: Sequence[UnitRecord[P]]) -> msgspec.Struct:
+    def summarise(
+        self, header: RunHeader, records: Sequence[UnitRecord[Payload]]
+    ) -> msgspec.Struct:
         """Summarise a run: a pure function of its journal, equal for equal records.
 
         What differs between a run and the same run resumed (times) is at most in a field `took`,
         which results.json leaves out.
         """
 
-    def scores(self, record: UnitRecord[P]) -> Mapping[str, float]:
+    def scores(self, record: UnitRecord[Payload]) -> Mapping[str, float]:
         """Return the metrics of one unit by name; a missing one counts as 0, as all do where the
         unit failed."""
 

@@ -27,7 +27,7 @@ from infthor_eval.errors import DataError, UsageError, in_one_line, wrap_errors
 from infthor_eval.formats.reading import NOT_JSON, require_file
 from infthor_eval.runs.journals.records import (
     ArtifactRecord,
-    P,
+    Payload,
     RecordTypes,
     RunHeader,
     UnitKey,
@@ -54,14 +54,14 @@ _RETRY_S = 0.1  # between two attempts to lock
 _BAD_LINES = "bad_lines.txt"
 
 
-class Journal(Generic[P]):
+class Journal(Generic[Payload]):
     """Append-only record of one run, in a folder of shards; this process holds one of them."""
 
     def __init__(
         self,
         run: Path,
         header: RunHeader,
-        types: RecordTypes[P],
+        types: RecordTypes[Payload],
         worker: int = 0,
         wait_s: float = 0.0,
     ) -> None:
@@ -92,7 +92,7 @@ class Journal(Generic[P]):
         try:
             _lock(self._file, path, wait_s)
             self._types = types
-            self._log: RunLog[P] = read_shards(run, types)
+            self._log: RunLog[Payload] = read_shards(run, types)
             self._start_shard()
         except (DataError, UsageError):
             self._file.close()
@@ -105,11 +105,11 @@ class Journal(Generic[P]):
         self._file.close()
 
     @property
-    def records(self) -> list[UnitRecord[P]]:
+    def records(self) -> list[UnitRecord[Payload]]:
         """The latest record of each unit in all shards."""
         return self._log.records
 
-    def find_record(self, key: UnitKey, fingerprint: str) -> UnitRecord[P] | None:
+    def find_record(self, key: UnitKey, fingerprint: str) -> UnitRecord[Payload] | None:
         """Return the record of a unit with a result from these inputs; a failed unit is tried again
         by the next run."""
         record = self._log.units.get(key)
@@ -117,22 +117,22 @@ class Journal(Generic[P]):
             return None
         return record
 
-    def latest_records(self, keys: Iterable[UnitKey]) -> tuple[UnitRecord[P], ...]:
+    def latest_records(self, keys: Iterable[UnitKey]) -> tuple[UnitRecord[Payload], ...]:
         """Return the latest records of these units, failed ones included; units without a record
         are left out."""
         return tuple(self._log.units[key] for key in keys if key in self._log.units)
 
-    def result_of(self, key: UnitKey) -> UnitRecord[P] | None:
+    def result_of(self, key: UnitKey) -> UnitRecord[Payload] | None:
         """Return the latest record of a unit if it has a result, from whatever inputs, else
         None."""
         record = self._log.units.get(key)
         return None if record is None or record.failure is not None else record
 
-    def add(self, record: UnitRecord[P]) -> None:
+    def add(self, record: UnitRecord[Payload]) -> None:
         """Add a record that is in another shard to what this process knows."""
         self._log.add(record)
 
-    def add_from(self, worker: int, record: UnitRecord[P]) -> None:
+    def add_from(self, worker: int, record: UnitRecord[Payload]) -> None:
         """Add a record that a worker has put on disk; where its shard is not visible here, write it
         into this one.
 
@@ -149,12 +149,12 @@ class Journal(Generic[P]):
         if path.exists():
             read_shard(path, self._types, self._log)
 
-    def holds(self, record: UnitRecord[P]) -> bool:
+    def holds(self, record: UnitRecord[Payload]) -> bool:
         """Return whether this very object is in the journal: a record that the suite found there
         and yielded as is."""
         return self._log.units.get(record.key) is record
 
-    def append(self, record: UnitRecord[P]) -> UnitRecord[P]:
+    def append(self, record: UnitRecord[Payload]) -> UnitRecord[Payload]:
         """Write a record; it is on disk when this returns. The returned record has the number of
         its attempt.
 

@@ -16,9 +16,12 @@ from infthor_eval.runs.usage import NOTHING, Count, Usage
 
 __all__ = [
     "FORMAT",
+    "Artifact",
     "ArtifactRecord",
+    "Payload",
     "RecordTypes",
     "RunHeader",
+    "SuiteUnit",
     "Tokens",
     "Unit",
     "UnitKey",
@@ -28,10 +31,10 @@ __all__ = [
 
 FORMAT = 3
 
-A = TypeVar("A")  # an artifact
-P = TypeVar("P")  # the payload of a suite's records
-P_co = TypeVar("P_co", covariant=True)
-U = TypeVar("U", bound="Unit[Any]")  # a suite's unit
+Artifact = TypeVar("Artifact")  # what a suite caches
+Payload = TypeVar("Payload")  # the payload of a suite's records
+Payload_co = TypeVar("Payload_co", covariant=True)
+SuiteUnit = TypeVar("SuiteUnit", bound="Unit[Any]")  # a suite's unit
 
 
 class UnitKey(NamedTuple):
@@ -92,7 +95,7 @@ class RunHeader(
 
 class UnitRecord(
     msgspec.Struct,
-    Generic[P],
+    Generic[Payload],
     frozen=True,
     kw_only=True,
     omit_defaults=True,
@@ -120,7 +123,7 @@ class UnitRecord(
     id: str
     cluster: str
     fingerprint: str
-    payload: P
+    payload: Payload
     variant: str = ""
     repeat: Count = 1
     attempt: Count = 1
@@ -139,7 +142,7 @@ class UnitRecord(
 
 class ArtifactRecord(
     msgspec.Struct,
-    Generic[P],
+    Generic[Payload],
     frozen=True,
     kw_only=True,
     omit_defaults=True,
@@ -156,12 +159,12 @@ class ArtifactRecord(
     """
 
     fingerprint: str
-    payload: P
+    payload: Payload
     usage: Usage = NOTHING
 
 
 @dataclass(frozen=True)
-class RecordTypes(Generic[P_co]):
+class RecordTypes(Generic[Payload_co]):
     """The types of what a suite writes into a journal; payloads are msgspec structs with a tag.
 
     Attributes:
@@ -171,7 +174,7 @@ class RecordTypes(Generic[P_co]):
         config: config of its runs.
     """
 
-    unit: type[P_co]
+    unit: type[Payload_co]
     artifact: type[Any] | UnionType | None = None
     config: type[RunConfig[Any]] = RunConfig[dict[str, Any]]
 
@@ -195,7 +198,7 @@ def describe_failure(error: Exception) -> str:
 
 
 @dataclass(frozen=True)
-class Unit(Generic[P]):
+class Unit(Generic[Payload]):
     """The smallest piece of work with a record of its own: a sample or an episode.
 
     Attributes:
@@ -206,14 +209,14 @@ class Unit(Generic[P]):
 
     key: UnitKey
     cluster: str
-    payload: P
+    payload: Payload
 
-    def without_inputs(self) -> "Unit[P]":
+    def without_inputs(self) -> "Unit[Payload]":
         """Return what can record its failure in another process, without the inputs that only the
         suite needs."""
         return Unit(self.key, self.cluster, self.payload)
 
-    def record(self, fingerprint: str, payload: P, **envelope: Any) -> UnitRecord[P]:
+    def record(self, fingerprint: str, payload: Payload, **envelope: Any) -> UnitRecord[Payload]:
         """Return its record; further fields of the envelope (see `UnitRecord`) are keywords."""
         return UnitRecord(
             **self.key._asdict(),
@@ -223,10 +226,14 @@ class Unit(Generic[P]):
             **envelope,
         )
 
-    def record_failure(self, reason: str, fingerprint: str = "", **envelope: Any) -> UnitRecord[P]:
+    def record_failure(
+        self, reason: str, fingerprint: str = "", **envelope: Any
+    ) -> UnitRecord[Payload]:
         """Return its record if there is no result."""
         return self.record(fingerprint, self.payload, failure=reason, **envelope)
 
-    def record_exclusion(self, reason: str, fingerprint: str, **envelope: Any) -> UnitRecord[P]:
+    def record_exclusion(
+        self, reason: str, fingerprint: str, **envelope: Any
+    ) -> UnitRecord[Payload]:
         """Return its record if it turns out that no subject can be evaluated on it."""
         return self.record(fingerprint, self.payload, excluded=reason, **envelope)

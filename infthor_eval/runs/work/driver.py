@@ -11,7 +11,7 @@ import msgspec
 
 from infthor_eval.runs.journals import journal as journals
 from infthor_eval.runs.journals.journal import Journal
-from infthor_eval.runs.journals.records import P, U, Unit, UnitRecord
+from infthor_eval.runs.journals.records import Payload, SuiteUnit, Unit, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.results import write_run_files
 from infthor_eval.runs.stored.command import write_command
@@ -51,7 +51,7 @@ class Silent:
 
 
 @dataclass(frozen=True)
-class RunOutcome(Generic[U, P]):
+class RunOutcome(Generic[SuiteUnit, Payload]):
     """A run that has ended.
 
     Attributes:
@@ -62,19 +62,19 @@ class RunOutcome(Generic[U, P]):
     """
 
     folder: Path
-    run: PreparedRun[U, P]
+    run: PreparedRun[SuiteUnit, Payload]
     summary: RunSummary
-    records: list[UnitRecord[P]]
+    records: list[UnitRecord[Payload]]
     n_missing: int
     usage: Usage
     samples: Iterable[UnitSample]
 
 
 def execute(
-    run: PreparedRun[U, P],
+    run: PreparedRun[SuiteUnit, Payload],
     observer: Observer | None = None,
     should_stop: Callable[[], bool] = lambda: False,
-) -> RunOutcome[U, P]:
+) -> RunOutcome[SuiteUnit, Payload]:
     """Load the model, do what the journal does not hold yet, and write the results.
 
     The folder `<output>/<name>/<tasks>-<config hash>/` holds the journal, `run.yaml` (the options
@@ -123,15 +123,20 @@ def execute(
         )
 
 
-def _start_executor(run: PreparedRun[U, P], report: Callable[[str], None]) -> Executor[P]:
+def _start_executor(
+    run: PreparedRun[SuiteUnit, Payload], report: Callable[[str], None]
+) -> Executor[Payload]:
     if run.request.worker_settings.is_local:
         return LocalExecutor(run)
     return WorkerPoolExecutor(run, report)
 
 
 def _write_results(
-    run: PreparedRun[U, P], folder: Path, workload: Workload[Unit[Any]], journal: Journal[P]
-) -> tuple[RunSummary, list[UnitRecord[P]], Usage]:
+    run: PreparedRun[SuiteUnit, Payload],
+    folder: Path,
+    workload: Workload[Unit[Any]],
+    journal: Journal[Payload],
+) -> tuple[RunSummary, list[UnitRecord[Payload]], Usage]:
     """Write the results of the units that the journal has by now; return summary, records and
     usage."""
     asked = {

@@ -14,7 +14,14 @@ from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from infthor_eval.runs.journals.records import A, P, U, Unit, UnitRecord, describe_failure
+from infthor_eval.runs.journals.records import (
+    Artifact,
+    Payload,
+    SuiteUnit,
+    Unit,
+    UnitRecord,
+    describe_failure,
+)
 from infthor_eval.runs.request import RunRequest, prepare
 from infthor_eval.runs.suite import BoundEvaluation, Group, Suite, Workload
 from infthor_eval.runs.usage import NOTHING, Usage
@@ -111,7 +118,7 @@ class _MeasuringSession:
         """See `Session`; nothing is written."""
         return describe_failure(error)
 
-    def find_artifact(self, fingerprint: str, kind: type[A]) -> A | None:
+    def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
         """See `Session`."""
         return self._artifacts.get(fingerprint)
 
@@ -121,7 +128,10 @@ class _MeasuringSession:
 
 
 def estimate_run(
-    request: RunRequest, suite: Suite[U, P], n_units: int, progress: Callable[[], None]
+    request: RunRequest,
+    suite: Suite[SuiteUnit, Payload],
+    n_units: int,
+    progress: Callable[[], None],
 ) -> Estimate:
     """Load the subject, do about `n_units` units of each task, and estimate the quantities of all.
 
@@ -141,7 +151,9 @@ def estimate_run(
     return Estimate(workload, estimate_tasks(workload, groups) if is_measured else (), failures)
 
 
-def _measure(evaluation: BoundEvaluation[U, P], n_units: int) -> Iterator[_MeasuredGroup]:
+def _measure(
+    evaluation: BoundEvaluation[SuiteUnit, Payload], n_units: int
+) -> Iterator[_MeasuredGroup]:
     """Do a few units of each task: of groups of all sizes, the first, the middle and the last
     unit."""
     session = _MeasuringSession()
@@ -164,9 +176,9 @@ def _measure(evaluation: BoundEvaluation[U, P], n_units: int) -> Iterator[_Measu
         yield _MeasuredGroup(group.frames, quantities, failures)
 
 
-def _choose_groups(groups: Sequence[Group[U]], n: int) -> Iterator[Group[U]]:
+def _choose_groups(groups: Sequence[Group[SuiteUnit]], n: int) -> Iterator[Group[SuiteUnit]]:
     """Yield n groups of each task, evenly from the smallest to the largest."""
-    by_task: dict[str, list[Group[U]]] = {}
+    by_task: dict[str, list[Group[SuiteUnit]]] = {}
     for group in groups:
         by_task.setdefault(group.units[0].key.task, []).append(group)
     for same in by_task.values():

@@ -8,7 +8,7 @@ import msgspec
 
 from infthor_eval.errors import ModelError
 from infthor_eval.runs.journals.journal import Journal
-from infthor_eval.runs.journals.records import P, RunHeader, U, Unit, UnitRecord
+from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit, Unit, UnitRecord
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import BoundEvaluation, Group, Session, UnitSample, Workload
@@ -19,11 +19,11 @@ __all__ = ["Executor", "LocalExecutor", "Recorded", "group_records"]
 
 
 Recorded = tuple[
-    UnitRecord[P], bool
+    UnitRecord[Payload], bool
 ]  # a record that is on disk; True if an earlier run had put it there
 
 
-class Executor(Protocol[P]):
+class Executor(Protocol[Payload]):
     """Does the work of a run. It is ready as soon as it is created."""
 
     @property
@@ -35,22 +35,22 @@ class Executor(Protocol[P]):
         """All the work."""
 
     def evaluate(
-        self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
-    ) -> Iterator[tuple[UnitRecord[P], bool]]:
+        self, folder: Path, journal: Journal[Payload], should_stop: Callable[[], bool]
+    ) -> Iterator[tuple[UnitRecord[Payload], bool]]:
         """Do all groups, or stop after the units in hand; yield every record as soon as it is on
         disk."""
 
-    def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
+    def samples(self, records: Sequence[UnitRecord[Payload]]) -> Iterator[UnitSample]:
         """Convert records for other readers, in their order; not after `close`."""
 
     def close(self) -> None:
         """Release everything, in whatever state it is."""
 
 
-class LocalExecutor(Generic[U, P]):
+class LocalExecutor(Generic[SuiteUnit, Payload]):
     """The executor of this process."""
 
-    def __init__(self, run: PreparedRun[U, P]) -> None:
+    def __init__(self, run: PreparedRun[SuiteUnit, Payload]) -> None:
         """Load the subject and find the work.
 
         Raises:
@@ -61,8 +61,8 @@ class LocalExecutor(Generic[U, P]):
         self.workload = self._bound.evaluation.workload
 
     def evaluate(
-        self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
-    ) -> Iterator[tuple[UnitRecord[P], bool]]:
+        self, folder: Path, journal: Journal[Payload], should_stop: Callable[[], bool]
+    ) -> Iterator[tuple[UnitRecord[Payload], bool]]:
         """See `Executor`."""
         session = JournalSession(journal)
         evaluation = self._bound.evaluation
@@ -74,7 +74,7 @@ class LocalExecutor(Generic[U, P]):
             if should_stop():
                 return
 
-    def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
+    def samples(self, records: Sequence[UnitRecord[Payload]]) -> Iterator[UnitSample]:
         """See `Executor`."""
         return map(self._bound.evaluation.to_sample, records)
 
@@ -84,8 +84,10 @@ class LocalExecutor(Generic[U, P]):
 
 
 def group_records(
-    evaluation: BoundEvaluation[U, P], group: Group[U], session: Session[P]
-) -> Iterator[UnitRecord[P]]:
+    evaluation: BoundEvaluation[SuiteUnit, Payload],
+    group: Group[SuiteUnit],
+    session: Session[Payload],
+) -> Iterator[UnitRecord[Payload]]:
     """Yield the records of a group; units without a record when it ends have failed.
 
     Raises:

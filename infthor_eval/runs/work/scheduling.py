@@ -4,17 +4,17 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 
-from infthor_eval.runs.journals.records import P, U, UnitRecord
+from infthor_eval.runs.journals.records import Payload, SuiteUnit, UnitRecord
 from infthor_eval.runs.suite import Group
 
 __all__ = ["run_groups"]
 
 
 def run_groups(
-    groups: Sequence[Group[U]],
-    do: Callable[[Group[U]], Iterable[UnitRecord[P]]],
+    groups: Sequence[Group[SuiteUnit]],
+    do: Callable[[Group[SuiteUnit]], Iterable[UnitRecord[Payload]]],
     max_in_flight: int,
-) -> Iterator[UnitRecord[P]]:
+) -> Iterator[UnitRecord[Payload]]:
     """Yield the records of all groups as soon as they are there; several in flight are done in a
     thread each."""
     if max_in_flight == 1 or len(groups) <= 1:
@@ -25,12 +25,14 @@ def run_groups(
 
 
 def _in_threads(
-    groups: Sequence[Group[U]], do: Callable[[Group[U]], Iterable[UnitRecord[P]]], n_threads: int
-) -> Iterator[UnitRecord[P]]:
-    waiting: SimpleQueue[Group[U]] = SimpleQueue()
+    groups: Sequence[Group[SuiteUnit]],
+    do: Callable[[Group[SuiteUnit]], Iterable[UnitRecord[Payload]]],
+    n_threads: int,
+) -> Iterator[UnitRecord[Payload]]:
+    waiting: SimpleQueue[Group[SuiteUnit]] = SimpleQueue()
     for group in groups:
         waiting.put(group)
-    results: SimpleQueue[UnitRecord[P] | BaseException | None] = (
+    results: SimpleQueue[UnitRecord[Payload] | BaseException | None] = (
         SimpleQueue()
     )  # None: a thread has ended
     stop = Event()
@@ -55,9 +57,9 @@ def _in_threads(
 
 
 def _work(
-    waiting: "SimpleQueue[Group[U]]",
-    do: Callable[[Group[U]], Iterable[UnitRecord[P]]],
-    results: "SimpleQueue[UnitRecord[P] | BaseException | None]",
+    waiting: "SimpleQueue[Group[SuiteUnit]]",
+    do: Callable[[Group[SuiteUnit]], Iterable[UnitRecord[Payload]]],
+    results: "SimpleQueue[UnitRecord[Payload] | BaseException | None]",
     stop: Event,
 ) -> None:
     try:
@@ -72,7 +74,7 @@ def _work(
         results.put(None)
 
 
-def _next(waiting: "SimpleQueue[Group[U]]") -> Group[U] | None:
+def _next(waiting: "SimpleQueue[Group[SuiteUnit]]") -> Group[SuiteUnit] | None:
     """Return the next group, or None if there is none."""
     try:  # rather than a check whether it is empty: another thread may take the last group after it
         return waiting.get_nowait()
