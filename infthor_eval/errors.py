@@ -104,8 +104,8 @@ def in_one_line(error: BaseException) -> str:
 
 def describe_exception(error: Exception) -> str:
     """Return type, place and message of an unexpected exception, in one line."""
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    where = f"{Path(place.filename).name}:{place.lineno} ({place.name})"
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{Path(frame.filename).name}:{frame.lineno} ({frame.name})"
     return f"{type(error).__name__} in {where}: {in_one_line(error)}"
 
 

@@ -186,9 +186,8 @@ def paired_difference(
     estimate = _with_t_interval(totals, sizes)
     if estimate.stderr is None:
         return Difference(estimate, None)
-    if (
-        estimate.stderr == 0
-    ):  # every question differs by the same amount: either by nothing, or never by chance
+    # Every question differs by the same amount: either by nothing, or never by chance.
+    if estimate.stderr == 0:
         return Difference(estimate, 1.0 if estimate.mean == 0 else 0.0)
     t = abs(estimate.mean / estimate.stderr)
     return Difference(estimate, float(2 * scipy.special.stdtr(estimate.n_clusters - 1, -t)))

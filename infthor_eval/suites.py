@@ -81,18 +81,18 @@ _BUILT_IN = {
 }
 _DOCS = "docs/own-tasks.md"
 _SUITES = PluginTable(
-    "suite", "infthor_eval.suites", {name: item.suite for name, item in _BUILT_IN.items()}, _DOCS
+    "suite", "infthor_eval.suites", {name: kind.suite for name, kind in _BUILT_IN.items()}, _DOCS
 )
 _PRESENTERS = PluginTable(
     "presenter",
     "infthor_eval.presenters",
-    {name: item.presenter for name, item in _BUILT_IN.items()},
+    {name: kind.presenter for name, kind in _BUILT_IN.items()},
     _DOCS,
 )
 _REQUESTS = PluginTable(
     "lm-eval adapter of suite",
     "infthor_eval.lm_eval",
-    {name: item.requests for name, item in _BUILT_IN.items()},
+    {name: kind.requests for name, kind in _BUILT_IN.items()},
     _DOCS,
 )
 

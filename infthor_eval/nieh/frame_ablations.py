@@ -53,12 +53,12 @@ class FrameAblation:
             return list(parts)
         frames = [frame for part in parts for frame in _frames_in(part)]
         if self.frames == "blank":
-            shown = [blank_like(frame) for frame in frames]
+            replacements = [blank_like(frame) for frame in frames]
         elif self.frames == "shuffled":
-            shown = self._shuffle(frames, sample.question.traj_id)
+            replacements = self._shuffle(frames, sample.question.traj_id)
         else:
-            shown = self._of_another(frames, data, context, sample)
-        left = iter(shown)
+            replacements = self._of_another(frames, data, context, sample)
+        left = iter(replacements)
         return [_with_frames(part, [next(left) for _ in _frames_in(part)]) for part in parts]
 
     def _shuffle(self, frames: Sequence[FrameRef], traj_id: str) -> list[FrameRef]:
@@ -79,14 +79,14 @@ class FrameAblation:
         its length."""
         traj_id = sample.question.traj_id
         others = [other for other in _trajectories(data) if other != traj_id]
-        shown = context.frames(
+        other_frames = context.frames(
             data, random.Random(f"{self.seed}/{traj_id}").choice(others), sample.fps
         )
         positions = {
             frame: position
             for position, frame in enumerate(context.frames(data, traj_id, sample.fps))
         }
-        return [shown[positions[frame] % len(shown)] for frame in frames]
+        return [other_frames[positions[frame] % len(other_frames)] for frame in frames]
 
 
 def _trajectories(data: NiehSet) -> list[str]:

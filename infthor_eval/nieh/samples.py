@@ -65,8 +65,10 @@ class TaskSamples:
             for answer in question.answers
             if isinstance(answer, str)
         }
-        asked = {word.lower() for question in questions for word in _WORD.findall(question.text)}
-        return tuple(sorted(answers | (asked - {answer.lower() for answer in answers})))
+        question_words = {
+            word.lower() for question in questions for word in _WORD.findall(question.text)
+        }
+        return tuple(sorted(answers | (question_words - {answer.lower() for answer in answers})))
 
     def all_frames(self, sample: Sample) -> list[FrameRef]:
         """Return all frames of a sample's trajectory as a memory observes them: ablated, but in
@@ -76,12 +78,11 @@ class TaskSamples:
             DataError: the trajectory cannot be read.
         """
         frames = self.data.frames(sample.question.traj_id)
-        if (
-            self.frame_ablation.frames == "shuffled"
-        ):  # the shown ones are shuffled, once they are recalled
+        # The shown ones are shuffled, once they are recalled.
+        if self.frame_ablation.frames == "shuffled":
             return list(frames)
-        shown = self.frame_ablation.apply(frames, self.data, self.context, sample)
-        return [part for part in shown if isinstance(part, FrameRef)]
+        ablated = self.frame_ablation.apply(frames, self.data, self.context, sample)
+        return [part for part in ablated if isinstance(part, FrameRef)]
 
     def request(self, sample: Sample) -> tuple[list[ContextPart], str]:
         """Return the request of a sample: the context, and the text with the question that follows
@@ -173,19 +174,19 @@ def _by_question(
     trajectories = [
         row.traj_id if isinstance(row, Question) else row.question.traj_id for row in data.rows
     ]
-    places = range(len(data.rows)) if limit is None else spread(trajectories, str, settings.seed)
-    by_place: dict[int, _Items] = {}
+    positions = range(len(data.rows)) if limit is None else spread(trajectories, str, settings.seed)
+    by_position: dict[int, _Items] = {}
     n_asked = 0
-    for place in places:
-        row = data.rows[place]
+    for position in positions:
+        row = data.rows[position]
         items = _samples(context, data, row, settings) if isinstance(row, Question) else [row]
-        by_place[place] = [
-            skip_unreadable(item) if isinstance(item, Sample) else item for item in items
+        by_position[position] = [
+            skip_unreadable(sample) if isinstance(sample, Sample) else sample for sample in items
         ]
-        n_asked += any(isinstance(item, Sample) for item in by_place[place])
+        n_asked += any(isinstance(sample, Sample) for sample in by_position[position])
         if n_asked == limit:
             break
-    return [by_place[place] for place in sorted(by_place)]
+    return [by_position[position] for position in sorted(by_position)]
 
 
 def _samples(

@@ -70,8 +70,8 @@ def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference"
 
 def scores(reply: str, answers: Sequence[Answer]) -> dict[str, float]:
     """Return the scores of a whole reply, of which the last line counts, under each scorer."""
-    said = last_line(reply)
-    return {scorer: score(said, answers, scorer) for scorer in SCORERS}
+    response = last_line(reply)
+    return {scorer: score(response, answers, scorer) for scorer in SCORERS}
 
 
 def says_yes_or_no(response: str) -> str | None:
@@ -138,13 +138,13 @@ def _largest_matching(
 
 
 def _matches_reference(response: str, gold: Answer) -> bool:
-    said = _normalise(response)
+    answer = _normalise(response)
     wanted = _normalise(gold)
-    if _near(said, wanted) or _synonymous(said, wanted):
+    if _near(answer, wanted) or _synonymous(answer, wanted):
         return True
-    if wanted == "yes" and "yes" in said[:4]:
+    if wanted == "yes" and "yes" in answer[:4]:
         return True
-    return wanted == "no" and "no" in said[:3]
+    return wanted == "no" and "no" in answer[:3]
 
 
 def _matches_strict(response: str, gold: Answer) -> bool:
@@ -154,11 +154,11 @@ def _matches_strict(response: str, gold: Answer) -> bool:
         other = _YES_NO[wanted == "yes"]
         return words[:1] == [wanted] and other not in words
     if _is_number(wanted):
-        said = _normalise(response)
-        return _is_number(said) and float(said) == float(wanted)
-    said = _without_slice(plain_form(response.lower().strip()))
+        answer = _normalise(response)
+        return _is_number(answer) and float(answer) == float(wanted)
+    answer = _without_slice(plain_form(response.lower().strip()))
     wanted = _without_slice(wanted)
-    return _near(said, wanted) or _synonymous(said, wanted)
+    return _near(answer, wanted) or _synonymous(answer, wanted)
 
 
 def _without_slice(text: str) -> str:
@@ -178,26 +178,24 @@ def _normalise(text: Answer) -> str:
     text = text.lower().strip()
     try:
         return str(w2n.word_to_num(text))
-    except (
-        ValueError,
-        IndexError,
-    ):  # the library's own ways to say "not a number" ("thousand one": IndexError)
+    # The library's own ways to say "not a number" ("thousand one": IndexError).
+    except (ValueError, IndexError):
         return plain_form(text)
 
 
-def _near(said: str, wanted: str) -> bool:
-    if said == wanted:
+def _near(answer: str, wanted: str) -> bool:
+    if answer == wanted:
         return True
-    if not said or not wanted:
+    if not answer or not wanted:
         return False
-    return round(100 * SequenceMatcher(None, said, wanted).ratio()) >= _NEAR
+    return round(100 * SequenceMatcher(None, answer, wanted).ratio()) >= _NEAR
 
 
-def _synonymous(said: str, wanted: str) -> bool:
+def _synonymous(answer: str, wanted: str) -> bool:
     return any(
-        (said == word and wanted in phrases)
-        or (wanted == word and said in phrases)
-        or (said in phrases and wanted in phrases)
+        (answer == word and wanted in phrases)
+        or (wanted == word and answer in phrases)
+        or (answer in phrases and wanted in phrases)
         for word, phrases in _synonyms().items()
     )
 

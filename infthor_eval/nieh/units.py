@@ -66,6 +66,8 @@ def shown_clues(task_samples: TaskSamples, sample: Sample) -> ShownClues | None:
     if question.absence or not data.has_frames:
         return None
     clues = clue_positions(data, question)
-    shown = set(task_samples.context.positions(data, sample))
+    positions = set(task_samples.context.positions(data, sample))
     n_after = len(data.frames(question.traj_id)) - 1 - clues[-1]
-    return ShownClues(n_shown=len(shown.intersection(clues)), n_clues=len(clues), n_after=n_after)
+    return ShownClues(
+        n_shown=len(positions.intersection(clues)), n_clues=len(clues), n_after=n_after
+    )

@@ -91,10 +91,12 @@ def distinct_names(folders: Sequence[Path], headers: Sequence[RunHeader]) -> lis
         for name, header in zip(names, headers, strict=True)
     ]
     with_tasks = list(zip(keys, tasks, strict=True))
-    for place, key in enumerate(keys):
+    for position, key in enumerate(keys):
         if keys.count(key) > 1:
-            is_told_by_tasks = with_tasks.count(with_tasks[place]) == 1
-            names[place] += f" ({tasks[place] if is_told_by_tasks else folders[place].name})"
+            is_told_by_tasks = with_tasks.count(with_tasks[position]) == 1
+            names[position] += (
+                f" ({tasks[position] if is_told_by_tasks else folders[position].name})"
+            )
     return names
 
 
@@ -115,7 +117,7 @@ def choose_evenly(items: Sequence[T], n: int) -> list[T]:
 def records_by_unit(runs: Sequence[ReportRun]) -> Mapping[UnitKey, list[UnitRecord[Any] | None]]:
     """Return the records of each unit, with a place per run, in the order of the units' keys."""
     units: dict[UnitKey, list[UnitRecord[Any] | None]] = {}
-    for place, run in enumerate(runs):
+    for position, run in enumerate(runs):
         for record in run.records:
-            units.setdefault(record.key, [None] * len(runs))[place] = record
+            units.setdefault(record.key, [None] * len(runs))[position] = record
     return dict(sorted(units.items()))

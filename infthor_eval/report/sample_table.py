@@ -57,7 +57,7 @@ def _table_of(run: PresentedRun) -> Table:
     arrays = {}
     for column in columns:
         cells = [column.value(record) for record in run.records]
-        arrays[column.name] = pyarrow.array(cells, types[column.form])
+        arrays[column.name] = pyarrow.array(cells, types[column.cell_type])
     return pyarrow.table(arrays)
 
 
@@ -79,7 +79,7 @@ def load_run(folder: str | os.PathLike[str]) -> DataFrame:
     return sample_table(read_report_runs([Path(folder)])).to_pandas()
 
 
-def encode_samples(table: Table, form: str) -> bytes:
+def encode_samples(table: Table, file_format: str) -> bytes:
     """Return the bytes of a file: "csv" or "parquet".
 
     CSV is opened in spreadsheets and printed on terminals: a text that would be a formula begins
@@ -89,7 +89,7 @@ def encode_samples(table: Table, form: str) -> bytes:
     import pyarrow.parquet
 
     file = io.BytesIO()
-    if form == "parquet":
+    if file_format == "parquet":
         pyarrow.parquet.write_table(table, file)
     else:
         pyarrow.csv.write_csv(_with_safe_texts(table), file)
@@ -99,12 +99,12 @@ def encode_samples(table: Table, form: str) -> bytes:
 def _with_safe_texts(table: Table) -> Table:
     import pyarrow
 
-    for place, column in enumerate(table.columns):
+    for index, column in enumerate(table.columns):
         if pyarrow.types.is_string(column.type):
             texts = [
                 None if text is None else shield(printable(text)) for text in column.to_pylist()
             ]
             table = table.set_column(
-                place, table.column_names[place], pyarrow.array(texts, pyarrow.string())
+                index, table.column_names[index], pyarrow.array(texts, pyarrow.string())
             )
     return table

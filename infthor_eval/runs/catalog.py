@@ -180,8 +180,10 @@ def _folder_of(point: EntryPoint) -> Path:
     """Return the folder of task files that a package names, without importing the package."""
     package, *inside = point.value.split(".")
     spec = find_spec(package)
-    places = spec.submodule_search_locations if spec is not None else None
-    folders = [Path(place, *inside) for place in places or () if Path(place, *inside).is_dir()]
+    locations = spec.submodule_search_locations if spec is not None else None
+    folders = [
+        Path(location, *inside) for location in locations or () if Path(location, *inside).is_dir()
+    ]
     if not folders:
         raise UsageError(
             f"the tasks {point.name} of another package are not in {point.value}; fix its package, "

@@ -22,7 +22,7 @@ class RunRequest:
     Attributes:
         model: name of a model, a policy, or a baseline of the suite.
         tasks: the request to the suite.
-        asked: names of tasks and groups as typed, which name the run's folder.
+        task_names: names of tasks and groups as typed, which name the run's folder.
         output: folder above the run's folder.
         model_options: options of the model as typed.
         name: name of the run; None for the checkpoint's name, or the model's.
@@ -36,7 +36,7 @@ class RunRequest:
 
     model: str
     tasks: TaskRequest[Any]
-    asked: tuple[str, ...]
+    task_names: tuple[str, ...]
     output: Path
     model_options: Mapping[str, str] = field(default_factory=dict)
     name: str | None = None
@@ -53,7 +53,7 @@ class RunRequest:
 
     def folder(self, header: RunHeader) -> Path:
         """Return the run's folder."""
-        return run_folder(self.output, header, self.asked)
+        return run_folder(self.output, header, self.task_names)
 
 
 def run_folder(output: Path, header: RunHeader, tasks: Iterable[str]) -> Path:
@@ -84,9 +84,8 @@ def prepare(
     if request.model not in suite.baselines and not is_known(request.model):
         raise unknown_name("model", request.model, [*suite.baselines, *names()])
     if request.model not in suite.baselines:
-        check_options(
-            request.model, request.model_options
-        )  # before the data are read, which may take minutes
+        # Before the data are read, which may take minutes.
+        check_options(request.model, request.model_options)
     elif request.model_options:
         raise UsageError(
             f"{request.model} has no option {next(iter(request.model_options))}, nor any other"

@@ -53,13 +53,13 @@ class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
     @classmethod
     def total(cls, usages: Iterable["Usage"]) -> "Usage":
         """Return the sum of several usages."""
-        items = list(usages)
-        costs = [usage.cost for usage in items if usage.cost is not None]
+        summands = list(usages)
+        costs = [usage.cost for usage in summands if usage.cost is not None]
         return cls(
-            requests=sum(usage.requests for usage in items),
-            context=sum(usage.context for usage in items),
-            cached=sum(usage.cached for usage in items),
-            reply=sum(usage.reply for usage in items),
+            requests=sum(usage.requests for usage in summands),
+            context=sum(usage.context for usage in summands),
+            cached=sum(usage.cached for usage in summands),
+            reply=sum(usage.reply for usage in summands),
             cost=round(math.fsum(costs), _DIGITS) if costs else None,
         )
 

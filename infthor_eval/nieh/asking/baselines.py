@@ -94,13 +94,12 @@ class Random(BaselineSubject):
 
 
 def _counts(seen: Mapping[str, Counter[str]], question: Question) -> Counter[str]:
-    asked = question_type(question)
-    if asked not in seen:
+    kind = question_type(question)
+    if kind not in seen:
         raise ModelError(
-            f"no question of type {asked!r} was in the answer key; fit the baseline to the whole "
-            "key"
+            f"no question of type {kind!r} was in the answer key; fit the baseline to the whole key"
         )
-    return seen[asked]
+    return seen[kind]
 
 
 BASELINES: Mapping[str, Callable[[int], Baseline]] = {

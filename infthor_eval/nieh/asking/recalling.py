@@ -33,9 +33,8 @@ from infthor_eval.storage.digests import fingerprint
 
 __all__ = ["FindRecall", "KeepRecall", "Recaller", "apply_recall", "recall_all"]
 
-FindRecall = Callable[
-    [str], NiehRecall | None
-]  # looks up what was recalled from the same inputs, by their hash
+# Looks up what was recalled from the same inputs, by their hash.
+FindRecall = Callable[[str], NiehRecall | None]
 KeepRecall = Callable[[str, NiehRecall], None]
 
 _IN_USE = threading.Lock()  # memories are shared by a process, and serve one trajectory at a time

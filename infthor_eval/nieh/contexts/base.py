@@ -157,25 +157,24 @@ class ContextSettings:
     prompt: str = PUBLISHED_MAIN
 
     @classmethod
-    def read(cls, given: Mapping[str, Any], place: str = "dataset_kwargs") -> "ContextSettings":
-        """Return the settings in a mapping; other keys are ignored. `place` is its file and key,
-        for messages.
+    def read(cls, raw: Mapping[str, Any], location: str = "dataset_kwargs") -> "ContextSettings":
+        """Return the settings in a mapping at a location (for messages); other keys are ignored.
 
         Raises:
-            UsageError: a value is not valid; the message has place, setting and valid values.
+            UsageError: a value is not valid; the message has location, setting and valid values.
         """
         values = {}
         for name, kind in get_type_hints(cls).items():
-            if given.get(name) is None:
+            if raw.get(name) is None:
                 continue
-            check, form = _VALUES[name]
+            check, expected = _VALUES[name]
             try:
-                values[name] = msgspec.convert(given[name], kind)
+                values[name] = msgspec.convert(raw[name], kind)
                 is_valid = check is None or check(values[name])
             except msgspec.ValidationError:
                 is_valid = False
             if not is_valid:
-                raise UsageError(f"{place}: {name} is {given[name]!r:.60}; it is {form}")
+                raise UsageError(f"{location}: {name} is {raw[name]!r:.60}; it is {expected}")
         return cls(**values)
 
     def n_frames(self, k_tokens: int) -> int:
@@ -262,7 +261,7 @@ class Context:
         """Return the request of a sample: the context, and the text with the question that follows
         it."""
         parts = self.parts(data, sample, self.select_frames(data, sample))
-        has_texts = any(isinstance(item, str) for item in sample.recalled or ())
+        has_texts = any(isinstance(part, str) for part in sample.recalled or ())
         return parts, question_text(
             self.text_intro if has_texts else self.intro, sample.question, prompt
         )

@@ -16,9 +16,8 @@ from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Recall
 
 __all__ = ["memory", "memory_sources", "recalled_parts"]
 
-_UNRECALLED = (
-    "<memory>"  # the place of what will be recalled, in prompts of samples that no model was asked
-)
+# Stands for what will be recalled, in prompts of samples that no model was asked.
+_UNRECALLED = "<memory>"
 _OF_RETRIEVER = ("retriever", "retriever_revision")
 
 
@@ -44,7 +43,7 @@ def recalled_parts(_data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -
     if sample.recalled is None:
         return [_UNRECALLED, *frames[-1:]]
     left = iter(frames)
-    return [*(item if isinstance(item, str) else next(left) for item in sample.recalled), *left]
+    return [*(part if isinstance(part, str) else next(left) for part in sample.recalled), *left]
 
 
 def _recall(settings: ContextSettings) -> RecallSettings:
@@ -57,8 +56,7 @@ def _recall(settings: ContextSettings) -> RecallSettings:
         value = getattr(settings, name)
         if value is not None and name in accepted_options(settings.memory):
             options.setdefault(name, value)
-    # Without a budget the size of a frame decides nothing, and recalls are the same for every
-    # model.
+    # Without a budget the size of a frame decides nothing: recalls are the same for every model.
     size = settings.tokens_per_frame if settings.budget is not None else None
     return RecallSettings(
         settings.memory, tuple(sorted(options.items())), settings.budget, size, settings.seed

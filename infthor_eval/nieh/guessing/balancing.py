@@ -157,8 +157,7 @@ def _prune(
     """Return the questions without those, in forms with a surplus, that most guessers get right."""
     gone: set[str] = set()
     for form, group in _by_form(questions).items():
-        easiest = sorted(
-            group, key=lambda question: -sum(right[question.id])
-        )  # stable: the first of equals
+        # Stable: the first of equals.
+        easiest = sorted(group, key=lambda question: -sum(right[question.id]))
         gone |= {question.id for question in easiest[: surplus.get(form, 0)]}
     return [question for question in questions if question.id not in gone]

@@ -42,9 +42,8 @@ def visible_knowledge(context: str) -> Knowledge:
     return Knowledge.WORDS | Knowledge.NUMBER if context == "clues" else Knowledge.WORDS
 
 
-_LEARNING = (
-    Lock()
-)  # questions that are asked at once need the same guesses: one learns them, the others wait
+# Questions that are asked at once need the same guesses: one learns them, the others wait.
+_LEARNING = Lock()
 
 
 def find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
@@ -87,8 +86,8 @@ def _learn_guesses(data: NiehSet, knowledge: Knowledge) -> dict[str, Guess]:
         by_guesser = []
         for guesser in GUESSERS:
             if guesser.knows in knowledge:
-                guessed = zip(guesser.guess(samples), questions, strict=True)
-                by_guesser.append([scores(reply, asked.answers) for reply, asked in guessed])
+                replies = zip(guesser.guess(samples), questions, strict=True)
+                by_guesser.append([scores(reply, question.answers) for reply, question in replies])
         guesses |= _best_by_form(questions, by_guesser)
     return guesses
 
@@ -121,24 +120,24 @@ def sample_on_clues(question: Question) -> Sample:
 
 
 def _best_by_form(questions: Sequence[Question], by_guesser: Sequence[_Scores]) -> dict[str, Guess]:
-    places: dict[str, list[int]] = {}
-    for place, question in enumerate(questions):
-        places.setdefault(form_of(question), []).append(place)
+    positions: dict[str, list[int]] = {}
+    for position, question in enumerate(questions):
+        positions.setdefault(form_of(question), []).append(position)
     guesses = {}
-    for form, of_form in places.items():
+    for form, of_form in positions.items():
         best: dict[str, _Scores] = {
             scorer: _best(by_guesser, of_form, scorer) for scorer in SCORERS
         }
         means = {scorer: _mean(scored, of_form, scorer) for scorer, scored in best.items()}
-        for place in of_form:
-            own = {scorer: scored[place][scorer] for scorer, scored in best.items()}
-            guesses[questions[place].id] = Guess(form=form, scores=own, form_scores=means)
+        for position in of_form:
+            own = {scorer: scored[position][scorer] for scorer, scored in best.items()}
+            guesses[questions[position].id] = Guess(form=form, scores=own, form_scores=means)
     return guesses
 
 
-def _best(by_guesser: Sequence[_Scores], places: Sequence[int], scorer: str) -> _Scores:
-    return max(by_guesser, key=lambda scored: _mean(scored, places, scorer))
+def _best(by_guesser: Sequence[_Scores], positions: Sequence[int], scorer: str) -> _Scores:
+    return max(by_guesser, key=lambda scored: _mean(scored, positions, scorer))
 
 
-def _mean(scored: _Scores, places: Sequence[int], scorer: str) -> float:
-    return sum(scored[place][scorer] for place in places) / len(places)
+def _mean(scored: _Scores, positions: Sequence[int], scorer: str) -> float:
+    return sum(scored[position][scorer] for position in positions) / len(positions)

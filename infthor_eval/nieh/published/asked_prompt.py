@@ -36,9 +36,8 @@ def _fitting(reply: LoggedReply) -> str | None:
     if reply.published is None or reply.n_context_tokens is None:
         return None
     known: Mapping[str, int]
-    if (
-        reply.mode == "video"
-    ):  # its rows do not count frames, and no text is as long as a pair of them
+    # Rows of videos do not count frames, and no text is as long as a pair of them.
+    if reply.mode == "video":
         n_text = reply.n_context_tokens % _PER_PAIR - _MARKS
         known = _OF_FILMS
     elif reply.n_frames is None:

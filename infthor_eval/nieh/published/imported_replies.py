@@ -26,9 +26,8 @@ _PUBLISHED_NAME = re.compile(
     r"eval_(?P<file>qa_set_.+?_clue)_(?P<model>.+?)_(?:full_traj.*)\.log(?:\.gz)?$"
 )
 _RATE = re.compile(r"_fps(?P<fps>\d+)")
-_PUBLISHED_TASK = (
-    "nieh_published_"  # begins the names of tasks that ask as published logs were asked
-)
+# Begins the names of tasks that ask as published logs were asked.
+_PUBLISHED_TASK = "nieh_published_"
 # Published modes: the task of ours, and its context.
 _MODES = {
     None: ("nieh_full", "trajectory"),
@@ -273,8 +272,8 @@ def _find_question(
 def _record(
     task: str, question: Question, reply: LoggedReply, known: _Known
 ) -> UnitRecord[NiehAnswer]:
-    shown = _shown_clues(question, reply, known.n_frames.get(question.traj_id))
-    payload = NiehAnswer.of(question, known.guesses.get(question.id), shown)
+    clues = _shown_clues(question, reply, known.n_frames.get(question.traj_id))
+    payload = NiehAnswer.of(question, known.guesses.get(question.id), clues)
     unit = Unit(UnitKey(task, question.id), question.traj_id, payload)
     return unit.record(
         fingerprint({"question": question.id, "reply": reply.text}),

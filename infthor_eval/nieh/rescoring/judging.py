@@ -157,12 +157,12 @@ class Judge:
 
     def config(self) -> dict[str, Any]:
         """Return everything that verdicts and sample depend on, as JSON values."""
-        asked = {
+        settings = {
             "decoding": self._decoding.document(),
             "prompt": self.prompt,
             "sample_seed": self.seed,
         }
-        return {"label": self.name, **self._identity, **asked}
+        return {"label": self.name, **self._identity, **settings}
 
     def verdict(self, record: Record, session: Session[NiehAnswer]) -> float | None:
         """Return the judge's score, 0 to 1, or None if it gives none; it is asked unless the
@@ -172,10 +172,10 @@ class Judge:
             ModelError: the judge cannot be asked.
         """
         payload = record.payload
-        said = last_line(payload.reply or "")
-        text = self._form.text(payload.question, payload.answers, said)
-        asked = {"system": self._form.system, "text": text, "decoding": self._decoding.document()}
-        inputs = fingerprint({"judge": self._identity, **asked})
+        response = last_line(payload.reply or "")
+        text = self._form.text(payload.question, payload.answers, response)
+        request = {"system": self._form.system, "text": text, "decoding": self._decoding.document()}
+        inputs = fingerprint({"judge": self._identity, **request})
         known = session.find_artifact(inputs, NiehVerdict)
         if known is not None:
             return known.score
@@ -187,7 +187,7 @@ class Judge:
         verdict = NiehVerdict(
             question=payload.question,
             answers=payload.answers,
-            reply=said,
+            reply=response,
             said=reply.text,
             score=self._form.read(answer_of(reply).answer),
             judge=self._identity,
@@ -257,9 +257,13 @@ def _sample(
 
 
 def _count(records: Sequence[Record], verdicts: Mapping[UnitKey, float | None]) -> Verdicts:
-    said = [verdicts[record.key] for record in records if record.key in verdicts]
-    n_partly = sum(score is not None and 0 < score < 1 for score in said)
-    counts = {"n_right": said.count(1.0), "n_wrong": said.count(0.0), "n_neither": said.count(None)}
+    scores = [verdicts[record.key] for record in records if record.key in verdicts]
+    n_partly = sum(score is not None and 0 < score < 1 for score in scores)
+    counts = {
+        "n_right": scores.count(1.0),
+        "n_wrong": scores.count(0.0),
+        "n_neither": scores.count(None),
+    }
     return Verdicts(
-        n=len(records), n_partly=n_partly, n_not_asked=len(records) - len(said), **counts
+        n=len(records), n_partly=n_partly, n_not_asked=len(records) - len(scores), **counts
     )

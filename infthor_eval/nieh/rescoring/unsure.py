@@ -53,12 +53,12 @@ class KnownAnswers:
         """Return True if the rules are unsure of a reply that `strict` has scored; see the module
         for the rule."""
         payload = record.payload
-        said = last_line(payload.reply or "")
-        if not said or not is_open_ended(record) or payload.scores["strict"] >= 1.0:
+        response = last_line(payload.reply or "")
+        if not response or not is_open_ended(record) or payload.scores["strict"] >= 1.0:
             return False
         others = self._names[payload.question_type] - set(map(_name, payload.answers))
         return not all(
-            _is_accounted_for(piece, payload.answers, others) for piece in pieces_of(said)
+            _is_accounted_for(piece, payload.answers, others) for piece in pieces_of(response)
         )
 
 

@@ -90,9 +90,8 @@ def effective_length(base: float | None, scores: Mapping[str, float | None]) -> 
 
 
 def _is_lost(score: float, base: float) -> bool:
-    return score < KEPT * base and not math.isclose(
-        score, KEPT * base
-    )  # means of questions are rounded
+    # Means of questions are rounded.
+    return score < KEPT * base and not math.isclose(score, KEPT * base)
 
 
 def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:

@@ -28,16 +28,16 @@ def evidence_tables(runs: Sequence[RunSummary]) -> list[Table]:
     it.
     """
     distances = _used(runs)
-    shown = list(_rows(runs, lambda cells: cells.by_shown_clues, SHOWN_CLUES, _hides_evidence))
+    rows = list(_rows(runs, lambda cells: cells.by_shown_clues, SHOWN_CLUES, _hides_evidence))
     far = list(
         _rows(
             runs, lambda cells: cells.by_distance, distances, lambda task: task.context != "clues"
         )
     )
     tables = []
-    if shown:
+    if rows:
         title = "Accuracy, % by how many of the clue frames were shown (questions)"
-        tables.append(_table(title, SHOWN_CLUES, shown))
+        tables.append(_table(title, SHOWN_CLUES, rows))
     if far:
         title = (
             "Accuracy, % by frames between the last clue and the end of the trajectory (questions)"

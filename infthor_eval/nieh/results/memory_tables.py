@@ -50,8 +50,8 @@ def _rows(runs: Sequence[RunSummary]) -> Iterator[tuple[tuple[str | int, ...], R
         for name, task in run.summary.tasks.items():
             if task.memory is not None:
                 subject = subject_of(name_of(run))
-                place = subject, name, task.memory.name, task.memory.budget or 0
-                yield place, Row((subject, name, *_cells(run.summary, name, task)))
+                sort_key = subject, name, task.memory.name, task.memory.budget or 0
+                yield sort_key, Row((subject, name, *_cells(run.summary, name, task)))
 
 
 def _cells(summary: NiehSummary, name: str, task: TaskSummary) -> tuple[str, ...]:

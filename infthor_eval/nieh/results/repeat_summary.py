@@ -114,11 +114,12 @@ def _vote(records: Sequence[Record], metric: str) -> tuple[float, float]:
     """Return the score of the commonest answer, and the share of the answers that say it; failures
     say nothing."""
     replies = [record.payload.reply if record.failure is None else None for record in records]
-    said = [None if reply is None else plain_form(last_line(reply)).casefold() for reply in replies]
-    counts = Counter(text for text in said if text is not None)
+    answers = [
+        None if reply is None else plain_form(last_line(reply)).casefold() for reply in replies
+    ]
+    counts = Counter(text for text in answers if text is not None)
     if not counts:
         return 0.0, 0.0
-    text, count = max(
-        counts.items(), key=lambda item: item[1]
-    )  # the first of equals: counters keep the order
-    return records[said.index(text)].payload.scores.get(metric, 0.0), count / len(records)
+    # The first of equals: counters keep the order.
+    text, count = max(counts.items(), key=lambda counted: counted[1])
+    return records[answers.index(text)].payload.scores.get(metric, 0.0), count / len(records)

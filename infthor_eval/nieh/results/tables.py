@@ -81,11 +81,11 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
     A task that asked nothing is a line below the table.
     """
     tasks = list(_tasks(runs))
-    asked = [(run, name, task) for run, name, task in tasks if task.n]
-    left_out = any(task.skipped.n or task.by_clues["total"].n_failed for _, _, task in asked)
+    with_samples = [(run, name, task) for run, name, task in tasks if task.n]
+    left_out = any(task.skipped.n or task.by_clues["total"].n_failed for _, _, task in with_samples)
     rows = tuple(
         Row((run, *_name_and_total(name, task), *(_left_out(task) if left_out else ())))
-        for run, name, task in asked
+        for run, name, task in with_samples
     )
     numbers = ("total", "95 %", "bootstrap", "n", *(("skipped", "failed") if left_out else ()))
     notes = (
@@ -365,7 +365,7 @@ def _replies_table(runs: Sequence[RunSummary]) -> Table:
         further = [tokens, str(task.n_thought)] if thought else [tokens]
         both = (task.yes_no.share_gold_yes, task.yes_no.share_said_yes)
         shares = ["-" if share is None else f"{100 * share:.1f}" for share in both]
-        said = ", ".join(f"{n} {reason}" for reason, n in task.format_failures.items()) or "-"
-        rows.append(Row((run, name, str(task.yes_no.n), *shares, *further, said)))
+        failures = ", ".join(f"{n} {reason}" for reason, n in task.format_failures.items()) or "-"
+        rows.append(Row((run, name, str(task.yes_no.n), *shares, *further, failures)))
     columns = (*_NAMES, *map(Column, numbers), Column("not in the form asked for", False))
     return Table("Form of the replies", columns, tuple(rows))

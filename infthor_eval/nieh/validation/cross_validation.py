@@ -154,18 +154,20 @@ def write_inspection_list(path: Path, items: Iterable[JudgedQuestion]) -> Path |
     earlier = read_decisions(path) if path.exists() else {}
     listed = list(items)
     renamed = None
-    if earlier.keys() - {item.question.id for item in listed}:
+    if earlier.keys() - {judged.question.id for judged in listed}:
         names = (
             path.with_name(f"{path.stem}.{number}{path.suffix}") for number in itertools.count(1)
         )
         renamed = path.rename(next(name for name in names if not name.exists()))
-    write_sheet(path, _COLUMNS, (_row(item, earlier.get(item.question.id, "")) for item in listed))
+    write_sheet(
+        path, _COLUMNS, (_row(judged, earlier.get(judged.question.id, "")) for judged in listed)
+    )
     return renamed
 
 
-def _row(item: JudgedQuestion, decision: str) -> list[object]:
-    question = item.question
-    replies = "; ".join(f"{model}: {text}" for model, text in item.replies.items())
+def _row(judged: JudgedQuestion, decision: str) -> list[object]:
+    question = judged.question
+    replies = "; ".join(f"{model}: {text}" for model, text in judged.replies.items())
     clues = list(question.clues)
     answers = list(question.answers)
     return [question.id, question.traj_id, question.text, clues, answers, replies, decision]
@@ -180,15 +182,15 @@ def read_decisions(path: Path) -> dict[str, str]:
     decisions: dict[str, str] = {}
     hint = "fill the list that `validate` wrote"
     for row in read_rows(path, ("question_id", "decision"), hint, line_breaks=True):
-        place = f"{path}, line {row.line}"
+        where = f"{path}, line {row.line}"
         if row.problem is not None:
-            raise DataError(f"{place}: {row.problem}")
+            raise DataError(f"{where}: {row.problem}")
         name = unshield(row.cells["question_id"])
         decision = row.cells["decision"].strip().lower()
         if decision and decision not in DECISIONS:
-            raise DataError(f"{place}: decision is {decision!r:.60}; write keep or drop")
+            raise DataError(f"{where}: decision is {decision!r:.60}; write keep or drop")
         if decisions.get(name, decision) != decision:
-            raise DataError(f"{place}: {name} has another decision above; remove one of the rows")
+            raise DataError(f"{where}: {name} has another decision above; remove one of the rows")
         if decision:
             decisions[name] = decision
     return decisions

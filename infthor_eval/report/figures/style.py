@@ -118,7 +118,7 @@ def save_figure(draw: Callable[[], Figure], folder: Path, name: str) -> list[Pat
     """
     with _in_style():
         figure = draw()
-        return [_save(figure, folder / f"{name}.{form}", form) for form in ("png", "svg")]
+        return [_save(figure, folder / f"{name}.{kind}", kind) for kind in ("png", "svg")]
 
 
 def inline_svg(draw: Callable[[], Figure]) -> str:
@@ -149,13 +149,13 @@ def _in_style(more: dict[Any, Any] | None = None) -> Iterator[None]:
         yield
 
 
-def _save(figure: Figure, path: Path, form: str) -> Path:
-    metadata = _SVG_METADATA if form == "svg" else {}
+def _save(figure: Figure, path: Path, kind: str) -> Path:
+    metadata = _SVG_METADATA if kind == "svg" else {}
     with (
         wrap_errors(f"{path}: cannot be written", "give another --out"),
         write_atomically(path) as partial,
     ):
-        figure.savefig(partial, format=form, dpi=160, metadata=metadata)
+        figure.savefig(partial, format=kind, dpi=160, metadata=metadata)
     return path
 
 

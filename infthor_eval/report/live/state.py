@@ -131,9 +131,8 @@ class LiveRun:
         with self._asking:
             folder = str(self._run or self._folder)
             try:
-                with wrap_errors(
-                    f"{folder}: cannot be read", "restore it"
-                ):  # also what is set aside just now
+                # Also what is set aside just now.
+                with wrap_errors(f"{folder}: cannot be read", "restore it"):
                     return self._read()
             except InfthorError as error:
                 return LiveState(status="unknown", folder=folder, problem=str(error))

@@ -79,16 +79,20 @@ def _by_evidence(task: str, lines: Sequence[_Line]) -> Iterator[Chart]:
     for file in lines[0].task.evidence:
         of_file = f"{task}, {short_name(file)}" if len(lines[0].task.evidence) > 1 else task
 
-        def shown(line: _Line, file: str = file) -> Mapping[str, Cell]:
+        def cells_by_share(line: _Line, file: str = file) -> Mapping[str, Cell]:
             return line.task.evidence[file].by_shown_clues if file in line.task.evidence else {}
 
         def far(line: _Line, file: str = file) -> Mapping[str, Cell]:
             return line.task.evidence[file].by_distance if file in line.task.evidence else {}
 
-        if any(shown(line).keys() - {"all"} for line in lines):
+        if any(cells_by_share(line).keys() - {"all"} for line in lines):
             title = f"{of_file}: accuracy by clue frames shown"
             yield _by_columns(
-                title, lines, SHOWN_CLUES, shown, "of the clue frames were shown (questions)"
+                title,
+                lines,
+                SHOWN_CLUES,
+                cells_by_share,
+                "of the clue frames were shown (questions)",
             )
         known = set().union(*map(far, lines))
         distances = [name for name in DISTANCES if name in known]
@@ -229,9 +233,8 @@ def _by_rows(
         axes.set_yticks(range(len(rows)), [printable(name)[:60] for name, _ in reversed(rows)])
         axes.set_ylim(-0.6, len(rows) - 0.4)
         low, high = axes.get_xlim()
-        axes.set_xlim(
-            min(low, -5), max(high, 5)
-        )  # nothing at all would be drawn on a scale of hundredths
+        # Nothing at all would be drawn on a scale of hundredths.
+        axes.set_xlim(min(low, -5), max(high, 5))
         axes.set_xlabel(label)
         axes.grid(axis="y", visible=False)
         return figure

@@ -38,12 +38,10 @@ def find_timelines(
         if opened is None or question is None:
             continue
         try:
-            chosen[key] = _choose_frames(
-                opened, question, logs.read(opened.folder(question.traj_id))
-            )
-        except (
-            DataError
-        ):  # the question was skipped or failed for it, and its record has the reason
+            facts_of_frames = logs.read(opened.folder(question.traj_id))
+            chosen[key] = _choose_frames(opened, question, facts_of_frames)
+        # The question was skipped or failed for it, and its record has the reason.
+        except DataError:
             continue
     thumbnails.expect(
         len(

@@ -29,8 +29,7 @@ _SCRIPTS = (
     "report.js",
 )  # one script on the page, in this order
 
-# In a script element "</script" and "<!--" would end or twist it; the line separators end a line of
-# a script.
+# "</script" and "<!--" would end or twist a script element; line separators end a script's line.
 _ESCAPED = {
     "<": "\\u003c",
     ">": "\\u003e",

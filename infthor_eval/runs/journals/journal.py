@@ -202,10 +202,8 @@ class Journal(Generic[Payload]):
     def _write(self, record: msgspec.Struct) -> None:
         line = memoryview(msgspec.json.encode(record) + b"\n")
         hint = "make room and run the same command again, which resumes it"
-        with (
-            self._writing,
-            wrap_errors(f"{self._path}: cannot be written", hint),
-        ):  # threads must not mix their lines
+        # Threads must not mix their lines.
+        with self._writing, wrap_errors(f"{self._path}: cannot be written", hint):
             while line:  # an unbuffered write may take a part of the line only
                 line = line[self._file.write(line) :]
             # Before the record counts: after a crash of the machine a unit is done if and only if

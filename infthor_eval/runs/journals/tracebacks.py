@@ -47,10 +47,10 @@ class TracebackFile:
         with self._lock:
             first = self._units.setdefault(text, unit)
             # The same fault often fails every unit: its traceback is written once.
-            shown = text if first == unit else f"{_SAME}{first}\n"
+            entry = text if first == unit else f"{_SAME}{first}\n"
             # One write in append mode: workers share the file, and must not interleave.
             with self._path.open("ab", buffering=0) as file:
-                file.write(f"== {unit}\n{shown}\n".encode())
+                file.write(f"== {unit}\n{entry}\n".encode())
         return f"{self._path.parent.name}/{_NAME}"
 
 

@@ -111,9 +111,8 @@ def execute(
                     observer.done(record, resumed)
             except Exception:
                 raise
-            except (
-                BaseException
-            ):  # stopped at once: the units that are done have their results all the same
+            # Stopped at once: the units that are done have their results all the same.
+            except BaseException:
                 _write_results(run, folder, workload, journal)
                 raise
             summary, records, usage = _write_results(run, folder, workload, journal)
@@ -139,10 +138,9 @@ def _write_results(
 ) -> tuple[RunSummary, list[UnitRecord[Payload]], Usage]:
     """Write the results of the units that the journal has by now; return summary, records and
     usage."""
-    asked = {
-        unit.key for group in workload.groups for unit in group.units
-    }  # the journal may hold more
-    records = [record for record in journal.records if record.key in asked]
+    # The journal may hold more.
+    keys = {unit.key for group in workload.groups for unit in group.units}
+    records = [record for record in journal.records if record.key in keys]
     journal.check_file()
     summary = RunSummary(journal.header, run.suite.summarise(journal.header, records))
     n_missing = workload.n_units - len(records)

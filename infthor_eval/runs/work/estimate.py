@@ -243,8 +243,8 @@ def _first_unit_excess(
     return excess
 
 
-def _mean(items: Sequence[Quantities]) -> Quantities:
+def _mean(measured: Sequence[Quantities]) -> Quantities:
     total = Quantities()
-    for quantities in items:
-        total = total.plus(quantities, 1 / len(items))
+    for quantities in measured:
+        total = total.plus(quantities, 1 / len(measured))
     return total

@@ -18,9 +18,8 @@ from infthor_eval.runs.work.scheduling import run_groups
 __all__ = ["Executor", "LocalExecutor", "Recorded", "group_records"]
 
 
-Recorded = tuple[
-    UnitRecord[Payload], bool
-]  # a record that is on disk; True if an earlier run had put it there
+# A record that is on disk; True if an earlier run had put it there.
+Recorded = tuple[UnitRecord[Payload], bool]
 
 
 class Executor(Protocol[Payload]):
@@ -97,9 +96,8 @@ def group_records(
     fault: Exception = ModelError("the suite gives no record of it; fix the suite")
     try:
         for record in evaluation.run(group, session):
-            msgspec.json.encode(
-                record
-            )  # a record that cannot be written must fail here, not in the journal
+            # A record that cannot be written must fail here, not in the journal.
+            msgspec.json.encode(record)
             waiting.pop(record.key, None)
             yield record
     except MemoryError:  # the next group would have no more memory than this one

@@ -32,9 +32,8 @@ def _in_threads(
     waiting: SimpleQueue[Group[SuiteUnit]] = SimpleQueue()
     for group in groups:
         waiting.put(group)
-    results: SimpleQueue[UnitRecord[Payload] | BaseException | None] = (
-        SimpleQueue()
-    )  # None: a thread has ended
+    # None: a thread has ended.
+    results: SimpleQueue[UnitRecord[Payload] | BaseException | None] = SimpleQueue()
     stop = Event()
     threads = [
         Thread(target=_work, args=(waiting, do, results, stop), daemon=True)
@@ -45,13 +44,13 @@ def _in_threads(
     running = n_threads
     try:
         while running:
-            item = results.get()
-            if isinstance(item, BaseException):
-                raise item
-            if item is None:
+            result = results.get()
+            if isinstance(result, BaseException):
+                raise result
+            if result is None:
                 running -= 1
             else:
-                yield item
+                yield result
     finally:
         stop.set()
 

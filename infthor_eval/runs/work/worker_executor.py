@@ -228,9 +228,8 @@ class WorkerPoolExecutor(Generic[SuiteUnit, Payload]):
                     progress.done.add(record.key)
                     yield record, resumed
             elif isinstance(event, WorkerLost | JobFailed):
-                journal.reread(
-                    event.worker
-                )  # it may have written records that it could no longer send
+                # It may have written records that it could no longer send.
+                journal.reread(event.worker)
             if isinstance(event, JobFailed):
                 given_up[portions[event.job]] = event.reason
         return given_up
