@@ -56,8 +56,7 @@ class UsageError(InfthorError):
 
 
 class DataError(InfthorError):
-    """A file is missing or does not have the documented form; the message names the file and the
-    place in it."""
+    """A file is missing or not of its documented form; the message names the file and the place."""
 
 
 class ModelError(InfthorError):
@@ -65,8 +64,7 @@ class ModelError(InfthorError):
 
 
 class UserCodeError(InfthorError):
-    """Code that is not this package's raised an unexpected exception, which is the cause of this
-    one."""
+    """Code that is not this package's raised an unexpected exception, the cause of this one."""
 
 
 class AdapterError(UserCodeError, ModelError):
@@ -84,8 +82,7 @@ class SceneError(SimulatorError):
 
 
 def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
-    """Return the error for an unknown name of a kind ("task"); it suggests the closest known name,
-    or lists all."""
+    """Return the error for an unknown name of a kind ("task"); it suggests the closest, or all."""
     names = sorted(known)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names)}"
@@ -93,8 +90,7 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
 
 
 def in_one_line(error: BaseException) -> str:
-    """Return the message of another library's error as one line, short enough to be part of our
-    message."""
+    """Return another library's error message as one line, short enough for one of ours."""
     reason = error.strerror if isinstance(error, OSError) else None  # `str` would repeat the path
     text = " ".join((reason or str(error)).split()) or type(error).__name__
     if isinstance(error, KeyError):  # its text is only the key
@@ -117,8 +113,7 @@ def wrap_errors(
     catch: type[BaseException] | tuple[type[BaseException], ...] = OSError,
     raise_as: type[InfthorError] = DataError,
 ) -> Iterator[None]:
-    """Turn errors of another library or of the system into a one-line error for people; our own
-    pass unchanged.
+    """Turn errors of a library or the system into one-line errors; our own pass unchanged.
 
     Args:
         problem: the problem and its place ("set.json: not JSON").

@@ -46,8 +46,7 @@ __all__ = [
 
 
 class _BuiltIn(NamedTuple):
-    """A suite of this package: "module:Class" of each part, and names of its baselines, listed
-    without importing it."""
+    """A suite here: "module:Class" of its parts, and its baselines, listed without an import."""
 
     suite: str
     options: str
@@ -152,8 +151,7 @@ def options_class(name: str) -> type:
 
 
 def suite_code(name: str) -> dict[str, Any]:
-    """Return package, version and source digest of another package's suite as JSON values; {} for a
-    built-in one.
+    """Return another package's suite's package, version and source digest; {} for a built-in.
 
     Raises:
         ModelError: its source cannot be read.

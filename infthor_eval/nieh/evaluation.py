@@ -216,8 +216,7 @@ class BoundNieh:
 
 
 def _groups(prepared: Mapping[str, PreparedTask], repeats: int = 1) -> list[Group[NiehUnit]]:
-    """Return a group for each task and trajectory: its samples share what is encoded of the
-    trajectory."""
+    """Return a group per task and trajectory: its samples share what is encoded of that."""
     groups = []
     for task, item in prepared.items():
         ordered = sorted(item.task_samples.samples, key=lambda sample: sample.question.traj_id)
@@ -234,8 +233,7 @@ def _groups(prepared: Mapping[str, PreparedTask], repeats: int = 1) -> list[Grou
 
 
 def _measure_frame(data: NiehSet, answerer: Answerer) -> int:
-    """Return the subject's size of a frame, by the first frame of the questions that can be
-    read."""
+    """Return the subject's size of a frame, by the first readable frame of the questions."""
     problems: list[InfthorError] = []
     for question in data.questions:
         for frame in data.clue_frames(question):
@@ -274,8 +272,7 @@ def _refuse_without_sampling(subject: Subject, options: NiehOptions) -> None:
 
 
 def _refuse_empty(task_samples: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:
-    """Refuse tasks of which none has a question to ask; some may have none, where no window of
-    their size fits."""
+    """Refuse tasks without any question to ask; some may have none, where no window fits."""
     if any(samples is None or samples.samples for samples in task_samples):
         return
     reasons = {

@@ -62,8 +62,7 @@ class FrameAblation:
         return [_with_frames(part, [next(left) for _ in _frames_in(part)]) for part in parts]
 
     def _shuffle(self, frames: Sequence[FrameRef], traj_id: str) -> list[FrameRef]:
-        """Return the frames in another order if there is one; the same order for every question in
-        a context."""
+        """Return frames in another order, if any; the same for all questions in a context."""
         draw = random.Random(
             f"{self.seed}/{traj_id}/{'/'.join(frame.path.name for frame in frames)}"
         )
@@ -75,8 +74,7 @@ class FrameAblation:
     def _of_another(
         self, frames: Sequence[FrameRef], data: NiehSet, context: Context, sample: Sample
     ) -> list[FrameRef]:
-        """Return the frames at the same positions of another trajectory; of a shorter one, modulo
-        its length."""
+        """Return another trajectory's frames at the same positions, modulo its length."""
         traj_id = sample.question.traj_id
         others = [other for other in _trajectories(data) if other != traj_id]
         other_frames = context.frames(

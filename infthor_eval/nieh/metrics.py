@@ -29,8 +29,7 @@ ProcessResults = Callable[[Doc, list[str]], Mapping[str, Any]]
 
 
 class MetricError(UserCodeError, DataError):
-    """A metrics function that is not this package's raised an exception, or its result lacks a
-    metric."""
+    """A metrics function from elsewhere raised an exception, or its result lacks a metric."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +62,7 @@ class Metrics:
 
 @contextmanager
 def wrap_metric_errors(problem: str) -> Iterator[None]:
-    """Turn any exception in a metrics function into a `MetricError` of one line, with the place of
-    the exception.
+    """Turn any exception in a metrics function into a `MetricError` of one line, with its place.
 
     Args:
         problem: the function and the question that it fails on.
@@ -143,8 +141,7 @@ def _check(entry: object, where: str) -> None:
 
 
 def _import_function(task_file: Path, name: str) -> tuple[ModuleType, str]:
-    """Import a function's module as lm-eval does: from beside the file, else from the path. Return
-    its name too."""
+    """Import a module as lm-eval does: beside the file, else from the path; return its name too."""
     module, _, attribute = name.rpartition(".")
     beside = task_file.parent / f"{module.replace('.', '/')}.py"
     try:

@@ -100,8 +100,7 @@ class OwnScorer:
 
 
 def find_scorer(name: str) -> OwnScorer:
-    """Return the scorer of a name: FILE.py:NAME, or an entry point `infthor_eval.scorers` of
-    another package.
+    """Return the scorer FILE.py:NAME, or an entry point `infthor_eval.scorers` of that name.
 
     Raises:
         UsageError: there is none of this name, or it cannot be called.

@@ -56,8 +56,7 @@ class TaskSamples:
 
     @cached_property
     def words(self) -> tuple[str, ...]:
-        """All answers in words and all words of the questions, sorted: what a person's typing is
-        completed from."""
+        """All words of answers and questions, sorted: a person's typing is completed from them."""
         questions = [sample.question for sample in self.samples]
         answers = {
             answer
@@ -71,8 +70,7 @@ class TaskSamples:
         return tuple(sorted(answers | (question_words - {answer.lower() for answer in answers})))
 
     def all_frames(self, sample: Sample) -> list[FrameRef]:
-        """Return all frames of a sample's trajectory as a memory observes them: ablated, but in
-        their order.
+        """Return all frames of the trajectory as a memory observes them: ablated, in their order.
 
         Raises:
             DataError: the trajectory cannot be read.
@@ -85,16 +83,14 @@ class TaskSamples:
         return [part for part in ablated if isinstance(part, FrameRef)]
 
     def request(self, sample: Sample) -> tuple[list[ContextPart], str]:
-        """Return the request of a sample: the context, and the text with the question that follows
-        it."""
+        """Return the request of a sample: the context, and the text with the question after it."""
         parts, text = self.context.request(self.data, sample, self.prompt)
         return self.frame_ablation.apply(parts, self.data, self.context, sample), text
 
 
 @lru_cache(maxsize=8)
 def open_set(root: str, trajectories: str | None = None) -> NiehSet:
-    """Open the set in a folder, once per process; `open_set.cache_clear()` makes it be read
-    again."""
+    """Open a folder's set, once per process; `open_set.cache_clear()` makes it be read again."""
     return NiehSet(Path(root), Path(trajectories) if trajectories else None)
 
 
@@ -163,8 +159,7 @@ _Items = list[Sample | SkippedQuestion]  # of one question
 def _by_question(
     data: NiehSet, context: Context, settings: ContextSettings, limit: int | None
 ) -> list[_Items]:
-    """Return the items of each question in the order of the set; with a limit, of the questions
-    read to reach it."""
+    """Return samples by question in the set's order; with a limit, of those read to reach it."""
     problems: dict[FrameRef, str | None] = {}
 
     def skip_unreadable(sample: Sample) -> Sample | SkippedQuestion:
@@ -199,8 +194,7 @@ def _samples(
 
 
 def _find_problem(frames: list[FrameRef], known: dict[FrameRef, str | None]) -> str | None:
-    """Return why one of the frames cannot be shown, or None. `known` caches the check of each
-    frame's file."""
+    """Return why a frame cannot be shown, or None. `known` caches the check of each file."""
     for frame in frames:
         if frame not in known:
             known[frame] = frame.problem()

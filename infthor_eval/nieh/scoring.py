@@ -53,8 +53,7 @@ _SLICE = re.compile(r"\b(?:slices?|sliced)\b(?: of\b)?|(?<=\w)sliced\b")
 
 
 def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference") -> float:
-    """Return how many of the gold answers a response gives, as a share or F1; 1.0 or 0.0 for a
-    single gold answer.
+    """Return how many gold answers a response gives, as a share or F1; 1.0 or 0.0 for a single one.
 
     Only the reference scorer can exceed 1.0, when one gold answer is repeated.
 
@@ -75,8 +74,7 @@ def scores(reply: str, answers: Sequence[Answer]) -> dict[str, float]:
 
 
 def says_yes_or_no(response: str) -> str | None:
-    """Return "yes" or "no" if the strict scorer takes a response for one; None if it is neither, or
-    both."""
+    """Return "yes" or "no" as the strict scorer takes a response; None for neither or both."""
     return next((answer for answer in _YES_NO if _matches_strict(response, answer)), None)
 
 
@@ -119,8 +117,7 @@ def _strict(response: str, answers: Sequence[Answer]) -> float:
 def _largest_matching(
     answers: Sequence[Answer], pieces: Sequence[str], match: Callable[[str, Answer], bool]
 ) -> int:
-    """Return the number of gold answers that can have a piece each (augmenting paths; both lists
-    are short)."""
+    """Return how many gold answers can have a piece each (augmenting paths; lists are short)."""
     fits = [[index for index, piece in enumerate(pieces) if match(piece, gold)] for gold in answers]
     owner: dict[int, int] = {}
 
@@ -171,8 +168,7 @@ def _is_number(text: str) -> bool:
 
 
 def _normalise(text: Answer) -> str:
-    """Return the published normal form: a number in digits if the text holds one, else plain
-    words."""
+    """Return the published normal form: a number in digits if there is one, else plain words."""
     if not isinstance(text, str):
         return str(text)
     text = text.lower().strip()

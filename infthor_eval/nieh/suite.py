@@ -54,8 +54,7 @@ class NiehSuite:
         return record.payload.scores
 
     def primary_metrics(self, summary: NiehSummary) -> Mapping[str, Rate]:
-        """See `Suite.primary_metrics`: the strict scorer, or the first of the task's own
-        metrics."""
+        """See `Suite.primary_metrics`: the strict scorer, or the task's own first metric."""
         return primary_metrics(summary)
 
     def overview(self, runs: Sequence[RunSummary]) -> list[Table]:

@@ -35,8 +35,7 @@ _NEEDED = (
 
 @dataclass(frozen=True)
 class PreparedTask:
-    """A task with all that turns its samples into records; `generation_kwargs` are the decoding in
-    lm-eval's words.
+    """A task with what turns samples into records; `generation_kwargs` in lm-eval's words.
 
     Attributes:
         stop: strings that end an answer behind thoughts; the decoding's own would end the thoughts.
@@ -105,8 +104,7 @@ class NiehTask:
         )
 
     def prepare(self, tokens_per_frame: int | None) -> PreparedTask:
-        """Prepare the task for a model, given the tokens of a frame where the samples depend on
-        them."""
+        """Prepare the task for a model, given a frame's tokens where samples depend on them."""
         samples = self.task_samples
         if samples is None:
             samples = find_samples(
@@ -154,8 +152,7 @@ class NiehTask:
 
 
 def check_task_file(file: TaskFile) -> None:
-    """Check the settings under `dataset_kwargs`, so that none is without effect, as a misspelt one
-    would be.
+    """Check `dataset_kwargs`, so that no setting is without effect, as a misspelt one would be.
 
     Raises:
         DataError: names the file and the setting.
@@ -198,8 +195,7 @@ def check_task_file(file: TaskFile) -> None:
 
 
 def _drawn(generation_kwargs: Any, options: NiehOptions) -> Any:
-    """Return the generation settings of a task with drawn replies, if the run wants them or repeats
-    its questions."""
+    """Return generation settings with drawn replies, if the run wants them or repeats questions."""
     if not isinstance(generation_kwargs, Mapping):
         return generation_kwargs  # refused where it is read
     own = generation_kwargs.get("temperature") or None

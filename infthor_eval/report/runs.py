@@ -65,14 +65,12 @@ class ReportRun:
 
     @property
     def simulator(self) -> str:
-        """Name of the simulator that the frames are from, or names separated by commas; empty if it
-        is not known."""
+        """Names of the frames' simulators, separated by commas; empty if not known."""
         return ", ".join(self.header.config.simulators)
 
 
 def label_report_runs(folders: Sequence[Path], headers: Sequence[RunHeader]) -> list[str]:
-    """Return a label per run: its name, with the options that tell runs of one name apart, or with
-    its folder.
+    """Return a label per run: its name, with options or folder to tell equal names apart.
 
     Raises:
         DataError: the `run.yaml` of a run is not what it should be.
@@ -107,8 +105,7 @@ def with_frames(name: str, header: RunHeader) -> str:
 
 
 def choose_evenly(items: Sequence[T], n: int) -> list[T]:
-    """Return n items, evenly spaced from the first to the last; all of them if there are no
-    more."""
+    """Return n items, evenly spaced from the first to the last; all if there are no more."""
     if len(items) <= n:
         return list(items)
     return [items[round(number * (len(items) - 1) / max(n - 1, 1))] for number in range(n)]

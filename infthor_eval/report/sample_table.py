@@ -69,8 +69,7 @@ def _score_columns(run: PresentedRun) -> list[SampleColumn]:
 
 
 def _score(run: PresentedRun, metric: str, record: UnitRecord[Any]) -> float | None:
-    """Return a score as the run's summary counts it: 0 for a failed unit, none for one that does
-    not count."""
+    """Return a score as summaries count it: 0 for a failed unit, None for one that is excluded."""
     return None if record.excluded is not None else run.suite.scores(record).get(metric, 0.0)
 
 

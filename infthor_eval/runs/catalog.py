@@ -82,8 +82,7 @@ class Catalog:
 
     @classmethod
     def find_installed(cls, include: Sequence[Path] = ()) -> "Catalog":
-        """Return the catalog of the tasks of this package, of other installed packages, and of
-        further folders.
+        """Return the catalog of tasks in this package, other installed packages, further folders.
 
         Raises:
             UsageError: an installed package lacks the folder that it names.
@@ -123,8 +122,7 @@ class Catalog:
         return list(by_name.values())
 
     def _members(self, group: str, inside: tuple[str, ...]) -> list[TaskFile]:
-        """Return the single tasks of a group and of the groups in it; `inside` has the groups
-        around it."""
+        """Return the single tasks of a group, nested or not; `inside` has the groups around it."""
         members: list[TaskFile] = []
         for name in self.groups[group]:
             if name in inside:
@@ -220,8 +218,7 @@ class _Reader:
         self._contents: dict[Path, Mapping[str, Any]] = {}
 
     def settings(self, path: Path, including: tuple[Path, ...] = ()) -> dict[str, Any]:
-        """Return a file's settings over those of what it includes; `including` has the files that
-        include it."""
+        """Return a file's settings over its includes'; `including`: the files that include it."""
         if path not in self._contents:
             self._contents[path] = _read(path)
         config = dict(self._contents[path])

@@ -64,8 +64,7 @@ def decoding_of(settings: Mapping[str, Any], seed: int, task: str) -> Decoding:
 
 
 def _temperature(settings: Mapping[str, Any], task: str) -> float:
-    """Return the temperature as lm-eval reads it: above 0 implies sampling, and sampling alone
-    implies 1."""
+    """Return the temperature as lm-eval does: above 0 implies sampling, which alone implies 1."""
     temperature = (
         None
         if settings.get("temperature") is None

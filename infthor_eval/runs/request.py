@@ -63,8 +63,7 @@ def run_folder(output: Path, header: RunHeader, tasks: Iterable[str]) -> Path:
 
 @dataclass(frozen=True)
 class PreparedRun(Generic[SuiteUnit, Payload]):
-    """A request whose names, files and data are in order, with its suite set up; it is pickled and
-    sent to workers."""
+    """A request found in order, with its suite set up; it is pickled and sent to workers."""
 
     request: RunRequest
     suite: Suite[SuiteUnit, Payload]

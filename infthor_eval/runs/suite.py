@@ -133,15 +133,13 @@ class Workload(Generic[SuiteUnit_co]):
 
 
 class Session(Protocol[Payload]):
-    """The results of a run so far, as a suite sees them while it does a group; several threads may
-    use it at once."""
+    """A run's results so far, for a suite that does a group; several threads may use it at once."""
 
     def find_record(self, unit: Unit[Payload], fingerprint: str) -> UnitRecord[Payload] | None:
         """Return the record of a unit that already has a result from these very inputs, or None."""
 
     def describe_failure(self, unit: Unit[Payload], error: Exception) -> str:
-        """Return the reason why a unit failed by an exception, and keep the traceback of an
-        unexpected one."""
+        """Return why an exception made a unit fail, and keep an unexpected one's traceback."""
 
     def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
         """Return the cached artifact of these inputs, or None."""
@@ -172,8 +170,7 @@ class UnitSample:
 
 
 class BoundEvaluation(Protocol[SuiteUnit, Payload]):
-    """An evaluation of one subject. It owns whatever depends on the subject, its simulators among
-    it."""
+    """An evaluation of one subject, which owns what depends on it, such as its simulators."""
 
     @property
     def workload(self) -> Workload[SuiteUnit]:
@@ -182,8 +179,7 @@ class BoundEvaluation(Protocol[SuiteUnit, Payload]):
     def run(
         self, group: Group[SuiteUnit], session: Session[Payload]
     ) -> Iterator[UnitRecord[Payload]]:
-        """Do a group: yield a record per unit as soon as it is there; records found in the session
-        as they are.
+        """Do a group: yield a record per unit when it is there; those in the session as they are.
 
         Raises:
             InfthorError: the units without a record cannot be done. The run records them as failed
@@ -195,13 +191,11 @@ class BoundEvaluation(Protocol[SuiteUnit, Payload]):
         """Convert a record of this workload for other readers; not after `close`."""
 
     def close(self) -> None:
-        """Release what the work needed (simulators); called once, whether the work was finished or
-        not."""
+        """Release what the work needed (simulators); called once, also if it was not finished."""
 
 
 class Evaluation(Protocol[SuiteUnit, Payload]):
-    """A suite set up for one run. It holds only what was read from files, and may be bound more
-    than once."""
+    """A suite set up for a run. It holds only what files hold, and may be bound more than once."""
 
     def bind(self, subject: Subject) -> BoundEvaluation[SuiteUnit, Payload]:
         """Find all the work for a subject.
@@ -241,8 +235,7 @@ class Suite(Protocol[SuiteUnit, Payload]):
         """
 
     def prepare(self, request: TaskRequest[Any]) -> Evaluation[SuiteUnit, Payload]:
-        """Set up a run. Whatever can be refused without the subject is refused here, before it is
-        loaded.
+        """Set up a run. What can be refused without the subject is refused before it is loaded.
 
         Raises:
             UsageError: a task or an option that does not fit.
@@ -259,16 +252,13 @@ class Suite(Protocol[SuiteUnit, Payload]):
         """
 
     def scores(self, record: UnitRecord[Payload]) -> Mapping[str, float]:
-        """Return the metrics of one unit by name; a missing one counts as 0, as all do where the
-        unit failed."""
+        """Return a unit's metrics by name; a missing one is 0, as all are where the unit failed."""
 
     def primary_metrics(self, summary: Any) -> Mapping[str, Rate]:
-        """Return the primary metric of each task, a share from 0 to 1; none for a task of which no
-        unit counts."""
+        """Return each task's primary metric, a share from 0 to 1; none where no unit counts."""
 
     def overview(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:
-        """Return what people see first of runs of this suite, side by side, at most 100 columns
-        wide."""
+        """Return what people see first of runs side by side, at most 100 columns wide."""
 
     def tables(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:
         """Return all results of runs of this suite, with the published numbers beside them."""

@@ -65,8 +65,7 @@ class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
 
     @property
     def hit_rate(self) -> float | None:
-        """Share of the context's tokens that were not encoded again, 0 to 1; None if none were
-        counted."""
+        """Share of the context's tokens not encoded again, 0 to 1; None if none were counted."""
         return self.cached / self.context if self.context else None
 
     @property

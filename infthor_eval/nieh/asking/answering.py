@@ -78,8 +78,7 @@ class _UnitRequest:
         usage: Usage,
         session: Session[NiehAnswer],
     ) -> UnitRecord[NiehAnswer]:
-        """Return the record of a reply; a failed one, with the reply, if the task's own metrics
-        fail on it."""
+        """Return the record of a reply; failed, with the reply, if the metrics fail on it."""
         scores = {}
         failure = None
         thinking, answer = answer_of(reply)
@@ -114,16 +113,13 @@ class OpenAnswerer(Protocol):
 
     @property
     def write(self) -> Write | None:
-        """What asks the model for texts for its memory; None if it has no memory, as it reads no
-        context."""
+        """What asks the model for texts for its memory; None without one: it reads no context."""
 
     def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
-        """Return a context as the model is given it: films as images, unless it has a video
-        input."""
+        """Return a context as the model gets it: films as images, unless it has a video input."""
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
-        """Return the replies to units that share their decoding, and their context unless contexts
-        are batched.
+        """Return replies to units of one decoding, and of one context unless contexts are batched.
 
         Raises:
             DataError: a frame cannot be read; nothing is answered then.
@@ -135,8 +131,7 @@ class OpenAnswerer(Protocol):
 
 
 class OpenModel:
-    """A model with one conversation, so that units in the same context share what is encoded of
-    it."""
+    """A model with one conversation: units in the same context share what is encoded of it."""
 
     def __init__(self, model: Model, session: Session[NiehAnswer]) -> None:
         self.batch_size = model.capabilities.batch_size
@@ -275,8 +270,7 @@ def _recall_all(
     answerer: OpenAnswerer,
     session: Session[NiehAnswer],
 ) -> list[tuple[NiehUnit, NiehUnit | Exception]]:
-    """Return each unit with what its memory recalled, or why that failed; as they are if there is
-    nothing to recall."""
+    """Return each unit with what its memory recalled, or why that failed; or as it is."""
     if answerer.write is None or not any(unit.sample.awaits_recall for unit in units):
         return [(unit, unit) for unit in units]
     recaller = Recaller(
@@ -328,8 +322,7 @@ def _batches(requests: Sequence[_UnitRequest], size: int) -> Iterator[Sequence[_
 def _find_record(
     request: _UnitRequest, session: Session[NiehAnswer]
 ) -> UnitRecord[NiehAnswer] | None:
-    """Return the record of a unit that needs no answer: an earlier run has it, or a frame cannot be
-    read."""
+    """Return the record of a unit without asking: an earlier run's, or of an unreadable frame."""
     try:
         return session.find_record(request.unit, request.fingerprint)
     except DataError as error:

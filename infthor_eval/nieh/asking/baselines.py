@@ -27,8 +27,7 @@ Predict = Callable[[Sample], str]
 
 @runtime_checkable
 class Baseline(Subject, Protocol):
-    """A subject that answers from the answer key, without frames; the data's fingerprint covers the
-    key."""
+    """A subject that answers from the answer key, without frames; the data's hash covers it."""
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
         """Read the whole answer key of one task, and return a function that answers its samples."""
@@ -45,15 +44,13 @@ class Oracle(BaselineSubject):
 
 
 class Blind(BaselineSubject):
-    """The best guess from the question's words, learned on the other trajectories: the score
-    without looking."""
+    """The best guess from the question's words, learned on the other trajectories."""
 
     name = "blind"
     _chains: Callable[[Sample], list[Chain]] = staticmethod(chains_of_words)
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
-        """See `Guesser`; each file of a set is learned alone, as the published scripts ask one at a
-        time."""
+        """See `Guesser`; each file of a set is learned alone, as the published scripts ask."""
         by_file: dict[str, list[Sample]] = defaultdict(list)
         for sample in samples:
             by_file[sample.question.file].append(sample)
@@ -78,8 +75,7 @@ class Random(BaselineSubject):
         return {"baseline": self.name, "seed": self._seed}
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
-        """See `Baseline`; a draw depends on the seed and the question alone, not on the order of
-        asking."""
+        """See `Baseline`; a draw depends on seed and question alone, not on the order of asking."""
         seen: dict[str, Counter[str]] = defaultdict(Counter)
         for question in {sample.question.id: sample.question for sample in samples}.values():
             seen[question_type(question)][doc_target(question)] += 1

@@ -52,8 +52,7 @@ class _Built(NamedTuple):
 
 
 class Recaller:
-    """Recalls for questions, trajectory by trajectory, while `in_use` reserves the memories of this
-    process."""
+    """Recalls for questions, by trajectory, while `in_use` reserves this process's memories."""
 
     def __init__(
         self, task_samples: TaskSamples, write: Write | None, find: FindRecall, keep: KeepRecall
@@ -79,8 +78,7 @@ class Recaller:
 
     @contextmanager
     def in_use(self) -> Iterator[None]:
-        """Reserve the memories of this process within the context; what this has built is not used
-        afterwards."""
+        """Reserve this process's memories within the context; what was built is not used later."""
         with _IN_USE:
             yield
             self._built = None
@@ -188,8 +186,7 @@ def apply_recall(sample: Sample, recall: NiehRecall) -> Sample:
 
 
 def recall_all(task_samples: TaskSamples) -> list[Sample]:
-    """Return the samples of a task, with what their memory recalls, for models that are none of
-    ours.
+    """Return a task's samples, with what their memory recalls, for models that are none of ours.
 
     Raises:
         UsageError: the memory asks the model under test, or recalling fails.
@@ -215,8 +212,7 @@ def recall_all(task_samples: TaskSamples) -> list[Sample]:
 
 
 def _visible(steps: Sequence[Observation], memory: Memory) -> list[Observation]:
-    """Return the steps as the memory may see them: the simulator's metadata only if it is
-    privileged."""
+    """Return the steps as the memory may see them: metadata only if it is privileged."""
     return (
         list(steps)
         if memory.capabilities.privileged

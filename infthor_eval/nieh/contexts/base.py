@@ -178,8 +178,7 @@ class ContextSettings:
         return cls(**values)
 
     def n_frames(self, k_tokens: int) -> int:
-        """Return the number of frames that fill the context, given the published tokens of its
-        kilo-token.
+        """Return how many frames fill the context, given the published tokens of its kilo-token.
 
         Raises:
             UsageError: the size, or the tokens of a frame, are not given.
@@ -258,8 +257,7 @@ class Context:
     def request(
         self, data: NiehSet, sample: Sample, prompt: str = PUBLISHED_MAIN
     ) -> tuple[list[ContextPart], str]:
-        """Return the request of a sample: the context, and the text with the question that follows
-        it."""
+        """Return the request of a sample: the context, and the text with the question after it."""
         parts = self.parts(data, sample, self.select_frames(data, sample))
         has_texts = any(isinstance(part, str) for part in sample.recalled or ())
         return parts, question_text(
@@ -274,8 +272,7 @@ def clue_positions(data: NiehSet, question: Question) -> tuple[int, ...]:
 
 
 def trajectories_identity(data: NiehSet, _settings: ContextSettings) -> dict[str, Any]:
-    """Return the hash of the trajectories' own files, which the set's fingerprint does not
-    cover."""
+    """Return the hash of the trajectories' own files, which the set's hash does not cover."""
     ids = sorted({question.traj_id for question in data.questions})
     files = {traj_id: path for traj_id in ids if (path := data.outline_file(traj_id)) is not None}
     return {

@@ -76,8 +76,7 @@ def _around(needle: int, n_all: int, n: int, d_index: int, last_end: int) -> tup
 
 
 def sampling_pool(clues: Sequence[int], n_all: int, n: int) -> list[int]:
-    """Return the frames from which a window around clues that are apart is drawn: those between
-    them.
+    """Return the frames from which a window around clues that are apart is drawn: those between.
 
     If these are too few, as many as are missing on either side too. As published, clues can be
     among these: a clue that is drawn takes no second place, and the window is shorter.

@@ -24,8 +24,7 @@ _OF_RETRIEVER = ("retriever", "retriever_revision")
 def memory(
     data: NiehSet, question: Question, settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """Ask on what a memory recalls of the frames before the last, and on that one, the agent's
-    current view."""
+    """Ask on what a memory recalls of the frames before the last, and on the last (the view)."""
     return [
         Sample(question, tuple(range(len(data.frames(question.traj_id)))), recall=_recall(settings))
     ]
@@ -38,8 +37,7 @@ def memory_sources(_data: NiehSet, settings: ContextSettings) -> dict[str, Any]:
 
 
 def recalled_parts(_data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
-    """Return what was recalled in its order, then the last frame; a mark in its place if nothing
-    was recalled yet."""
+    """Return what was recalled in order (a mark before it is), then the last frame."""
     if sample.recalled is None:
         return [_UNRECALLED, *frames[-1:]]
     left = iter(frames)

@@ -15,8 +15,7 @@ _K_TOKENS = 1024  # truncate_head's published kilo-token
 def clues(
     data: NiehSet, question: Question, _settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """Ask on the frames that are evidence alone, in time order whatever the file's (the paper's
-    Table 4)."""
+    """Ask on the evidence alone, in time order whatever the file's (the paper's Table 4)."""
     if not data.has_frames:  # baselines need no more than their number
         return [Sample(question, tuple(sorted(question.clues)))]
     order = {frame: position for position, frame in enumerate(data.frames(question.traj_id))}
@@ -33,8 +32,7 @@ def trajectory(
 def truncate_head(
     data: NiehSet, question: Question, settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """The last frames that fit the context (published under the same name); clues before them are
-    lost."""
+    """Ask on the last frames that fit (published under the same name); earlier clues are lost."""
     n_all = len(data.frames(question.traj_id))
     n = settings.n_frames(_K_TOKENS)
     if n < 1:

@@ -84,8 +84,7 @@ class Group:
 
 
 def audit(data: NiehSet, scorer: Scorer = "strict") -> list[AuditedQuestion]:
-    """Return the questions of a set that can be asked, with the guessers' scores; a file is guessed
-    at a time."""
+    """Return a set's questions that can be asked, with the guessers' scores, file by file."""
     return [
         AuditedQuestion(question, scores)
         for questions in questions_by_file(data).values()
@@ -107,8 +106,7 @@ BY: Mapping[str, Callable[[Question], str]] = {
 
 
 def groups(questions: Sequence[AuditedQuestion], by: str) -> list[Group]:
-    """Return the groups of some questions; all but whole files are split by file, in a set of
-    several."""
+    """Return groups of questions; of several files, all but whole files are split by file."""
     split: dict[str, list[AuditedQuestion]] = {}
     for audited in questions:
         name = BY[by](audited.question)

@@ -51,8 +51,7 @@ class Balanced:
 
 
 def balance(questions: Sequence[Question]) -> Balanced:
-    """Return the balanced part of some questions; it may be empty. Of questions that are there
-    twice it has one."""
+    """Return the balanced part of some questions, each once; it may be empty."""
     before = Counter(map(_name, questions))
     different: dict[str, Question] = {}
     for question in questions:
@@ -104,8 +103,7 @@ def _cut_answers(questions: Sequence[Question]) -> list[Question]:
 
 
 def _best_cut(sizes: Sequence[int]) -> tuple[int, int]:
-    """Return how many of the commonest answers to keep, and up to how many questions of each; 0
-    answers for none.
+    """Return how many of the commonest answers to keep (0: none), and how many questions of each.
 
     Args:
         sizes: number of questions of each answer, descending.
@@ -138,8 +136,7 @@ def _right_by_guesser(
 def _surplus(
     questions: Sequence[Question], right: Mapping[str, tuple[float, ...]]
 ) -> dict[str, int]:
-    """Return half of what the best guesser of a form gets right beyond chance, if it is beyond the
-    margin too."""
+    """Return half of what each form's best guesser gets beyond chance, where above the margin."""
     surplus = {}
     for form, group in _by_form(questions).items():
         chance = _chance(group)

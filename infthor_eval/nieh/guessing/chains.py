@@ -38,8 +38,7 @@ _DIGITS = 9
 
 
 def chains_of_words(sample: Sample) -> list[Chain]:
-    """Return chains of a question's words: the leading words, and each later word, alone and after
-    the first two."""
+    """Return chains of words: the leading ones, each later one, alone and after the first two."""
     words = words_of(sample.question)
     later = sorted(set(words[2:]))
     leading = [("leading", *words[:n]) for n in range(1, len(words) + 1)]
@@ -53,8 +52,7 @@ def chains_of_words_and_count(sample: Sample) -> list[Chain]:
 
 
 def chains_of_words_and_place(sample: Sample) -> list[Chain]:
-    """Return the chains of words, and of the place of the last clue and the span of the clues after
-    the stem."""
+    """Return the chains of words, and of the last clue's place and the clues' span."""
     stem = words_of(sample.question)[:_STEM]
     first, last = sample.frames[0], sample.frames[-1]
     place = ("place", *stem, last // _PLACE)
@@ -68,8 +66,7 @@ def words_of(question: Question) -> list[str]:
 
 
 def held_out(samples: Sequence[Sample]) -> Callable[[Sample], str]:
-    """Return what a sample is left out with: its trajectory, or itself if all are on one
-    trajectory."""
+    """Return what a sample is left out with: its trajectory, or itself if there is one alone."""
     is_alone = len({sample.question.traj_id for sample in samples}) == 1
     return lambda sample: sample.question.id if is_alone else sample.question.traj_id
 
@@ -78,8 +75,7 @@ class Guesser:
     """Guesses at samples from the answers to others."""
 
     def __init__(self, samples: Sequence[Sample], chains: Callable[[Sample], list[Chain]]) -> None:
-        """Count the answer key; if it is of one trajectory, each question is guessed from the
-        others."""
+        """Count the answer key; on one trajectory alone, a question is guessed from the others."""
         self._chains = chains
         self._held_out = held_out(samples)
         self._answers = sorted({doc_target(sample.question) for sample in samples})
@@ -90,8 +86,7 @@ class Guesser:
             self._count(sample)
 
     def guess(self, sample: Sample) -> str:
-        """Return the likeliest answer (of equal ones, the first in the alphabet); empty if nothing
-        was learned."""
+        """Return the likeliest answer (of equals, the first by name); empty if none was learned."""
         group = self._held_out(sample)
         counts = self._vector(self._others((), group))
         if not counts.any():

@@ -48,8 +48,7 @@ class NamedGuesser:
 
 
 def _guess_constant(samples: Sequence[Sample], group_of: Callable[[Sample], str]) -> list[str]:
-    """Guess the commonest answer to questions of a group on other trajectories; the first in the
-    alphabet of equals."""
+    """Guess the commonest answer of a group on other trajectories; of equals the first by name."""
     own_of = held_out(samples)
     everywhere: dict[str, Counter[str]] = defaultdict(Counter)
     own: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)

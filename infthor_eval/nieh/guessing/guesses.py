@@ -72,8 +72,7 @@ def _find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
 
 
 def _key(data: NiehSet, knowledge: Knowledge) -> str:
-    """Return a hash of all that guesses depend on: the questions, and this code with its
-    library."""
+    """Return a hash of all that guesses depend on: questions, this code and its library."""
     code = digest_of_files(sorted(Path(infthor_eval.nieh.__file__).parent.rglob("*.py")))
     learner = {"knowledge": knowledge.value, "code": code, "library": version("scikit-learn")}
     return fingerprint(learner | {"questions": list(map(repr, data.questions))})
@@ -93,8 +92,7 @@ def _learn_guesses(data: NiehSet, knowledge: Knowledge) -> dict[str, Guess]:
 
 
 def questions_by_file(data: NiehSet) -> dict[str, list[Question]]:
-    """Return the questions that can be asked by the name of their file; empty if the set has one
-    file alone."""
+    """Return the questions that can be asked by file name (empty if the set has one file alone)."""
     by_file: dict[str, list[Question]] = {}
     for question in data.questions:
         by_file.setdefault(question.file, []).append(question)

@@ -25,8 +25,7 @@ _ITERATIONS = 1000
 
 
 def guess_by_learning(samples: Sequence[Sample], *, number: bool, place: bool) -> list[str]:
-    """Return a guess for each sample, learned on other trajectories; empty texts if there is
-    nothing to learn from.
+    """Return a guess per sample, learned on other trajectories; "" if there is nothing to learn.
 
     Args:
         samples: samples on the clue frames.

@@ -25,8 +25,7 @@ _MOST_SPLITS = 7  # the prompts' distance less one
 
 
 def asked_prompt(replies: Iterable[LoggedReply]) -> str | None:
-    """Return the prompt that fits every row of a published log; None if none does, or if a row does
-    not tell."""
+    """Return the prompt that fits every row; None if none does, or if a row does not tell."""
     fitting = [_fitting(reply) for reply in replies if reply.published]
     prompts = set(fitting)
     return prompts.pop() if len(prompts) == 1 else None

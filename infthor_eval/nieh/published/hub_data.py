@@ -19,8 +19,7 @@ def default_folder() -> Path:
 
 
 def fetch_nieh(folder: Path, token: str | None = None, endpoint: str | None = None) -> NiehSet:
-    """Download, unpack and check the published NIEH data; files that exist are not downloaded
-    again.
+    """Download, unpack and check the published NIEH data; files that exist are kept.
 
     An interrupted download is resumed. The archive is deleted once it is unpacked and the set is
     checked.

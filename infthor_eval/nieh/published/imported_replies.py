@@ -102,8 +102,7 @@ class ImportedRun:
 
 
 def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -> list[ImportedRun]:
-    """Return the runs that some logs hold: logs of one model in one mode, on different questions,
-    are one run.
+    """Return the runs in logs: those of one model and mode, on different questions, are one run.
 
     Args:
         logs: files with replies (`infthor_eval.formats.reply_logs`).
@@ -141,8 +140,7 @@ def _replies(rows: Sequence[LoggedReply | UnreadRow]) -> list[LoggedReply]:
 
 
 def _trajectory_lengths(replies: Iterable[LoggedReply]) -> dict[str, int]:
-    """Return the numbers of frames of trajectories, from published rows on whole ones or on their
-    ends."""
+    """Return trajectories' numbers of frames, from published rows on whole ones or their ends."""
     lengths: dict[str, int] = {}
     for reply in replies:
         n_frames = None
@@ -156,8 +154,7 @@ def _trajectory_lengths(replies: Iterable[LoggedReply]) -> dict[str, int]:
 
 
 def _mode_of(replies: Sequence[LoggedReply], log: Path) -> tuple[str, dict[str, Any]]:
-    """Return task and context settings of a log, from its first row; a log that is not published
-    names none."""
+    """Return task and context settings by a log's first row; general ones if unpublished."""
     first = next((reply for reply in replies if reply.published), None)
     if first is None:
         return _OTHER[0], {"context": _OTHER[1]}
@@ -179,8 +176,7 @@ def _mode_of(replies: Sequence[LoggedReply], log: Path) -> tuple[str, dict[str, 
 
 
 def _published_task(settings: Mapping[str, Any]) -> str | None:
-    """Return the task of ours that asks as a published row was made; None if there is none with
-    these settings."""
+    """Return our task that asks as a published row was made; None if none has these settings."""
     tasks = [
         task
         for name, task in Catalog.find_packaged().tasks.items()
@@ -284,8 +280,7 @@ def _record(
 
 
 def _shown_clues(question: Question, reply: LoggedReply, n_frames: int | None) -> ShownClues | None:
-    """Return the clue frames that the model saw; None if the row does not tell, or if no frame is
-    evidence."""
+    """Return the clue frames shown; None if the row does not tell, or if no frame is evidence."""
     clues = set(question.clues)
     is_whole = reply.published is not None and reply.mode in _WHOLE
     if question.absence or (reply.frames is None and not is_whole):

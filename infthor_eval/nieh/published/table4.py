@@ -60,8 +60,7 @@ def table4(data: NiehSet) -> Table:
 
 
 def derive_row(data: NiehSet, row: PublishedRow) -> dict[str, MeanEstimate]:
-    """Return the mean of a row's scores by column, each from 0 to 1 (the published scorer can
-    exceed 1).
+    """Return a row's mean scores by column, from 0 to 1 (the published scorer can exceed 1).
 
     Raises:
         DataError: a question lacks the score, or no question is in a column.
@@ -81,8 +80,7 @@ def derive_row(data: NiehSet, row: PublishedRow) -> dict[str, MeanEstimate]:
 
 
 def _by_steps(data: NiehSet) -> list[str]:
-    """Return the questions of each column by the number of steps that their clue frames belong to
-    ("2: 215, 3: 7")."""
+    """Return each column's questions by the steps of their clue frames ("2: 215, 3: 7")."""
     cells = []
     for name in CLUE_COLUMNS[:-1]:
         chosen = [
@@ -113,8 +111,7 @@ def _mean_cell(estimate: MeanEstimate) -> TableCell:
 
 
 def _printed(row: PublishedRow, table: PublishedTable) -> tuple[list[str], list[str]]:
-    """Return the printed cells, those known to be wrong with a mark, and a note on each of
-    these."""
+    """Return the printed cells, a mark at those known to be wrong, and a note on each of these."""
     values = dict(zip(table.columns, row.values, strict=True))
     cells = [f"{values[name]:.2f}{'*' if name in row.misprints else ''}" for name in CLUE_COLUMNS]
     notes = [

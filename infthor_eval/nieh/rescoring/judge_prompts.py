@@ -106,8 +106,7 @@ def _published_text(question: str, answers: Sequence[Answer], reply: str) -> str
 
 
 def _read_score(answer: str) -> float | None:
-    """Return the score of the first JSON object in an answer; the published parser reads another
-    key."""
+    """Return the score of the first JSON object (the published parser reads another key)."""
     found = _OBJECT.search(answer)
     try:
         value = json.loads(found[0]).get("score") if found else None

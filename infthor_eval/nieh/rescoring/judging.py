@@ -48,8 +48,7 @@ Track = Callable[[Sequence[Record]], Iterable[Record]]
 
 
 class Verdicts(msgspec.Struct, frozen=True, kw_only=True):
-    """A judge's verdicts on n replies: right, partly right, wrong, neither, or not asked as the
-    request failed."""
+    """A judge's verdicts on n replies: right, partly right, wrong, neither, or request failed."""
 
     n: int
     n_right: int
@@ -74,8 +73,7 @@ class Agreement(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def share(self) -> float | None:
-        """Share of the sampled replies on which judge and rules agree, 0 to 1; None if it was asked
-        about none."""
+        """Share of the sampled replies on which judge and rules agree, 0 to 1; None without any."""
         n = sum(sampled.n - sampled.n_not_asked for sampled in (self.right, self.wrong))
         return (self.right.n_right + self.wrong.n_wrong) / n if n else None
 
@@ -113,8 +111,7 @@ class Judge:
         seed: int,
         prompt: str = YES_NO,
     ) -> None:
-        """Take a model, its name for people, the identity of its adapter's code, and the limit of a
-        verdict."""
+        """Take a model, its name for people, its adapter's identity, and the limit of a verdict."""
         self.name = name
         self.seed = seed
         self.prompt = prompt
@@ -165,8 +162,7 @@ class Judge:
         return {"label": self.name, **self._identity, **settings}
 
     def verdict(self, record: Record, session: Session[NiehAnswer]) -> float | None:
-        """Return the judge's score, 0 to 1, or None if it gives none; it is asked unless the
-        session has its verdict.
+        """Return the judge's score, 0 to 1; None if it gives none. The session's verdict is reused.
 
         Raises:
             ModelError: the judge cannot be asked.
@@ -239,8 +235,7 @@ def judge_replies(
 def _sample(
     scored: Sequence[Record], unsure: set[UnitKey], seed: int
 ) -> tuple[list[Record], list[Record]]:
-    """Return replies to open-ended questions that are right, and that are plainly wrong, from all
-    trajectories."""
+    """Return open-ended replies that are right, and plainly wrong ones, from all trajectories."""
     sure = [
         record
         for record in scored

@@ -40,8 +40,7 @@ _NEVER_OPEN_ENDED = re.compile(r"yes|no|\d+")
 
 
 class KnownAnswers:
-    """The gold answers of a run's open-ended questions by type, and the replies that they leave
-    open."""
+    """Gold answers of a run's open-ended questions by type, and the replies they leave open."""
 
     def __init__(self, records: Sequence[Record]) -> None:
         """Take all records of a run, failed ones too: their questions have answers all the same."""
@@ -70,7 +69,6 @@ def _is_accounted_for(piece: str, answers: Sequence[Answer], others: set[str]) -
 
 
 def _name(text: Answer) -> str:
-    """Return what an answer is known by: its letters alone, without a beginning such as "on
-    the"."""
+    """Return what an answer is known by: its letters, without a beginning such as "on the"."""
     words = " ".join(plain_form(str(text).lower()).split())
     return _BEGINNING.sub("", words).replace(" ", "")

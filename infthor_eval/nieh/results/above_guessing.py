@@ -23,8 +23,7 @@ SOLVED = 0.95
 
 
 class FormScore(msgspec.Struct, frozen=True):
-    """The questions of a form: their number, the run's mean score, and the mean of the best guesser
-    on them."""
+    """A form's questions: their number, the run's mean score, and the best guesser's mean."""
 
     n: int
     score: float

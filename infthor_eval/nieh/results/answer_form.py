@@ -29,8 +29,7 @@ class YesNo(msgspec.Struct, frozen=True):
 
 
 def yes_no(records: Sequence[Record]) -> YesNo:
-    """Return the bias on the yes/no questions among a task's: does a model always say yes, or
-    neither?"""
+    """Return the bias on a task's yes/no questions: is it always yes, or neither?"""
     binary = [record for record in records if _gold(record) in ({"yes"}, {"no"})]
     answers = Counter(says_yes_or_no(last_line(record.payload.reply or "")) for record in binary)
     n = len(binary)
@@ -43,8 +42,7 @@ def yes_no(records: Sequence[Record]) -> YesNo:
 
 
 def format_failures(records: Sequence[Record], max_new_tokens: int | None) -> dict[str, int]:
-    """Count a task's replies that are not of the form asked for, by reason; one with two faults
-    counts in both."""
+    """Count replies not of the form asked for, by reason; one with two faults counts twice."""
     counts: Counter[str] = Counter()
     for record in records:
         if record.payload.reply is not None:

@@ -43,8 +43,7 @@ class Series:
 
 
 def effective_lengths(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return a table with a row per model, kind of context and scorer; none without a run on the
-    clue frames."""
+    """Return a table by model, kind of context and scorer; none without a run on clues."""
     rows = []
     for series in find_series(runs):
         by_score = {point.length: point.score for point in series.points}
@@ -95,8 +94,7 @@ def _is_lost(score: float, base: float) -> bool:
 
 
 def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:
-    """Yield the series of each model that has also been asked on the clue frames of the same
-    set."""
+    """Yield the series of each model that was also asked on the same set's clue frames."""
     by_subject: dict[str, list[tuple[RunSummary, str, TaskSummary]]] = {}
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
@@ -128,8 +126,7 @@ def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:
 def _lengths(
     items: Sequence[tuple[RunSummary, str, TaskSummary]],
 ) -> dict[str, list[tuple[float, TaskSummary]]]:
-    """Return the tasks by kind of context, each with its size in thousand tokens (0: binned),
-    ascending."""
+    """Return tasks by kind of context, with their thousand tokens (0: binned), ascending."""
     chosen: dict[str, list[tuple[float, TaskSummary]]] = {}
     for run, name, task in items:
         size = run.header.config.tasks[name].dataset_kwargs.get("ctx_size")

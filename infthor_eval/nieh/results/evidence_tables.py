@@ -21,8 +21,7 @@ _WITH_INTERVAL = "In brackets: 95 % interval, clustered by trajectory; in parent
 
 
 def evidence_tables(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return the tables by share of the clue frames shown and by distance of the last clue, as far
-    as they are known.
+    """Return the tables by share of the clue frames shown and last clue's distance, where known.
 
     A task that shows all evidence of all samples is not in the first, which would say nothing of
     it.

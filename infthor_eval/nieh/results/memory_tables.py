@@ -43,8 +43,7 @@ def memory_tables(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def _rows(runs: Sequence[RunSummary]) -> Iterator[tuple[tuple[str | int, ...], Row]]:
-    """Yield rows with their place: by subject and task, the budgets of a memory below each
-    other."""
+    """Yield rows with their place: by subject and task, a memory's budgets below each other."""
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():

@@ -141,8 +141,7 @@ def _reply(question: Question, model: str, replies: Mapping[str, str | None]) ->
 
 
 def write_inspection_list(path: Path, items: Iterable[JudgedQuestion]) -> Path | None:
-    """Write the questions that a person must decide on; the person fills the last column with keep
-    or drop.
+    """Write the questions for a person to decide on, who fills the last column: keep or drop.
 
     Decisions in an existing list are kept. A list with decisions on other questions is renamed, and
     its new path is returned; else None.

@@ -24,8 +24,7 @@ INSPECTION = "inspection.csv"
 
 
 def check_output(out: Path, data: NiehSet) -> None:
-    """Refuse an output folder whose contents the validated set would damage; called before the
-    models run.
+    """Refuse an output folder that the validated set would damage, before the models run.
 
     Raises:
         UsageError: it is the folder of the set itself.

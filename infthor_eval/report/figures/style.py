@@ -105,8 +105,7 @@ def looks_of(labels: Iterable[str], together: Iterable[Collection[str]] = ()) ->
 
 
 def save_figure(draw: Callable[[], Figure], folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and SVG and return the files' paths; the same figure gives the same
-    bytes of SVG.
+    """Write a figure as PNG and SVG (equal bytes for equal figures) and return the files' paths.
 
     Args:
         draw: draws the figure; called with the style in effect.
@@ -122,8 +121,7 @@ def save_figure(draw: Callable[[], Figure], folder: Path, name: str) -> list[Pat
 
 
 def inline_svg(draw: Callable[[], Figure]) -> str:
-    """Return a figure as an element of a page, in the page's colours (light or dark) and no wider
-    than its column."""
+    """Return a figure for a page, in its colours (light or dark), no wider than its column."""
     with _in_style(_PAGE_SETTINGS):
         text = io.StringIO()
         figure = draw()
@@ -139,8 +137,7 @@ def inline_svg(draw: Callable[[], Figure]) -> str:
 
 @contextmanager
 def _in_style(more: dict[Any, Any] | None = None) -> Iterator[None]:
-    """Apply the style, instead of the user's settings of matplotlib, which would change the
-    picture."""
+    """Apply the style instead of the user's settings of matplotlib, which change the picture."""
     with matplotlib.rc_context(), warnings.catch_warnings():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS | (more or {}))
@@ -171,8 +168,7 @@ def add_legend(axes: Axes, entries: Sequence[tuple[str, Look]]) -> None:
 
 
 def add_words(figure: Figure, heading: Sequence[str], notes: Sequence[str], width: float) -> None:
-    """Write the lines of the heading above the panels, and the notes below them; `width` is the
-    figure's, in inches."""
+    """Write the heading above the panels, and the notes below; `width` is the figure's, inches."""
     settings: dict[str, Any] = {"x": 0.01, "ha": "left"}
     wrapped = [
         part for line in heading for part in textwrap.wrap(printable(line), round(width * 12))

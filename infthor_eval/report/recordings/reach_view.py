@@ -100,8 +100,7 @@ class _Pane:
         _draw_dot(pen, (x, y), 6 * OVERSAMPLING, _HAND)
 
     def _write_names(self, pen: ImageDraw.ImageDraw) -> None:
-        """Write each name in the middle of its object; beside it if it is small and the instruction
-        names it."""
+        """Write names in their objects; beside them if small and named by the instruction."""
         occupied: list[tuple[float, float]] = []
         for nearby in sorted(self._items, key=lambda nearby: not nearby.is_named):
             face = font(13, "-Bold") if nearby.is_named else font(12)

@@ -217,8 +217,7 @@ class _Name(NamedTuple):
 
 
 def _name(shape: MapObject, scale: _Scale, size: int) -> _Name | None:
-    """Place a name in the object's box, or beside it if the plan names it and the box is too
-    small."""
+    """Place a name in the object's box; beside it if the plan names it and the box is small."""
     face = font(14, "-Bold") if shape.is_named else font(12)
     x, y = scale.at(_middle(shape))
     wide, high = (
@@ -258,8 +257,7 @@ def _middle(shape: MapObject) -> Point:
 def _draw_legend(
     pen: ImageDraw.ImageDraw, legend: Sequence[tuple[float, str, str]], size: int
 ) -> None:
-    """Draw the dots of the legend; its text is written into the final picture, as letters need no
-    oversampling."""
+    """Draw the legend's dots; its letters need no oversampling, and go into the final picture."""
     fine = size * OVERSAMPLING
     radius = 6 * OVERSAMPLING
     y = (size - _LEGEND / 2) * OVERSAMPLING

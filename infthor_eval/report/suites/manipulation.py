@@ -98,8 +98,7 @@ def _model_runs(runs: Sequence[ReportRun]) -> list[ArmRun]:
 
 
 def _runs_by_radius(runs: Sequence[ReportRun]) -> list[ArmRun]:
-    """Runs named after their models and radii, or by all options that differ if that is
-    ambiguous."""
+    """Runs named after models and radii, or by all options that differ if that is ambiguous."""
     named = label_by_radius(_model_runs(runs))
     return (
         named

@@ -74,8 +74,7 @@ def _by_clues(task: str, lines: Sequence[_Line]) -> Chart:
 
 
 def _by_evidence(task: str, lines: Sequence[_Line]) -> Iterator[Chart]:
-    """Draw accuracy by the share of the clue frames that were shown, and by distance of the last
-    clue; by file."""
+    """Draw accuracy by share of the clues shown and by distance of the last clue; by file."""
     for file in lines[0].task.evidence:
         of_file = f"{task}, {short_name(file)}" if len(lines[0].task.evidence) > 1 else task
 
@@ -110,8 +109,7 @@ def _by_columns(
     cells_of: Callable[[_Line], Mapping[str, Cell]],
     label: str,
 ) -> Chart:
-    """Draw a column per name, with the dots of all lines; the counts are those of the first
-    line."""
+    """Draw a column per name, with the dots of all lines and the counts of the first."""
 
     def draw() -> Figure:
         figure = Figure(figsize=(_PANEL[0] + LEGEND, _PANEL[1]), layout="constrained")
@@ -191,8 +189,7 @@ def _describe(lines: Sequence[_Line]) -> str:
 
 
 def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
-    """Draw the gain of each run over blank frames, a row per task; None if no run on blank frames
-    is among them."""
+    """Draw each run's gain over blank frames, a row per task; None without a run on blank ones."""
     summaries = [run.summary for run in runs]
     rows = []
     for gain in find_gains(summaries):
@@ -244,8 +241,7 @@ def _by_rows(
 
 
 def _heat_map(run: ReportRun) -> Chart | None:
-    """Draw accuracy by depth of the needle and size of the context; None if no task of the run has
-    depths."""
+    """Draw accuracy by depth of the needle and context size; None if no task has depths."""
     tasks: dict[int, TaskSummary] = {}
     for name, task in run.summary.summary.tasks.items():
         if any(variant.startswith(_DEPTH) for variant in task.by_variant):

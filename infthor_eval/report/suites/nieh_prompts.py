@@ -101,8 +101,7 @@ def _film(part: ContextPart, positions: Mapping[FrameRef, int], ablation: str) -
 def _frames(
     what: str, frames: Sequence[FrameRef], positions: Mapping[FrameRef, int], ablation: str
 ) -> PromptFrames:
-    """Return frames by their places; frames of another trajectory, blank or decoded ones have none
-    in this one."""
+    """Return frames by their positions; those of other trajectories, blank or decoded have none."""
     frame_positions = [positions.get(frame) for frame in frames]
     own = [position for position in frame_positions if position is not None]
     is_own = len(own) == len(frame_positions)

@@ -161,8 +161,7 @@ def _data(page: Page) -> Markup:
 
 
 def _share_details(samples: list[Any]) -> tuple[list[Any], list[tuple[str, str]]]:
-    """Return samples with the numbers of their details, and the details: many samples have the
-    same."""
+    """Return samples with numbers of details, and the details: many have the same."""
     facts: Numbered[tuple[str, str]] = Numbered()
     for sample in samples:
         for result in filter(None, sample["results"]):

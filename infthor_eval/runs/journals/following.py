@@ -66,8 +66,7 @@ class FollowedJournal:
         return self.log.header
 
     def read(self) -> bool:
-        """Read what is new; return whether there was anything. A last line without its end is left
-        for the next time.
+        """Read what is new; return whether there was any. A line without its end is left for later.
 
         Raises:
             DataError: a line is bad.
@@ -114,8 +113,7 @@ class FollowedJournal:
 
 
 def is_written(run: Path) -> bool | None:
-    """Return whether a process of this machine holds a journal, as runs do while they go on; None
-    if that is not known.
+    """Return whether a process here holds a journal, as a run does; None if that is not known.
 
     The system's list of locks is read: to try a lock would be to hold it for a moment, and a run
     that starts in that moment would be refused.

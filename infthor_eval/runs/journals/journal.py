@@ -110,21 +110,18 @@ class Journal(Generic[Payload]):
         return self._log.records
 
     def find_record(self, key: UnitKey, fingerprint: str) -> UnitRecord[Payload] | None:
-        """Return the record of a unit with a result from these inputs; a failed unit is tried again
-        by the next run."""
+        """Return a unit's result from these inputs; a failed one is tried again by the next run."""
         record = self._log.units.get(key)
         if record is None or record.failure is not None or record.fingerprint != fingerprint:
             return None
         return record
 
     def latest_records(self, keys: Iterable[UnitKey]) -> tuple[UnitRecord[Payload], ...]:
-        """Return the latest records of these units, failed ones included; units without a record
-        are left out."""
+        """Return these units' latest records, failed ones included; some may have none."""
         return tuple(self._log.units[key] for key in keys if key in self._log.units)
 
     def result_of(self, key: UnitKey) -> UnitRecord[Payload] | None:
-        """Return the latest record of a unit if it has a result, from whatever inputs, else
-        None."""
+        """Return a unit's latest record if it has a result, from whatever inputs, else None."""
         record = self._log.units.get(key)
         return None if record is None or record.failure is not None else record
 
@@ -133,8 +130,7 @@ class Journal(Generic[Payload]):
         self._log.add(record)
 
     def add_from(self, worker: int, record: UnitRecord[Payload]) -> None:
-        """Add a record that a worker has put on disk; where its shard is not visible here, write it
-        into this one.
+        """Add a worker's record; where its shard is not visible here, write it into this one.
 
         Raises:
             DataError: it cannot be written.
@@ -150,13 +146,11 @@ class Journal(Generic[Payload]):
             read_shard(path, self._types, self._log)
 
     def holds(self, record: UnitRecord[Payload]) -> bool:
-        """Return whether this very object is in the journal: a record that the suite found there
-        and yielded as is."""
+        """Return whether this very object is in the journal: found there and yielded as it is."""
         return self._log.units.get(record.key) is record
 
     def append(self, record: UnitRecord[Payload]) -> UnitRecord[Payload]:
-        """Write a record; it is on disk when this returns. The returned record has the number of
-        its attempt.
+        """Write a record to disk before returning it with the number of its attempt.
 
         Raises:
             DataError: it cannot be written, or the shard was deleted or replaced.
@@ -242,8 +236,7 @@ def _lock(file: BinaryIO | FileIO, path: Path, wait_s: float = 0.0) -> None:
 
 
 def recover(run: Path, header: RunHeader, types: RecordTypes[Any]) -> int:
-    """Move the bad lines of a run's shards to a file beside them, so that their units are tried
-    again.
+    """Move the bad lines of a run's shards to a file beside them: their units are tried again.
 
     The header replaces a bad first line. Returns the number of bad lines.
 

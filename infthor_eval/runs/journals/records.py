@@ -64,8 +64,7 @@ class UnitKey(NamedTuple):
 
 
 class Tokens(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Tokens of a unit's requests, of those that were not encoded again, and of its replies; None
-    if not counted."""
+    """Tokens of a unit's requests, of those not encoded again, and of replies; None: not counted."""
 
     context: Count | None = None
     cached: Count | None = None
@@ -149,8 +148,7 @@ class ArtifactRecord(
     tag_field="type",
     tag="artifact",
 ):
-    """A cached artifact: an intermediate result of a suite that a resumed run does not compute
-    again.
+    """A cached artifact: a suite's intermediate result, which a resumed run does not repeat.
 
     Attributes:
         fingerprint: hash of all its inputs, by which it is looked up.
@@ -190,8 +188,7 @@ class RecordTypes(Generic[Payload_co]):
 
 
 def describe_failure(error: Exception) -> str:
-    """Return the message of an expected error, or type, place and message of another exception, in
-    one line."""
+    """Return an expected error's message; another's type, place and message, in one line."""
     if isinstance(error, InfthorError):
         return str(error)
     return f"{describe_exception(error)}; fix the suite and run the same command again"
@@ -212,8 +209,7 @@ class Unit(Generic[Payload]):
     payload: Payload
 
     def without_inputs(self) -> "Unit[Payload]":
-        """Return what can record its failure in another process, without the inputs that only the
-        suite needs."""
+        """Return what records its failure in another process, without the suite's own inputs."""
         return Unit(self.key, self.cluster, self.payload)
 
     def record(self, fingerprint: str, payload: Payload, **envelope: Any) -> UnitRecord[Payload]:

@@ -41,8 +41,7 @@ class JournalSession(Generic[Payload]):
         self.journal.cache_artifact(fingerprint, artifact, usage)
 
     def append_new(self, record: UnitRecord[Payload]) -> tuple[UnitRecord[Payload], bool]:
-        """Put a suite's record on disk unless it is there already; return it, and True if it was
-        there."""
+        """Put a suite's record on disk unless it is there; return it, and True if it was there."""
         if self.journal.holds(record):
             return record, True
         return self.journal.append(self._note_changed_inputs(record)), False

@@ -47,16 +47,14 @@ _HINT = (
 
 @dataclass
 class RunLog(Generic[Payload]):
-    """The contents of all shards of a run: latest records of units, and artifacts by
-    fingerprint."""
+    """The contents of all shards: latest records of units, and artifacts by fingerprint."""
 
     header: RunHeader | None = None
     units: dict[UnitKey, UnitRecord[Payload]] = field(default_factory=dict)
     artifacts: dict[str, ArtifactRecord[Any]] = field(default_factory=dict)
 
     def add(self, record: UnitRecord[Payload] | ArtifactRecord[Any]) -> None:
-        """Add a record. Of several of one unit the last attempt counts; of one attempt by two
-        workers, the result."""
+        """Add a record: a unit's last attempt counts; of one attempt by two workers, the result."""
         if isinstance(record, ArtifactRecord):
             self.artifacts[record.fingerprint] = record
             return
@@ -220,8 +218,7 @@ def parse_record(
 
 
 def read_lines(path: Path) -> list[bytes]:
-    """Return the complete lines of a shard; a last line without its end is still being written, or
-    never will be."""
+    """Return a shard's complete lines: a last one without its end may still be being written."""
     content = read_bytes(path, "restore the file")
     return content[: content.rfind(b"\n") + 1].splitlines()
 
@@ -231,8 +228,7 @@ class _AnyFormat(msgspec.Struct):
 
 
 def check_format(path: Path, line: bytes) -> None:
-    """Refuse a shard whose first line is the header of another format; a line that is no header
-    passes.
+    """Refuse a shard whose first line is a header of another format; any other line passes.
 
     Raises:
         DataError: names both formats, and what to do.

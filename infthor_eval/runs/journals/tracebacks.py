@@ -32,8 +32,7 @@ class TracebackFile:
         self._lock = Lock()
 
     def append(self, key: UnitKey, attempt: int, error: Exception) -> str:
-        """Append the traceback of an unexpected exception, or of the cause of a `UserCodeError`,
-        that failed a unit.
+        """Append the traceback of an unexpected exception, or of a `UserCodeError`'s cause.
 
         Returns:
             Name of the file within the run's folder; empty for an expected error, which needs no

@@ -100,8 +100,7 @@ def read_options(path: Path) -> dict[str, Any]:
 
 
 def _options_of(request: RunRequest) -> dict[str, Any]:
-    """Return all options of a request. Keys of servers are none: they come from the environment
-    only."""
+    """Return a request's options. Keys of servers are none: they come from the environment."""
     tasks = request.tasks
     model_options = dict(request.model_options)
     if _CHECKPOINT in model_options:
@@ -135,8 +134,7 @@ def _non_default(options: Any) -> dict[str, Any]:
 
 
 def _absolute(text: str) -> str:
-    """Return a path that exists as an absolute one, which holds in any folder; a name of the hub as
-    it is."""
+    """Return a path that exists as an absolute one, for any folder; a name of the hub as it is."""
     return str(Path(text).absolute()) if Path(text).exists() else text
 
 

@@ -86,8 +86,7 @@ def _load_subject(run: PreparedRun[SuiteUnit, Payload]) -> Subject:
 
 
 def require_capability(subject: Subject, name: str, suite: Suite[SuiteUnit, Payload]) -> None:
-    """Refuse a subject, by the name that it was requested by, that lacks what a suite needs
-    (UsageError)."""
+    """Refuse a subject, by its requested name, that lacks what a suite needs (UsageError)."""
     kind, description = _NEEDED[suite.needs]
     if not isinstance(subject, kind):
         raise UsageError(f"{name} cannot be evaluated on {suite.name}, which needs {description}")

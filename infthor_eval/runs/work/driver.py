@@ -27,8 +27,7 @@ class Observer(Protocol):
     """Follows a run."""
 
     def begin(self, workload: Workload[Unit[Any]], n_recovered: int) -> None:
-        """Called before the first unit, with all the work and the number of bad lines taken out of
-        the journal."""
+        """Called before the first unit, with all the work and the number of bad lines removed."""
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
         """Called for each unit; `resumed` if its record is that of an earlier, stopped run."""
@@ -136,8 +135,7 @@ def _write_results(
     workload: Workload[Unit[Any]],
     journal: Journal[Payload],
 ) -> tuple[RunSummary, list[UnitRecord[Payload]], Usage]:
-    """Write the results of the units that the journal has by now; return summary, records and
-    usage."""
+    """Write the results of the units in the journal; return summary, records and usage."""
     # The journal may hold more.
     keys = {unit.key for group in workload.groups for unit in group.units}
     records = [record for record in journal.records if record.key in keys]

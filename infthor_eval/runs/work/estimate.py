@@ -75,8 +75,7 @@ class Quantities:
 
 @dataclass(frozen=True)
 class _MeasuredGroup:
-    """The frames of a group, task and quantities of each measured unit, and task and reason of each
-    failed one."""
+    """A group's frames, task and quantities of measured units, task and reason of failed ones."""
 
     frames: int
     quantities: Sequence[tuple[str, Quantities]]
@@ -96,8 +95,7 @@ class TaskEstimate:
 
 @dataclass(frozen=True)
 class Estimate:
-    """The estimate of a run by task (none if all measured units failed), and task and reason of
-    each failed unit."""
+    """A run's estimate by task (none if all failed), and task and reason of each failed unit."""
 
     workload: Workload
     tasks: Sequence[TaskEstimate]
@@ -105,8 +103,7 @@ class Estimate:
 
 
 class _MeasuringSession:
-    """A `Session` without records, as every unit is to be measured; artifacts are cached in
-    memory."""
+    """A `Session` without records: every unit is measured; artifacts are cached in memory."""
 
     def __init__(self) -> None:
         self._artifacts: dict[str, Any] = {}
@@ -154,8 +151,7 @@ def estimate_run(
 def _measure(
     evaluation: BoundEvaluation[SuiteUnit, Payload], n_units: int
 ) -> Iterator[_MeasuredGroup]:
-    """Do a few units of each task: of groups of all sizes, the first, the middle and the last
-    unit."""
+    """Do a few units of each task: of groups of all sizes, the first, middle and last unit."""
     session = _MeasuringSession()
     for group in _choose_groups(
         evaluation.workload.groups, max(1, round(n_units / _UNITS_OF_A_GROUP))
@@ -190,8 +186,7 @@ def _choose_groups(groups: Sequence[Group[SuiteUnit]], n: int) -> Iterator[Group
 def estimate_tasks(
     workload: Workload[Unit[Any]], measured: Sequence[_MeasuredGroup]
 ) -> list[TaskEstimate]:
-    """Estimate each task of a workload by measured groups of it, with at least one unit that has
-    not failed."""
+    """Estimate each task of a workload by measured groups with a unit that has not failed."""
     later = _later_units(measured)
     excess = _first_unit_excess(measured, later)
     estimates = []
@@ -213,8 +208,7 @@ def estimate_tasks(
 
 
 def _later_units(measured: Sequence[_MeasuredGroup]) -> Mapping[str, Quantities]:
-    """Return the mean quantities of units that are not the first of their group, by task; under ""
-    of all tasks."""
+    """Return mean quantities of units not first in their group, by task; under "" of all tasks."""
     by_task: dict[str, list[Quantities]] = {}
     for group in measured:
         for task, quantities in group.quantities[1:] or group.quantities:
@@ -226,8 +220,7 @@ def _later_units(measured: Sequence[_MeasuredGroup]) -> Mapping[str, Quantities]
 def _first_unit_excess(
     measured: Sequence[_MeasuredGroup], later: Mapping[str, Quantities]
 ) -> Callable[[Group[Unit[Any]]], Quantities]:
-    """Return a function of a group: the excess of a first unit over a later one per frame, in
-    groups of its task."""
+    """Return a function of a group: a first unit's excess over later ones per frame in its task."""
     totals: dict[str, Quantities] = {}
     frames: Counter[str] = Counter()
     for group in measured:

@@ -36,8 +36,7 @@ class Executor(Protocol[Payload]):
     def evaluate(
         self, folder: Path, journal: Journal[Payload], should_stop: Callable[[], bool]
     ) -> Iterator[tuple[UnitRecord[Payload], bool]]:
-        """Do all groups, or stop after the units in hand; yield every record as soon as it is on
-        disk."""
+        """Do all groups, or stop after the units in hand; yield each record once it is on disk."""
 
     def samples(self, records: Sequence[UnitRecord[Payload]]) -> Iterator[UnitSample]:
         """Convert records for other readers, in their order; not after `close`."""

@@ -15,8 +15,7 @@ def run_groups(
     do: Callable[[Group[SuiteUnit]], Iterable[UnitRecord[Payload]]],
     max_in_flight: int,
 ) -> Iterator[UnitRecord[Payload]]:
-    """Yield the records of all groups as soon as they are there; several in flight are done in a
-    thread each."""
+    """Yield all groups' records when they are there; several in flight have a thread each."""
     if max_in_flight == 1 or len(groups) <= 1:
         for group in groups:
             yield from do(group)

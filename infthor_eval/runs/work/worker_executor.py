@@ -49,8 +49,7 @@ _BATCH = 256  # records that a worker converts at a time
 
 @dataclass(frozen=True)
 class _Greeting:
-    """What the driver learns from a worker before it hands out work: units without what only the
-    suite needs."""
+    """What a worker tells before it gets work: units without what only the suite needs."""
 
     header: RunHeader
     workload: Workload[Unit[Any]]
@@ -145,8 +144,7 @@ class _Evaluator(Generic[SuiteUnit, Payload]):
 
 @dataclass(frozen=True)
 class _Progress(Generic[Payload]):
-    """The state of a run that all its portions share; `done` are the units whose records were
-    yielded."""
+    """A run's state that all portions share; `done` are the units whose records were yielded."""
 
     folder: Path
     journal: Journal[Payload]
@@ -209,8 +207,7 @@ class WorkerPoolExecutor(Generic[SuiteUnit, Payload]):
     def _do_portions(
         self, portions: Sequence[_Portion], progress: _Progress[Payload], max_losses: int
     ) -> Generator[tuple[UnitRecord[Payload], bool], None, dict[_Portion, str]]:
-        """Have portions done; yield the records, and return the portions that were given up, with
-        the reason."""
+        """Have portions done; yield records, and return those given up, with the reason."""
         journal = progress.journal
         given_up: dict[_Portion, str] = {}
 
@@ -262,8 +259,7 @@ class WorkerPoolExecutor(Generic[SuiteUnit, Payload]):
         self._pool.close()
 
     def _check_config(self, greeting: _Greeting) -> None:
-        """Refuse a worker that would evaluate something else: another version, a model that has
-        changed."""
+        """Refuse a worker that would evaluate something else: another version, a changed model."""
         theirs = greeting.header.config
         if self._expected is None:
             self._expected = theirs
