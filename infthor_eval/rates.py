@@ -24,7 +24,7 @@ __all__ = [
 
 
 class Rate(msgspec.Struct, frozen=True):
-    """The mean of n values, its 95 % interval clustered by trajectory (None with fewer than two)."""
+    """The mean of n values and its 95 % interval by trajectory (None with fewer than two)."""
 
     mean: float
     low: float | None

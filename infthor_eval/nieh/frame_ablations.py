@@ -57,7 +57,7 @@ class FrameAblation:
         elif self.frames == "shuffled":
             replacements = self._shuffle(frames, sample.question.traj_id)
         else:
-            replacements = self._of_another(frames, data, context, sample)
+            replacements = self._frames_elsewhere(frames, data, context, sample)
         left = iter(replacements)
         return [_with_frames(part, [next(left) for _ in _frames_in(part)]) for part in parts]
 
@@ -71,7 +71,7 @@ class FrameAblation:
             draw.shuffle(shuffled)
         return shuffled
 
-    def _of_another(
+    def _frames_elsewhere(
         self, frames: Sequence[FrameRef], data: NiehSet, context: Context, sample: Sample
     ) -> list[FrameRef]:
         """Return another trajectory's frames at the same positions, modulo its length."""

@@ -48,7 +48,8 @@ def decoding_of(settings: Mapping[str, Any], seed: int, task: str) -> Decoding:
     top_p = _number(settings.get("top_p", 1.0), "top_p", task)
     setting = settings.get("repetition_penalty")
     penalty = None if setting is None else _number(setting, "repetition_penalty", task)
-    stop, choices = (_texts(settings.get(name, ()), name, task) for name in ("until", "choices"))
+    stop = _texts(settings.get("until", ()), "until", task)
+    choices = _texts(settings.get("choices", ()), "choices", task)
     try:
         return Decoding(
             max_new_tokens=limit,

@@ -56,8 +56,8 @@ class Group:
     @property
     def share_yes(self) -> float | None:
         """Share of yes among the answers yes and no; None if there are none."""
-        yes, no = (self.answers[answer] for answer in _YES_NO)
-        return yes / (yes + no) if yes + no else None
+        n_yes_or_no = sum(self.answers[answer] for answer in _YES_NO)
+        return self.answers["yes"] / n_yes_or_no if n_yes_or_no else None
 
     @property
     def chance(self) -> float:

@@ -51,7 +51,9 @@ class _Pane:
             nearby for nearby in reach.objects if _is_in_view(nearby, reach, is_above=is_above)
         ]
         corners = [self._flat(reach.low), self._flat(reach.high)]
-        (left, right), (bottom, top) = (sorted(values) for values in zip(*corners, strict=True))
+        across, upward = zip(*corners, strict=True)
+        left, right = sorted(across)
+        bottom, top = sorted(upward)
         # One scale in both views, so that lengths can be compared.
         rises = [reach.high[0] - reach.low[0], reach.high[2] - reach.low[2]]
         self._per_metre = min(wide / (right - left), (high - _HEAD) / max(rises))
@@ -137,7 +139,8 @@ class _Pane:
     def _outline(self, nearby: NearbyObject) -> list[tuple[float, float]]:
         if self._is_above:
             return [self._fine((*corner, 0.0)) for corner in nearby.corners]
-        near, far = (choose(ahead for _, ahead in nearby.corners) for choose in (min, max))
+        depths = [ahead for _, ahead in nearby.corners]
+        near, far = min(depths), max(depths)
         corners = ((near, nearby.low), (near, nearby.high), (far, nearby.high), (far, nearby.low))
         return [self._fine((0.0, ahead, height)) for ahead, height in corners]
 

@@ -220,9 +220,8 @@ def _name(shape: MapObject, scale: _Scale, size: int) -> _Name | None:
     """Place a name in the object's box; beside it if the plan names it and the box is small."""
     face = font(14, "-Bold") if shape.is_named else font(12)
     x, y = scale.at(_middle(shape))
-    wide, high = (
-        (high - low) * scale.per_metre for low, high in zip(shape.low, shape.high, strict=True)
-    )
+    wide = (shape.high[0] - shape.low[0]) * scale.per_metre
+    high = (shape.high[1] - shape.low[1]) * scale.per_metre
     for text in (shape.name, "\n".join(_PARTS.findall(shape.name))):
         lines = text.split("\n")
         half = max(map(face.getlength, lines)) / 2

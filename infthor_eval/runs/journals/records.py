@@ -64,7 +64,7 @@ class UnitKey(NamedTuple):
 
 
 class Tokens(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Tokens of a unit's requests, of those not encoded again, and of replies; None: not counted."""
+    """Tokens of requests, of those not encoded again, and of replies; None if not counted."""
 
     context: Count | None = None
     cached: Count | None = None
