@@ -111,9 +111,9 @@ def doc_prompt(doc: Doc) -> str:
 def prompt_of(task_samples: TaskSamples, sample: Sample, *, videos: bool = False) -> str:
     """Return the text of a sample's request, with placeholders for frames (and videos if any)."""
     context, text = task_samples.request(sample)
-    shown = context if videos else as_images(context)
+    parts = context if videos else as_images(context)
     return "".join(
-        part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in (*shown, text)
+        part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in (*parts, text)
     )
 
 

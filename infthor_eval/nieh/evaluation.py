@@ -60,17 +60,17 @@ class NiehEvaluation:
         tokens = self._tokens_per_frame(answerer)
         tasks = {task.name: task for task in self._tasks}
         prepared = {name: task.prepare(tokens) for name, task in tasks.items()}
-        _refuse_empty([item.task_samples for item in prepared.values()], self._tasks)
+        _refuse_empty([ready.task_samples for ready in prepared.values()], self._tasks)
         answerer.fit(
             {name: partial(task.answer_key, prepared[name], tokens) for name, task in tasks.items()}
         )
-        costs = {name: answerer.cost(item) for name, item in prepared.items()}
+        costs = {name: answerer.cost(ready) for name, ready in prepared.items()}
         workload = Workload(
             groups=_groups(prepared, self._options.repeats),
             skipped=[
                 Skipped(UnitKey(name, skipped.question.id, skipped.variant), skipped.reason)
-                for name, item in prepared.items()
-                for skipped in item.task_samples.skipped
+                for name, ready in prepared.items()
+                for skipped in ready.task_samples.skipped
             ],
             config=self._config(
                 {
@@ -218,13 +218,13 @@ class BoundNieh:
 def _groups(prepared: Mapping[str, PreparedTask], repeats: int = 1) -> list[Group[NiehUnit]]:
     """Return a group per task and trajectory: its samples share what is encoded of that."""
     groups = []
-    for task, item in prepared.items():
-        ordered = sorted(item.task_samples.samples, key=lambda sample: sample.question.traj_id)
+    for task, ready in prepared.items():
+        ordered = sorted(ready.task_samples.samples, key=lambda sample: sample.question.traj_id)
         for _, samples in groupby(ordered, key=lambda sample: sample.question.traj_id):
             same = list(samples)
             frames = len({frame for sample in same for frame in sample.frames})
             units = [
-                NiehUnit.of(task, item.task_samples, sample, repeat)
+                NiehUnit.of(task, ready.task_samples, sample, repeat)
                 for sample in same
                 for repeat in range(1, repeats + 1)
             ]
@@ -276,7 +276,10 @@ def _refuse_empty(task_samples: Sequence[TaskSamples | None], tasks: Sequence[Ni
     if any(samples is None or samples.samples for samples in task_samples):
         return
     reasons = {
-        item.reason for samples in task_samples if samples is not None for item in samples.skipped
+        skipped.reason
+        for samples in task_samples
+        if samples is not None
+        for skipped in samples.skipped
     }
     listed = "; ".join(sorted(reasons)[:3]) or "its files are empty"
     raise UsageError(

@@ -134,5 +134,5 @@ def read_asked_tasks(root: Path, trajectories: Path | None = None) -> Iterator[A
             {"data": str(root), "tokens_per_frame": _QWEN_FRAME, "seed": 0, **settings, **more}
         )
         yield AskedTask(
-            name, len(samples.samples), Counter(item.reason for item in samples.skipped)
+            name, len(samples.samples), Counter(skipped.reason for skipped in samples.skipped)
         )

@@ -158,13 +158,13 @@ class OpenModel:
                 Notice(title="Question", words=requests[0].prepared.task_samples.words)
             )
         with wrap_request_errors(self._name):
-            if any(item.context != context for item in requests[1:]):
+            if any(request.context != context for request in requests[1:]):
                 self._go_to(())
                 return self._conversation.replies(
-                    [[*item.context, item.text] for item in requests], decoding
+                    [[*request.context, request.text] for request in requests], decoding
                 )
             self._go_to(context)
-            return self._conversation.replies([[item.text] for item in requests], decoding)
+            return self._conversation.replies([[request.text] for request in requests], decoding)
 
     def _go_to(self, context: tuple[Part, ...]) -> None:
         """Let the conversation be this context."""
@@ -196,7 +196,7 @@ class OpenBaseline:
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
         """See `OpenAnswerer`."""
-        return [Reply(self._predict(item.unit.sample)) for item in requests]
+        return [Reply(self._predict(request.unit.sample)) for request in requests]
 
     def usage(self, reply: Reply) -> Usage:
         """See `OpenAnswerer`."""
@@ -302,10 +302,10 @@ def _answer_in_batches(
     # those beside them.
     for batch in _batches(requests, answerer.batch_size):
         waiting = []
-        for item in batch:
-            record = _find_record(item, session)
+        for request in batch:
+            record = _find_record(request, session)
             if record is None:
-                waiting.append(item)
+                waiting.append(request)
             else:
                 yield record
         if waiting:
@@ -314,8 +314,8 @@ def _answer_in_batches(
 
 def _batches(requests: Sequence[_UnitRequest], size: int) -> Iterator[Sequence[_UnitRequest]]:
     """Yield batches of requests with one decoding: all first requests, then all second ones."""
-    for repeat in sorted({item.unit.key.repeat for item in requests}):
-        same = [item for item in requests if item.unit.key.repeat == repeat]
+    for repeat in sorted({request.unit.key.repeat for request in requests}):
+        same = [request for request in requests if request.unit.key.repeat == repeat]
         yield from (same[at : at + size] for at in range(0, len(same), size))
 
 
@@ -340,16 +340,16 @@ def _answer(
         replies = answerer.answer(requests)
     except (DataError, ModelError) as error:
         if len(requests) == 1:
-            (item,) = requests
-            yield item.unit.record_failure(
-                session.describe_failure(item.unit, error), item.fingerprint, faults=faults
+            (request,) = requests
+            yield request.unit.record_failure(
+                session.describe_failure(request.unit, error), request.fingerprint, faults=faults
             )
             return
-        for item in requests:  # one of them may be to blame; the others are answered
+        for request in requests:  # one of them may be to blame; the others are answered
             yield from _answer(
-                [item], answerer, session, (f"asked with {len(requests) - 1} others: {error}",)
+                [request], answerer, session, (f"asked with {len(requests) - 1} others: {error}",)
             )
         return
     seconds = (time.perf_counter() - start) / len(requests)
-    for item, reply in zip(requests, replies, strict=True):
-        yield item.record(reply, seconds, faults, answerer.usage(reply), session)
+    for request, reply in zip(requests, replies, strict=True):
+        yield request.record(reply, seconds, faults, answerer.usage(reply), session)

@@ -117,7 +117,7 @@ class Recaller:
         recall_s = time.perf_counter() - start
         check_recalled(recalled, past, settings.memory, settings.budget, settings.tokens_per_frame)
         result = NiehRecall(
-            recalled=tuple(item if isinstance(item, str) else item.number for item in recalled),
+            recalled=tuple(part if isinstance(part, str) else part.number for part in recalled),
             build_s=round(built.seconds, 4),
             recall_s=round(recall_s, 4),
         )
@@ -181,7 +181,7 @@ class Recaller:
 
 def apply_recall(sample: Sample, recall: NiehRecall) -> Sample:
     """Return a sample with what was recalled for it: these frames and the last one are shown."""
-    frames = [item for item in recall.recalled if isinstance(item, int)]
+    frames = [number for number in recall.recalled if isinstance(number, int)]
     return replace(sample, frames=(*frames, sample.frames[-1]), recalled=recall.recalled)
 
 
@@ -196,7 +196,7 @@ def recall_all(task_samples: TaskSamples) -> list[Sample]:
     kept: dict[str, NiehRecall] = {}
     recaller = Recaller(task_samples, None, kept.get, kept.__setitem__)
     by_trajectory = sorted(
-        enumerate(task_samples.samples), key=lambda item: item[1].question.traj_id
+        enumerate(task_samples.samples), key=lambda numbered: numbered[1].question.traj_id
     )
     with recaller.in_use():
         try:

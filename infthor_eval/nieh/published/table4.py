@@ -84,7 +84,9 @@ def _by_steps(data: NiehSet) -> list[str]:
     cells = []
     for name in CLUE_COLUMNS[:-1]:
         chosen = [
-            item.published for item in data.questions if item.clue_column == name and item.published
+            question.published
+            for question in data.questions
+            if question.clue_column == name and question.published
         ]
         counts = Counter(len(set(published.steps)) for published in chosen)
         cells.append(", ".join(f"{n_steps}: {count}" for n_steps, count in sorted(counts.items())))
@@ -93,7 +95,8 @@ def _by_steps(data: NiehSet) -> list[str]:
 
 def _mean(questions: Sequence[Question], match: str, data: NiehSet) -> MeanEstimate:
     scores = [
-        dict(item.published.matches).get(match) if item.published else None for item in questions
+        dict(question.published.matches).get(match) if question.published else None
+        for question in questions
     ]
     known = [score for score in scores if score is not None]
     if len(known) < len(scores):
@@ -102,7 +105,7 @@ def _mean(questions: Sequence[Question], match: str, data: NiehSet) -> MeanEstim
             f"{data.root}: no {match} for question {missing}; give the published question files, "
             "with all columns"
         )
-    return clustered_mean(known, [item.traj_id for item in questions])
+    return clustered_mean(known, [question.traj_id for question in questions])
 
 
 def _mean_cell(estimate: MeanEstimate) -> TableCell:

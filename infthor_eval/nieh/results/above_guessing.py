@@ -87,7 +87,11 @@ def above_guessing(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> Ab
         n_unknown=len(records) - len(known),
         forms=_by_form(known, scorer),
         solved_forms=sorted(
-            {_form(item) for item in known if score_above_guessing(item.payload, scorer) is None}
+            {
+                _form(record)
+                for record in known
+                if score_above_guessing(record.payload, scorer) is None
+            }
         ),
     )
 
