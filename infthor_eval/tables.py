@@ -31,12 +31,12 @@ class TableCell(str):
 
 
 def interval_cell(
-    low: float | None, high: float | None, form: str = ".1f", pattern: str = "[{}, {}]"
+    low: float | None, high: float | None, number_format: str = ".1f", pattern: str = "[{}, {}]"
 ) -> TableCell:
     """Return an interval's cell, its formatted ends in the pattern; `-` if there is none."""
     if low is None or high is None:
         return TableCell("-", {"low": "", "high": ""})
-    ends = {"low": f"{low:{form}}", "high": f"{high:{form}}"}
+    ends = {"low": f"{low:{number_format}}", "high": f"{high:{number_format}}"}
     return TableCell(pattern.format(*ends.values()), ends)
 
 

@@ -112,36 +112,36 @@ class NiehEvaluation:
 
     def _refuse_unused(self) -> None:
         """Refuse options without effect: they would only change the run's config, or mislead."""
-        asked = ", ".join(task.name for task in self._tasks)
+        names = ", ".join(task.name for task in self._tasks)
         measured = any(task.needs_size for task in self._tasks)
         for name in ("k_tokens", "tokens_per_frame"):
             value = getattr(self._options, name)
             if value is not None and not measured:
                 raise UsageError(
-                    f"--{name.replace('_', '-')} {value}: no context of {asked} has a size in "
+                    f"--{name.replace('_', '-')} {value}: no context of {names} has a size in "
                     "tokens; leave it out, or ask nieh_haystack or nieh_truncate_head"
                 )
         for name, value in self._memory().items():
             if not any(task.takes_memory for task in self._tasks):
                 raise UsageError(
-                    f"--{name.replace('_', '-')} {value}: no task of {asked} leaves its memory "
+                    f"--{name.replace('_', '-')} {value}: no task of {names} leaves its memory "
                     "open; leave it out, or ask nieh_memory"
                 )
         if self._options.prompt is not None and not any(task.takes_prompt for task in self._tasks):
             raise UsageError(
-                f"--prompt {self._options.prompt}: no task of {asked} leaves its words open; leave "
+                f"--prompt {self._options.prompt}: no task of {names} leaves its words open; leave "
                 "it out, or ask nieh_full"
             )
         if (self._options.retriever or self._options.retriever_revision) and not self._depends_on(
             "retriever"
         ):
             raise UsageError(
-                f"--retriever: no context of {asked} retrieves frames; leave it out, or ask "
+                f"--retriever: no context of {names} retrieves frames; leave it out, or ask "
                 "nieh_clip_retrieval or nieh_memory_frames, or --memory clip"
             )
         if self._options.trajectories and not self._depends_on("trajectories"):
             raise UsageError(
-                f"--trajectories: no context of {asked} tells of the trajectory beside its frames; "
+                f"--trajectories: no context of {names} tells of the trajectory beside its frames; "
                 "leave it out, or ask nieh_interleaved or nieh_text_state"
             )
 

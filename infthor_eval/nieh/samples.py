@@ -143,10 +143,12 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
     frame_ablation = FrameAblation(settings.frames, settings.seed)
     frame_ablation.check(data)
     items = [
-        item for of_question in _by_question(data, context, settings, limit) for item in of_question
+        sample
+        for of_question in _by_question(data, context, settings, limit)
+        for sample in of_question
     ]
-    samples = [item for item in items if isinstance(item, Sample)]
-    skipped = [item for item in items if isinstance(item, SkippedQuestion)]
+    samples = [sample for sample in items if isinstance(sample, Sample)]
+    skipped = [sample for sample in items if isinstance(sample, SkippedQuestion)]
     sources = context.sources(data, settings)
     return TaskSamples(
         data, config["context"], context, samples, skipped, sources, frame_ablation, settings.prompt

@@ -163,7 +163,7 @@ def check_task_file(file: TaskFile) -> None:
     raw = file.settings["dataset_kwargs"]
     if not isinstance(raw, Mapping) or not isinstance(raw.get("context"), str):
         raise DataError(f"{location} must be a mapping with the name of a context (context: NAME)")
-    known = (*_OF_SETS, *(item.name for item in fields(ContextSettings)))
+    known = (*_OF_SETS, *(setting.name for setting in fields(ContextSettings)))
     for key in raw:
         if key not in known:
             near = difflib.get_close_matches(str(key), known, n=1)

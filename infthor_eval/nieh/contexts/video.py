@@ -69,7 +69,9 @@ def video_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> li
 def as_images(parts: Iterable[ContextPart]) -> list[ContextPart]:
     """Return parts with each video's frames in its place, for a model without a video input."""
     return [
-        item for part in parts for item in (part.frames if isinstance(part, Video) else (part,))
+        shown_part
+        for part in parts
+        for shown_part in (part.frames if isinstance(part, Video) else (part,))
     ]
 
 

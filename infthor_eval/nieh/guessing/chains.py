@@ -55,9 +55,9 @@ def chains_of_words_and_place(sample: Sample) -> list[Chain]:
     """Return the chains of words, and of the last clue's place and the clues' span."""
     stem = words_of(sample.question)[:_STEM]
     first, last = sample.frames[0], sample.frames[-1]
-    place = ("place", *stem, last // _PLACE)
+    last_clue = ("place", *stem, last // _PLACE)
     span = ("span", *stem, (last - first).bit_length())
-    return [*chains_of_words(sample), [("stem", *stem), place], [("stem", *stem), span]]
+    return [*chains_of_words(sample), [("stem", *stem), last_clue], [("stem", *stem), span]]
 
 
 def words_of(question: Question) -> list[str]:
@@ -97,7 +97,7 @@ class Guesser:
                 np.log(self._probability(chain, counts, group)) for chain in self._chains(sample)
             ]
         known = np.flatnonzero(counts)
-        total = prior[known] + sum(item[known] - prior[known] for item in evidence)
+        total = prior[known] + sum(logs[known] - prior[known] for logs in evidence)
         return self._answers[known[np.argmax(np.round(total, _DIGITS))]]
 
     def _count(self, sample: Sample) -> None:

@@ -226,7 +226,9 @@ def _add_log(
             run.records.append(_record(run.task, question, row, known))
             run.rescored += _compare_scores(log, row, run.records[-1])
     if len(run.records) == n_before:
-        reasons = "; ".join(dict.fromkeys(item.reason for item in refused[:3])) or "it is empty"
+        reasons = (
+            "; ".join(dict.fromkeys(refusal.reason for refusal in refused[:3])) or "it is empty"
+        )
         raise UsageError(
             f"{log}: no row answers a question of this set ({reasons}); give the set that it is "
             "about"
@@ -252,10 +254,10 @@ def _find_question(
     if row.row is None or not 0 <= row.row < len(questions):
         return f"answers question {row.row}; the file has {len(questions)}"
     question = questions[row.row]
-    said = row.published
+    published = row.published
     if isinstance(question, SkippedQuestion):
         return question.reason
-    if said and (said.traj_id, said.text, said.clues, said.answers) != (
+    if published and (published.traj_id, published.text, published.clues, published.answers) != (
         question.traj_id,
         question.text,
         question.clues,

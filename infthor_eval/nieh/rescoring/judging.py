@@ -227,8 +227,8 @@ def judge_replies(
         right=_count(right, verdicts),
         wrong=_count(wrong, verdicts),
     )
-    found = {record.key: verdicts.get(record.key) or 0.0 for record in unsure}
-    scores = {r.key: max(found.get(r.key, 0.0), r.payload.scores["strict"]) for r in scored}
+    judged = {record.key: verdicts.get(record.key) or 0.0 for record in unsure}
+    scores = {r.key: max(judged.get(r.key, 0.0), r.payload.scores["strict"]) for r in scored}
     return Judgement(scores, agreement, failures)
 
 

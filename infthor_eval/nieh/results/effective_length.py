@@ -134,7 +134,7 @@ def _lengths(
             chosen.setdefault(task.context, []).append((float(size), task))
         elif task.context == "trajectory":
             chosen.setdefault(task.context, []).append((0.0, task))
-    return {context: sorted(tasks, key=lambda item: item[0]) for context, tasks in chosen.items()}
+    return {context: sorted(tasks, key=lambda sized: sized[0]) for context, tasks in chosen.items()}
 
 
 def _points(sized: tuple[float, TaskSummary], scorer: str) -> Iterator[_Point]:

@@ -37,7 +37,7 @@ _NOTES = (
 
 def memory_tables(runs: Sequence[RunSummary]) -> list[Table]:
     """Return the table of the tasks that have a memory, if there are any."""
-    rows = tuple(row for _, row in sorted(_rows(runs), key=lambda item: item[0]))
+    rows = tuple(row for _, row in sorted(_rows(runs), key=lambda keyed: keyed[0]))
     columns = (*(Column(name, False) for name in _NAMES), *map(Column, _NUMBERS))
     return [Table("Memories", columns, rows, _NOTES)] if rows else []
 

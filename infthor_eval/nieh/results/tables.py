@@ -151,7 +151,9 @@ def _notes(runs: Sequence[RunSummary]) -> list[str]:
     embedded = (
         [_EMBEDDED] if any(task.simulator == "embedded" for _, _, task in _tasks(runs)) else []
     )
-    sources = dict.fromkeys(item for run in runs for item in sources_of(run.header.config).items())
+    sources = dict.fromkeys(
+        source for run in runs for source in sources_of(run.header.config).items()
+    )
     return [
         *embedded,
         *(f"{metric}: {source}." for metric, source in sources if metric not in SCORERS),
