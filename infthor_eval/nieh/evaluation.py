@@ -166,10 +166,7 @@ class BoundNieh:
     """NIEH for one subject; see `infthor_eval.runs.BoundEvaluation`."""
 
     def __init__(
-        self,
-        workload: Workload[NiehUnit],
-        prepared: Mapping[str, PreparedTask],
-        answerer: Answerer,
+        self, workload: Workload[NiehUnit], prepared: Mapping[str, PreparedTask], answerer: Answerer
     ) -> None:
         """Take the work, the tasks by name, and what answers, fitted to their answer keys."""
         self.workload = workload

@@ -11,14 +11,7 @@ from infthor_eval.nieh.results.summary import NiehSummary, primary_metrics, summ
 from infthor_eval.nieh.results.tables import overview, tables
 from infthor_eval.nieh.task import check_task_file
 from infthor_eval.rates import Rate
-from infthor_eval.runs import (
-    RecordTypes,
-    RunHeader,
-    RunSummary,
-    TaskFile,
-    TaskRequest,
-    UnitRecord,
-)
+from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject

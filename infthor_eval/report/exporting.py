@@ -61,10 +61,7 @@ def _csv_columns(column: Column, cells: Sequence[str]) -> Iterator[list[str]]:
     ) or [""]
     for number, name in enumerate(names):
         heading = _in_one_line(f"{column.name} {name}")
-        yield [
-            heading,
-            *(_csv_cell(cell, name, column, is_first=number == 0) for cell in cells),
-        ]
+        yield [heading, *(_csv_cell(cell, name, column, is_first=number == 0) for cell in cells)]
 
 
 def _csv_cell(cell: str, name: str, column: Column, *, is_first: bool) -> str:

@@ -1,14 +1,7 @@
 """Contexts by the names that task files use."""
 
 from infthor_eval.errors import UsageError
-from infthor_eval.nieh.contexts import (
-    interleaved,
-    memory,
-    plans,
-    retrieval,
-    video,
-    views,
-)
+from infthor_eval.nieh.contexts import interleaved, memory, plans, retrieval, video, views
 from infthor_eval.nieh.contexts.base import (
     Context,
     ContextPart,
