@@ -30,9 +30,8 @@ def load_run(folder: str | os.PathLike[str]) -> DataFrame:
         DataError: there is no journal in the folder, or one with a bad line, or of another format.
         UsageError: the suite of the run is not known here.
     """
-    from infthor_eval.plugins import (
-        import_target,  # by name: every module imports this one, and few need pandas
-    )
+    # By name: every module imports this one, and few need pandas.
+    from infthor_eval.plugins import import_target
 
-    frame: DataFrame = import_target("infthor_eval.data_frames:load_run")(folder)
+    frame: DataFrame = import_target("infthor_eval.report.sample_table:load_run")(folder)
     return frame

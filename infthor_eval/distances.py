@@ -6,18 +6,12 @@ from itertools import pairwise
 
 __all__ = ["DISTANCES", "LENGTHS", "distance_class", "length_class"]
 
-# Bins double in width, so that they serve trajectories of hundreds and of thousands of frames
-# alike.
+# Bins double in width: they serve trajectories of hundreds and of thousands of frames alike.
 _FRAMES = (0, 50, 100, 200, 400, 800, 1600, 3200)
-DISTANCES = (
-    *(f"{low}-{high - 1}" for low, high in pairwise(_FRAMES)),
-    f">={_FRAMES[-1]}",
-)  # frames
+DISTANCES = (*(f"{low}-{high - 1}" for low, high in pairwise(_FRAMES)), f">={_FRAMES[-1]}")
+# Thousand tokens.
 _TOKENS = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)
-LENGTHS = (
-    *(f"{low}-{high}" for low, high in pairwise(_TOKENS)),
-    f">={_TOKENS[-1]}",
-)  # thousand tokens
+LENGTHS = (*(f"{low}-{high}" for low, high in pairwise(_TOKENS)), f">={_TOKENS[-1]}")
 
 
 def distance_class(n_frames: int) -> str:

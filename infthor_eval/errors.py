@@ -60,8 +60,7 @@ class UsageError(InfthorError):
 
 
 class DataError(InfthorError):
-    """A file is missing or does not have the documented form; the message names the file and the
-    place in it."""
+    """A file is missing or not of its documented form; the message names the file and the place."""
 
 
 class ModelError(InfthorError):
@@ -69,8 +68,7 @@ class ModelError(InfthorError):
 
 
 class UserCodeError(InfthorError):
-    """Code that is not this package's raised an unexpected exception, which is the cause of this
-    one."""
+    """Code that is not this package's raised an unexpected exception, the cause of this one."""
 
 
 class AdapterError(UserCodeError, ModelError):
@@ -88,8 +86,7 @@ class SceneError(SimulatorError):
 
 
 def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
-    """Return the error for an unknown name of a kind ("task"); it suggests the closest known name,
-    or lists all."""
+    """Return the error for an unknown name of a kind ("task"); it suggests the closest, or all."""
     names = sorted(known)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names)}"
@@ -97,8 +94,7 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
 
 
 def in_one_line(error: BaseException) -> str:
-    """Return the message of another library's error as one line, short enough to be part of our
-    message."""
+    """Return another library's error message as one line, short enough for one of ours."""
     reason = error.strerror if isinstance(error, OSError) else None  # `str` would repeat the path
     text = " ".join((reason or str(error)).split()) or type(error).__name__
     if isinstance(error, KeyError):  # its text is only the key
@@ -108,8 +104,8 @@ def in_one_line(error: BaseException) -> str:
 
 def describe_exception(error: Exception) -> str:
     """Return type, place and message of an unexpected exception, in one line."""
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    where = f"{Path(place.filename).name}:{place.lineno} ({place.name})"
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{Path(frame.filename).name}:{frame.lineno} ({frame.name})"
     return f"{type(error).__name__} in {where}: {in_one_line(error)}"
 
 
@@ -121,8 +117,7 @@ def wrap_errors(
     catch: type[BaseException] | tuple[type[BaseException], ...] = OSError,
     raise_as: type[InfthorError] = DataError,
 ) -> Iterator[None]:
-    """Turn errors of another library or of the system into a one-line error for people; our own
-    pass unchanged.
+    """Turn errors of a library or the system into one-line errors; our own pass unchanged.
 
     Args:
         problem: the problem and its place ("set.json: not JSON").

@@ -24,8 +24,7 @@ __all__ = [
 
 
 class Rate(msgspec.Struct, frozen=True):
-    """The mean of n values with its 95 % interval, clustered by trajectory; None with fewer than
-    two trajectories."""
+    """The mean of n values and its 95 % interval by trajectory (None with fewer than two)."""
 
     mean: float
     low: float | None
@@ -41,8 +40,7 @@ def clustered_rate(values: Sequence[float], clusters: Sequence[Hashable]) -> Rat
 
 
 def rate_over_clusters(values: Sequence[float]) -> Rate | None:
-    """Return the mean of one value per cluster (see `mean_over_clusters`), or None if there are
-    none."""
+    """Return the mean of one value per cluster (see `mean_over_clusters`); None without any."""
     from infthor_eval.statistics import mean_over_clusters
 
     return _rate(mean_over_clusters(values)) if values else None
@@ -51,8 +49,7 @@ def rate_over_clusters(values: Sequence[float]) -> Rate | None:
 def paired_rate(
     first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]
 ) -> Rate | None:
-    """Return the mean difference of paired values, second minus first (see `paired_difference`);
-    None without any."""
+    """Return the mean of second minus first, paired (see `paired_difference`); None without any."""
     from infthor_eval.statistics import paired_difference
 
     return _rate(paired_difference(first, second, clusters).estimate) if first else None

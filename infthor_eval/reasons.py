@@ -15,8 +15,7 @@ _NUMBER = re.compile(r"(?<![\w/.,-])\d+(?:,\d{3})*(?:\.\d+)?(?![\w/]|[.,-]\w)")
 
 
 def count_reasons(reasons: Iterable[tuple[_Where, str]]) -> list[tuple[_Where, str, int]]:
-    """Count reasons by task (or task and outcome), in alphabetical order; numbers that differ are
-    given as a range."""
+    """Count reasons by task (or task and outcome), sorted; numbers that differ become a range."""
     groups: dict[tuple[_Where, str], list[str]] = defaultdict(list)
     for where, reason in reasons:
         groups[where, _NUMBER.sub("#", reason)].append(reason)
@@ -31,7 +30,10 @@ def _merge(reasons: list[str]) -> str:
 
 
 def _range(numbers: tuple[str, ...]) -> str:
-    least, most = (
-        choose(numbers, key=lambda text: float(text.replace(",", ""))) for choose in (min, max)
-    )
+    least = min(numbers, key=_value)
+    most = max(numbers, key=_value)
     return least if least == most else f"{least} to {most}"
+
+
+def _value(number: str) -> float:
+    return float(number.replace(",", ""))

@@ -31,8 +31,7 @@ _LEVEL = 0.95
 
 @dataclass(frozen=True)
 class MeanEstimate:
-    """The mean of n scores with its clustered standard error and 95 % interval, which need not be
-    symmetric.
+    """The mean of n scores, its clustered standard error and 95 % interval, symmetric or not.
 
     Error and interval are None with fewer than two clusters.
     """
@@ -75,8 +74,7 @@ def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> Mea
 
 
 def mean_over_clusters(values: Sequence[float]) -> MeanEstimate:
-    """Return the mean and t interval of values with one per cluster (such as the rewards of
-    trajectories).
+    """Return mean and t interval of values, one per cluster (such as rewards of trajectories).
 
     Unlike `clustered_mean`, this never takes values for shares: the points of a reward curve that
     happen to lie between 0 and 1 get the same kind of interval as all others.
@@ -136,8 +134,7 @@ def _effective_size(estimate: MeanEstimate) -> float:
 
 
 def _wilson(mean: float, n: float) -> tuple[float, float]:
-    """Return Wilson's score interval of a share among `n` questions (Wilson 1927, with z the normal
-    quantile).
+    """Return Wilson's interval of a share of `n` questions (Wilson 1927; z: normal quantile).
 
     centre = (mean + z²/2n) / (1 + z²/n), margin = z / (1 + z²/n) * sqrt(mean (1 - mean) / n +
     z²/4n²)
@@ -173,8 +170,7 @@ def bootstrap_interval(
 def paired_difference(
     first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]
 ) -> Difference:
-    """Return the mean difference of the scores of two runs on the same questions in the same order,
-    second minus first.
+    """Return the mean of second minus first: two runs' scores on the same questions in one order.
 
     Raises:
         DataError: the runs differ in length, or as in `clustered_mean`.
@@ -188,9 +184,8 @@ def paired_difference(
     estimate = _with_t_interval(totals, sizes)
     if estimate.stderr is None:
         return Difference(estimate, None)
-    if (
-        estimate.stderr == 0
-    ):  # every question differs by the same amount: either by nothing, or never by chance
+    # Every question differs by the same amount: either by nothing, or never by chance.
+    if estimate.stderr == 0:
         return Difference(estimate, 1.0 if estimate.mean == 0 else 0.0)
     t = abs(estimate.mean / estimate.stderr)
     return Difference(estimate, float(2 * scipy.special.stdtr(estimate.n_clusters - 1, -t)))
@@ -199,8 +194,7 @@ def paired_difference(
 def _partition(
     scores: Sequence[float], clusters: Sequence[Hashable]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sum of scores and the number of questions per cluster, from which all else here is
-    computed."""
+    """Return sum of scores and number of questions per cluster, the base of all else here."""
     if not scores:
         raise DataError("there is no score to take the mean of")
     if len(scores) != len(clusters):

@@ -1,5 +1,4 @@
-"""The suites by the names that task files use, with their presenters and their adapters for
-lm-eval's requests.
+"""The suites by the names in task files, with their presenters and lm-eval adapters.
 
 Each class is imported only when needed, so that `--help` stays quick. Other packages add theirs
 through entry points, as "module:Class" under the suite's name: the suite in `infthor_eval.suites`,
@@ -53,8 +52,7 @@ __all__ = [
 
 
 class _BuiltIn(NamedTuple):
-    """A suite of this package: "module:Class" of each part, and names of its baselines, listed
-    without importing it."""
+    """A suite here: "module:Class" of its parts, and its baselines, listed without an import."""
 
     suite: str
     options: str
@@ -88,18 +86,18 @@ _BUILT_IN = {
 }
 _DOCS = "docs/own-tasks.md"
 _SUITES = PluginTable(
-    "suite", "infthor_eval.suites", {name: item.suite for name, item in _BUILT_IN.items()}, _DOCS
+    "suite", "infthor_eval.suites", {name: kind.suite for name, kind in _BUILT_IN.items()}, _DOCS
 )
 _PRESENTERS = PluginTable(
     "presenter",
     "infthor_eval.presenters",
-    {name: item.presenter for name, item in _BUILT_IN.items()},
+    {name: kind.presenter for name, kind in _BUILT_IN.items()},
     _DOCS,
 )
 _REQUESTS = PluginTable(
     "lm-eval adapter of suite",
     "infthor_eval.lm_eval",
-    {name: item.requests for name, item in _BUILT_IN.items()},
+    {name: kind.requests for name, kind in _BUILT_IN.items()},
     _DOCS,
 )
 
@@ -159,8 +157,7 @@ def options_class(name: str) -> type:
 
 
 def suite_code(name: str) -> dict[str, Any]:
-    """Return package, version and source digest of another package's suite as JSON values; {} for a
-    built-in one.
+    """Return another package's suite's package, version and source digest; {} for a built-in.
 
     Raises:
         ModelError: its source cannot be read.

@@ -31,13 +31,12 @@ class TableCell(str):
 
 
 def interval_cell(
-    low: float | None, high: float | None, form: str = ".1f", pattern: str = "[{}, {}]"
+    low: float | None, high: float | None, number_format: str = ".1f", pattern: str = "[{}, {}]"
 ) -> TableCell:
-    """Return a cell with an interval, its ends formatted and in the places of the pattern; `-` if
-    there is none."""
+    """Return an interval's cell, its formatted ends in the pattern; `-` if there is none."""
     if low is None or high is None:
         return TableCell("-", {"low": "", "high": ""})
-    ends = {"low": f"{low:{form}}", "high": f"{high:{form}}"}
+    ends = {"low": f"{low:{number_format}}", "high": f"{high:{number_format}}"}
     return TableCell(pattern.format(*ends.values()), ends)
 
 
@@ -51,8 +50,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Row:
-    """A row: a text per column (missing ones at the end are empty), of published numbers or our
-    own.
+    """A row: a text per column (missing ones at the end are empty), published or our own.
 
     Attributes:
         ends_section: True if a line is drawn below it.
@@ -65,8 +63,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of at least one column, with a title of one line (empty for none), and notes below, a
-    paragraph each."""
+    """A table with columns, a title of one line (or empty), and notes below, a paragraph each."""
 
     title: str
     columns: tuple[Column, ...]

@@ -79,8 +79,7 @@ class _Description(TextColumn):
 
 
 def progress_bar(on: Console) -> Progress:
-    """Return a bar that disappears when the work is done; it draws nothing where there is no
-    terminal."""
+    """Return a bar that disappears when done; it draws nothing where there is no terminal."""
     columns = (_Description(), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     return Progress(*columns, console=on, transient=True, disable=not on.is_terminal)
 

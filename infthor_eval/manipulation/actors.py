@@ -17,7 +17,7 @@ from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.planner.reaching import plan_steps
-from infthor_eval.runs.baseline import BaselineSubject
+from infthor_eval.runs.suite import BaselineSubject
 from model_adapters import ArmDelta, Capabilities, Policy, Subject
 
 __all__ = ["BASELINES", "ArmActor", "ArmBaseline", "ArmSituation", "PolicyActor", "Step"]

@@ -12,8 +12,8 @@ from typing import Any
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import PublishedColumns, Question
 from infthor_eval.formats.video import Video
-from infthor_eval.nieh.asking.recall_settings import RecallSettings
 from infthor_eval.nieh.contexts import ContextPart, Sample, context_named
+from infthor_eval.nieh.contexts.base import RecallSettings
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.frame_ablations import FrameAblation
 from infthor_eval.nieh.samples import TaskSamples, open_set
@@ -35,8 +35,7 @@ _PLACEHOLDERS = {FrameRef: "<image>", Video: "<video>"}
 
 
 def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> Doc:
-    """Return the doc of a task's sample; with `pixels`, requests hold decoded images, as lm-eval's
-    own models need."""
+    """Return the doc of a sample; with `pixels` it has decoded images, for lm-eval's own models."""
     question = sample.question
     return {
         "suite": "nieh",
@@ -99,8 +98,7 @@ def samples_of(docs: Sequence[Doc]) -> TaskSamples:
 
 
 def doc_parts(doc: Doc) -> list[ContextPart]:
-    """Return the request of a doc, with the question's text last and films as images, for lm-eval's
-    own models."""
+    """Return a doc's request for lm-eval's models: films as images, the question's text last."""
     context, text = samples_of([doc]).request(sample_of(doc))
     return [*as_images(context), text]
 
@@ -111,12 +109,11 @@ def doc_prompt(doc: Doc) -> str:
 
 
 def prompt_of(task_samples: TaskSamples, sample: Sample, *, videos: bool = False) -> str:
-    """Return the text of a sample's request, with placeholders for frames, and for videos if it has
-    them."""
+    """Return the text of a sample's request, with placeholders for frames (and videos if any)."""
     context, text = task_samples.request(sample)
-    shown = context if videos else as_images(context)
+    parts = context if videos else as_images(context)
     return "".join(
-        part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in (*shown, text)
+        part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in (*parts, text)
     )
 
 

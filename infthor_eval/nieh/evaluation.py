@@ -60,17 +60,17 @@ class NiehEvaluation:
         tokens = self._tokens_per_frame(answerer)
         tasks = {task.name: task for task in self._tasks}
         prepared = {name: task.prepare(tokens) for name, task in tasks.items()}
-        _refuse_empty([item.task_samples for item in prepared.values()], self._tasks)
+        _refuse_empty([ready.task_samples for ready in prepared.values()], self._tasks)
         answerer.fit(
             {name: partial(task.answer_key, prepared[name], tokens) for name, task in tasks.items()}
         )
-        costs = {name: answerer.cost(item) for name, item in prepared.items()}
+        costs = {name: answerer.cost(ready) for name, ready in prepared.items()}
         workload = Workload(
             groups=_groups(prepared, self._options.repeats),
             skipped=[
                 Skipped(UnitKey(name, skipped.question.id, skipped.variant), skipped.reason)
-                for name, item in prepared.items()
-                for skipped in item.task_samples.skipped
+                for name, ready in prepared.items()
+                for skipped in ready.task_samples.skipped
             ],
             config=self._config(
                 {
@@ -112,36 +112,36 @@ class NiehEvaluation:
 
     def _refuse_unused(self) -> None:
         """Refuse options without effect: they would only change the run's config, or mislead."""
-        asked = ", ".join(task.name for task in self._tasks)
+        names = ", ".join(task.name for task in self._tasks)
         measured = any(task.needs_size for task in self._tasks)
         for name in ("k_tokens", "tokens_per_frame"):
             value = getattr(self._options, name)
             if value is not None and not measured:
                 raise UsageError(
-                    f"--{name.replace('_', '-')} {value}: no context of {asked} has a size in "
+                    f"--{name.replace('_', '-')} {value}: no context of {names} has a size in "
                     "tokens; leave it out, or ask nieh_haystack or nieh_truncate_head"
                 )
         for name, value in self._memory().items():
             if not any(task.takes_memory for task in self._tasks):
                 raise UsageError(
-                    f"--{name.replace('_', '-')} {value}: no task of {asked} leaves its memory "
+                    f"--{name.replace('_', '-')} {value}: no task of {names} leaves its memory "
                     "open; leave it out, or ask nieh_memory"
                 )
         if self._options.prompt is not None and not any(task.takes_prompt for task in self._tasks):
             raise UsageError(
-                f"--prompt {self._options.prompt}: no task of {asked} leaves its words open; leave "
+                f"--prompt {self._options.prompt}: no task of {names} leaves its words open; leave "
                 "it out, or ask nieh_full"
             )
         if (self._options.retriever or self._options.retriever_revision) and not self._depends_on(
             "retriever"
         ):
             raise UsageError(
-                f"--retriever: no context of {asked} retrieves frames; leave it out, or ask "
+                f"--retriever: no context of {names} retrieves frames; leave it out, or ask "
                 "nieh_clip_retrieval or nieh_memory_frames, or --memory clip"
             )
         if self._options.trajectories and not self._depends_on("trajectories"):
             raise UsageError(
-                f"--trajectories: no context of {asked} tells of the trajectory beside its frames; "
+                f"--trajectories: no context of {names} tells of the trajectory beside its frames; "
                 "leave it out, or ask nieh_interleaved or nieh_text_state"
             )
 
@@ -166,10 +166,7 @@ class BoundNieh:
     """NIEH for one subject; see `infthor_eval.runs.BoundEvaluation`."""
 
     def __init__(
-        self,
-        workload: Workload[NiehUnit],
-        prepared: Mapping[str, PreparedTask],
-        answerer: Answerer,
+        self, workload: Workload[NiehUnit], prepared: Mapping[str, PreparedTask], answerer: Answerer
     ) -> None:
         """Take the work, the tasks by name, and what answers, fitted to their answer keys."""
         self.workload = workload
@@ -216,16 +213,15 @@ class BoundNieh:
 
 
 def _groups(prepared: Mapping[str, PreparedTask], repeats: int = 1) -> list[Group[NiehUnit]]:
-    """Return a group for each task and trajectory: its samples share what is encoded of the
-    trajectory."""
+    """Return a group per task and trajectory: its samples share what is encoded of that."""
     groups = []
-    for task, item in prepared.items():
-        ordered = sorted(item.task_samples.samples, key=lambda sample: sample.question.traj_id)
+    for task, ready in prepared.items():
+        ordered = sorted(ready.task_samples.samples, key=lambda sample: sample.question.traj_id)
         for _, samples in groupby(ordered, key=lambda sample: sample.question.traj_id):
             same = list(samples)
             frames = len({frame for sample in same for frame in sample.frames})
             units = [
-                NiehUnit.of(task, item.task_samples, sample, repeat)
+                NiehUnit.of(task, ready.task_samples, sample, repeat)
                 for sample in same
                 for repeat in range(1, repeats + 1)
             ]
@@ -234,8 +230,7 @@ def _groups(prepared: Mapping[str, PreparedTask], repeats: int = 1) -> list[Grou
 
 
 def _measure_frame(data: NiehSet, answerer: Answerer) -> int:
-    """Return the subject's size of a frame, by the first frame of the questions that can be
-    read."""
+    """Return the subject's size of a frame, by the first readable frame of the questions."""
     problems: list[InfthorError] = []
     for question in data.questions:
         for frame in data.clue_frames(question):
@@ -274,12 +269,14 @@ def _refuse_without_sampling(subject: Subject, options: NiehOptions) -> None:
 
 
 def _refuse_empty(task_samples: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:
-    """Refuse tasks of which none has a question to ask; some may have none, where no window of
-    their size fits."""
+    """Refuse tasks without any question to ask; some may have none, where no window fits."""
     if any(samples is None or samples.samples for samples in task_samples):
         return
     reasons = {
-        item.reason for samples in task_samples if samples is not None for item in samples.skipped
+        skipped.reason
+        for samples in task_samples
+        if samples is not None
+        for skipped in samples.skipped
     }
     listed = "; ".join(sorted(reasons)[:3]) or "its files are empty"
     raise UsageError(

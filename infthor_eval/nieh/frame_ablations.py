@@ -1,5 +1,4 @@
-"""Frame ablations: other frames in the places of the true ones, to measure what a model gains from
-seeing them.
+"""Frame ablations: other frames instead of the true ones, to measure what seeing them gains.
 
 To add a frame ablation: its effect here, its name in `options.py: FRAMES`.
 """
@@ -57,17 +56,16 @@ class FrameAblation:
             return list(parts)
         frames = [frame for part in parts for frame in _frames_in(part)]
         if self.frames == "blank":
-            shown = [blank_like(frame) for frame in frames]
+            replacements = [blank_like(frame) for frame in frames]
         elif self.frames == "shuffled":
-            shown = self._shuffle(frames, sample.question.traj_id)
+            replacements = self._shuffle(frames, sample.question.traj_id)
         else:
-            shown = self._of_another(frames, data, context, sample)
-        left = iter(shown)
+            replacements = self._frames_elsewhere(frames, data, context, sample)
+        left = iter(replacements)
         return [_with_frames(part, [next(left) for _ in _frames_in(part)]) for part in parts]
 
     def _shuffle(self, frames: Sequence[FrameRef], traj_id: str) -> list[FrameRef]:
-        """Return the frames in another order if there is one; the same order for every question in
-        a context."""
+        """Return frames in another order, if any; the same for all questions in a context."""
         draw = random.Random(
             f"{self.seed}/{traj_id}/{'/'.join(frame.path.name for frame in frames)}"
         )
@@ -76,21 +74,20 @@ class FrameAblation:
             draw.shuffle(shuffled)
         return shuffled
 
-    def _of_another(
+    def _frames_elsewhere(
         self, frames: Sequence[FrameRef], data: NiehSet, context: Context, sample: Sample
     ) -> list[FrameRef]:
-        """Return the frames at the same positions of another trajectory; of a shorter one, modulo
-        its length."""
+        """Return another trajectory's frames at the same positions, modulo its length."""
         traj_id = sample.question.traj_id
         others = [other for other in _trajectories(data) if other != traj_id]
-        shown = context.frames(
+        other_frames = context.frames(
             data, random.Random(f"{self.seed}/{traj_id}").choice(others), sample.fps
         )
         positions = {
             frame: position
             for position, frame in enumerate(context.frames(data, traj_id, sample.fps))
         }
-        return [shown[positions[frame] % len(shown)] for frame in frames]
+        return [other_frames[positions[frame] % len(other_frames)] for frame in frames]
 
 
 def _trajectories(data: NiehSet) -> list[str]:

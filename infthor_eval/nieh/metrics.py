@@ -29,8 +29,7 @@ ProcessResults = Callable[[Doc, list[str]], Mapping[str, Any]]
 
 
 class MetricError(UserCodeError, DataError):
-    """A metrics function that is not this package's raised an exception, or its result lacks a
-    metric."""
+    """A metrics function from elsewhere raised an exception, or its result lacks a metric."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +53,8 @@ class Metrics:
             MetricError: the task's own function raises an exception, or its result lacks a metric.
         """
         if self.process is None:
-            found = scores(reply, sample.question.answers)
-            return {name: found[name] for name in self.names}
+            by_scorer = scores(reply, sample.question.answers)
+            return {name: by_scorer[name] for name in self.names}
         with wrap_metric_errors(f"process_results fails on {sample.question.id}"):
             results = self.process(doc_of(task_samples, sample), [reply])
             return {name: finite(name, results[name]) for name in self.names}
@@ -63,8 +62,7 @@ class Metrics:
 
 @contextmanager
 def wrap_metric_errors(problem: str) -> Iterator[None]:
-    """Turn any exception in a metrics function into a `MetricError` of one line, with the place of
-    the exception.
+    """Turn any exception in a metrics function into a `MetricError` of one line, with its place.
 
     Args:
         problem: the function and the question that it fails on.
@@ -102,24 +100,24 @@ def metrics_of(task: TaskFile) -> Metrics:
     """
     name = task.settings["process_results"]
     listed = task.settings.get("metric_list") or []
-    for item in listed:
-        _check(item, f"{task.path}: metric_list: ")
+    for entry in listed:
+        _check(entry, f"{task.path}: metric_list: ")
     if name == _OURS:
-        return _our_metrics([item["metric"] for item in listed], f"{task.path}: metric_list: ")
+        return _our_metrics([entry["metric"] for entry in listed], f"{task.path}: metric_list: ")
     if not listed:
         raise DataError(
             f"{task.path}: a task with its own process_results names its metrics under metric_list"
         )
     module, attribute = _import_function(task.path, name)
     source = {"process_results": name, "source": digest_of_file(Path(str(module.__file__)))}
-    return Metrics(tuple(item["metric"] for item in listed), getattr(module, attribute), source)
+    return Metrics(tuple(entry["metric"] for entry in listed), getattr(module, attribute), source)
 
 
-def _our_metrics(listed: Sequence[str], place: str) -> Metrics:
+def _our_metrics(listed: Sequence[str], where: str) -> Metrics:
     for name in listed:
         if name not in SCORERS:
             raise DataError(
-                f"{place}{name} is none of our scorers, {', '.join(SCORERS)}; name its "
+                f"{where}{name} is none of our scorers, {', '.join(SCORERS)}; name its "
                 "process_results too"
             )
     names = tuple(name for name in SCORERS if name in (listed or SCORERS))
@@ -130,20 +128,20 @@ def _our_metrics(listed: Sequence[str], place: str) -> Metrics:
     )
 
 
-def _check(item: object, place: str) -> None:
-    if not isinstance(item, Mapping) or "metric" not in item:
-        raise DataError(f"{place}{item!r} is not a mapping with the metric's name (metric: NAME)")
-    if item.get("aggregation", "mean") != "mean":
-        raise DataError(f"{place}{item['metric']} is not averaged (aggregation: mean); use lm-eval")
-    if not item.get(
-        "higher_is_better", True
-    ):  # a failed sample counts as 0, which would be the best value
-        raise DataError(f"{place}{item['metric']} is better when lower; negate it, or use lm-eval")
+def _check(entry: object, where: str) -> None:
+    if not isinstance(entry, Mapping) or "metric" not in entry:
+        raise DataError(f"{where}{entry!r} is not a mapping with the metric's name (metric: NAME)")
+    if entry.get("aggregation", "mean") != "mean":
+        raise DataError(
+            f"{where}{entry['metric']} is not averaged (aggregation: mean); use lm-eval"
+        )
+    # A failed sample counts as 0, which would be the best value.
+    if not entry.get("higher_is_better", True):
+        raise DataError(f"{where}{entry['metric']} is better when lower; negate it, or use lm-eval")
 
 
 def _import_function(task_file: Path, name: str) -> tuple[ModuleType, str]:
-    """Import a function's module as lm-eval does: from beside the file, else from the path. Return
-    its name too."""
+    """Import a module as lm-eval does: beside the file, else from the path; return its name too."""
     module, _, attribute = name.rpartition(".")
     beside = task_file.parent / f"{module.replace('.', '/')}.py"
     try:

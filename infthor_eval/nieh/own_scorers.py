@@ -1,5 +1,4 @@
-"""Scorers that are not this package's: a function in a user's file, or one that another package
-names.
+"""Scorers that are not this package's: a function in a user's file, or in another package.
 
 A scorer is given a whole reply and the gold answers, and returns its score, or several by name.
 """
@@ -101,8 +100,7 @@ class OwnScorer:
 
 
 def find_scorer(name: str) -> OwnScorer:
-    """Return the scorer of a name: FILE.py:NAME, or an entry point `infthor_eval.scorers` of
-    another package.
+    """Return the scorer FILE.py:NAME, or an entry point `infthor_eval.scorers` of that name.
 
     Raises:
         UsageError: there is none of this name, or it cannot be called.

@@ -9,9 +9,8 @@ from infthor_eval.formats.question import Question
 __all__ = ["PROMPTS", "PUBLISHED_LOGS", "PUBLISHED_MAIN", "last_line", "question_text"]
 
 PUBLISHED_MAIN = "published-main"  # of the published branch main; the default
-PUBLISHED_LOGS = (
-    "published-logs"  # of the branch nieh_dev, with which the published image logs were asked
-)
+# Of the branch nieh_dev, with which the published image logs were asked.
+PUBLISHED_LOGS = "published-logs"
 PROMPTS = (PUBLISHED_MAIN, PUBLISHED_LOGS)
 
 _INDENT = " " * 8

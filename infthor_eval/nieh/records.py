@@ -1,5 +1,4 @@
-"""Payloads of NIEH's records in the journal: replies, what memories recalled and models wrote, a
-judge's verdicts."""
+"""Payloads of NIEH records: replies, what memories recalled and models wrote, judges' verdicts."""
 
 from typing import Annotated, Any
 
@@ -9,8 +8,8 @@ from msgspec import Meta
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
 from infthor_eval.nieh.config import NiehConfig
-from infthor_eval.runs.counts import Count
 from infthor_eval.runs.journals.records import RecordTypes
+from infthor_eval.runs.usage import Count
 
 __all__ = ["RECORDS", "Guess", "NiehAnswer", "NiehNote", "NiehRecall", "NiehVerdict", "ShownClues"]
 

@@ -1,5 +1,4 @@
-"""The samples of a task: every question of its set in every variant of its context, and the skipped
-ones."""
+"""The samples of a task: each question in every variant of its context, and the skipped ones."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -57,8 +56,7 @@ class TaskSamples:
 
     @cached_property
     def words(self) -> tuple[str, ...]:
-        """All answers in words and all words of the questions, sorted: what a person's typing is
-        completed from."""
+        """All words of answers and questions, sorted: a person's typing is completed from them."""
         questions = [sample.question for sample in self.samples]
         answers = {
             answer
@@ -66,35 +64,33 @@ class TaskSamples:
             for answer in question.answers
             if isinstance(answer, str)
         }
-        asked = {word.lower() for question in questions for word in _WORD.findall(question.text)}
-        return tuple(sorted(answers | (asked - {answer.lower() for answer in answers})))
+        question_words = {
+            word.lower() for question in questions for word in _WORD.findall(question.text)
+        }
+        return tuple(sorted(answers | (question_words - {answer.lower() for answer in answers})))
 
     def all_frames(self, sample: Sample) -> list[FrameRef]:
-        """Return all frames of a sample's trajectory as a memory observes them: ablated, but in
-        their order.
+        """Return all frames of the trajectory as a memory observes them: ablated, in their order.
 
         Raises:
             DataError: the trajectory cannot be read.
         """
         frames = self.data.frames(sample.question.traj_id)
-        if (
-            self.frame_ablation.frames == "shuffled"
-        ):  # the shown ones are shuffled, once they are recalled
+        # The shown ones are shuffled, once they are recalled.
+        if self.frame_ablation.frames == "shuffled":
             return list(frames)
-        shown = self.frame_ablation.apply(frames, self.data, self.context, sample)
-        return [part for part in shown if isinstance(part, FrameRef)]
+        ablated = self.frame_ablation.apply(frames, self.data, self.context, sample)
+        return [part for part in ablated if isinstance(part, FrameRef)]
 
     def request(self, sample: Sample) -> tuple[list[ContextPart], str]:
-        """Return the request of a sample: the context, and the text with the question that follows
-        it."""
+        """Return the request of a sample: the context, and the text with the question after it."""
         parts, text = self.context.request(self.data, sample, self.prompt)
         return self.frame_ablation.apply(parts, self.data, self.context, sample), text
 
 
 @lru_cache(maxsize=8)
 def open_set(root: str, trajectories: str | None = None) -> NiehSet:
-    """Open the set in a folder, once per process; `open_set.cache_clear()` makes it be read
-    again."""
+    """Open a folder's set, once per process; `open_set.cache_clear()` makes it be read again."""
     return NiehSet(Path(root), Path(trajectories) if trajectories else None)
 
 
@@ -147,10 +143,12 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
     frame_ablation = FrameAblation(settings.frames, settings.seed)
     frame_ablation.check(data)
     items = [
-        item for of_question in _by_question(data, context, settings, limit) for item in of_question
+        sample
+        for of_question in _by_question(data, context, settings, limit)
+        for sample in of_question
     ]
-    samples = [item for item in items if isinstance(item, Sample)]
-    skipped = [item for item in items if isinstance(item, SkippedQuestion)]
+    samples = [sample for sample in items if isinstance(sample, Sample)]
+    skipped = [sample for sample in items if isinstance(sample, SkippedQuestion)]
     sources = context.sources(data, settings)
     return TaskSamples(
         data, config["context"], context, samples, skipped, sources, frame_ablation, settings.prompt
@@ -163,8 +161,7 @@ _Items = list[Sample | SkippedQuestion]  # of one question
 def _by_question(
     data: NiehSet, context: Context, settings: ContextSettings, limit: int | None
 ) -> list[_Items]:
-    """Return the items of each question in the order of the set; with a limit, of the questions
-    read to reach it."""
+    """Return samples by question in the set's order; with a limit, of those read to reach it."""
     problems: dict[FrameRef, str | None] = {}
 
     def skip_unreadable(sample: Sample) -> Sample | SkippedQuestion:
@@ -174,19 +171,19 @@ def _by_question(
     trajectories = [
         row.traj_id if isinstance(row, Question) else row.question.traj_id for row in data.rows
     ]
-    places = range(len(data.rows)) if limit is None else spread(trajectories, str, settings.seed)
-    by_place: dict[int, _Items] = {}
+    positions = range(len(data.rows)) if limit is None else spread(trajectories, str, settings.seed)
+    by_position: dict[int, _Items] = {}
     n_asked = 0
-    for place in places:
-        row = data.rows[place]
+    for position in positions:
+        row = data.rows[position]
         items = _samples(context, data, row, settings) if isinstance(row, Question) else [row]
-        by_place[place] = [
-            skip_unreadable(item) if isinstance(item, Sample) else item for item in items
+        by_position[position] = [
+            skip_unreadable(sample) if isinstance(sample, Sample) else sample for sample in items
         ]
-        n_asked += any(isinstance(item, Sample) for item in by_place[place])
+        n_asked += any(isinstance(sample, Sample) for sample in by_position[position])
         if n_asked == limit:
             break
-    return [by_place[place] for place in sorted(by_place)]
+    return [by_position[position] for position in sorted(by_position)]
 
 
 def _samples(
@@ -199,8 +196,7 @@ def _samples(
 
 
 def _find_problem(frames: list[FrameRef], known: dict[FrameRef, str | None]) -> str | None:
-    """Return why one of the frames cannot be shown, or None. `known` caches the check of each
-    frame's file."""
+    """Return why a frame cannot be shown, or None. `known` caches the check of each file."""
     for frame in frames:
         if frame not in known:
             known[frame] = frame.problem()

@@ -56,8 +56,7 @@ _SLICE = re.compile(r"\b(?:slices?|sliced)\b(?: of\b)?|(?<=\w)sliced\b")
 
 
 def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference") -> float:
-    """Return how many of the gold answers a response gives, as a share or F1; 1.0 or 0.0 for a
-    single gold answer.
+    """Return how many gold answers a response gives, as a share or F1; 1.0 or 0.0 for a single one.
 
     Only the reference scorer can exceed 1.0, when one gold answer is repeated.
 
@@ -73,13 +72,12 @@ def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference"
 
 def scores(reply: str, answers: Sequence[Answer]) -> dict[str, float]:
     """Return the scores of a whole reply, of which the last line counts, under each scorer."""
-    said = last_line(reply)
-    return {scorer: score(said, answers, scorer) for scorer in SCORERS}
+    response = last_line(reply)
+    return {scorer: score(response, answers, scorer) for scorer in SCORERS}
 
 
 def says_yes_or_no(response: str) -> str | None:
-    """Return "yes" or "no" if the strict scorer takes a response for one; None if it is neither, or
-    both."""
+    """Return "yes" or "no" as the strict scorer takes a response; None for neither or both."""
     return next((answer for answer in _YES_NO if _matches_strict(response, answer)), None)
 
 
@@ -122,8 +120,7 @@ def _strict(response: str, answers: Sequence[Answer]) -> float:
 def _largest_matching(
     answers: Sequence[Answer], pieces: Sequence[str], match: Callable[[str, Answer], bool]
 ) -> int:
-    """Return the number of gold answers that can have a piece each (augmenting paths; both lists
-    are short)."""
+    """Return how many gold answers can have a piece each (augmenting paths; lists are short)."""
     fits = [[index for index, piece in enumerate(pieces) if match(piece, gold)] for gold in answers]
     owner: dict[int, int] = {}
 
@@ -141,13 +138,13 @@ def _largest_matching(
 
 
 def _matches_reference(response: str, gold: Answer) -> bool:
-    said = _normalise(response)
+    answer = _normalise(response)
     wanted = _normalise(gold)
-    if _near(said, wanted) or _synonymous(said, wanted):
+    if _near(answer, wanted) or _synonymous(answer, wanted):
         return True
-    if wanted == "yes" and "yes" in said[:4]:
+    if wanted == "yes" and "yes" in answer[:4]:
         return True
-    return wanted == "no" and "no" in said[:3]
+    return wanted == "no" and "no" in answer[:3]
 
 
 def _matches_strict(response: str, gold: Answer) -> bool:
@@ -157,11 +154,11 @@ def _matches_strict(response: str, gold: Answer) -> bool:
         other = _YES_NO[wanted == "yes"]
         return words[:1] == [wanted] and other not in words
     if _is_number(wanted):
-        said = _normalise(response)
-        return _is_number(said) and float(said) == float(wanted)
-    said = _without_slice(plain_form(response.lower().strip()))
+        answer = _normalise(response)
+        return _is_number(answer) and float(answer) == float(wanted)
+    answer = _without_slice(plain_form(response.lower().strip()))
     wanted = _without_slice(wanted)
-    return _near(said, wanted) or _synonymous(said, wanted)
+    return _near(answer, wanted) or _synonymous(answer, wanted)
 
 
 def _without_slice(text: str) -> str:
@@ -174,33 +171,30 @@ def _is_number(text: str) -> bool:
 
 
 def _normalise(text: Answer) -> str:
-    """Return the published normal form: a number in digits if the text holds one, else plain
-    words."""
+    """Return the published normal form: a number in digits if there is one, else plain words."""
     if not isinstance(text, str):
         return str(text)
     text = text.lower().strip()
     try:
         return str(w2n.word_to_num(text))
-    except (
-        ValueError,
-        IndexError,
-    ):  # the library's own ways to say "not a number" ("thousand one": IndexError)
+    # The library's own ways to say "not a number" ("thousand one": IndexError).
+    except (ValueError, IndexError):
         return plain_form(text)
 
 
-def _near(said: str, wanted: str) -> bool:
-    if said == wanted:
+def _near(answer: str, wanted: str) -> bool:
+    if answer == wanted:
         return True
-    if not said or not wanted:
+    if not answer or not wanted:
         return False
-    return round(100 * SequenceMatcher(None, said, wanted).ratio()) >= _NEAR
+    return round(100 * SequenceMatcher(None, answer, wanted).ratio()) >= _NEAR
 
 
-def _synonymous(said: str, wanted: str) -> bool:
+def _synonymous(answer: str, wanted: str) -> bool:
     return any(
-        (said == word and wanted in phrases)
-        or (wanted == word and said in phrases)
-        or (said in phrases and wanted in phrases)
+        (answer == word and wanted in phrases)
+        or (wanted == word and answer in phrases)
+        or (answer in phrases and wanted in phrases)
         for word, phrases in _synonyms().items()
     )
 

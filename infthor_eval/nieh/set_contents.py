@@ -21,9 +21,8 @@ __all__ = ["AskedTask", "SetContents", "read_asked_tasks", "read_contents"]
 # Contexts whose frames are chosen by a model; which questions they can be asked with is that of
 # whole trajectories.
 _BY_MODEL = frozenset({"clip_retrieval", "memory"})
-_QWEN_FRAME = (
-    121  # tokens of a frame of 300x300 in Qwen2.5-VL, for contexts that are measured in tokens
-)
+# Tokens of a frame of 300x300 in Qwen2.5-VL, for contexts that are measured in tokens.
+_QWEN_FRAME = 121
 
 
 @dataclass
@@ -78,38 +77,40 @@ def read_contents(root: Path) -> SetContents:
         DataError: the folder is no set.
     """
     data = NiehSet(root)
-    found = SetContents()
+    contents = SetContents()
     for name, rows in data.files.items():
-        asked = [row for row in rows if isinstance(row, Question)]
-        found.questions[name] = Counter(row.question_type or type_of(row.text) for row in asked)
-    found.malformed.update(row.reason for row in data.malformed)
-    found.left_out.update(data.reasons() - found.malformed)
+        questions = [row for row in rows if isinstance(row, Question)]
+        contents.questions[name] = Counter(
+            row.question_type or type_of(row.text) for row in questions
+        )
+    contents.malformed.update(row.reason for row in data.malformed)
+    contents.left_out.update(data.reasons() - contents.malformed)
     named = {
         row.traj_id for rows in data.files.values() for row in rows if isinstance(row, Question)
     }
-    found.n_trajectories = len(named)
+    contents.n_trajectories = len(named)
     if data.has_frames:
         folders = [path.name for path in data.folder("").iterdir() if path.is_dir()]
-        found.n_unasked = len(set(folders) - named)
+        contents.n_unasked = len(set(folders) - named)
         for traj_id in sorted(named):
-            _read_trajectory(data, traj_id, found)
-    return found
+            _read_trajectory(data, traj_id, contents)
+    return contents
 
 
-def _read_trajectory(data: NiehSet, traj_id: str, found: SetContents) -> None:
+def _read_trajectory(data: NiehSet, traj_id: str, contents: SetContents) -> None:
     try:
         frames = data.frames(traj_id)
         layout = layout_of(data.folder(traj_id))
     except DataError as error:
-        found.unreadable.append(str(error))
+        contents.unreadable.append(str(error))
         return
-    found.frames.append(len(frames))
-    found.layouts[layout.value] += 1
+    contents.frames.append(len(frames))
+    contents.layouts[layout.value] += 1
     if frames:
-        found.image_folders[frames[0].path.parent.name] += 1
+        contents.image_folders[frames[0].path.parent.name] += 1
         if frames[0].problem() is None:
             with Image.open(frames[0].path) as image:
-                found.image_sizes[image.size] += 1
+                contents.image_sizes[image.size] += 1
 
 
 def read_asked_tasks(root: Path, trajectories: Path | None = None) -> Iterator[AskedTask]:
@@ -133,5 +134,5 @@ def read_asked_tasks(root: Path, trajectories: Path | None = None) -> Iterator[A
             {"data": str(root), "tokens_per_frame": _QWEN_FRAME, "seed": 0, **settings, **more}
         )
         yield AskedTask(
-            name, len(samples.samples), Counter(item.reason for item in samples.skipped)
+            name, len(samples.samples), Counter(skipped.reason for skipped in samples.skipped)
         )

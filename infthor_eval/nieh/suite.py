@@ -11,14 +11,7 @@ from infthor_eval.nieh.results.summary import NiehSummary, primary_metrics, summ
 from infthor_eval.nieh.results.tables import overview, tables
 from infthor_eval.nieh.task import check_task_file
 from infthor_eval.rates import Rate
-from infthor_eval.runs import (
-    RecordTypes,
-    RunHeader,
-    RunSummary,
-    TaskFile,
-    TaskRequest,
-    UnitRecord,
-)
+from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject
@@ -54,8 +47,7 @@ class NiehSuite:
         return record.payload.scores
 
     def primary_metrics(self, summary: NiehSummary) -> Mapping[str, Rate]:
-        """See `Suite.primary_metrics`: the strict scorer, or the first of the task's own
-        metrics."""
+        """See `Suite.primary_metrics`: the strict scorer, or the task's own first metric."""
         return primary_metrics(summary)
 
     def overview(self, runs: Sequence[RunSummary]) -> list[Table]:

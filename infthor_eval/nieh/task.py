@@ -21,11 +21,8 @@ from model_adapters import Decoding, cut_at_stop
 
 __all__ = ["NiehTask", "PreparedTask", "check_task_file"]
 
-_OF_SETS = (
-    "context",
-    "data",
-    "bundled",
-)  # keys of `dataset_kwargs` beside the settings of contexts
+# Keys of `dataset_kwargs` beside the settings of contexts.
+_OF_SETS = ("context", "data", "bundled")
 _NEEDED = (
     "custom_dataset",
     "dataset_kwargs",
@@ -38,8 +35,7 @@ _NEEDED = (
 
 @dataclass(frozen=True)
 class PreparedTask:
-    """A task with all that turns its samples into records; `generation_kwargs` are the decoding in
-    lm-eval's words.
+    """A task with what turns samples into records; `generation_kwargs` in lm-eval's words.
 
     Attributes:
         stop: strings that end an answer behind thoughts; the decoding's own would end the thoughts.
@@ -108,8 +104,7 @@ class NiehTask:
         )
 
     def prepare(self, tokens_per_frame: int | None) -> PreparedTask:
-        """Prepare the task for a model, given the tokens of a frame where the samples depend on
-        them."""
+        """Prepare the task for a model, given a frame's tokens where samples depend on them."""
         samples = self.task_samples
         if samples is None:
             samples = find_samples(
@@ -157,52 +152,50 @@ class NiehTask:
 
 
 def check_task_file(file: TaskFile) -> None:
-    """Check the settings under `dataset_kwargs`, so that none is without effect, as a misspelt one
-    would be.
+    """Check `dataset_kwargs`, so that no setting is without effect, as a misspelt one would be.
 
     Raises:
         DataError: names the file and the setting.
         UsageError: likewise.
     """
     file.require("dataset_kwargs")
-    place = f"{file.path}: dataset_kwargs"
-    given = file.settings["dataset_kwargs"]
-    if not isinstance(given, Mapping) or not isinstance(given.get("context"), str):
-        raise DataError(f"{place} must be a mapping with the name of a context (context: NAME)")
-    known = (*_OF_SETS, *(item.name for item in fields(ContextSettings)))
-    for key in given:
+    location = f"{file.path}: dataset_kwargs"
+    raw = file.settings["dataset_kwargs"]
+    if not isinstance(raw, Mapping) or not isinstance(raw.get("context"), str):
+        raise DataError(f"{location} must be a mapping with the name of a context (context: NAME)")
+    known = (*_OF_SETS, *(setting.name for setting in fields(ContextSettings)))
+    for key in raw:
         if key not in known:
             near = difflib.get_close_matches(str(key), known, n=1)
             hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(sorted(known))}"
-            raise DataError(f"{place}: {key} is not known; {hint}")
+            raise DataError(f"{location}: {key} is not known; {hint}")
     for key in _OF_SETS:
-        if not isinstance(given.get(key, ""), str):
-            raise DataError(f"{place}: {key} is {given[key]!r:.60}; it is a name")
-    context = CONTEXTS.get(given["context"])
+        if not isinstance(raw.get(key, ""), str):
+            raise DataError(f"{location}: {key} is {raw[key]!r:.60}; it is a name")
+    context = CONTEXTS.get(raw["context"])
     if context is None:
         raise UsageError(
-            f"{place}: context is {given['context']!r:.60}; it is one of {', '.join(CONTEXTS)}"
+            f"{location}: context is {raw['context']!r:.60}; it is one of {', '.join(CONTEXTS)}"
         )
-    settings = ContextSettings.read(given, place)
+    settings = ContextSettings.read(raw, location)
     try:
-        check_prompt(given["context"], settings.prompt)
+        check_prompt(raw["context"], settings.prompt)
     except UsageError as error:
-        raise UsageError(f"{place}: {error}") from error
+        raise UsageError(f"{location}: {error}") from error
     if context.needs_model and settings.ctx_size is None:
         raise UsageError(
-            f"{place}: ctx_size is missing; {given['context']} needs it, a number of kilo-tokens "
+            f"{location}: ctx_size is missing; {raw['context']} needs it, a number of kilo-tokens "
             "above 0"
         )
-    if "bundled" in given:
+    if "bundled" in raw:
         try:
-            packaged_folder(f"sets/{given['bundled']}")
+            packaged_folder(f"sets/{raw['bundled']}")
         except DataError as error:
-            raise DataError(f"{place}: bundled is {given['bundled']!r:.60}: {error}") from error
+            raise DataError(f"{location}: bundled is {raw['bundled']!r:.60}: {error}") from error
 
 
 def _drawn(generation_kwargs: Any, options: NiehOptions) -> Any:
-    """Return the generation settings of a task with drawn replies, if the run wants them or repeats
-    its questions."""
+    """Return generation settings with drawn replies, if the run wants them or repeats questions."""
     if not isinstance(generation_kwargs, Mapping):
         return generation_kwargs  # refused where it is read
     own = generation_kwargs.get("temperature") or None

@@ -1,4 +1,4 @@
-"""The unit of NIEH: a question in one variant of its context."""
+"""The unit of NIEH: a question in one variant of its context, and how much evidence that shows."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -6,14 +6,13 @@ from typing import Any
 
 from msgspec.structs import replace as replace_fields
 
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts.base import Sample, clue_positions
 from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
-from infthor_eval.nieh.records import Guess, NiehAnswer
+from infthor_eval.nieh.records import Guess, NiehAnswer, ShownClues
 from infthor_eval.nieh.samples import TaskSamples
-from infthor_eval.nieh.shown_clues import shown_clues
 from infthor_eval.runs import Unit, UnitKey, UnitRecord
 
-__all__ = ["NiehUnit"]
+__all__ = ["NiehUnit", "shown_clues"]
 
 
 @dataclass(frozen=True)
@@ -58,3 +57,17 @@ class NiehUnit(Unit[NiehAnswer]):
 
     def _with_guess(self, payload: NiehAnswer) -> NiehAnswer:
         return replace_fields(payload, guess=self.find_guess())
+
+
+def shown_clues(task_samples: TaskSamples, sample: Sample) -> ShownClues | None:
+    """Return the clue frames that a sample shows; None for absences and sets without frames."""
+    data = task_samples.data
+    question = sample.question
+    if question.absence or not data.has_frames:
+        return None
+    clues = clue_positions(data, question)
+    positions = set(task_samples.context.positions(data, sample))
+    n_after = len(data.frames(question.traj_id)) - 1 - clues[-1]
+    return ShownClues(
+        n_shown=len(positions.intersection(clues)), n_clues=len(clues), n_after=n_after
+    )

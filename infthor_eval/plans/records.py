@@ -4,8 +4,8 @@ import msgspec
 
 from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.plans.config import PlansConfig
-from infthor_eval.runs.counts import Count, Total
 from infthor_eval.runs.journals.records import RecordTypes
+from infthor_eval.runs.usage import Count, Total
 
 __all__ = ["RECORDS", "PlanRecord", "StepRecord"]
 

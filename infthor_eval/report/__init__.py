@@ -1,2 +1,1 @@
-"""Results for people: tables on the terminal, comparisons, pages; pure functions of typed
-summaries."""
+"""Results for people: tables, comparisons and pages, as pure functions of typed summaries."""

@@ -124,8 +124,7 @@ class _TaskComparison:
     n_unshared: int
 
     def by_scores(self, units: Sequence[_PairedUnit], suite: Suite) -> Iterator[Comparison]:
-        """Compare in the suite's metrics; a unit without a result has no scores, and counts as
-        0."""
+        """Compare in the suite's metrics; a unit without a result counts as 0."""
         scores = [unit.scores(suite.scores) for unit in units]
         for metric in _shared_metrics(scores):
             yield self._compare(metric, scores)
@@ -162,8 +161,7 @@ class _TaskComparison:
 
 
 def _shared_metrics(scores: Sequence[_PairedScores]) -> list[str]:
-    """Return the metrics that both runs have; all of the other run's if one has no unit with a
-    result."""
+    """Return the metrics of both runs; all of the other's if one has no unit with a result."""
     first: dict[str, None] = {}
     second: dict[str, None] = {}
     for unit in scores:
@@ -189,8 +187,7 @@ def _drawing(samples: Sequence[Sequence[float]], n_units: int) -> float | None:
 
 
 def comparison_table(comparisons: Sequence[Comparison], first: str, second: str) -> Table:
-    """Return a table with a row per task and metric, each in its own unit; `first` and `second`
-    name the runs."""
+    """Return a table by task and metric, in its own unit; `first` and `second` name the runs."""
     repeated = any(comparison.drawing is not None for comparison in comparisons)
     numbers = ["first", "second", "difference", "95 % interval", "p", "samples", "only in one"]
     numbers += ["drawing"] if repeated else []

@@ -25,7 +25,7 @@ _MARKDOWN = re.compile(r"([\\`*_\[\]<>|~#])")
 _THOUSANDS = re.compile(r"(?<=\d),(?=\d{3}(?!\d))")
 
 
-def export_tables(tables: Sequence[Table], form: str) -> str:
+def export_tables(tables: Sequence[Table], file_format: str) -> str:
     """Return tables in a form, separated by empty lines.
 
     Args:
@@ -34,9 +34,11 @@ def export_tables(tables: Sequence[Table], form: str) -> str:
             interval, a count) becomes several columns. The title and the notes are lines that begin
             with `#`; a table alone has none.
     """
-    if form == "csv":
+    if file_format == "csv":
         return "\n".join(_csv(table, with_words=len(tables) > 1) for table in tables)
-    return "\n".join({"latex": _latex, "markdown": _markdown}[form](table) for table in tables)
+    return "\n".join(
+        {"latex": _latex, "markdown": _markdown}[file_format](table) for table in tables
+    )
 
 
 def _csv(table: Table, *, with_words: bool) -> str:
@@ -57,9 +59,9 @@ def _csv_columns(column: Column, cells: Sequence[str]) -> Iterator[list[str]]:
             name for cell in cells if isinstance(cell, TableCell) for name in cell.numbers
         )
     ) or [""]
-    for place, name in enumerate(names):
+    for number, name in enumerate(names):
         heading = _in_one_line(f"{column.name} {name}")
-        yield [heading, *(_csv_cell(cell, name, column, is_first=place == 0) for cell in cells)]
+        yield [heading, *(_csv_cell(cell, name, column, is_first=number == 0) for cell in cells)]
 
 
 def _csv_cell(cell: str, name: str, column: Column, *, is_first: bool) -> str:

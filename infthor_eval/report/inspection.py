@@ -28,7 +28,7 @@ def write_inspection_page(path: Path, items: Sequence[JudgedQuestion], data: Nie
     # Questions and replies come from data files and models: whatever they hold is shown as text.
     page = Environment(autoescape=True).from_string(template)
     text = page.render(
-        items=[_describe(item, data, path.parent) for item in items], choices=DECISIONS
+        items=[_describe(judged, data, path.parent) for judged in items], choices=DECISIONS
     )
     try:
         path.write_text(text, encoding="utf-8")
@@ -38,15 +38,16 @@ def write_inspection_page(path: Path, items: Sequence[JudgedQuestion], data: Nie
         ) from error
 
 
-def _describe(item: JudgedQuestion, data: NiehSet, folder: Path) -> dict[str, object]:
-    question = item.question
+def _describe(judged: JudgedQuestion, data: NiehSet, folder: Path) -> dict[str, object]:
+    question = judged.question
     frames = zip(question.clues, data.clue_frames(question), strict=True)
     return {
         "id": question.id,
         "question": question.text,
         "answer": ", ".join(map(str, question.answers)),
         "replies": [
-            (model, "(failed)" if reply is None else reply) for model, reply in item.replies.items()
+            (model, "(failed)" if reply is None else reply)
+            for model, reply in judged.replies.items()
         ],
         "frames": [
             {"index": i, "url": quote(os.path.relpath(frame.path, folder))} for i, frame in frames

@@ -21,8 +21,7 @@ _LONGEST = 2000  # characters of a field on the page
 
 
 class PlainPresenter:
-    """See `Presenter`: samples are the fields of the records, and there are no charts, figures or
-    replays."""
+    """See `Presenter`: samples are records' fields; there are no charts, figures or replays."""
 
     title: str = ""
     measure: str = "primary metric"

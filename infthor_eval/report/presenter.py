@@ -113,8 +113,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class EpisodeSelection:
-    """The episodes of a run to replay; None stands for all, or for the only one where one is
-    needed.
+    """The episodes of a run to replay; None: all, or the only one where one is needed.
 
     Attributes:
         task: name of a task of the run.
@@ -136,8 +135,7 @@ class ReplayFrame(Protocol):
 
     @property
     def observation(self) -> Any:
-        """The world at that state, with an image `frame` (uint8 RGB array); None if nobody acted in
-        the episode."""
+        """The world at that state, with `frame` (uint8 RGB array); None if nobody acted in it."""
 
     @property
     def note(self) -> str:
@@ -152,8 +150,7 @@ class OpenReplay(Protocol):
         """Number of episodes of the trajectory."""
 
     def frames(self, records: Sequence[Record], /) -> Iterator[Any]:
-        """Replay some episodes and yield their frames (`ReplayFrame`): the start of each, then a
-        frame per step.
+        """Replay episodes and yield `ReplayFrame`s: the start of each, then one per step.
 
         Raises:
             InfthorError: an episode cannot be replayed.
@@ -243,8 +240,7 @@ class Presenter(Protocol):
         shown as they are."""
 
     def further_scores(self, record: Record) -> Mapping[str, float]:
-        """Return scores that not every sample has, by name; runs are compared in them on the
-        samples that have them."""
+        """Return scores that only some samples have, by name; runs are compared on those."""
 
     def charts(self, runs: Sequence[ReportRun]) -> Sequence[Chart]:
         """Draw the charts of the suite's section; its tables are `Suite.tables`."""
@@ -265,11 +261,9 @@ class Presenter(Protocol):
         """Return the steps of a recorded episode; empty if it has none."""
 
     def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
-        """Return the requests of a run's records, equal ones as one object; `data` is as for
-        `timelines`."""
+        """Return the requests of a run's records, equal ones once; `data` is as for `timelines`."""
 
     def timelines(
         self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore
     ) -> Timelines:
-        """Find the frames that the samples are about; `data` is the set's folder, None for the one
-        a run names."""
+        """Find the samples' frames; `data` is the set's folder, None for the one a run names."""

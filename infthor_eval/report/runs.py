@@ -65,14 +65,12 @@ class ReportRun:
 
     @property
     def simulator(self) -> str:
-        """Name of the simulator that the frames are from, or names separated by commas; empty if it
-        is not known."""
+        """Names of the frames' simulators, separated by commas; empty if not known."""
         return ", ".join(self.header.config.simulators)
 
 
 def label_report_runs(folders: Sequence[Path], headers: Sequence[RunHeader]) -> list[str]:
-    """Return a label per run: its name, with the options that tell runs of one name apart, or with
-    its folder.
+    """Return a label per run: its name, with options or folder to tell equal names apart.
 
     Raises:
         DataError: the `run.yaml` of a run is not what it should be.
@@ -91,10 +89,12 @@ def distinct_names(folders: Sequence[Path], headers: Sequence[RunHeader]) -> lis
         for name, header in zip(names, headers, strict=True)
     ]
     with_tasks = list(zip(keys, tasks, strict=True))
-    for place, key in enumerate(keys):
+    for position, key in enumerate(keys):
         if keys.count(key) > 1:
-            is_told_by_tasks = with_tasks.count(with_tasks[place]) == 1
-            names[place] += f" ({tasks[place] if is_told_by_tasks else folders[place].name})"
+            is_told_by_tasks = with_tasks.count(with_tasks[position]) == 1
+            names[position] += (
+                f" ({tasks[position] if is_told_by_tasks else folders[position].name})"
+            )
     return names
 
 
@@ -105,8 +105,7 @@ def with_frames(name: str, header: RunHeader) -> str:
 
 
 def choose_evenly(items: Sequence[T], n: int) -> list[T]:
-    """Return n items, evenly spaced from the first to the last; all of them if there are no
-    more."""
+    """Return n items, evenly spaced from the first to the last; all if there are no more."""
     if len(items) <= n:
         return list(items)
     return [items[round(number * (len(items) - 1) / max(n - 1, 1))] for number in range(n)]
@@ -115,7 +114,7 @@ def choose_evenly(items: Sequence[T], n: int) -> list[T]:
 def records_by_unit(runs: Sequence[ReportRun]) -> Mapping[UnitKey, list[UnitRecord[Any] | None]]:
     """Return the records of each unit, with a place per run, in the order of the units' keys."""
     units: dict[UnitKey, list[UnitRecord[Any] | None]] = {}
-    for place, run in enumerate(runs):
+    for position, run in enumerate(runs):
         for record in run.records:
-            units.setdefault(record.key, [None] * len(runs))[place] = record
+            units.setdefault(record.key, [None] * len(runs))[position] = record
     return dict(sorted(units.items()))

@@ -18,18 +18,18 @@ class SampleColumn(NamedTuple):
 
     Attributes:
         name: its name; docs/formats.md says what it holds, in which unit.
-        form: type of its cells: str, int, float or bool.
+        cell_type: type of its cells: str, int, float or bool.
         value: returns the cell of a record; None for an empty one.
     """
 
     name: str
-    form: type
+    cell_type: type
     value: Callable[[UnitRecord[Any]], str | float | bool | None]
 
 
-def payload_column(name: str, form: type) -> SampleColumn:
+def payload_column(name: str, cell_type: type) -> SampleColumn:
     """Return the column of a field of the payload."""
-    return SampleColumn(name, form, attrgetter(f"payload.{name}"))
+    return SampleColumn(name, cell_type, attrgetter(f"payload.{name}"))
 
 
 ENVELOPE = (

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Sequence
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from infthor_eval.formats.csv_files import shield
-from infthor_eval.report.presented import PresentedRun
+from infthor_eval.report.presented import PresentedRun, read_report_runs
 from infthor_eval.report.sample_columns import ENVELOPE, SampleColumn
 from infthor_eval.runs import UnitRecord
 from infthor_eval.terminal import printable
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
     from pyarrow import Table
 
-__all__ = ["FORMS", "encode_samples", "sample_table"]
+__all__ = ["FORMS", "encode_samples", "load_run", "sample_table"]
 
 FORMS = ("csv", "parquet")
 
@@ -54,7 +57,7 @@ def _table_of(run: PresentedRun) -> Table:
     arrays = {}
     for column in columns:
         cells = [column.value(record) for record in run.records]
-        arrays[column.name] = pyarrow.array(cells, types[column.form])
+        arrays[column.name] = pyarrow.array(cells, types[column.cell_type])
     return pyarrow.table(arrays)
 
 
@@ -66,12 +69,16 @@ def _score_columns(run: PresentedRun) -> list[SampleColumn]:
 
 
 def _score(run: PresentedRun, metric: str, record: UnitRecord[Any]) -> float | None:
-    """Return a score as the run's summary counts it: 0 for a failed unit, none for one that does
-    not count."""
+    """Return a score as summaries count it: 0 for a failed unit, None for one that is excluded."""
     return None if record.excluded is not None else run.suite.scores(record).get(metric, 0.0)
 
 
-def encode_samples(table: Table, form: str) -> bytes:
+def load_run(folder: str | os.PathLike[str]) -> DataFrame:
+    """See `infthor_eval.load_run`."""
+    return sample_table(read_report_runs([Path(folder)])).to_pandas()
+
+
+def encode_samples(table: Table, file_format: str) -> bytes:
     """Return the bytes of a file: "csv" or "parquet".
 
     CSV is opened in spreadsheets and printed on terminals: a text that would be a formula begins
@@ -81,7 +88,7 @@ def encode_samples(table: Table, form: str) -> bytes:
     import pyarrow.parquet
 
     file = io.BytesIO()
-    if form == "parquet":
+    if file_format == "parquet":
         pyarrow.parquet.write_table(table, file)
     else:
         pyarrow.csv.write_csv(_with_safe_texts(table), file)
@@ -91,12 +98,12 @@ def encode_samples(table: Table, form: str) -> bytes:
 def _with_safe_texts(table: Table) -> Table:
     import pyarrow
 
-    for place, column in enumerate(table.columns):
+    for index, column in enumerate(table.columns):
         if pyarrow.types.is_string(column.type):
             texts = [
                 None if text is None else shield(printable(text)) for text in column.to_pylist()
             ]
             table = table.set_column(
-                place, table.column_names[place], pyarrow.array(texts, pyarrow.string())
+                index, table.column_names[index], pyarrow.array(texts, pyarrow.string())
             )
     return table

@@ -1,5 +1,4 @@
-"""The catalog of tasks that `--tasks` can name: this package's, those of other packages, and the
-user's own.
+"""The tasks that `--tasks` can name: this package's, other packages', and the user's own.
 
 The files are lm-eval's own format, and say which suite evaluates them (`metadata: {suite: NAME}`).
 lm-eval passes over a broken file without a word, so they are read and checked here first, without
@@ -83,8 +82,7 @@ class Catalog:
 
     @classmethod
     def find_installed(cls, include: Sequence[Path] = ()) -> "Catalog":
-        """Return the catalog of the tasks of this package, of other installed packages, and of
-        further folders.
+        """Return the catalog of tasks in this package, other installed packages, further folders.
 
         Raises:
             UsageError: an installed package lacks the folder that it names.
@@ -124,8 +122,7 @@ class Catalog:
         return list(by_name.values())
 
     def _members(self, group: str, inside: tuple[str, ...]) -> list[TaskFile]:
-        """Return the single tasks of a group and of the groups in it; `inside` has the groups
-        around it."""
+        """Return the single tasks of a group, nested or not; `inside` has the groups around it."""
         members: list[TaskFile] = []
         for name in self.groups[group]:
             if name in inside:
@@ -181,8 +178,10 @@ def _folder_of(point: EntryPoint) -> Path:
     """Return the folder of task files that a package names, without importing the package."""
     package, *inside = point.value.split(".")
     spec = find_spec(package)
-    places = spec.submodule_search_locations if spec is not None else None
-    folders = [Path(place, *inside) for place in places or () if Path(place, *inside).is_dir()]
+    locations = spec.submodule_search_locations if spec is not None else None
+    folders = [
+        Path(location, *inside) for location in locations or () if Path(location, *inside).is_dir()
+    ]
     if not folders:
         raise UsageError(
             f"the tasks {point.name} of another package are not in {point.value}; fix its package, "
@@ -219,8 +218,7 @@ class _Reader:
         self._contents: dict[Path, Mapping[str, Any]] = {}
 
     def settings(self, path: Path, including: tuple[Path, ...] = ()) -> dict[str, Any]:
-        """Return a file's settings over those of what it includes; `including` has the files that
-        include it."""
+        """Return a file's settings over its includes'; `including`: the files that include it."""
         if path not in self._contents:
             self._contents[path] = _read(path)
         config = dict(self._contents[path])

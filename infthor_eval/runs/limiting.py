@@ -15,19 +15,19 @@ def spread(items: Sequence[T], cluster_of: Callable[[T], str], seed: int) -> lis
     Each round takes one item of every trajectory that has any left. The item, and the order of the
     trajectories, are drawn. A larger limit selects all items of a smaller one.
     """
-    places: dict[str, list[int]] = {}
-    for place, item in enumerate(items):
-        places.setdefault(cluster_of(item), []).append(place)
-    clusters = sorted(places)
+    positions: dict[str, list[int]] = {}
+    for position, item in enumerate(items):
+        positions.setdefault(cluster_of(item), []).append(position)
+    clusters = sorted(positions)
     random.Random(f"{seed}").shuffle(clusters)
     for cluster in clusters:  # each with its own seed: a further trajectory changes no other
-        random.Random(f"{seed} {cluster}").shuffle(places[cluster])
-    longest = max(map(len, places.values()), default=0)
+        random.Random(f"{seed} {cluster}").shuffle(positions[cluster])
+    longest = max(map(len, positions.values()), default=0)
     return [
-        places[cluster][turn]
+        positions[cluster][turn]
         for turn in range(longest)
         for cluster in clusters
-        if turn < len(places[cluster])
+        if turn < len(positions[cluster])
     ]
 
 
@@ -36,7 +36,7 @@ def limit_items(
 ) -> list[T]:
     """Return the items that a limit selects, in their order; all items without a limit."""
     return (
-        [items[place] for place in sorted(spread(items, cluster_of, seed)[:limit])]
+        [items[position] for position in sorted(spread(items, cluster_of, seed)[:limit])]
         if limit
         else list(items)
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Generic
 
 from infthor_eval.errors import UsageError, unknown_name
-from infthor_eval.runs.journals.records import P, RunHeader, U
+from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit
 from infthor_eval.runs.suite import Evaluation, Suite, TaskRequest
 from infthor_eval.storage.files import require_writable
 from infthor_eval.workers import WorkerSettings
@@ -22,7 +22,7 @@ class RunRequest:
     Attributes:
         model: name of a model, a policy, or a baseline of the suite.
         tasks: the request to the suite.
-        asked: names of tasks and groups as typed, which name the run's folder.
+        task_names: names of tasks and groups as typed, which name the run's folder.
         output: folder above the run's folder.
         model_options: options of the model as typed.
         name: name of the run; None for the checkpoint's name, or the model's.
@@ -36,7 +36,7 @@ class RunRequest:
 
     model: str
     tasks: TaskRequest[Any]
-    asked: tuple[str, ...]
+    task_names: tuple[str, ...]
     output: Path
     model_options: Mapping[str, str] = field(default_factory=dict)
     name: str | None = None
@@ -53,7 +53,7 @@ class RunRequest:
 
     def folder(self, header: RunHeader) -> Path:
         """Return the run's folder."""
-        return run_folder(self.output, header, self.asked)
+        return run_folder(self.output, header, self.task_names)
 
 
 def run_folder(output: Path, header: RunHeader, tasks: Iterable[str]) -> Path:
@@ -62,16 +62,17 @@ def run_folder(output: Path, header: RunHeader, tasks: Iterable[str]) -> Path:
 
 
 @dataclass(frozen=True)
-class PreparedRun(Generic[U, P]):
-    """A request whose names, files and data are in order, with its suite set up; it is pickled and
-    sent to workers."""
+class PreparedRun(Generic[SuiteUnit, Payload]):
+    """A request found in order, with its suite set up; it is pickled and sent to workers."""
 
     request: RunRequest
-    suite: Suite[U, P]
-    evaluation: Evaluation[U, P]
+    suite: Suite[SuiteUnit, Payload]
+    evaluation: Evaluation[SuiteUnit, Payload]
 
 
-def prepare(request: RunRequest, suite: Suite[U, P]) -> PreparedRun[U, P]:
+def prepare(
+    request: RunRequest, suite: Suite[SuiteUnit, Payload]
+) -> PreparedRun[SuiteUnit, Payload]:
     """Check a request before anything expensive is loaded.
 
     Raises:
@@ -82,9 +83,8 @@ def prepare(request: RunRequest, suite: Suite[U, P]) -> PreparedRun[U, P]:
     if request.model not in suite.baselines and not is_known(request.model):
         raise unknown_name("model", request.model, [*suite.baselines, *names()])
     if request.model not in suite.baselines:
-        check_options(
-            request.model, request.model_options
-        )  # before the data are read, which may take minutes
+        # Before the data are read, which may take minutes.
+        check_options(request.model, request.model_options)
     elif request.model_options:
         raise UsageError(
             f"{request.model} has no option {next(iter(request.model_options))}, nor any other"

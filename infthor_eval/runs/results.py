@@ -32,8 +32,7 @@ _USAGE = "usage.json"
 def results_document(
     run: RunSummary, suite: Suite[Any, Any], n_missing: int | None, usage: Usage
 ) -> dict[str, Any]:
-    """Return the contents of `results.json`, see docs/formats.md; `n_missing` is None if it is not
-    known."""
+    """Return the contents of `results.json` (docs/formats.md); `n_missing` is None if unknown."""
     header = run.header
     return {
         "suite": header.suite,
@@ -73,8 +72,7 @@ def write_run_files(
 
 
 def write_results(folder: Path, document: dict[str, Any]) -> None:
-    """Write `results.json` (see `results_document`) into a run's folder; equal runs give equal
-    bytes.
+    """Write `results.json` (`results_document`) into a run's folder; equal runs give equal bytes.
 
     Raises:
         DataError: the file cannot be written.
@@ -83,8 +81,7 @@ def write_results(folder: Path, document: dict[str, Any]) -> None:
 
 
 def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRecord[Any]]) -> None:
-    """Write the scores of every unit to `scores.jsonl`, a JSON object a line; equal runs give equal
-    bytes.
+    """Write every unit's scores to `scores.jsonl`, an object a line; equal runs give equal bytes.
 
     Raises:
         DataError: the file cannot be written.
@@ -107,8 +104,7 @@ def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRec
 
 
 def write_usage(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) -> None:
-    """Write requests, tokens, time and cost of a run, which differ from run to run, to
-    `usage.json`.
+    """Write requests, tokens, time and cost, which differ from run to run, to `usage.json`.
 
     Raises:
         DataError: the file cannot be written.

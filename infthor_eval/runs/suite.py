@@ -7,7 +7,7 @@ and tables. Each further object exists only once all that it needs is known:
     Evaluation.bind(subject) -> BoundEvaluation    groups that share expensive work; simulators
     BoundEvaluation.run(group, session)            a record per unit
 
-`U` is the suite's unit, `P` the payload of its records.
+`SuiteUnit` is the suite's unit, `Payload` the payload of its records.
 
 To add an option of a suite: a field with its help in the suite's options, as in
 `infthor_eval/nieh/options.py`; `is_place` in its metadata if it may name a file.
@@ -27,20 +27,21 @@ from infthor_eval.rates import Rate
 from infthor_eval.runs.catalog import TaskFile
 from infthor_eval.runs.config import RunConfig
 from infthor_eval.runs.journals.records import (
-    A,
-    P,
+    Artifact,
+    Payload,
     RecordTypes,
     RunHeader,
-    U,
+    SuiteUnit,
     Unit,
     UnitKey,
     UnitRecord,
 )
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.tables import Table
-from model_adapters import Subject
+from model_adapters import Capabilities, Subject
 
 __all__ = [
+    "BaselineSubject",
     "BoundEvaluation",
     "Cost",
     "Evaluation",
@@ -57,12 +58,12 @@ __all__ = [
 
 Need = Literal["conversation", "policy"]
 
-O_co = TypeVar("O_co", covariant=True)
-U_co = TypeVar("U_co", bound=Unit[Any], covariant=True)
+Options_co = TypeVar("Options_co", covariant=True)
+SuiteUnit_co = TypeVar("SuiteUnit_co", bound=Unit[Any], covariant=True)
 
 
 @dataclass(frozen=True)
-class TaskRequest(Generic[O_co]):
+class TaskRequest(Generic[Options_co]):
     """The request of a run to a suite.
 
     Attributes:
@@ -75,14 +76,14 @@ class TaskRequest(Generic[O_co]):
     """
 
     tasks: Sequence[TaskFile]
-    options: O_co
+    options: Options_co
     data: Path | None = None
     limit: int | None = None
     seed: int = 0
 
 
 @dataclass(frozen=True)
-class Group(Generic[U_co]):
+class Group(Generic[SuiteUnit_co]):
     """Units that share work, done one after the other in one place.
 
     Attributes:
@@ -91,7 +92,7 @@ class Group(Generic[U_co]):
             with it.
     """
 
-    units: Sequence[U_co]
+    units: Sequence[SuiteUnit_co]
     frames: int = 1
 
 
@@ -112,7 +113,7 @@ class Cost:
 
 
 @dataclass(frozen=True)
-class Workload(Generic[U_co]):
+class Workload(Generic[SuiteUnit_co]):
     """All the work of a run.
 
     Attributes:
@@ -125,7 +126,7 @@ class Workload(Generic[U_co]):
             trained otherwise.
     """
 
-    groups: Sequence[Group[U_co]]
+    groups: Sequence[Group[SuiteUnit_co]]
     skipped: Sequence[Skipped] = ()
     config: RunConfig[Any] = field(default_factory=RunConfig)
     costs: Sequence[Cost] = ()
@@ -137,18 +138,16 @@ class Workload(Generic[U_co]):
         return sum(len(group.units) for group in self.groups)
 
 
-class Session(Protocol[P]):
-    """The results of a run so far, as a suite sees them while it does a group; several threads may
-    use it at once."""
+class Session(Protocol[Payload]):
+    """A run's results so far, for a suite that does a group; several threads may use it at once."""
 
-    def find_record(self, unit: Unit[P], fingerprint: str) -> UnitRecord[P] | None:
+    def find_record(self, unit: Unit[Payload], fingerprint: str) -> UnitRecord[Payload] | None:
         """Return the record of a unit that already has a result from these very inputs, or None."""
 
-    def describe_failure(self, unit: Unit[P], error: Exception) -> str:
-        """Return the reason why a unit failed by an exception, and keep the traceback of an
-        unexpected one."""
+    def describe_failure(self, unit: Unit[Payload], error: Exception) -> str:
+        """Return why an exception made a unit fail, and keep an unexpected one's traceback."""
 
-    def find_artifact(self, fingerprint: str, kind: type[A]) -> A | None:
+    def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
         """Return the cached artifact of these inputs, or None."""
 
     def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
@@ -176,17 +175,17 @@ class UnitSample:
     reply: str
 
 
-class BoundEvaluation(Protocol[U, P]):
-    """An evaluation of one subject. It owns whatever depends on the subject, its simulators among
-    it."""
+class BoundEvaluation(Protocol[SuiteUnit, Payload]):
+    """An evaluation of one subject, which owns what depends on it, such as its simulators."""
 
     @property
-    def workload(self) -> Workload[U]:
+    def workload(self) -> Workload[SuiteUnit]:
         """All the work; the same object every time."""
 
-    def run(self, group: Group[U], session: Session[P]) -> Iterator[UnitRecord[P]]:
-        """Do a group: yield a record per unit as soon as it is there; records found in the session
-        as they are.
+    def run(
+        self, group: Group[SuiteUnit], session: Session[Payload]
+    ) -> Iterator[UnitRecord[Payload]]:
+        """Do a group: yield a record per unit when it is there; those in the session as they are.
 
         Raises:
             InfthorError: the units without a record cannot be done. The run records them as failed
@@ -194,19 +193,17 @@ class BoundEvaluation(Protocol[U, P]):
                 only MemoryError ends the run.
         """
 
-    def to_sample(self, record: UnitRecord[P]) -> UnitSample:
+    def to_sample(self, record: UnitRecord[Payload]) -> UnitSample:
         """Convert a record of this workload for other readers; not after `close`."""
 
     def close(self) -> None:
-        """Release what the work needed (simulators); called once, whether the work was finished or
-        not."""
+        """Release what the work needed (simulators); called once, also if it was not finished."""
 
 
-class Evaluation(Protocol[U, P]):
-    """A suite set up for one run. It holds only what was read from files, and may be bound more
-    than once."""
+class Evaluation(Protocol[SuiteUnit, Payload]):
+    """A suite set up for a run. It holds only what files hold, and may be bound more than once."""
 
-    def bind(self, subject: Subject) -> BoundEvaluation[U, P]:
+    def bind(self, subject: Subject) -> BoundEvaluation[SuiteUnit, Payload]:
         """Find all the work for a subject.
 
         Raises:
@@ -216,7 +213,7 @@ class Evaluation(Protocol[U, P]):
         """
 
 
-class Suite(Protocol[U, P]):
+class Suite(Protocol[SuiteUnit, Payload]):
     """A kind of evaluation.
 
     Attributes:
@@ -232,7 +229,7 @@ class Suite(Protocol[U, P]):
     baselines: ClassVar[Mapping[str, Callable[[int], Subject]]]
 
     @property
-    def records(self) -> RecordTypes[P]:
+    def records(self) -> RecordTypes[Payload]:
         """Payloads of the suite's records."""
 
     def check_task(self, task: TaskFile) -> None:
@@ -243,33 +240,31 @@ class Suite(Protocol[U, P]):
             DataError: the file does not match its format.
         """
 
-    def prepare(self, request: TaskRequest[Any]) -> Evaluation[U, P]:
-        """Set up a run. Whatever can be refused without the subject is refused here, before it is
-        loaded.
+    def prepare(self, request: TaskRequest[Any]) -> Evaluation[SuiteUnit, Payload]:
+        """Set up a run. What can be refused without the subject is refused before it is loaded.
 
         Raises:
             UsageError: a task or an option that does not fit.
             DataError: the data do not match their format.
         """
 
-    def summarise(self, header: RunHeader, records: Sequence[UnitRecord[P]]) -> msgspec.Struct:
+    def summarise(
+        self, header: RunHeader, records: Sequence[UnitRecord[Payload]]
+    ) -> msgspec.Struct:
         """Summarise a run: a pure function of its journal, equal for equal records.
 
         What differs between a run and the same run resumed (times) is at most in a field `took`,
         which results.json leaves out.
         """
 
-    def scores(self, record: UnitRecord[P]) -> Mapping[str, float]:
-        """Return the metrics of one unit by name; a missing one counts as 0, as all do where the
-        unit failed."""
+    def scores(self, record: UnitRecord[Payload]) -> Mapping[str, float]:
+        """Return a unit's metrics by name; a missing one is 0, as all are where the unit failed."""
 
     def primary_metrics(self, summary: Any) -> Mapping[str, Rate]:
-        """Return the primary metric of each task, a share from 0 to 1; none for a task of which no
-        unit counts."""
+        """Return each task's primary metric, a share from 0 to 1; none where no unit counts."""
 
     def overview(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:
-        """Return what people see first of runs of this suite, side by side, at most 100 columns
-        wide."""
+        """Return what people see first of runs side by side, at most 100 columns wide."""
 
     def tables(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:
         """Return all results of runs of this suite, with the published numbers beside them."""
@@ -281,3 +276,21 @@ class RunSummary:
 
     header: RunHeader
     summary: Any
+
+
+class BaselineSubject:
+    """A subject without options that sees no frame and holds no resource."""
+
+    name = ""
+    capabilities = Capabilities(counts_tokens=False, token_ids=False)
+
+    def __init__(self, seed: int) -> None:
+        """Take the seed of the run."""
+        self._seed = seed
+
+    def identity(self) -> dict[str, Any]:
+        """Return the name; what is drawn depends on the seed, which the run's config has anyway."""
+        return {"baseline": self.name}
+
+    def close(self) -> None:
+        """Nothing is held."""

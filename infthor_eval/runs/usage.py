@@ -1,16 +1,22 @@
-"""Usage: the number of requests, their tokens and their cost."""
+"""Counts as journals have them, and usage: number, tokens and cost of requests."""
 
 import math
 from collections.abc import Iterable
+from typing import Annotated
 
 import msgspec
+from msgspec import Meta
 
-from infthor_eval.runs.counts import Count
 from model_adapters import Reply
 
-__all__ = ["NOTHING", "Usage"]
+__all__ = ["NOTHING", "Count", "Total", "Usage"]
 
 _DIGITS = 9  # of dollars; further digits depend on the order of the sum
+# A float holds it exactly: means and sums of larger numbers would fail, or be wrong.
+_MOST = 2**53
+
+Count = Annotated[int, Meta(ge=0, le=_MOST)]
+Total = Annotated[int, Meta(ge=1, le=_MOST)]  # what a count is a share of
 
 
 class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -47,20 +53,19 @@ class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
     @classmethod
     def total(cls, usages: Iterable["Usage"]) -> "Usage":
         """Return the sum of several usages."""
-        items = list(usages)
-        costs = [usage.cost for usage in items if usage.cost is not None]
+        summands = list(usages)
+        costs = [usage.cost for usage in summands if usage.cost is not None]
         return cls(
-            requests=sum(usage.requests for usage in items),
-            context=sum(usage.context for usage in items),
-            cached=sum(usage.cached for usage in items),
-            reply=sum(usage.reply for usage in items),
+            requests=sum(usage.requests for usage in summands),
+            context=sum(usage.context for usage in summands),
+            cached=sum(usage.cached for usage in summands),
+            reply=sum(usage.reply for usage in summands),
             cost=round(math.fsum(costs), _DIGITS) if costs else None,
         )
 
     @property
     def hit_rate(self) -> float | None:
-        """Share of the context's tokens that were not encoded again, 0 to 1; None if none were
-        counted."""
+        """Share of the context's tokens not encoded again, 0 to 1; None if none were counted."""
         return self.cached / self.context if self.context else None
 
     @property

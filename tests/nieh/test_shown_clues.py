@@ -9,7 +9,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings, Sample
 from infthor_eval.nieh.records import ShownClues
 from infthor_eval.nieh.samples import TaskSamples, find_samples, open_set
-from infthor_eval.nieh.shown_clues import shown_clues
+from infthor_eval.nieh.units import shown_clues
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ def request(output, **changes):
     fields = {
         "model": "adder",
         "tasks": TaskRequest([task], None),
-        "asked": ("sums",),
+        "task_names": ("sums",),
         "output": output,
     }
     return RunRequest(**{**fields, **changes})

@@ -21,7 +21,7 @@ from infthor_eval.runs import (
     TaskRequest,
     UnitRecord,
 )
-from infthor_eval.runs.baseline import BaselineSubject
+from infthor_eval.runs.suite import BaselineSubject
 from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["Calculator", "Sum", "SumsConfig", "SumsOptions", "SumsSuite", "SumsSummary"]

@@ -31,8 +31,7 @@ def command(run: Path, port: int) -> None:
     """
     from infthor_eval.errors import UsageError
     from infthor_eval.pages.server import require_page_extra, serve_pages
-    from infthor_eval.report.live.page import live_routes
-    from infthor_eval.report.live.state import LiveRun
+    from infthor_eval.report.live.state import LiveRun, live_routes
     from infthor_eval.terminal import print_line
 
     if run.exists() and not run.is_dir():

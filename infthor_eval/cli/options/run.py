@@ -229,7 +229,7 @@ class RunOptions:
                     request = RunRequest(
                         model=model.name,
                         tasks=TaskRequest(tasks, options, self.data, self.limit, self.seed),
-                        asked=typed_names,
+                        task_names=typed_names,
                         output=self.output,
                         model_options=model.options,
                         name=self.name,

@@ -42,8 +42,7 @@ class Answerer(Protocol):
         """Return the cost of a task in words, or None where it is not known."""
 
     def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
-        """Fit the subject to the answer key of each task, given a function that finds the key;
-        models need no key."""
+        """Fit the subject to each task's answer key, which a function finds; models need no key."""
 
     def open(self, task: str, session: Session[NiehAnswer]) -> OpenAnswerer:
         """Return what answers the questions of a task on one trajectory."""

@@ -1,5 +1,4 @@
-"""Having questions answered, by a model through its conversation or by a baseline from the answer
-key.
+"""Having questions answered: by a model's conversation, or by a baseline from the answer key.
 
 This is the one way from a sample to its record, whoever drives it: our own run, or lm-eval as the
 host.
@@ -26,9 +25,8 @@ from infthor_eval.nieh.contexts import ContextPart
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.metrics import MetricError
 from infthor_eval.nieh.records import NiehAnswer, NiehRecall
-from infthor_eval.nieh.shown_clues import shown_clues
 from infthor_eval.nieh.task import PreparedTask
-from infthor_eval.nieh.units import NiehUnit
+from infthor_eval.nieh.units import NiehUnit, shown_clues
 from infthor_eval.runs import NOTHING, Session, Tokens, UnitRecord, Usage
 from infthor_eval.storage.digests import fingerprint
 from model_adapters import (
@@ -80,8 +78,7 @@ class _UnitRequest:
         usage: Usage,
         session: Session[NiehAnswer],
     ) -> UnitRecord[NiehAnswer]:
-        """Return the record of a reply; a failed one, with the reply, if the task's own metrics
-        fail on it."""
+        """Return the record of a reply; failed, with the reply, if the metrics fail on it."""
         scores = {}
         failure = None
         thinking, answer = answer_of(reply)
@@ -116,16 +113,13 @@ class OpenAnswerer(Protocol):
 
     @property
     def write(self) -> Write | None:
-        """What asks the model for texts for its memory; None if it has no memory, as it reads no
-        context."""
+        """What asks the model for texts for its memory; None without one: it reads no context."""
 
     def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
-        """Return a context as the model is given it: films as images, unless it has a video
-        input."""
+        """Return a context as the model gets it: films as images, unless it has a video input."""
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
-        """Return the replies to units that share their decoding, and their context unless contexts
-        are batched.
+        """Return replies to units of one decoding, and of one context unless contexts are batched.
 
         Raises:
             DataError: a frame cannot be read; nothing is answered then.
@@ -137,8 +131,7 @@ class OpenAnswerer(Protocol):
 
 
 class OpenModel:
-    """A model with one conversation, so that units in the same context share what is encoded of
-    it."""
+    """A model with one conversation: units in the same context share what is encoded of it."""
 
     def __init__(self, model: Model, session: Session[NiehAnswer]) -> None:
         self.batch_size = model.capabilities.batch_size
@@ -165,13 +158,13 @@ class OpenModel:
                 Notice(title="Question", words=requests[0].prepared.task_samples.words)
             )
         with wrap_request_errors(self._name):
-            if any(item.context != context for item in requests[1:]):
+            if any(request.context != context for request in requests[1:]):
                 self._go_to(())
                 return self._conversation.replies(
-                    [[*item.context, item.text] for item in requests], decoding
+                    [[*request.context, request.text] for request in requests], decoding
                 )
             self._go_to(context)
-            return self._conversation.replies([[item.text] for item in requests], decoding)
+            return self._conversation.replies([[request.text] for request in requests], decoding)
 
     def _go_to(self, context: tuple[Part, ...]) -> None:
         """Let the conversation be this context."""
@@ -203,7 +196,7 @@ class OpenBaseline:
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
         """See `OpenAnswerer`."""
-        return [Reply(self._predict(item.unit.sample)) for item in requests]
+        return [Reply(self._predict(request.unit.sample)) for request in requests]
 
     def usage(self, reply: Reply) -> Usage:
         """See `OpenAnswerer`."""
@@ -277,8 +270,7 @@ def _recall_all(
     answerer: OpenAnswerer,
     session: Session[NiehAnswer],
 ) -> list[tuple[NiehUnit, NiehUnit | Exception]]:
-    """Return each unit with what its memory recalled, or why that failed; as they are if there is
-    nothing to recall."""
+    """Return each unit with what its memory recalled, or why that failed; or as it is."""
     if answerer.write is None or not any(unit.sample.awaits_recall for unit in units):
         return [(unit, unit) for unit in units]
     recaller = Recaller(
@@ -310,10 +302,10 @@ def _answer_in_batches(
     # those beside them.
     for batch in _batches(requests, answerer.batch_size):
         waiting = []
-        for item in batch:
-            record = _find_record(item, session)
+        for request in batch:
+            record = _find_record(request, session)
             if record is None:
-                waiting.append(item)
+                waiting.append(request)
             else:
                 yield record
         if waiting:
@@ -322,16 +314,15 @@ def _answer_in_batches(
 
 def _batches(requests: Sequence[_UnitRequest], size: int) -> Iterator[Sequence[_UnitRequest]]:
     """Yield batches of requests with one decoding: all first requests, then all second ones."""
-    for repeat in sorted({item.unit.key.repeat for item in requests}):
-        same = [item for item in requests if item.unit.key.repeat == repeat]
+    for repeat in sorted({request.unit.key.repeat for request in requests}):
+        same = [request for request in requests if request.unit.key.repeat == repeat]
         yield from (same[at : at + size] for at in range(0, len(same), size))
 
 
 def _find_record(
     request: _UnitRequest, session: Session[NiehAnswer]
 ) -> UnitRecord[NiehAnswer] | None:
-    """Return the record of a unit that needs no answer: an earlier run has it, or a frame cannot be
-    read."""
+    """Return the record of a unit without asking: an earlier run's, or of an unreadable frame."""
     try:
         return session.find_record(request.unit, request.fingerprint)
     except DataError as error:
@@ -349,16 +340,16 @@ def _answer(
         replies = answerer.answer(requests)
     except (DataError, ModelError) as error:
         if len(requests) == 1:
-            (item,) = requests
-            yield item.unit.record_failure(
-                session.describe_failure(item.unit, error), item.fingerprint, faults=faults
+            (request,) = requests
+            yield request.unit.record_failure(
+                session.describe_failure(request.unit, error), request.fingerprint, faults=faults
             )
             return
-        for item in requests:  # one of them may be to blame; the others are answered
+        for request in requests:  # one of them may be to blame; the others are answered
             yield from _answer(
-                [item], answerer, session, (f"asked with {len(requests) - 1} others: {error}",)
+                [request], answerer, session, (f"asked with {len(requests) - 1} others: {error}",)
             )
         return
     seconds = (time.perf_counter() - start) / len(requests)
-    for item, reply in zip(requests, replies, strict=True):
-        yield item.record(reply, seconds, faults, answerer.usage(reply), session)
+    for request, reply in zip(requests, replies, strict=True):
+        yield request.record(reply, seconds, faults, answerer.usage(reply), session)

@@ -1,5 +1,4 @@
-"""Baselines that see no frame: the answer key itself, the best guess from the question alone, and
-chance.
+"""Baselines without frames: the answer key, the best guess from the question alone, and chance.
 
 To add a baseline of NIEH: a class in `BASELINES` here, and its name in `infthor_eval/suites.py`.
 """
@@ -18,9 +17,9 @@ from infthor_eval.nieh.guessing.chains import (
     Guesser,
     chains_of_words,
     chains_of_words_and_count,
+    question_type,
 )
-from infthor_eval.nieh.guessing.forms import question_type
-from infthor_eval.runs.baseline import BaselineSubject
+from infthor_eval.runs.suite import BaselineSubject
 from infthor_eval.storage.digests import seed_of
 from model_adapters import Subject
 
@@ -31,8 +30,7 @@ Predict = Callable[[Sample], str]
 
 @runtime_checkable
 class Baseline(Subject, Protocol):
-    """A subject that answers from the answer key, without frames; the data's fingerprint covers the
-    key."""
+    """A subject that answers from the answer key, without frames; the data's hash covers it."""
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
         """Read the whole answer key of one task, and return a function that answers its samples."""
@@ -49,15 +47,13 @@ class Oracle(BaselineSubject):
 
 
 class Blind(BaselineSubject):
-    """The best guess from the question's words, learned on the other trajectories: the score
-    without looking."""
+    """The best guess from the question's words, learned on the other trajectories."""
 
     name = "blind"
     _chains: Callable[[Sample], list[Chain]] = staticmethod(chains_of_words)
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
-        """See `Guesser`; each file of a set is learned alone, as the published scripts ask one at a
-        time."""
+        """See `Guesser`; each file of a set is learned alone, as the published scripts ask."""
         by_file: dict[str, list[Sample]] = defaultdict(list)
         for sample in samples:
             by_file[sample.question.file].append(sample)
@@ -82,8 +78,7 @@ class Random(BaselineSubject):
         return {"baseline": self.name, "seed": self._seed}
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
-        """See `Baseline`; a draw depends on the seed and the question alone, not on the order of
-        asking."""
+        """See `Baseline`; a draw depends on seed and question alone, not on the order of asking."""
         seen: dict[str, Counter[str]] = defaultdict(Counter)
         for question in {sample.question.id: sample.question for sample in samples}.values():
             seen[question_type(question)][doc_target(question)] += 1
@@ -98,13 +93,12 @@ class Random(BaselineSubject):
 
 
 def _counts(seen: Mapping[str, Counter[str]], question: Question) -> Counter[str]:
-    asked = question_type(question)
-    if asked not in seen:
+    kind = question_type(question)
+    if kind not in seen:
         raise ModelError(
-            f"no question of type {asked!r} was in the answer key; fit the baseline to the whole "
-            "key"
+            f"no question of type {kind!r} was in the answer key; fit the baseline to the whole key"
         )
-    return seen[asked]
+    return seen[kind]
 
 
 BASELINES: Mapping[str, Callable[[int], Baseline]] = {

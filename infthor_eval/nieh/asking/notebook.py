@@ -22,8 +22,7 @@ class Notebook:
         self._session = session
 
     def write(self, parts: Sequence[str | FrameRef], max_new_tokens: int) -> str:
-        """Return what the model writes when it is given texts and frames
-        (`infthor_eval.memory.Write`).
+        """Return what the model writes when given texts and frames (`infthor_eval.memory.Write`).
 
         Raises:
             DataError: a frame cannot be read.

@@ -25,18 +25,16 @@ from infthor_eval.memory import (
     open_memory,
     wrap_memory_errors,
 )
-from infthor_eval.nieh.asking.recall_settings import RecallSettings
 from infthor_eval.nieh.contexts import Sample
-from infthor_eval.nieh.contexts.base import clue_positions
+from infthor_eval.nieh.contexts.base import RecallSettings, clue_positions
 from infthor_eval.nieh.records import NiehRecall
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.storage.digests import fingerprint
 
 __all__ = ["FindRecall", "KeepRecall", "Recaller", "apply_recall", "recall_all"]
 
-FindRecall = Callable[
-    [str], NiehRecall | None
-]  # looks up what was recalled from the same inputs, by their hash
+# Looks up what was recalled from the same inputs, by their hash.
+FindRecall = Callable[[str], NiehRecall | None]
 KeepRecall = Callable[[str, NiehRecall], None]
 
 _IN_USE = threading.Lock()  # memories are shared by a process, and serve one trajectory at a time
@@ -54,8 +52,7 @@ class _Built(NamedTuple):
 
 
 class Recaller:
-    """Recalls for questions, trajectory by trajectory, while `in_use` reserves the memories of this
-    process."""
+    """Recalls for questions, by trajectory, while `in_use` reserves this process's memories."""
 
     def __init__(
         self, task_samples: TaskSamples, write: Write | None, find: FindRecall, keep: KeepRecall
@@ -81,8 +78,7 @@ class Recaller:
 
     @contextmanager
     def in_use(self) -> Iterator[None]:
-        """Reserve the memories of this process within the context; what this has built is not used
-        afterwards."""
+        """Reserve this process's memories within the context; what was built is not used later."""
         with _IN_USE:
             yield
             self._built = None
@@ -121,7 +117,7 @@ class Recaller:
         recall_s = time.perf_counter() - start
         check_recalled(recalled, past, settings.memory, settings.budget, settings.tokens_per_frame)
         result = NiehRecall(
-            recalled=tuple(item if isinstance(item, str) else item.number for item in recalled),
+            recalled=tuple(part if isinstance(part, str) else part.number for part in recalled),
             build_s=round(built.seconds, 4),
             recall_s=round(recall_s, 4),
         )
@@ -185,13 +181,12 @@ class Recaller:
 
 def apply_recall(sample: Sample, recall: NiehRecall) -> Sample:
     """Return a sample with what was recalled for it: these frames and the last one are shown."""
-    frames = [item for item in recall.recalled if isinstance(item, int)]
+    frames = [number for number in recall.recalled if isinstance(number, int)]
     return replace(sample, frames=(*frames, sample.frames[-1]), recalled=recall.recalled)
 
 
 def recall_all(task_samples: TaskSamples) -> list[Sample]:
-    """Return the samples of a task, with what their memory recalls, for models that are none of
-    ours.
+    """Return a task's samples, with what their memory recalls, for models that are none of ours.
 
     Raises:
         UsageError: the memory asks the model under test, or recalling fails.
@@ -201,7 +196,7 @@ def recall_all(task_samples: TaskSamples) -> list[Sample]:
     kept: dict[str, NiehRecall] = {}
     recaller = Recaller(task_samples, None, kept.get, kept.__setitem__)
     by_trajectory = sorted(
-        enumerate(task_samples.samples), key=lambda item: item[1].question.traj_id
+        enumerate(task_samples.samples), key=lambda numbered: numbered[1].question.traj_id
     )
     with recaller.in_use():
         try:
@@ -217,8 +212,7 @@ def recall_all(task_samples: TaskSamples) -> list[Sample]:
 
 
 def _visible(steps: Sequence[Observation], memory: Memory) -> list[Observation]:
-    """Return the steps as the memory may see them: the simulator's metadata only if it is
-    privileged."""
+    """Return the steps as the memory may see them: metadata only if it is privileged."""
     return (
         list(steps)
         if memory.capabilities.privileged

@@ -5,15 +5,7 @@ file in `tasks/nieh/contexts/`.
 """
 
 from infthor_eval.errors import UsageError
-from infthor_eval.nieh.contexts import (
-    interleaved,
-    memory,
-    plans,
-    retrieval,
-    text_state,
-    video,
-    views,
-)
+from infthor_eval.nieh.contexts import interleaved, memory, plans, retrieval, video, views
 from infthor_eval.nieh.contexts.base import (
     Context,
     ContextPart,
@@ -53,10 +45,10 @@ CONTEXTS = {
         plans.interleaved_plans, intro=_INTERLEAVED, parts=plans.plans_parts
     ),
     "text_state": Context(
-        text_state.text_state,
+        views.text_state,
         intro="Answer the question given the description of the environment and the agent's state "
         "(the last image).",
-        parts=text_state.state_parts,
+        parts=views.state_parts,
         sources=trajectories_identity,
     ),
     "clip_retrieval": Context(

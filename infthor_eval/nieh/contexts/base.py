@@ -11,7 +11,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.video import FILM_FPS, Video
-from infthor_eval.nieh.asking.recall_settings import RecallSettings
+from infthor_eval.memory import MemoryOptions
 from infthor_eval.nieh.options import FRAMES
 from infthor_eval.nieh.prompts import PROMPTS, PUBLISHED_MAIN, question_text
 from infthor_eval.storage.digests import digest_of_file, fingerprint
@@ -20,6 +20,7 @@ __all__ = [
     "Context",
     "ContextPart",
     "ContextSettings",
+    "RecallSettings",
     "Sample",
     "clue_positions",
     "trajectories_identity",
@@ -64,6 +65,30 @@ _VALUES: dict[str, tuple[Callable[[Any], bool] | None, str]] = {
     "frames": (lambda value: value in FRAMES, f"one of {', '.join(FRAMES)}"),
     "prompt": (lambda value: value in PROMPTS, f"one of {', '.join(PROMPTS)}"),
 }
+
+
+@dataclass(frozen=True)
+class RecallSettings:
+    """How a memory recalls what a sample shows.
+
+    Attributes:
+        memory: name of the memory, or FILE.py:CLASS.
+        options: options of its class, sorted pairs.
+        budget: most tokens of what is recalled; None for the memory's own limit.
+        tokens_per_frame: tokens of a frame for the model under test; None if there is no budget.
+        seed: seed of what the memory draws.
+    """
+
+    memory: str
+    options: MemoryOptions = ()
+    budget: int | None = None
+    tokens_per_frame: int | None = None
+    seed: int = 0
+
+    @classmethod
+    def of(cls, document: Mapping[str, Any]) -> "RecallSettings":
+        """Return the settings of a mapping of their fields."""
+        return cls(**{**document, "options": tuple(sorted(dict(document["options"]).items()))})
 
 
 @dataclass(frozen=True)
@@ -132,30 +157,28 @@ class ContextSettings:
     prompt: str = PUBLISHED_MAIN
 
     @classmethod
-    def read(cls, given: Mapping[str, Any], place: str = "dataset_kwargs") -> "ContextSettings":
-        """Return the settings in a mapping; other keys are ignored. `place` is its file and key,
-        for messages.
+    def read(cls, raw: Mapping[str, Any], location: str = "dataset_kwargs") -> "ContextSettings":
+        """Return the settings in a mapping at a location (for messages); other keys are ignored.
 
         Raises:
-            UsageError: a value is not valid; the message has place, setting and valid values.
+            UsageError: a value is not valid; the message has location, setting and valid values.
         """
         values = {}
         for name, kind in get_type_hints(cls).items():
-            if given.get(name) is None:
+            if raw.get(name) is None:
                 continue
-            check, form = _VALUES[name]
+            check, expected = _VALUES[name]
             try:
-                values[name] = msgspec.convert(given[name], kind)
+                values[name] = msgspec.convert(raw[name], kind)
                 is_valid = check is None or check(values[name])
             except msgspec.ValidationError:
                 is_valid = False
             if not is_valid:
-                raise UsageError(f"{place}: {name} is {given[name]!r:.60}; it is {form}")
+                raise UsageError(f"{location}: {name} is {raw[name]!r:.60}; it is {expected}")
         return cls(**values)
 
     def n_frames(self, k_tokens: int) -> int:
-        """Return the number of frames that fill the context, given the published tokens of its
-        kilo-token.
+        """Return how many frames fill the context, given the published tokens of its kilo-token.
 
         Raises:
             UsageError: the size, or the tokens of a frame, are not given.
@@ -234,10 +257,9 @@ class Context:
     def request(
         self, data: NiehSet, sample: Sample, prompt: str = PUBLISHED_MAIN
     ) -> tuple[list[ContextPart], str]:
-        """Return the request of a sample: the context, and the text with the question that follows
-        it."""
+        """Return the request of a sample: the context, and the text with the question after it."""
         parts = self.parts(data, sample, self.select_frames(data, sample))
-        has_texts = any(isinstance(item, str) for item in sample.recalled or ())
+        has_texts = any(isinstance(part, str) for part in sample.recalled or ())
         return parts, question_text(
             self.text_intro if has_texts else self.intro, sample.question, prompt
         )
@@ -250,8 +272,7 @@ def clue_positions(data: NiehSet, question: Question) -> tuple[int, ...]:
 
 
 def trajectories_identity(data: NiehSet, _settings: ContextSettings) -> dict[str, Any]:
-    """Return the hash of the trajectories' own files, which the set's fingerprint does not
-    cover."""
+    """Return the hash of the trajectories' own files, which the set's hash does not cover."""
     ids = sorted({question.traj_id for question in data.questions})
     files = {traj_id: path for traj_id in ids if (path := data.outline_file(traj_id)) is not None}
     return {

@@ -60,8 +60,7 @@ def _window(
     if missing < 0:
         return "the clues do not fit the window"
     if clues[-1] - clues[0] == len(clues) - 1:  # they follow each other
-        # As published, the window of several clues may end one frame too late, and is then one
-        # frame shorter.
+        # As published, the window of several clues may end one frame too late: it is shorter then.
         return _around(clues[0], n_all, n, d_index if len(clues) == 2 else _STEPS - 1, n_all + 1)
     pool = sampling_pool(clues, n_all, n)
     if missing > len(pool):
@@ -77,13 +76,12 @@ def _around(needle: int, n_all: int, n: int, d_index: int, last_end: int) -> tup
 
 
 def sampling_pool(clues: Sequence[int], n_all: int, n: int) -> list[int]:
-    """Return the frames from which a window around clues that are apart is drawn: those between
-    them.
+    """Return the frames from which a window around clues that are apart is drawn: those between.
 
     If these are too few, as many as are missing on either side too. As published, clues can be
     among these: a clue that is drawn takes no second place, and the window is shorter.
     """
-    between = [place for place in range(clues[0] + 1, clues[-1]) if place not in clues]
+    between = [position for position in range(clues[0] + 1, clues[-1]) if position not in clues]
     missing = n - len(clues)
     if len(between) >= missing:
         return between

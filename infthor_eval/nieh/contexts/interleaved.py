@@ -21,7 +21,7 @@ def interleaved(
     if outline is None:
         return [SkippedQuestion(question, data.missing_outline)]
     layout = _layout(outline, data.action_frames(question.traj_id))
-    return [Sample(question, tuple(item for item in layout if isinstance(item, int)))]
+    return [Sample(question, tuple(part for part in layout if isinstance(part, int)))]
 
 
 def interleaved_parts(
@@ -32,7 +32,7 @@ def interleaved_parts(
     assert outline is not None  # or there were no sample
     left = iter(frames)
     layout = _layout(outline, data.action_frames(sample.question.traj_id))
-    return [next(left) if isinstance(item, int) else item for item in layout]
+    return [next(left) if isinstance(part, int) else part for part in layout]
 
 
 def _layout(outline: Outline, frames_of: Mapping[int, tuple[int, ...]]) -> Iterator[str | int]:
@@ -41,8 +41,7 @@ def _layout(outline: Outline, frames_of: Mapping[int, tuple[int, ...]]) -> Itera
     for goal, span in outline.tasks:
         yield f"Your task goal: {goal}. "
         yield _STATE
-        # The frame from which the first action starts: the last one of those before it, or the
-        # first of all.
+        # The frame from which the first action starts: the last before it, or the first of all.
         yield next(
             (
                 frames_of[number][-1]

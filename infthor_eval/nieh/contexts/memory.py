@@ -12,22 +12,19 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.memory import accepted_options, memory_identity
-from infthor_eval.nieh.asking.recall_settings import RecallSettings
-from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
+from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, RecallSettings, Sample
 
 __all__ = ["memory", "memory_sources", "recalled_parts"]
 
-_UNRECALLED = (
-    "<memory>"  # the place of what will be recalled, in prompts of samples that no model was asked
-)
+# Stands for what will be recalled, in prompts of samples that no model was asked.
+_UNRECALLED = "<memory>"
 _OF_RETRIEVER = ("retriever", "retriever_revision")
 
 
 def memory(
     data: NiehSet, question: Question, settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """Ask on what a memory recalls of the frames before the last, and on that one, the agent's
-    current view."""
+    """Ask on what a memory recalls of the frames before the last, and on the last (the view)."""
     return [
         Sample(question, tuple(range(len(data.frames(question.traj_id)))), recall=_recall(settings))
     ]
@@ -40,12 +37,11 @@ def memory_sources(_data: NiehSet, settings: ContextSettings) -> dict[str, Any]:
 
 
 def recalled_parts(_data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
-    """Return what was recalled in its order, then the last frame; a mark in its place if nothing
-    was recalled yet."""
+    """Return what was recalled in order (a mark before it is), then the last frame."""
     if sample.recalled is None:
         return [_UNRECALLED, *frames[-1:]]
     left = iter(frames)
-    return [*(item if isinstance(item, str) else next(left) for item in sample.recalled), *left]
+    return [*(part if isinstance(part, str) else next(left) for part in sample.recalled), *left]
 
 
 def _recall(settings: ContextSettings) -> RecallSettings:
@@ -58,8 +54,7 @@ def _recall(settings: ContextSettings) -> RecallSettings:
         value = getattr(settings, name)
         if value is not None and name in accepted_options(settings.memory):
             options.setdefault(name, value)
-    # Without a budget the size of a frame decides nothing, and recalls are the same for every
-    # model.
+    # Without a budget the size of a frame decides nothing: recalls are the same for every model.
     size = settings.tokens_per_frame if settings.budget is not None else None
     return RecallSettings(
         settings.memory, tuple(sorted(options.items())), settings.budget, size, settings.seed

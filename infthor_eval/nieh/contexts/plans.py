@@ -1,5 +1,4 @@
-"""The whole trajectory as agents are trained on it (`traj.txt`): goals, plans, actions, special
-tokens and frames."""
+"""A trajectory as agents are trained on it (`traj.txt`): goals, plans, actions, tokens, frames."""
 
 from collections.abc import Sequence
 from itertools import zip_longest
@@ -20,8 +19,7 @@ _ACT = "<|act|>"  # the end of an action there
 def interleaved_plans(
     data: NiehSet, question: Question, _settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """Ask on goals, plans, frames and actions in time order; of several frames of an action, the
-    last is shown."""
+    """Ask on goals, plans, frames and actions in time order; of an action's frames, on the last."""
     n_frames = len(data.frames(question.traj_id))
     done = _actions_before_marks(_sequence_text(data.folder(question.traj_id)))
     n_actions = max(done, default=0)

@@ -19,8 +19,7 @@ __all__ = ["clip_retrieval", "retriever_identity"]
 def clip_retrieval(
     data: NiehSet, question: Question, settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """Ask on the `top_k` frames most similar to the question, in time order (published by the same
-    name, k = 10).
+    """Ask on the `top_k` frames most similar to the question, in time order (published, k = 10).
 
     Of equally similar frames the earlier ones are taken; a trajectory of fewer frames is shown
     whole.

@@ -17,8 +17,7 @@ __all__ = ["as_images", "video", "video_frames", "video_identity", "video_parts"
 def video(
     data: NiehSet, question: Question, settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """Ask on the trajectory's film, its mp4, sampled at `fps` frames per second (published:
-    `video`, 1 and 2).
+    """Ask on the trajectory's film, its mp4, at `fps` frames per second (published: 1 and 2).
 
     Where there is no mp4, the frames themselves are the film. The variant names the source, so that
     the two are not mixed up in a result. Models without a video input are given the same frames as
@@ -37,8 +36,7 @@ def video(
 
 
 def video_frames(data: NiehSet, traj_id: str, fps: float | None) -> Sequence[FrameRef]:
-    """Return the frames that positions refer to: those sampled from the mp4, or all of a trajectory
-    without one.
+    """Return the frames that positions refer to: the mp4's samples, or all where there is none.
 
     Raises:
         DataError: the trajectory has a video that cannot be decoded.
@@ -69,16 +67,16 @@ def video_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> li
 
 
 def as_images(parts: Iterable[ContextPart]) -> list[ContextPart]:
-    """Return parts with the frames of each video in its place, for a model without a video
-    input."""
+    """Return parts with each video's frames in its place, for a model without a video input."""
     return [
-        item for part in parts for item in (part.frames if isinstance(part, Video) else (part,))
+        shown_part
+        for part in parts
+        for shown_part in (part.frames if isinstance(part, Video) else (part,))
     ]
 
 
 def video_identity(data: NiehSet, settings: ContextSettings) -> dict[str, Any]:
-    """Return the hash of the videos and their decoder; the set's own fingerprint does not cover
-    videos."""
+    """Return the hash of the videos and their decoder, which the set's own does not cover."""
     digest = hashlib.blake2b(digest_size=16)
     for traj_id in sorted({question.traj_id for question in data.questions}):
         if data.video(traj_id) is not None:

@@ -1,11 +1,13 @@
-"""Contexts that show frames of the trajectory without choosing by the needle: clues, whole, its
-end."""
+"""Contexts without a search: the clues, the whole trajectory, its end, its last state in words."""
 
+from collections.abc import Sequence
+
+from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.nieh.contexts.base import ContextSettings, Sample
+from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
-__all__ = ["clues", "trajectory", "truncate_head"]
+__all__ = ["clues", "state_parts", "text_state", "trajectory", "truncate_head"]
 
 _K_TOKENS = 1024  # truncate_head's published kilo-token
 
@@ -13,8 +15,7 @@ _K_TOKENS = 1024  # truncate_head's published kilo-token
 def clues(
     data: NiehSet, question: Question, _settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """Ask on the frames that are evidence alone, in time order whatever the file's (the paper's
-    Table 4)."""
+    """Ask on the evidence alone, in time order whatever the file's (the paper's Table 4)."""
     if not data.has_frames:  # baselines need no more than their number
         return [Sample(question, tuple(sorted(question.clues)))]
     order = {frame: position for position, frame in enumerate(data.frames(question.traj_id))}
@@ -31,11 +32,30 @@ def trajectory(
 def truncate_head(
     data: NiehSet, question: Question, settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """The last frames that fit the context (published under the same name); clues before them are
-    lost."""
+    """Ask on the last frames that fit (published under the same name); earlier clues are lost."""
     n_all = len(data.frames(question.traj_id))
     n = settings.n_frames(_K_TOKENS)
     if n < 1:
         return [SkippedQuestion(question, "no frame fits the context")]
     n_cut = max(0, n_all - n)
     return [Sample(question, tuple(range(n_cut, n_all)), n_cut=n_cut)]
+
+
+def text_state(
+    data: NiehSet, question: Question, _settings: ContextSettings
+) -> list[Sample | SkippedQuestion]:
+    """Ask on the last frame, beside the text of the last state (published under the same name)."""
+    if not data.states(question.traj_id):
+        reason = (
+            "the trajectory has no state_summary"
+            if data.outline(question.traj_id)
+            else data.missing_outline
+        )
+        return [SkippedQuestion(question, reason)]
+    return [Sample(question, (len(data.frames(question.traj_id)) - 1,))]
+
+
+def state_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
+    """Return the text of the last state, then the last frame."""
+    states = data.states(sample.question.traj_id)
+    return [f" State: {states[max(states)]}; Last agent's view: ", *frames]

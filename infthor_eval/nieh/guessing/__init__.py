@@ -1,2 +1,1 @@
-"""What can be guessed without a frame: guessers, the audit of a set, and a subset in which guessing
-does not help."""
+"""Guessing without a frame: guessers, the audit of a set, a subset where guessing does not help."""

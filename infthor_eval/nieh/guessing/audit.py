@@ -9,7 +9,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
 from infthor_eval.nieh.docs import doc_target
-from infthor_eval.nieh.guessing.forms import form_of
+from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS
 from infthor_eval.nieh.guessing.guesses import questions_by_file, score_guesses
 from infthor_eval.nieh.scoring import Scorer
@@ -45,7 +45,7 @@ class Group:
     @property
     def answers(self) -> Counter[str]:
         """The answers in lower case, with the number of questions that have each."""
-        return Counter(doc_target(item.question).lower() for item in self.questions)
+        return Counter(doc_target(audited.question).lower() for audited in self.questions)
 
     @property
     def entropy(self) -> float:
@@ -56,34 +56,35 @@ class Group:
     @property
     def share_yes(self) -> float | None:
         """Share of yes among the answers yes and no; None if there are none."""
-        yes, no = (self.answers[answer] for answer in _YES_NO)
-        return yes / (yes + no) if yes + no else None
+        n_yes_or_no = sum(self.answers[answer] for answer in _YES_NO)
+        return self.answers["yes"] / n_yes_or_no if n_yes_or_no else None
 
     @property
     def chance(self) -> float:
         """Mean over the questions of one over the number of answers that their form has here."""
         answers: dict[str, set[str]] = {}
-        for item in self.questions:
-            answers.setdefault(form_of(item.question), set()).add(doc_target(item.question).lower())
-        return sum(1 / len(answers[form_of(item.question)]) for item in self.questions) / len(
+        for audited in self.questions:
+            answers.setdefault(form_of(audited.question), set()).add(
+                doc_target(audited.question).lower()
+            )
+        return sum(1 / len(answers[form_of(audited.question)]) for audited in self.questions) / len(
             self.questions
         )
 
     def means(self) -> tuple[float, ...]:
         """Return the mean score of each guesser."""
-        columns = zip(*(item.scores for item in self.questions), strict=True)
+        columns = zip(*(audited.scores for audited in self.questions), strict=True)
         return tuple(sum(column) / len(self.questions) for column in columns)
 
     def best(self) -> tuple[str, float]:
         """Return the name of the best guesser, the simplest of equals, and its score."""
         means = self.means()
-        place = max(range(len(means)), key=means.__getitem__)
-        return GUESSERS[place].name, means[place]
+        best = max(range(len(means)), key=means.__getitem__)
+        return GUESSERS[best].name, means[best]
 
 
 def audit(data: NiehSet, scorer: Scorer = "strict") -> list[AuditedQuestion]:
-    """Return the questions of a set that can be asked, with the guessers' scores; a file is guessed
-    at a time."""
+    """Return a set's questions that can be asked, with the guessers' scores, file by file."""
     return [
         AuditedQuestion(question, scores)
         for questions in questions_by_file(data).values()
@@ -105,13 +106,12 @@ BY: Mapping[str, Callable[[Question], str]] = {
 
 
 def groups(questions: Sequence[AuditedQuestion], by: str) -> list[Group]:
-    """Return the groups of some questions; all but whole files are split by file, in a set of
-    several."""
+    """Return groups of questions; of several files, all but whole files are split by file."""
     split: dict[str, list[AuditedQuestion]] = {}
-    for item in questions:
-        name = BY[by](item.question)
-        file = item.question.file
-        split.setdefault(f"{file}: {name}" if file and by != "file" else name, []).append(item)
+    for audited in questions:
+        name = BY[by](audited.question)
+        file = audited.question.file
+        split.setdefault(f"{file}: {name}" if file and by != "file" else name, []).append(audited)
     return [Group(by, name, items) for name, items in sorted(split.items())]
 
 

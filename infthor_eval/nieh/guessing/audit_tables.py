@@ -1,5 +1,4 @@
-"""The audit of a set as tables: what guessers get by file, form, type and clues, and what runs get
-above it."""
+"""Audit tables: what guessers get by file, form, type and clues, and what runs get above it."""
 
 from collections.abc import Mapping, Sequence
 

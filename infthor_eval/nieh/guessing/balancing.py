@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.docs import doc_target
-from infthor_eval.nieh.guessing.forms import form_of
+from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS
 from infthor_eval.nieh.guessing.guesses import score_guesses
 
@@ -51,8 +51,7 @@ class Balanced:
 
 
 def balance(questions: Sequence[Question]) -> Balanced:
-    """Return the balanced part of some questions; it may be empty. Of questions that are there
-    twice it has one."""
+    """Return the balanced part of some questions, each once; it may be empty."""
     before = Counter(map(_name, questions))
     different: dict[str, Question] = {}
     for question in questions:
@@ -104,8 +103,7 @@ def _cut_answers(questions: Sequence[Question]) -> list[Question]:
 
 
 def _best_cut(sizes: Sequence[int]) -> tuple[int, int]:
-    """Return how many of the commonest answers to keep, and up to how many questions of each; 0
-    answers for none.
+    """Return how many of the commonest answers to keep (0: none), and how many questions of each.
 
     Args:
         sizes: number of questions of each answer, descending.
@@ -138,8 +136,7 @@ def _right_by_guesser(
 def _surplus(
     questions: Sequence[Question], right: Mapping[str, tuple[float, ...]]
 ) -> dict[str, int]:
-    """Return half of what the best guesser of a form gets right beyond chance, if it is beyond the
-    margin too."""
+    """Return half of what each form's best guesser gets beyond chance, where above the margin."""
     surplus = {}
     for form, group in _by_form(questions).items():
         chance = _chance(group)
@@ -157,8 +154,7 @@ def _prune(
     """Return the questions without those, in forms with a surplus, that most guessers get right."""
     gone: set[str] = set()
     for form, group in _by_form(questions).items():
-        easiest = sorted(
-            group, key=lambda question: -sum(right[question.id])
-        )  # stable: the first of equals
+        # Stable: the first of equals.
+        easiest = sorted(group, key=lambda question: -sum(right[question.id]))
         gone |= {question.id for question in easiest[: surplus.get(form, 0)]}
     return [question for question in questions if question.id not in gone]

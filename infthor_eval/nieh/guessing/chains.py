@@ -14,6 +14,7 @@ from collections.abc import Callable, Hashable, Sequence
 import numpy as np
 
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.question_forms import find_form
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
 
@@ -22,11 +23,14 @@ __all__ = [
     "chains_of_words",
     "chains_of_words_and_count",
     "chains_of_words_and_place",
+    "form_of",
     "held_out",
+    "question_type",
     "words_of",
 ]
 
 Chain = Sequence[Hashable]
+_LEADING_WORDS = 2  # the type of a question whose file names none
 _STEM = 3  # leading words that tell the forms of questions apart
 _PLACE = 100  # frames that count as one place
 # of a log probability; what is beyond is rounding, which must not decide between equal answers
@@ -34,8 +38,7 @@ _DIGITS = 9
 
 
 def chains_of_words(sample: Sample) -> list[Chain]:
-    """Return chains of a question's words: the leading words, and each later word, alone and after
-    the first two."""
+    """Return chains of words: the leading ones, each later one, alone and after the first two."""
     words = words_of(sample.question)
     later = sorted(set(words[2:]))
     leading = [("leading", *words[:n]) for n in range(1, len(words) + 1)]
@@ -49,13 +52,12 @@ def chains_of_words_and_count(sample: Sample) -> list[Chain]:
 
 
 def chains_of_words_and_place(sample: Sample) -> list[Chain]:
-    """Return the chains of words, and of the place of the last clue and the span of the clues after
-    the stem."""
+    """Return the chains of words, and of the last clue's place and the clues' span."""
     stem = words_of(sample.question)[:_STEM]
     first, last = sample.frames[0], sample.frames[-1]
-    place = ("place", *stem, last // _PLACE)
+    last_clue = ("place", *stem, last // _PLACE)
     span = ("span", *stem, (last - first).bit_length())
-    return [*chains_of_words(sample), [("stem", *stem), place], [("stem", *stem), span]]
+    return [*chains_of_words(sample), [("stem", *stem), last_clue], [("stem", *stem), span]]
 
 
 def words_of(question: Question) -> list[str]:
@@ -64,8 +66,7 @@ def words_of(question: Question) -> list[str]:
 
 
 def held_out(samples: Sequence[Sample]) -> Callable[[Sample], str]:
-    """Return what a sample is left out with: its trajectory, or itself if all are on one
-    trajectory."""
+    """Return what a sample is left out with: its trajectory, or itself if there is one alone."""
     is_alone = len({sample.question.traj_id for sample in samples}) == 1
     return lambda sample: sample.question.id if is_alone else sample.question.traj_id
 
@@ -74,8 +75,7 @@ class Guesser:
     """Guesses at samples from the answers to others."""
 
     def __init__(self, samples: Sequence[Sample], chains: Callable[[Sample], list[Chain]]) -> None:
-        """Count the answer key; if it is of one trajectory, each question is guessed from the
-        others."""
+        """Count the answer key; on one trajectory alone, a question is guessed from the others."""
         self._chains = chains
         self._held_out = held_out(samples)
         self._answers = sorted({doc_target(sample.question) for sample in samples})
@@ -86,8 +86,7 @@ class Guesser:
             self._count(sample)
 
     def guess(self, sample: Sample) -> str:
-        """Return the likeliest answer (of equal ones, the first in the alphabet); empty if nothing
-        was learned."""
+        """Return the likeliest answer (of equals, the first by name); empty if none was learned."""
         group = self._held_out(sample)
         counts = self._vector(self._others((), group))
         if not counts.any():
@@ -98,7 +97,7 @@ class Guesser:
                 np.log(self._probability(chain, counts, group)) for chain in self._chains(sample)
             ]
         known = np.flatnonzero(counts)
-        total = prior[known] + sum(item[known] - prior[known] for item in evidence)
+        total = prior[known] + sum(logs[known] - prior[known] for logs in evidence)
         return self._answers[known[np.argmax(np.round(total, _DIGITS))]]
 
     def _count(self, sample: Sample) -> None:
@@ -128,3 +127,14 @@ class Guesser:
         vector = np.zeros(len(self._answers))
         vector[list(counts)] = list(counts.values())
         return vector
+
+
+def form_of(question: Question) -> str:
+    """Return the question's form ("Is {} in/on {}?"), or its `question_type` if it has none."""
+    form = find_form(question.text)
+    return question_type(question) if form is None else form.words
+
+
+def question_type(question: Question) -> str:
+    """Return the question's type, or its leading words in lower case if the file names no type."""
+    return question.question_type or " ".join(question.text.lower().split()[:_LEADING_WORDS])

@@ -1,5 +1,4 @@
-"""Guessers that see no frame, from what they know: each guesses the questions of a file from other
-trajectories."""
+"""Guessers without frames: each guesses the questions of a file from other trajectories."""
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
@@ -15,9 +14,9 @@ from infthor_eval.nieh.guessing.chains import (
     chains_of_words,
     chains_of_words_and_count,
     chains_of_words_and_place,
+    form_of,
     held_out,
 )
-from infthor_eval.nieh.guessing.forms import form_of
 from infthor_eval.nieh.guessing.learner import guess_by_learning
 
 __all__ = ["GUESSERS", "Knowledge", "NamedGuesser"]
@@ -49,8 +48,7 @@ class NamedGuesser:
 
 
 def _guess_constant(samples: Sequence[Sample], group_of: Callable[[Sample], str]) -> list[str]:
-    """Guess the commonest answer to questions of a group on other trajectories; the first in the
-    alphabet of equals."""
+    """Guess the commonest answer of a group on other trajectories; of equals the first by name."""
     own_of = held_out(samples)
     everywhere: dict[str, Counter[str]] = defaultdict(Counter)
     own: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)

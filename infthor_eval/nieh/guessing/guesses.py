@@ -14,7 +14,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import NOT_JSON
 from infthor_eval.nieh import scoring
 from infthor_eval.nieh.contexts import Sample
-from infthor_eval.nieh.guessing.forms import form_of
+from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
 from infthor_eval.nieh.records import Guess
 from infthor_eval.nieh.scoring import SCORERS, Scorer, score, scores
@@ -86,15 +86,14 @@ def _learn_guesses(data: NiehSet, knowledge: Knowledge) -> dict[str, Guess]:
         by_guesser = []
         for guesser in GUESSERS:
             if guesser.knows in knowledge:
-                guessed = zip(guesser.guess(samples), questions, strict=True)
-                by_guesser.append([scores(reply, asked.answers) for reply, asked in guessed])
+                replies = zip(guesser.guess(samples), questions, strict=True)
+                by_guesser.append([scores(reply, question.answers) for reply, question in replies])
         guesses |= _best_by_form(questions, by_guesser)
     return guesses
 
 
 def questions_by_file(data: NiehSet) -> dict[str, list[Question]]:
-    """Return the questions that can be asked by the name of their file; empty if the set has one
-    file alone."""
+    """Return the questions that can be asked by file name (empty if the set has one file alone)."""
     by_file: dict[str, list[Question]] = {}
     for question in data.questions:
         by_file.setdefault(question.file, []).append(question)
@@ -120,24 +119,24 @@ def sample_on_clues(question: Question) -> Sample:
 
 
 def _best_by_form(questions: Sequence[Question], by_guesser: Sequence[_Scores]) -> dict[str, Guess]:
-    places: dict[str, list[int]] = {}
-    for place, question in enumerate(questions):
-        places.setdefault(form_of(question), []).append(place)
+    positions: dict[str, list[int]] = {}
+    for position, question in enumerate(questions):
+        positions.setdefault(form_of(question), []).append(position)
     guesses = {}
-    for form, of_form in places.items():
+    for form, of_form in positions.items():
         best: dict[str, _Scores] = {
             scorer: _best(by_guesser, of_form, scorer) for scorer in SCORERS
         }
         means = {scorer: _mean(scored, of_form, scorer) for scorer, scored in best.items()}
-        for place in of_form:
-            own = {scorer: scored[place][scorer] for scorer, scored in best.items()}
-            guesses[questions[place].id] = Guess(form=form, scores=own, form_scores=means)
+        for position in of_form:
+            own = {scorer: scored[position][scorer] for scorer, scored in best.items()}
+            guesses[questions[position].id] = Guess(form=form, scores=own, form_scores=means)
     return guesses
 
 
-def _best(by_guesser: Sequence[_Scores], places: Sequence[int], scorer: str) -> _Scores:
-    return max(by_guesser, key=lambda scored: _mean(scored, places, scorer))
+def _best(by_guesser: Sequence[_Scores], positions: Sequence[int], scorer: str) -> _Scores:
+    return max(by_guesser, key=lambda scored: _mean(scored, positions, scorer))
 
 
-def _mean(scored: _Scores, places: Sequence[int], scorer: str) -> float:
-    return sum(scored[place][scorer] for place in places) / len(places)
+def _mean(scored: _Scores, positions: Sequence[int], scorer: str) -> float:
+    return sum(scored[position][scorer] for position in positions) / len(positions)

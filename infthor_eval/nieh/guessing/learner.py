@@ -1,5 +1,4 @@
-"""A strong guesser: logistic regression on the words of a question, and on the number and place of
-its clues.
+"""A strong guesser: logistic regression on a question's words, and number and place of its clues.
 
 As in the stress test of test sets by Brown et al. (arXiv:2511.04655), it is trained on the
 questions alone, and guesses those of a tenth of the trajectories from the others. What it gets
@@ -13,23 +12,20 @@ import numpy as np
 
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
-from infthor_eval.nieh.guessing.chains import held_out, words_of
-from infthor_eval.nieh.guessing.forms import form_of
+from infthor_eval.nieh.guessing.chains import form_of, held_out, words_of
 
 __all__ = ["guess_by_learning"]
 
 _FOLDS = 10
 _PLACE = 100  # frames that count as one place
-# On the published files any strength from 1 to 10 gives the same within a point; nothing more is
-# tuned.
+# On the published files strengths from 1 to 10 differ by less than a point; no more is tuned.
 _INVERSE_PENALTY = 3.0
 _TOLERANCE = 1e-2
 _ITERATIONS = 1000
 
 
 def guess_by_learning(samples: Sequence[Sample], *, number: bool, place: bool) -> list[str]:
-    """Return a guess for each sample, learned on other trajectories; empty texts if there is
-    nothing to learn from.
+    """Return a guess per sample, learned on other trajectories; "" if there is nothing to learn.
 
     Args:
         samples: samples on the clue frames.
@@ -50,15 +46,14 @@ def guess_by_learning(samples: Sequence[Sample], *, number: bool, place: bool) -
     )
     answers = np.array([doc_target(sample.question) for sample in samples], dtype=object)
     guesses = np.empty(len(samples), dtype=object)
-    # These products are small: on a busy machine threads that wait for each other take ten times as
-    # long as one.
+    # These products are small: on a busy machine many threads take ten times as long as one.
     with threadpool_limits(limits=1):
-        for known, asked in GroupKFold(min(_FOLDS, n_groups)).split(features, answers, groups):
+        for known, unknown in GroupKFold(min(_FOLDS, n_groups)).split(features, answers, groups):
             if len(set(answers[known])) == 1:
-                guesses[asked] = answers[known][0]
+                guesses[unknown] = answers[known][0]
                 continue
             model = LogisticRegression(C=_INVERSE_PENALTY, tol=_TOLERANCE, max_iter=_ITERATIONS)
-            guesses[asked] = model.fit(features[known], answers[known]).predict(features[asked])
+            guesses[unknown] = model.fit(features[known], answers[known]).predict(features[unknown])
     return list(guesses)
 
 

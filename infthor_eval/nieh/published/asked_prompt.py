@@ -1,5 +1,4 @@
-"""The prompt that a published log was asked with, from the tokens of its requests as Qwen2.5-VL
-counts them.
+"""The prompt of a published log, from the tokens of its requests as Qwen2.5-VL counts them.
 
 A request is frames, the chat template, the words of a prompt, and the question. The tokens of all
 but the question are known; the question has at least one for each word and one for its mark. So
@@ -26,8 +25,7 @@ _MOST_SPLITS = 7  # the prompts' distance less one
 
 
 def asked_prompt(replies: Iterable[LoggedReply]) -> str | None:
-    """Return the prompt that fits every row of a published log; None if none does, or if a row does
-    not tell."""
+    """Return the prompt that fits every row; None if none does, or if a row does not tell."""
     fitting = [_fitting(reply) for reply in replies if reply.published]
     prompts = set(fitting)
     return prompts.pop() if len(prompts) == 1 else None
@@ -37,9 +35,8 @@ def _fitting(reply: LoggedReply) -> str | None:
     if reply.published is None or reply.n_context_tokens is None:
         return None
     known: Mapping[str, int]
-    if (
-        reply.mode == "video"
-    ):  # its rows do not count frames, and no text is as long as a pair of them
+    # Rows of videos do not count frames, and no text is as long as a pair of them.
+    if reply.mode == "video":
         n_text = reply.n_context_tokens % _PER_PAIR - _MARKS
         known = _OF_FILMS
     elif reply.n_frames is None:

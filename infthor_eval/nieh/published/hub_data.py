@@ -1,5 +1,4 @@
-"""The published NIEH data: downloading it from the Hugging Face hub, and the folder where it is
-kept."""
+"""The published NIEH data: their download from the Hugging Face hub, and their folder."""
 
 from pathlib import Path
 
@@ -20,8 +19,7 @@ def default_folder() -> Path:
 
 
 def fetch_nieh(folder: Path, token: str | None = None, endpoint: str | None = None) -> NiehSet:
-    """Download, unpack and check the published NIEH data; files that exist are not downloaded
-    again.
+    """Download, unpack and check the published NIEH data; files that exist are kept.
 
     An interrupted download is resumed. The archive is deleted once it is unpacked and the set is
     checked.

@@ -1,5 +1,4 @@
-"""Replies that others made, as runs: scored, with a journal and results like those of our own
-runs."""
+"""Replies that others made, as runs: scored, with journal and results like runs of our own."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,9 +26,8 @@ _PUBLISHED_NAME = re.compile(
     r"eval_(?P<file>qa_set_.+?_clue)_(?P<model>.+?)_(?:full_traj.*)\.log(?:\.gz)?$"
 )
 _RATE = re.compile(r"_fps(?P<fps>\d+)")
-_PUBLISHED_TASK = (
-    "nieh_published_"  # begins the names of tasks that ask as published logs were asked
-)
+# Begins the names of tasks that ask as published logs were asked.
+_PUBLISHED_TASK = "nieh_published_"
 # Published modes: the task of ours, and its context.
 _MODES = {
     None: ("nieh_full", "trajectory"),
@@ -104,8 +102,7 @@ class ImportedRun:
 
 
 def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -> list[ImportedRun]:
-    """Return the runs that some logs hold: logs of one model in one mode, on different questions,
-    are one run.
+    """Return the runs in logs: those of one model and mode, on different questions, are one run.
 
     Args:
         logs: files with replies (`infthor_eval.formats.reply_logs`).
@@ -143,8 +140,7 @@ def _replies(rows: Sequence[LoggedReply | UnreadRow]) -> list[LoggedReply]:
 
 
 def _trajectory_lengths(replies: Iterable[LoggedReply]) -> dict[str, int]:
-    """Return the numbers of frames of trajectories, from published rows on whole ones or on their
-    ends."""
+    """Return trajectories' numbers of frames, from published rows on whole ones or their ends."""
     lengths: dict[str, int] = {}
     for reply in replies:
         n_frames = None
@@ -158,8 +154,7 @@ def _trajectory_lengths(replies: Iterable[LoggedReply]) -> dict[str, int]:
 
 
 def _mode_of(replies: Sequence[LoggedReply], log: Path) -> tuple[str, dict[str, Any]]:
-    """Return task and context settings of a log, from its first row; a log that is not published
-    names none."""
+    """Return task and context settings by a log's first row; general ones if unpublished."""
     first = next((reply for reply in replies if reply.published), None)
     if first is None:
         return _OTHER[0], {"context": _OTHER[1]}
@@ -181,8 +176,7 @@ def _mode_of(replies: Sequence[LoggedReply], log: Path) -> tuple[str, dict[str, 
 
 
 def _published_task(settings: Mapping[str, Any]) -> str | None:
-    """Return the task of ours that asks as a published row was made; None if there is none with
-    these settings."""
+    """Return our task that asks as a published row was made; None if none has these settings."""
     tasks = [
         task
         for name, task in Catalog.find_packaged().tasks.items()
@@ -232,7 +226,9 @@ def _add_log(
             run.records.append(_record(run.task, question, row, known))
             run.rescored += _compare_scores(log, row, run.records[-1])
     if len(run.records) == n_before:
-        reasons = "; ".join(dict.fromkeys(item.reason for item in refused[:3])) or "it is empty"
+        reasons = (
+            "; ".join(dict.fromkeys(refusal.reason for refusal in refused[:3])) or "it is empty"
+        )
         raise UsageError(
             f"{log}: no row answers a question of this set ({reasons}); give the set that it is "
             "about"
@@ -258,10 +254,10 @@ def _find_question(
     if row.row is None or not 0 <= row.row < len(questions):
         return f"answers question {row.row}; the file has {len(questions)}"
     question = questions[row.row]
-    said = row.published
+    published = row.published
     if isinstance(question, SkippedQuestion):
         return question.reason
-    if said and (said.traj_id, said.text, said.clues, said.answers) != (
+    if published and (published.traj_id, published.text, published.clues, published.answers) != (
         question.traj_id,
         question.text,
         question.clues,
@@ -274,8 +270,8 @@ def _find_question(
 def _record(
     task: str, question: Question, reply: LoggedReply, known: _Known
 ) -> UnitRecord[NiehAnswer]:
-    shown = _shown_clues(question, reply, known.n_frames.get(question.traj_id))
-    payload = NiehAnswer.of(question, known.guesses.get(question.id), shown)
+    clues = _shown_clues(question, reply, known.n_frames.get(question.traj_id))
+    payload = NiehAnswer.of(question, known.guesses.get(question.id), clues)
     unit = Unit(UnitKey(task, question.id), question.traj_id, payload)
     return unit.record(
         fingerprint({"question": question.id, "reply": reply.text}),
@@ -286,8 +282,7 @@ def _record(
 
 
 def _shown_clues(question: Question, reply: LoggedReply, n_frames: int | None) -> ShownClues | None:
-    """Return the clue frames that the model saw; None if the row does not tell, or if no frame is
-    evidence."""
+    """Return the clue frames shown; None if the row does not tell, or if no frame is evidence."""
     clues = set(question.clues)
     is_whole = reply.published is not None and reply.mode in _WHOLE
     if question.absence or (reply.frames is None and not is_whole):

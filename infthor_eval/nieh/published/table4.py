@@ -1,5 +1,4 @@
-"""The paper's Table 4 from the published question files: means of their columns `match1` to
-`match4`."""
+"""The paper's Table 4 from the published questions: means of columns `match1` to `match4`."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -61,8 +60,7 @@ def table4(data: NiehSet) -> Table:
 
 
 def derive_row(data: NiehSet, row: PublishedRow) -> dict[str, MeanEstimate]:
-    """Return the mean of a row's scores by column, each from 0 to 1 (the published scorer can
-    exceed 1).
+    """Return a row's mean scores by column, from 0 to 1 (the published scorer can exceed 1).
 
     Raises:
         DataError: a question lacks the score, or no question is in a column.
@@ -82,12 +80,13 @@ def derive_row(data: NiehSet, row: PublishedRow) -> dict[str, MeanEstimate]:
 
 
 def _by_steps(data: NiehSet) -> list[str]:
-    """Return the questions of each column by the number of steps that their clue frames belong to
-    ("2: 215, 3: 7")."""
+    """Return each column's questions by the steps of their clue frames ("2: 215, 3: 7")."""
     cells = []
     for name in CLUE_COLUMNS[:-1]:
         chosen = [
-            item.published for item in data.questions if item.clue_column == name and item.published
+            question.published
+            for question in data.questions
+            if question.clue_column == name and question.published
         ]
         counts = Counter(len(set(published.steps)) for published in chosen)
         cells.append(", ".join(f"{n_steps}: {count}" for n_steps, count in sorted(counts.items())))
@@ -96,7 +95,8 @@ def _by_steps(data: NiehSet) -> list[str]:
 
 def _mean(questions: Sequence[Question], match: str, data: NiehSet) -> MeanEstimate:
     scores = [
-        dict(item.published.matches).get(match) if item.published else None for item in questions
+        dict(question.published.matches).get(match) if question.published else None
+        for question in questions
     ]
     known = [score for score in scores if score is not None]
     if len(known) < len(scores):
@@ -105,7 +105,7 @@ def _mean(questions: Sequence[Question], match: str, data: NiehSet) -> MeanEstim
             f"{data.root}: no {match} for question {missing}; give the published question files, "
             "with all columns"
         )
-    return clustered_mean(known, [item.traj_id for item in questions])
+    return clustered_mean(known, [question.traj_id for question in questions])
 
 
 def _mean_cell(estimate: MeanEstimate) -> TableCell:
@@ -114,8 +114,7 @@ def _mean_cell(estimate: MeanEstimate) -> TableCell:
 
 
 def _printed(row: PublishedRow, table: PublishedTable) -> tuple[list[str], list[str]]:
-    """Return the printed cells, those known to be wrong with a mark, and a note on each of
-    these."""
+    """Return the printed cells, a mark at those known to be wrong, and a note on each of these."""
     values = dict(zip(table.columns, row.values, strict=True))
     cells = [f"{values[name]:.2f}{'*' if name in row.misprints else ''}" for name in CLUE_COLUMNS]
     notes = [

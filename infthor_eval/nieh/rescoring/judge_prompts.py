@@ -1,5 +1,4 @@
-"""What a judge is asked, and how its verdict is read: by a yes or no, or by the published judge's
-score."""
+"""What a judge is asked, and how its verdict is read: yes or no, or the published judge's score."""
 
 import json
 import re
@@ -97,8 +96,8 @@ def _yes_no_text(question: str, answers: Sequence[Answer], reply: str) -> str:
 
 
 def _read_yes_no(answer: str) -> float | None:
-    said = says_yes_or_no(answer)
-    return None if said is None else float(said == "yes")
+    verdict = says_yes_or_no(answer)
+    return None if verdict is None else float(verdict == "yes")
 
 
 def _published_text(question: str, answers: Sequence[Answer], reply: str) -> str:
@@ -107,11 +106,10 @@ def _published_text(question: str, answers: Sequence[Answer], reply: str) -> str
 
 
 def _read_score(answer: str) -> float | None:
-    """Return the score of the first JSON object in an answer; the published parser reads another
-    key."""
-    found = _OBJECT.search(answer)
+    """Return the score of the first JSON object (the published parser reads another key)."""
+    match = _OBJECT.search(answer)
     try:
-        value = json.loads(found[0]).get("score") if found else None
+        value = json.loads(match[0]).get("score") if match else None
     except ValueError:
         return None
     if not isinstance(value, int | float) or isinstance(value, bool) or not 0 <= value <= 1:

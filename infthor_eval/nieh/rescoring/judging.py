@@ -1,5 +1,4 @@
-"""A judge: a model that is asked whether a reply is right where the rules are unsure, and how far
-it can be trusted.
+"""A judge: a model asked whether a reply is right where the rules are unsure, and its reliability.
 
 The metric `judged` is the strict score, or the judge's where the rules are unsure
 (`infthor_eval.nieh.rescoring.unsure`) and it gives more: 1 for a yes. A no leaves what the rules
@@ -49,8 +48,7 @@ Track = Callable[[Sequence[Record]], Iterable[Record]]
 
 
 class Verdicts(msgspec.Struct, frozen=True, kw_only=True):
-    """A judge's verdicts on n replies: right, partly right, wrong, neither, or not asked as the
-    request failed."""
+    """A judge's verdicts on n replies: right, partly right, wrong, neither, or request failed."""
 
     n: int
     n_right: int
@@ -75,8 +73,7 @@ class Agreement(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def share(self) -> float | None:
-        """Share of the sampled replies on which judge and rules agree, 0 to 1; None if it was asked
-        about none."""
+        """Share of the sampled replies on which judge and rules agree, 0 to 1; None without any."""
         n = sum(sampled.n - sampled.n_not_asked for sampled in (self.right, self.wrong))
         return (self.right.n_right + self.wrong.n_wrong) / n if n else None
 
@@ -114,8 +111,7 @@ class Judge:
         seed: int,
         prompt: str = YES_NO,
     ) -> None:
-        """Take a model, its name for people, the identity of its adapter's code, and the limit of a
-        verdict."""
+        """Take a model, its name for people, its adapter's identity, and the limit of a verdict."""
         self.name = name
         self.seed = seed
         self.prompt = prompt
@@ -158,25 +154,24 @@ class Judge:
 
     def config(self) -> dict[str, Any]:
         """Return everything that verdicts and sample depend on, as JSON values."""
-        asked = {
+        settings = {
             "decoding": self._decoding.document(),
             "prompt": self.prompt,
             "sample_seed": self.seed,
         }
-        return {"label": self.name, **self._identity, **asked}
+        return {"label": self.name, **self._identity, **settings}
 
     def verdict(self, record: Record, session: Session[NiehAnswer]) -> float | None:
-        """Return the judge's score, 0 to 1, or None if it gives none; it is asked unless the
-        session has its verdict.
+        """Return the judge's score, 0 to 1; None if it gives none. The session's verdict is reused.
 
         Raises:
             ModelError: the judge cannot be asked.
         """
         payload = record.payload
-        said = last_line(payload.reply or "")
-        text = self._form.text(payload.question, payload.answers, said)
-        asked = {"system": self._form.system, "text": text, "decoding": self._decoding.document()}
-        inputs = fingerprint({"judge": self._identity, **asked})
+        response = last_line(payload.reply or "")
+        text = self._form.text(payload.question, payload.answers, response)
+        request = {"system": self._form.system, "text": text, "decoding": self._decoding.document()}
+        inputs = fingerprint({"judge": self._identity, **request})
         known = session.find_artifact(inputs, NiehVerdict)
         if known is not None:
             return known.score
@@ -188,7 +183,7 @@ class Judge:
         verdict = NiehVerdict(
             question=payload.question,
             answers=payload.answers,
-            reply=said,
+            reply=response,
             said=reply.text,
             score=self._form.read(answer_of(reply).answer),
             judge=self._identity,
@@ -232,16 +227,15 @@ def judge_replies(
         right=_count(right, verdicts),
         wrong=_count(wrong, verdicts),
     )
-    found = {record.key: verdicts.get(record.key) or 0.0 for record in unsure}
-    scores = {r.key: max(found.get(r.key, 0.0), r.payload.scores["strict"]) for r in scored}
+    judged = {record.key: verdicts.get(record.key) or 0.0 for record in unsure}
+    scores = {r.key: max(judged.get(r.key, 0.0), r.payload.scores["strict"]) for r in scored}
     return Judgement(scores, agreement, failures)
 
 
 def _sample(
     scored: Sequence[Record], unsure: set[UnitKey], seed: int
 ) -> tuple[list[Record], list[Record]]:
-    """Return replies to open-ended questions that are right, and that are plainly wrong, from all
-    trajectories."""
+    """Return open-ended replies that are right, and plainly wrong ones, from all trajectories."""
     sure = [
         record
         for record in scored
@@ -258,9 +252,13 @@ def _sample(
 
 
 def _count(records: Sequence[Record], verdicts: Mapping[UnitKey, float | None]) -> Verdicts:
-    said = [verdicts[record.key] for record in records if record.key in verdicts]
-    n_partly = sum(score is not None and 0 < score < 1 for score in said)
-    counts = {"n_right": said.count(1.0), "n_wrong": said.count(0.0), "n_neither": said.count(None)}
+    scores = [verdicts[record.key] for record in records if record.key in verdicts]
+    n_partly = sum(score is not None and 0 < score < 1 for score in scores)
+    counts = {
+        "n_right": scores.count(1.0),
+        "n_wrong": scores.count(0.0),
+        "n_neither": scores.count(None),
+    }
     return Verdicts(
-        n=len(records), n_partly=n_partly, n_not_asked=len(records) - len(said), **counts
+        n=len(records), n_partly=n_partly, n_not_asked=len(records) - len(scores), **counts
     )

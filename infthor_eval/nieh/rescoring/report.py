@@ -1,5 +1,4 @@
-"""What scoring replies again has changed, and how a judge agrees with the rules: `rescored.json`,
-and tables."""
+"""What scoring again has changed, and how judge and rules agree: `rescored.json`, and tables."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -81,8 +80,7 @@ class RescoringReport(msgspec.Struct, frozen=True, kw_only=True):
 def find_changes(
     before: Mapping[UnitKey, Mapping[str, float]], records: Sequence[Record], names: Sequence[str]
 ) -> dict[str, Change]:
-    """Compare the scores of a task's records with those before, by unit: a change for each
-    metric."""
+    """Compare a task's scores with those before, by unit: a change for each metric."""
     return {name: _change(before, records, name) for name in names}
 
 
@@ -134,8 +132,7 @@ def sources_of(config: NiehConfig) -> dict[str, str]:
 
 
 def change_table(report: RescoringReport, sources: Mapping[str, str]) -> Table:
-    """Return the means today and in the journal, a row for each task and metric, with by whom a
-    metric is."""
+    """Return the means today and in the journal, by task and metric, with whose metric it is."""
     rows = [
         Row((task, *cells))
         for task, changes in report.tasks.items()
@@ -171,8 +168,7 @@ def _percent(share: float | None) -> str:
 
 
 def agreement_table(agreement: Agreement, judge: str) -> Table:
-    """Return what a judge of that name says: where the rules are unsure, and where they are
-    sure."""
+    """Return what a judge says where the rules are unsure, and where they are sure."""
     rows = (
         _verdicts_row("the rules are unsure of", agreement.unsure),
         _verdicts_row("are right by the rules (sample)", agreement.right),

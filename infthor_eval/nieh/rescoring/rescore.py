@@ -150,8 +150,7 @@ class Rescoring:
         return {"name": self.scorer.name, "metrics": list(self.own.names), **self.scorer.source}
 
     def _score(self, record: Record, session: Session[NiehAnswer]) -> Record:
-        """Return a record with today's scores by rule; failed without a reply, or if the own scorer
-        fails on it."""
+        """Return a record with today's scores; failed without a reply, or if a scorer fails."""
         today = replace(record, usage=NOTHING, attempt=1)
         if record.payload.reply is None:
             return today
@@ -205,8 +204,7 @@ def read_source(folder: Path) -> Source:
 def score_again(
     source: Source, scorer: OwnScorer | None = None, judge: Judge | None = None
 ) -> Rescoring:
-    """Set up a run with the scores of both scorers today, and of a scorer of one's own and a judge
-    if there are any.
+    """Set up a run with both scorers' scores today, and those of an own scorer and a judge if any.
 
     Raises:
         UsageError: the own scorer calls a metric as one of ours is called.

@@ -40,8 +40,7 @@ _NEVER_OPEN_ENDED = re.compile(r"yes|no|\d+")
 
 
 class KnownAnswers:
-    """The gold answers of a run's open-ended questions by type, and the replies that they leave
-    open."""
+    """Gold answers of a run's open-ended questions by type, and the replies they leave open."""
 
     def __init__(self, records: Sequence[Record]) -> None:
         """Take all records of a run, failed ones too: their questions have answers all the same."""
@@ -53,12 +52,12 @@ class KnownAnswers:
         """Return True if the rules are unsure of a reply that `strict` has scored; see the module
         for the rule."""
         payload = record.payload
-        said = last_line(payload.reply or "")
-        if not said or not is_open_ended(record) or payload.scores["strict"] >= 1.0:
+        response = last_line(payload.reply or "")
+        if not response or not is_open_ended(record) or payload.scores["strict"] >= 1.0:
             return False
         others = self._names[payload.question_type] - set(map(_name, payload.answers))
         return not all(
-            _is_accounted_for(piece, payload.answers, others) for piece in pieces_of(said)
+            _is_accounted_for(piece, payload.answers, others) for piece in pieces_of(response)
         )
 
 
@@ -70,7 +69,6 @@ def _is_accounted_for(piece: str, answers: Sequence[Answer], others: set[str]) -
 
 
 def _name(text: Answer) -> str:
-    """Return what an answer is known by: its letters alone, without a beginning such as "on
-    the"."""
+    """Return what an answer is known by: its letters, without a beginning such as "on the"."""
     words = " ".join(plain_form(str(text).lower()).split())
     return _BEGINNING.sub("", words).replace(" ", "")

@@ -23,8 +23,7 @@ SOLVED = 0.95
 
 
 class FormScore(msgspec.Struct, frozen=True):
-    """The questions of a form: their number, the run's mean score, and the mean of the best guesser
-    on them."""
+    """A form's questions: their number, the run's mean score, and the best guesser's mean."""
 
     n: int
     score: float
@@ -88,7 +87,11 @@ def above_guessing(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> Ab
         n_unknown=len(records) - len(known),
         forms=_by_form(known, scorer),
         solved_forms=sorted(
-            {_form(item) for item in known if score_above_guessing(item.payload, scorer) is None}
+            {
+                _form(record)
+                for record in known
+                if score_above_guessing(record.payload, scorer) is None
+            }
         ),
     )
 

@@ -1,5 +1,4 @@
-"""The form of replies, apart from whether they are right: a leaning to yes, and replies that are no
-answer at all."""
+"""The form of replies, right or wrong: a leaning to yes, and replies that are no answer at all."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -30,22 +29,20 @@ class YesNo(msgspec.Struct, frozen=True):
 
 
 def yes_no(records: Sequence[Record]) -> YesNo:
-    """Return the bias on the yes/no questions among a task's: does a model always say yes, or
-    neither?"""
-    asked = [record for record in records if _gold(record) in ({"yes"}, {"no"})]
-    said = Counter(says_yes_or_no(last_line(record.payload.reply or "")) for record in asked)
-    n = len(asked)
+    """Return the bias on a task's yes/no questions: is it always yes, or neither?"""
+    binary = [record for record in records if _gold(record) in ({"yes"}, {"no"})]
+    answers = Counter(says_yes_or_no(last_line(record.payload.reply or "")) for record in binary)
+    n = len(binary)
     return YesNo(
         n=n,
-        share_gold_yes=sum(_gold(record) == {"yes"} for record in asked) / n if n else None,
-        share_said_yes=said["yes"] / n if n else None,
-        n_neither=said[None],
+        share_gold_yes=sum(_gold(record) == {"yes"} for record in binary) / n if n else None,
+        share_said_yes=answers["yes"] / n if n else None,
+        n_neither=answers[None],
     )
 
 
 def format_failures(records: Sequence[Record], max_new_tokens: int | None) -> dict[str, int]:
-    """Count a task's replies that are not of the form asked for, by reason; one with two faults
-    counts in both."""
+    """Count replies not of the form asked for, by reason; one with two faults counts twice."""
     counts: Counter[str] = Counter()
     for record in records:
         if record.payload.reply is not None:
@@ -53,16 +50,16 @@ def format_failures(records: Sequence[Record], max_new_tokens: int | None) -> di
     return dict(sorted(counts.items()))
 
 
-def _failures(record: Record, said: str, max_new_tokens: int | None) -> list[str]:
+def _failures(record: Record, response: str, max_new_tokens: int | None) -> list[str]:
     gold = _gold(record)
     reasons = []
-    if not said:
+    if not response:
         reasons.append("empty" if record.payload.thinking is None else "cut off while thinking")
-    elif gold in ({"yes"}, {"no"}) and says_yes_or_no(said) is None:
+    elif gold in ({"yes"}, {"no"}) and says_yes_or_no(response) is None:
         reasons.append("neither yes nor no")
-    elif len(gold) == 1 and says_number(next(iter(gold))) and not says_number(said):
+    elif len(gold) == 1 and says_number(next(iter(gold))) and not says_number(response):
         reasons.append("no number")
-    is_cut_thinking = not said and record.payload.thinking is not None
+    is_cut_thinking = not response and record.payload.thinking is not None
     if (
         not is_cut_thinking
         and max_new_tokens is not None

@@ -1,5 +1,4 @@
-"""The effective length of a model's context: the longest at which it keeps 85 % of its score on the
-clue frames.
+"""A model's effective context length: the longest at which it keeps 85 % of its score on clues.
 
 The rule is NoLiMa's (Modarressi et al. 2025), with the model's own score on the clue frames alone
 as its base. It is applied to windows of growing size around the evidence (`nieh_haystack`), to the
@@ -44,8 +43,7 @@ class Series:
 
 
 def effective_lengths(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return a table with a row per model, kind of context and scorer; none without a run on the
-    clue frames."""
+    """Return a table by model, kind of context and scorer; none without a run on clues."""
     rows = []
     for series in find_series(runs):
         by_score = {point.length: point.score for point in series.points}
@@ -91,14 +89,12 @@ def effective_length(base: float | None, scores: Mapping[str, float | None]) -> 
 
 
 def _is_lost(score: float, base: float) -> bool:
-    return score < KEPT * base and not math.isclose(
-        score, KEPT * base
-    )  # means of questions are rounded
+    # Means of questions are rounded.
+    return score < KEPT * base and not math.isclose(score, KEPT * base)
 
 
 def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:
-    """Yield the series of each model that has also been asked on the clue frames of the same
-    set."""
+    """Yield the series of each model that was also asked on the same set's clue frames."""
     by_subject: dict[str, list[tuple[RunSummary, str, TaskSummary]]] = {}
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
@@ -130,8 +126,7 @@ def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:
 def _lengths(
     items: Sequence[tuple[RunSummary, str, TaskSummary]],
 ) -> dict[str, list[tuple[float, TaskSummary]]]:
-    """Return the tasks by kind of context, each with its size in thousand tokens (0: binned),
-    ascending."""
+    """Return tasks by kind of context, with their thousand tokens (0: binned), ascending."""
     chosen: dict[str, list[tuple[float, TaskSummary]]] = {}
     for run, name, task in items:
         size = run.header.config.tasks[name].dataset_kwargs.get("ctx_size")
@@ -139,7 +134,7 @@ def _lengths(
             chosen.setdefault(task.context, []).append((float(size), task))
         elif task.context == "trajectory":
             chosen.setdefault(task.context, []).append((0.0, task))
-    return {context: sorted(tasks, key=lambda item: item[0]) for context, tasks in chosen.items()}
+    return {context: sorted(tasks, key=lambda sized: sized[0]) for context, tasks in chosen.items()}
 
 
 def _points(sized: tuple[float, TaskSummary], scorer: str) -> Iterator[_Point]:

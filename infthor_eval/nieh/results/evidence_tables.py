@@ -1,5 +1,4 @@
-"""Tables on the evidence: was it among the shown frames, and how far from the end; and what was got
-above guessing."""
+"""Tables on the evidence: how much was shown, how far from the end, and scores above guessing."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -22,23 +21,22 @@ _WITH_INTERVAL = "In brackets: 95 % interval, clustered by trajectory; in parent
 
 
 def evidence_tables(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return the tables by share of the clue frames shown and by distance of the last clue, as far
-    as they are known.
+    """Return the tables by share of the clue frames shown and last clue's distance, where known.
 
     A task that shows all evidence of all samples is not in the first, which would say nothing of
     it.
     """
     distances = _used(runs)
-    shown = list(_rows(runs, lambda cells: cells.by_shown_clues, SHOWN_CLUES, _hides_evidence))
+    rows = list(_rows(runs, lambda cells: cells.by_shown_clues, SHOWN_CLUES, _hides_evidence))
     far = list(
         _rows(
             runs, lambda cells: cells.by_distance, distances, lambda task: task.context != "clues"
         )
     )
     tables = []
-    if shown:
+    if rows:
         title = "Accuracy, % by how many of the clue frames were shown (questions)"
-        tables.append(_table(title, SHOWN_CLUES, shown))
+        tables.append(_table(title, SHOWN_CLUES, rows))
     if far:
         title = (
             "Accuracy, % by frames between the last clue and the end of the trajectory (questions)"

@@ -1,5 +1,4 @@
-"""Gains over blank frames: how much higher a model scores with frames than without, by the wording
-alone."""
+"""Gains over blank frames: how much higher a model scores with frames than by the wording alone."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,8 +18,7 @@ _BLANK = "blank"
 
 @dataclass(frozen=True)
 class Gain:
-    """The gain of a run with frames over its run on blank ones, in one task under one scorer, with
-    both summaries."""
+    """The gain of a run with frames over its run on blank ones, in one task under one scorer."""
 
     run: RunSummary
     task: str
@@ -29,8 +27,7 @@ class Gain:
     blind: TaskSummary
 
     def in_column(self, column: str) -> float | None:
-        """Return the gain for a number of clues or in total, between -1 and 1; None if nothing was
-        asked."""
+        """Return the gain for a number of clues or in total, -1 to 1; None without questions."""
         seeing = self.seeing.by_clues[column]
         blind = self.blind.by_clues[column]
         if not seeing.n or not blind.n:
@@ -38,8 +35,7 @@ class Gain:
         return seeing.scores[self.metric].mean - blind.scores[self.metric].mean
 
     def total(self) -> MeanEstimate | None:
-        """Return the mean gain with its interval, paired by question, clustered by trajectory; None
-        without questions.
+        """Return mean gain and interval, paired by question, clustered by trajectory; or None.
 
         Runs whose configs differ in their frames only ask the same questions, in the same order.
         """
@@ -58,8 +54,7 @@ class Gain:
 
 
 def find_gains(runs: Sequence[RunSummary]) -> Iterator[Gain]:
-    """Yield the gains of every run that has a run on blank frames with otherwise the same config
-    among the runs."""
+    """Yield the gain of every run that has a run on blank frames, equal but for that, beside it."""
     for run in runs:
         for blind in runs:
             is_pair = frames_of(run) != _BLANK and frames_of(blind) == _BLANK

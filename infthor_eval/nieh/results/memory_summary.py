@@ -38,16 +38,14 @@ class MemorySummary(msgspec.Struct, frozen=True):
 
 
 class MemoryTimes(msgspec.Struct, frozen=True):
-    """Seconds of a task's memory: to observe a trajectory, and to recall for a question, both on
-    average."""
+    """Mean seconds of a task's memory to observe a trajectory, and to recall for a question."""
 
     build_s: float
     recall_s: float
 
 
 def subject_of(label: str) -> str:
-    """Return the label of a run without its memory: "nano (budget=1k, seed=2)" is "nano
-    (seed=2)"."""
+    """Return a run's label without its memory: "nano (budget=1k, seed=2)" is "nano (seed=2)"."""
     return _OF_MEMORY.sub("", label).replace("(, ", "(").replace(" ()", "")
 
 

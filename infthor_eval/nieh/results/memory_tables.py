@@ -1,5 +1,4 @@
-"""The table of memories: what each got right, what it recalled of the evidence, and what that
-took."""
+"""The table of memories: what each got right, what it recalled of the evidence, what that took."""
 
 from collections.abc import Iterator, Sequence
 
@@ -38,21 +37,20 @@ _NOTES = (
 
 def memory_tables(runs: Sequence[RunSummary]) -> list[Table]:
     """Return the table of the tasks that have a memory, if there are any."""
-    rows = tuple(row for _, row in sorted(_rows(runs), key=lambda item: item[0]))
+    rows = tuple(row for _, row in sorted(_rows(runs), key=lambda keyed: keyed[0]))
     columns = (*(Column(name, False) for name in _NAMES), *map(Column, _NUMBERS))
     return [Table("Memories", columns, rows, _NOTES)] if rows else []
 
 
 def _rows(runs: Sequence[RunSummary]) -> Iterator[tuple[tuple[str | int, ...], Row]]:
-    """Yield rows with their place: by subject and task, the budgets of a memory below each
-    other."""
+    """Yield rows with their place: by subject and task, a memory's budgets below each other."""
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():
             if task.memory is not None:
                 subject = subject_of(name_of(run))
-                place = subject, name, task.memory.name, task.memory.budget or 0
-                yield place, Row((subject, name, *_cells(run.summary, name, task)))
+                sort_key = subject, name, task.memory.name, task.memory.budget or 0
+                yield sort_key, Row((subject, name, *_cells(run.summary, name, task)))
 
 
 def _cells(summary: NiehSummary, name: str, task: TaskSummary) -> tuple[str, ...]:

@@ -58,14 +58,12 @@ class RepeatSummary(msgspec.Struct, frozen=True):
 
 
 def by_question(records: Sequence[Record]) -> list[list[Record]]:
-    """Return the records of each question in its variant, given records in the order of their
-    keys."""
+    """Return the records of each question in its variant, given records in key order."""
     return [list(same) for _, same in groupby(records, key=lambda record: record.key.once)]
 
 
 def mean_record(records: Sequence[Record]) -> Record:
-    """Return a record of one question's answers with their mean scores, and the first failure if
-    there is any."""
+    """Return a record of a question's answers: their mean scores, and the first failure if any."""
     if len(records) == 1:
         return records[0]
     names = {name for record in records for name in record.payload.scores}
@@ -111,14 +109,14 @@ def summarise_repeats(questions: Sequence[Sequence[Record]], metric: str) -> Rep
 
 
 def _vote(records: Sequence[Record], metric: str) -> tuple[float, float]:
-    """Return the score of the commonest answer, and the share of the answers that say it; failures
-    say nothing."""
+    """Return the commonest answer's score and share of the answers; failures say nothing."""
     replies = [record.payload.reply if record.failure is None else None for record in records]
-    said = [None if reply is None else plain_form(last_line(reply)).casefold() for reply in replies]
-    counts = Counter(text for text in said if text is not None)
+    answers = [
+        None if reply is None else plain_form(last_line(reply)).casefold() for reply in replies
+    ]
+    counts = Counter(text for text in answers if text is not None)
     if not counts:
         return 0.0, 0.0
-    text, count = max(
-        counts.items(), key=lambda item: item[1]
-    )  # the first of equals: counters keep the order
-    return records[said.index(text)].payload.scores.get(metric, 0.0), count / len(records)
+    # The first of equals: counters keep the order.
+    text, count = max(counts.items(), key=lambda counted: counted[1])
+    return records[answers.index(text)].payload.scores.get(metric, 0.0), count / len(records)

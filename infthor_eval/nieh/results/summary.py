@@ -60,8 +60,7 @@ Record = UnitRecord[NiehAnswer]
 
 
 class Score(msgspec.Struct, frozen=True):
-    """A mean score under one metric, from 0 to 1; the reference scorer can exceed 1 where a reply
-    repeats itself.
+    """A mean score under a metric, 0 to 1; the reference scorer exceeds 1 on repetitions.
 
     Standard error and 95 % intervals are by trajectory, and None with fewer than two. `bootstrap`
     is the interval over resampled trajectories; None also if all scores are equal.
@@ -76,8 +75,7 @@ class Score(msgspec.Struct, frozen=True):
 
 
 class Cell(msgspec.Struct, frozen=True):
-    """The scores of n samples by metric; empty if n is 0. A sample on which the model failed counts
-    as wrong."""
+    """Scores of n samples by metric (empty if n is 0); where the model failed, it is wrong."""
 
     n: int
     n_failed: int
@@ -85,8 +83,7 @@ class Cell(msgspec.Struct, frozen=True):
 
 
 class EvidenceCells(msgspec.Struct, frozen=True):
-    """The scores of samples by what was shown of their evidence; samples of which it is not known
-    are in no cell.
+    """Scores by what was shown of the evidence; samples where that is unknown are in no cell.
 
     Attributes:
         by_shown_clues: cells of the samples with all, some and none of their clue frames shown.
@@ -99,16 +96,14 @@ class EvidenceCells(msgspec.Struct, frozen=True):
 
 
 class LengthCell(msgspec.Struct, frozen=True):
-    """The scores of samples with a context of about one length, and their scores above guessing by
-    scorer."""
+    """Scores of samples with contexts of about one length, and those above guessing by scorer."""
 
     cell: Cell
     above_guessing: dict[str, float | None]
 
 
 class SkippedSummary(msgspec.Struct, frozen=True):
-    """The number of samples that were not asked, by reason; and the mean by metric if they were
-    counted as wrong."""
+    """Samples that were not asked, by reason; and the mean by metric if they counted as wrong."""
 
     n: int
     by_reason: dict[str, int]
@@ -304,8 +299,7 @@ def _by_clues(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, Ce
 
 
 def is_open_ended(record: Record) -> bool:
-    """Return the published test of a question: the first gold answer decides, a number in quotes
-    counts as a text."""
+    """Return the published test: the first gold answer decides, a number in quotes is a text."""
     first = record.payload.answers[0]
     return isinstance(first, str) and first.strip().lower() not in ("yes", "no")
 
@@ -332,8 +326,7 @@ def _in_order(
     name_of: Callable[[Record], str | None],
     names: Sequence[str],
 ) -> dict[str, Cell]:
-    """Return the cells of the groups that have samples, in the order of their names; some samples
-    are in none."""
+    """Return the cells of groups with samples, in their names' order; some samples are in none."""
     cells = {}
     for name in names:
         chosen = [record for record in records if name_of(record) == name]

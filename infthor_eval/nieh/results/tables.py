@@ -1,5 +1,4 @@
-"""NIEH results as tables: accuracy by clues beside the published rows, by depth, gain by frames,
-form of replies."""
+"""NIEH results as tables: by clues beside the published rows, by depth, gains, form of replies."""
 
 from collections.abc import Iterator, Sequence
 
@@ -47,8 +46,7 @@ _EMBEDDED = (
 
 
 def tables(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return the tables of runs: by depth and by clues, the gains over blank frames, and the form
-    of the replies.
+    """Return the tables of runs: by depth and clues, gains over blank frames, form of replies.
 
     Published rows by clues are below ours; a published table of other columns (question types,
     question files) is a table of its own beside runs in its context, with ours in it where they
@@ -76,17 +74,16 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def overview(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return the accuracy of each task with its intervals, and the tables of gains, memories and
-    repeats if any.
+    """Return each task's accuracy with intervals; and gains, memories and repeats if any.
 
     A task that asked nothing is a line below the table.
     """
     tasks = list(_tasks(runs))
-    asked = [(run, name, task) for run, name, task in tasks if task.n]
-    left_out = any(task.skipped.n or task.by_clues["total"].n_failed for _, _, task in asked)
+    with_samples = [(run, name, task) for run, name, task in tasks if task.n]
+    left_out = any(task.skipped.n or task.by_clues["total"].n_failed for _, _, task in with_samples)
     rows = tuple(
         Row((run, *_name_and_total(name, task), *(_left_out(task) if left_out else ())))
-        for run, name, task in asked
+        for run, name, task in with_samples
     )
     numbers = ("total", "95 %", "bootstrap", "n", *(("skipped", "failed") if left_out else ()))
     notes = (
@@ -133,8 +130,7 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
 
 
 def clues_table(runs: Sequence[RunSummary]) -> Table:
-    """Return the accuracy by number of clues: a row per run, task and metric, then the published
-    rows."""
+    """Return accuracy by clues: a row per run, task and metric, then the published rows."""
     apart = (OPEN_ENDED, ABSENCE, "above guessing")
     numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", *apart, "n", "skipped", "failed")
     rows = [row for run in runs for row in _rows_of(run)]
@@ -155,7 +151,9 @@ def _notes(runs: Sequence[RunSummary]) -> list[str]:
     embedded = (
         [_EMBEDDED] if any(task.simulator == "embedded" for _, _, task in _tasks(runs)) else []
     )
-    sources = dict.fromkeys(item for run in runs for item in sources_of(run.header.config).items())
+    sources = dict.fromkeys(
+        source for run in runs for source in sources_of(run.header.config).items()
+    )
     return [
         *embedded,
         *(f"{metric}: {source}." for metric, source in sources if metric not in SCORERS),
@@ -187,8 +185,7 @@ def _cells(task: TaskSummary, metric: str) -> list[str]:
 
 
 def _intervals(cell: Cell, metric: str) -> tuple[str, str]:
-    """Return the clustered interval, and that over resampled trajectories; one trajectory has
-    neither."""
+    """Return the clustered interval, and that by resampling; one trajectory has neither."""
     score = cell.scores.get(metric)
     if score is None:
         return _range(None, None), _range(None, None)
@@ -264,8 +261,7 @@ def _difference(cell: Cell, value: float | None, metric: str) -> str:
 
 
 def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
-    """Return the published rows, and the runs that asked in the same context and have one of the
-    columns."""
+    """Return the published rows, and the runs in the same context with one of the columns."""
     rows = [
         Row(
             (row.name, _made_by(row, table), table.metric, *map("{:.2f}".format, row.values)),
@@ -298,8 +294,7 @@ def _made_by(row: PublishedRow, table: PublishedTable) -> str:
 
 
 def _gains_table(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return a table of the gain of each run over its run on blank frames, if there is such a
-    pair."""
+    """Return a table of each run's gain over its run on blank frames, if there is a pair."""
     rows = [
         Row((name_of(gain.run), gain.task, gain.metric, *_gain_cells(gain)))
         for gain in find_gains(runs)
@@ -353,8 +348,7 @@ def _depth_table(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def _replies_table(runs: Sequence[RunSummary]) -> Table:
-    """Return the bias to yes, the length of replies, and those that are no answer: a row per run
-    and task."""
+    """Return bias to yes, reply length and replies that are no answer, a row per run and task."""
     thought = any(task.n_thought for _, _, task in _tasks(runs))
     numbers = ["yes/no questions", "gold yes, %", "said yes, %", "tokens per right answer"]
     numbers += ["with thoughts"] if thought else []
@@ -366,7 +360,7 @@ def _replies_table(runs: Sequence[RunSummary]) -> Table:
         further = [tokens, str(task.n_thought)] if thought else [tokens]
         both = (task.yes_no.share_gold_yes, task.yes_no.share_said_yes)
         shares = ["-" if share is None else f"{100 * share:.1f}" for share in both]
-        said = ", ".join(f"{n} {reason}" for reason, n in task.format_failures.items()) or "-"
-        rows.append(Row((run, name, str(task.yes_no.n), *shares, *further, said)))
+        failures = ", ".join(f"{n} {reason}" for reason, n in task.format_failures.items()) or "-"
+        rows.append(Row((run, name, str(task.yes_no.n), *shares, *further, failures)))
     columns = (*_NAMES, *map(Column, numbers), Column("not in the form asked for", False))
     return Table("Form of the replies", columns, tuple(rows))

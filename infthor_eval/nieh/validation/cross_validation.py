@@ -1,5 +1,4 @@
-"""Cross-validation of questions (paper, A.1.3): a filter over the replies of several models to the
-clue frames.
+"""Cross-validation of questions (paper, A.1.3): a filter over several models' replies to clues.
 
 A question is kept if at least one model answers it correctly: with full marks by default, with any
 part of them in the published filter (of its 829 questions with one clue 20 have partial credit
@@ -142,8 +141,7 @@ def _reply(question: Question, model: str, replies: Mapping[str, str | None]) ->
 
 
 def write_inspection_list(path: Path, items: Iterable[JudgedQuestion]) -> Path | None:
-    """Write the questions that a person must decide on; the person fills the last column with keep
-    or drop.
+    """Write the questions for a person to decide on, who fills the last column: keep or drop.
 
     Decisions in an existing list are kept. A list with decisions on other questions is renamed, and
     its new path is returned; else None.
@@ -155,18 +153,20 @@ def write_inspection_list(path: Path, items: Iterable[JudgedQuestion]) -> Path |
     earlier = read_decisions(path) if path.exists() else {}
     listed = list(items)
     renamed = None
-    if earlier.keys() - {item.question.id for item in listed}:
+    if earlier.keys() - {judged.question.id for judged in listed}:
         names = (
             path.with_name(f"{path.stem}.{number}{path.suffix}") for number in itertools.count(1)
         )
         renamed = path.rename(next(name for name in names if not name.exists()))
-    write_sheet(path, _COLUMNS, (_row(item, earlier.get(item.question.id, "")) for item in listed))
+    write_sheet(
+        path, _COLUMNS, (_row(judged, earlier.get(judged.question.id, "")) for judged in listed)
+    )
     return renamed
 
 
-def _row(item: JudgedQuestion, decision: str) -> list[object]:
-    question = item.question
-    replies = "; ".join(f"{model}: {text}" for model, text in item.replies.items())
+def _row(judged: JudgedQuestion, decision: str) -> list[object]:
+    question = judged.question
+    replies = "; ".join(f"{model}: {text}" for model, text in judged.replies.items())
     clues = list(question.clues)
     answers = list(question.answers)
     return [question.id, question.traj_id, question.text, clues, answers, replies, decision]
@@ -181,15 +181,15 @@ def read_decisions(path: Path) -> dict[str, str]:
     decisions: dict[str, str] = {}
     hint = "fill the list that `validate` wrote"
     for row in read_rows(path, ("question_id", "decision"), hint, line_breaks=True):
-        place = f"{path}, line {row.line}"
+        where = f"{path}, line {row.line}"
         if row.problem is not None:
-            raise DataError(f"{place}: {row.problem}")
+            raise DataError(f"{where}: {row.problem}")
         name = unshield(row.cells["question_id"])
         decision = row.cells["decision"].strip().lower()
         if decision and decision not in DECISIONS:
-            raise DataError(f"{place}: decision is {decision!r:.60}; write keep or drop")
+            raise DataError(f"{where}: decision is {decision!r:.60}; write keep or drop")
         if decisions.get(name, decision) != decision:
-            raise DataError(f"{place}: {name} has another decision above; remove one of the rows")
+            raise DataError(f"{where}: {name} has another decision above; remove one of the rows")
         if decision:
             decisions[name] = decision
     return decisions

@@ -24,8 +24,7 @@ INSPECTION = "inspection.csv"
 
 
 def check_output(out: Path, data: NiehSet) -> None:
-    """Refuse an output folder whose contents the validated set would damage; called before the
-    models run.
+    """Refuse an output folder that the validated set would damage, before the models run.
 
     Raises:
         UsageError: it is the folder of the set itself.
@@ -61,15 +60,15 @@ def write_validated_set(out: Path, data: NiehSet, verdicts: Verdicts) -> Path | 
             link.symlink_to((data.root / "metadata").resolve(), target_is_directory=True)
         if (data.root / "set.json").is_file():
             shutil.copy(data.root / "set.json", out / "set.json")
-        write_questions(out / "qa_set_validated.csv", [item.question for item in verdicts.kept])
-        lines = [msgspec.json.encode(_as_json(item)) for item in verdicts.rejected]
+        write_questions(out / "qa_set_validated.csv", [judged.question for judged in verdicts.kept])
+        lines = [msgspec.json.encode(_as_json(judged)) for judged in verdicts.rejected]
         with write_atomically(out / "rejected.jsonl") as partial:
             partial.write_bytes(b"".join(line + b"\n" for line in lines))
         return write_inspection_list(out / INSPECTION, verdicts.to_inspect)
 
 
-def _as_json(item: JudgedQuestion) -> dict[str, Any]:
-    question = item.question
+def _as_json(judged: JudgedQuestion) -> dict[str, Any]:
+    question = judged.question
     return {
         "question_id": question.id,
         "traj_id": question.traj_id,
@@ -77,6 +76,6 @@ def _as_json(item: JudgedQuestion) -> dict[str, Any]:
         "gt_img_idx": question.clues,
         "answer": question.answers,
         "question_type": question.question_type,
-        "replies": item.replies,
-        "decision": item.decision,
+        "replies": judged.replies,
+        "decision": judged.decision,
     }

@@ -13,7 +13,7 @@ from infthor_eval.plans.actors.habits import Habits
 from infthor_eval.plans.actors.protocols import Act, PlanActor, PlanBaseline, PlanSituation
 from infthor_eval.plans.actors.script import scripted_action
 from infthor_eval.plans.environment import StepOutcome
-from infthor_eval.runs.baseline import BaselineSubject
+from infthor_eval.runs.suite import BaselineSubject
 from infthor_eval.thor.actions import applicable_calls
 from model_adapters import Capabilities
 

@@ -125,7 +125,7 @@ def _row(run: RunCurves, bound: float, curves: RewardCurves) -> Row:
         for facet, curve in curves_of_run
         if facet.earned
     )
-    places = (
+    last_places = (
         "-" if curve is None else f"{curve.places[-1]:.0f}"
         for facet, curve in curves_of_run
         if facet.end_at
@@ -137,7 +137,7 @@ def _row(run: RunCurves, bound: float, curves: RewardCurves) -> Row:
             interval,
             share,
             *earned,
-            *places,
+            *last_places,
             *map(str, run.counts.values()),
         )
     )

@@ -39,8 +39,7 @@ def draw_curves(
 
 
 def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
-    """Return a figure with a row per panel, with the bound in each, and a column for each facet
-    that some run has."""
+    """Return a figure: a row per panel, with the bound in each, a column per facet of some run."""
     drawn = set().union(*(run.curves for run in curves.runs))
     facets = {name: facet for name, facet in curves.facets.items() if name in drawn}
     width = len(facets) * (_PANEL[0] if len(facets) < 3 else _NARROW) + LEGEND

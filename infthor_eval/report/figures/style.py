@@ -1,5 +1,4 @@
-"""The style of all figures: colours and lines of runs, texts around panels, files in PNG and
-SVG."""
+"""The style of all figures: colours and lines of runs, texts around panels, PNG and SVG files."""
 
 import io
 import re
@@ -106,8 +105,7 @@ def looks_of(labels: Iterable[str], together: Iterable[Collection[str]] = ()) ->
 
 
 def save_figure(draw: Callable[[], Figure], folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and SVG and return the files' paths; the same figure gives the same
-    bytes of SVG.
+    """Write a figure as PNG and SVG (equal bytes for equal figures) and return the files' paths.
 
     Args:
         draw: draws the figure; called with the style in effect.
@@ -119,12 +117,11 @@ def save_figure(draw: Callable[[], Figure], folder: Path, name: str) -> list[Pat
     """
     with _in_style():
         figure = draw()
-        return [_save(figure, folder / f"{name}.{form}", form) for form in ("png", "svg")]
+        return [_save(figure, folder / f"{name}.{kind}", kind) for kind in ("png", "svg")]
 
 
 def inline_svg(draw: Callable[[], Figure]) -> str:
-    """Return a figure as an element of a page, in the page's colours (light or dark) and no wider
-    than its column."""
+    """Return a figure for a page, in its colours (light or dark), no wider than its column."""
     with _in_style(_PAGE_SETTINGS):
         text = io.StringIO()
         figure = draw()
@@ -140,8 +137,7 @@ def inline_svg(draw: Callable[[], Figure]) -> str:
 
 @contextmanager
 def _in_style(more: dict[Any, Any] | None = None) -> Iterator[None]:
-    """Apply the style, instead of the user's settings of matplotlib, which would change the
-    picture."""
+    """Apply the style instead of the user's settings of matplotlib, which change the picture."""
     with matplotlib.rc_context(), warnings.catch_warnings():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS | (more or {}))
@@ -150,13 +146,13 @@ def _in_style(more: dict[Any, Any] | None = None) -> Iterator[None]:
         yield
 
 
-def _save(figure: Figure, path: Path, form: str) -> Path:
-    metadata = _SVG_METADATA if form == "svg" else {}
+def _save(figure: Figure, path: Path, kind: str) -> Path:
+    metadata = _SVG_METADATA if kind == "svg" else {}
     with (
         wrap_errors(f"{path}: cannot be written", "give another --out"),
         write_atomically(path) as partial,
     ):
-        figure.savefig(partial, format=form, dpi=160, metadata=metadata)
+        figure.savefig(partial, format=kind, dpi=160, metadata=metadata)
     return path
 
 
@@ -172,8 +168,7 @@ def add_legend(axes: Axes, entries: Sequence[tuple[str, Look]]) -> None:
 
 
 def add_words(figure: Figure, heading: Sequence[str], notes: Sequence[str], width: float) -> None:
-    """Write the lines of the heading above the panels, and the notes below them; `width` is the
-    figure's, in inches."""
+    """Write the heading above the panels, and the notes below; `width` is the figure's, inches."""
     settings: dict[str, Any] = {"x": 0.01, "ha": "left"}
     wrapped = [
         part for line in heading for part in textwrap.wrap(printable(line), round(width * 12))

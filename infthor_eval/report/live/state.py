@@ -1,16 +1,16 @@
-"""What the page on a run shows: a pure function of the run's folder at a moment, worked out again
-as it grows."""
+"""What the page on a run shows, worked out from its folder as it grows, and the page's routes."""
 
 import time
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from threading import Lock
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
 
 from infthor_eval.errors import InfthorError, wrap_errors
+from infthor_eval.pages.server import file_route
 from infthor_eval.rates import Rate
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.runs import NOTHING, UnitRecord, Usage
@@ -19,7 +19,11 @@ from infthor_eval.runs.journals.shards import FOLDER
 from infthor_eval.runs.stored.search import Results, read_results, run_folders
 from infthor_eval.suites import find_presenter, find_suite
 
-__all__ = ["LiveRun", "LiveSample", "LiveState", "Totals"]
+if TYPE_CHECKING:
+    from starlette.requests import Request
+    from starlette.routing import Route
+
+__all__ = ["LiveRun", "LiveSample", "LiveState", "Totals", "live_routes"]
 
 Status = Literal["waiting", "running", "ended", "stopped", "done", "unknown"]
 
@@ -127,9 +131,8 @@ class LiveRun:
         with self._asking:
             folder = str(self._run or self._folder)
             try:
-                with wrap_errors(
-                    f"{folder}: cannot be read", "restore it"
-                ):  # also what is set aside just now
+                # Also what is set aside just now.
+                with wrap_errors(f"{folder}: cannot be read", "restore it"):
                     return self._read()
             except InfthorError as error:
                 return LiveState(status="unknown", folder=folder, problem=str(error))
@@ -250,3 +253,18 @@ def _sample(run: PresentedRun, record: UnitRecord[Any]) -> LiveSample:
 
 def _cut(text: str) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+
+
+def live_routes(run: LiveRun) -> "list[Route]":
+    """Return the routes of the page on a run, which only read it; needs the extra `page`."""
+    from starlette.responses import Response
+    from starlette.routing import Route
+
+    def state(_request: "Request") -> Response:
+        return Response(msgspec.json.encode(run.state()), media_type="application/json")
+
+    own = __package__
+    report = "infthor_eval.report.web"
+    files = [("/", own, "live.html"), ("/live.js", own, "live.js"), ("/live.css", own, "live.css")]
+    files.append(("/report.css", report, "report.css"))
+    return [*(file_route(*file) for file in files), Route("/state.json", state)]

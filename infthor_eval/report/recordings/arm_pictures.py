@@ -1,5 +1,4 @@
-"""Frames of an arm's replayed episodes as pictures: the view beside the arm's reach, and the
-request below."""
+"""Replayed frames of an arm as pictures: the view beside the arm's reach, the request below."""
 
 from collections.abc import Iterable, Iterator
 from functools import partial
@@ -36,7 +35,7 @@ def arm_pictures(frames: Iterable[ArmFrame], heading: str) -> Iterator[Image.Ima
 def draw_arm_title(frame: ArmFrame, heading: str) -> Image.Image:
     """Draw the card before an episode; for an episode in which nobody acted it has the reason."""
     title = frame.title
-    place = (
+    position = (
         f"{title.kind}, episode {title.number} of {title.n_episodes} (the expert's action "
         f"{title.action})"
     )
@@ -45,7 +44,7 @@ def draw_arm_title(frame: ArmFrame, heading: str) -> Image.Image:
         "points"
     )
     lines = [
-        Line("", place, 26, colour=FAINT),
+        Line("", position, 26, colour=FAINT),
         Line("", one_line(title.instruction), 46, "-Bold", most=2),
         Line("", settings, 20, colour=FAINT),
         Line(

@@ -1,5 +1,4 @@
-"""The layout of a recording's pictures: two panes side by side, with text and numbers below
-them."""
+"""The layout of a recording's pictures: two panes side by side, text and numbers below them."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
@@ -86,8 +85,7 @@ def film_pictures(
     draw_title: Callable[[Any], Image.Image],
     draw: Callable[[Any], Image.Image],
 ) -> Iterator[Image.Image]:
-    """Draw the frames of episodes in time order: before each episode its title, and its end several
-    times."""
+    """Draw episodes' frames in time order: each with its title before, its end several times."""
     for frame in frames:
         if frame.number == 0:
             yield from [draw_title(frame)] * TITLE_REPEATS
@@ -162,8 +160,7 @@ def write_bar(pen: ImageDraw.ImageDraw, share: float) -> None:
 def write_in_hand(
     pen: ImageDraw.ImageDraw, objects: Sequence[str], ending: str, *, is_good: bool
 ) -> None:
-    """Write the objects in the hand, and how the episode ended; `ending` is empty while it goes
-    on."""
+    """Write the objects in hand and how the episode ended; `ending` is empty until then."""
     y = _BELOW + 112.0
     names = ", ".join(objects)
     pen.text((_RIGHT, y + 16), "in hand", font=font(14), fill=FAINT, anchor="ls")

@@ -26,8 +26,7 @@ _WIDTH = 2 * _EDGE + _SIDE + COLUMNS * (_CELL + _GAP) - _GAP
 
 
 def shown_steps(n_steps: int) -> list[int]:
-    """Return the steps of an episode that are shown: its start (0), its last step, and some
-    between, evenly spaced."""
+    """Return an episode's shown steps: its start (0), its last, and some between, evenly spaced."""
     return choose_evenly(range(n_steps + 1), COLUMNS)
 
 
@@ -55,8 +54,7 @@ def draw_sheet(episodes: Sequence[Sequence[ArmFrame]], heading: str) -> Image.Im
 
 
 def sheet_rows(frames: Iterable[ArmFrame]) -> Iterator[list[ArmFrame]]:
-    """Yield the frames of each episode that are shown; a difference between two of them is noted at
-    the later one."""
+    """Yield each episode's shown frames; a difference of two is noted at the later one."""
     row: list[ArmFrame] = []
     note = ""
     for frame in frames:

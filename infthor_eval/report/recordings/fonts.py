@@ -37,8 +37,7 @@ def fit_line(text: str, face: Font, width: float) -> str:
 
 
 def break_lines(text: str, face: Font, width: float, most: int) -> list[str]:
-    """Break a text between words into lines of `width` pixels; the last of `most` lines is cut if
-    there is more."""
+    """Break a text between words into lines of `width` pixels; the last of `most` may be cut."""
     lines: list[str] = []
     words = text.split()
     while words and len(lines) < most - 1:

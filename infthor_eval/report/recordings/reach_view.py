@@ -1,5 +1,4 @@
-"""An arm and the objects near it, from above and from the side; the agent looks to the right in
-both views."""
+"""An arm and objects near it, from above and the side; the agent looks to the right in both."""
 
 from PIL import Image, ImageDraw
 
@@ -49,10 +48,12 @@ class _Pane:
         self._is_above = is_above
         # Objects in front of the arm or behind it would hide it.
         self._items = [
-            item for item in reach.objects if _is_in_view(item, reach, is_above=is_above)
+            nearby for nearby in reach.objects if _is_in_view(nearby, reach, is_above=is_above)
         ]
         corners = [self._flat(reach.low), self._flat(reach.high)]
-        (left, right), (bottom, top) = (sorted(values) for values in zip(*corners, strict=True))
+        across, upward = zip(*corners, strict=True)
+        left, right = sorted(across)
+        bottom, top = sorted(upward)
         # One scale in both views, so that lengths can be compared.
         rises = [reach.high[0] - reach.low[0], reach.high[2] - reach.low[2]]
         self._per_metre = min(wide / (right - left), (high - _HEAD) / max(rises))
@@ -64,11 +65,11 @@ class _Pane:
         )
         pen = ImageDraw.Draw(large, "RGBA")
         # Large objects first, those that the instruction names last, on top.
-        for item in sorted(self._items, key=lambda item: (item.is_named, -_size(item))):
+        for nearby in sorted(self._items, key=lambda nearby: (nearby.is_named, -_size(nearby))):
             fill, edge, width = (
-                (NAMED, NAMED_EDGE, 3) if item.is_named else (FURNITURE, FURNITURE_EDGE, 1)
+                (NAMED, NAMED_EDGE, 3) if nearby.is_named else (FURNITURE, FURNITURE_EDGE, 1)
             )
-            pen.polygon(self._outline(item), fill=fill, outline=edge, width=width * OVERSAMPLING)
+            pen.polygon(self._outline(nearby), fill=fill, outline=edge, width=width * OVERSAMPLING)
         self._draw_arm(pen)
         picture = large.resize(self._size, Image.Resampling.BOX)
         words = ImageDraw.Draw(picture)
@@ -89,32 +90,31 @@ class _Pane:
         )
         if len(reach.path) > 1:
             pen.line(
-                [self._fine(place) for place in reach.path],
+                [self._fine(position) for position in reach.path],
                 fill=_PATH,
                 width=4 * OVERSAMPLING,
                 joint="curve",
             )
         joints = [self._fine(joint) for joint in reach.joints]
         pen.line([*joints, (x, y)], fill=_ARM, width=3 * OVERSAMPLING, joint="curve")
-        for place in joints:
-            _draw_dot(pen, place, 4 * OVERSAMPLING, _ARM)
+        for position in joints:
+            _draw_dot(pen, position, 4 * OVERSAMPLING, _ARM)
         _draw_dot(pen, (x, y), 6 * OVERSAMPLING, _HAND)
 
     def _write_names(self, pen: ImageDraw.ImageDraw) -> None:
-        """Write each name in the middle of its object; beside it if it is small and the instruction
-        names it."""
+        """Write names in their objects; beside them if small and named by the instruction."""
         occupied: list[tuple[float, float]] = []
-        for item in sorted(self._items, key=lambda item: not item.is_named):
-            face = font(13, "-Bold") if item.is_named else font(12)
-            place = self._name_place(item, face)
-            if place is None or any(
-                abs(place[0] - x) < 90 and abs(place[1] - y) < 16 for x, y in occupied
+        for nearby in sorted(self._items, key=lambda nearby: not nearby.is_named):
+            face = font(13, "-Bold") if nearby.is_named else font(12)
+            position = self._name_place(nearby, face)
+            if position is None or any(
+                abs(position[0] - x) < 90 and abs(position[1] - y) < 16 for x, y in occupied
             ):
                 continue
-            occupied.append(place)
+            occupied.append(position)
             pen.text(
-                place,
-                item.name,
+                position,
+                nearby.name,
                 font=face,
                 fill=_INK,
                 anchor="mm",
@@ -122,58 +122,59 @@ class _Pane:
                 stroke_fill="white",
             )
 
-    def _name_place(self, item: NearbyObject, face: Font) -> tuple[float, float] | None:
+    def _name_place(self, nearby: NearbyObject, face: Font) -> tuple[float, float] | None:
         xs, ys = zip(
-            *((x / OVERSAMPLING, y / OVERSAMPLING) for x, y in self._outline(item)), strict=True
+            *((x / OVERSAMPLING, y / OVERSAMPLING) for x, y in self._outline(nearby)), strict=True
         )
         left, right = max(min(xs), 0), min(max(xs), self._size[0])
         top, bottom = max(min(ys), _HEAD), min(max(ys), self._size[1])
-        half = face.getlength(item.name) / 2 + 4
-        if right <= left or bottom <= top or (not item.is_named and right - left < 2 * half):
+        half = face.getlength(nearby.name) / 2 + 4
+        if right <= left or bottom <= top or (not nearby.is_named and right - left < 2 * half):
             return None
         x = min(max((left + right) / 2, half), self._size[0] - half)
-        if not item.is_named or (right - left >= 2 * half and bottom - top >= 16):
+        if not nearby.is_named or (right - left >= 2 * half and bottom - top >= 16):
             return x, (top + bottom) / 2
         return x, top - 10 if top > _HEAD + 20 else bottom + 10
 
-    def _outline(self, item: NearbyObject) -> list[tuple[float, float]]:
+    def _outline(self, nearby: NearbyObject) -> list[tuple[float, float]]:
         if self._is_above:
-            return [self._fine((*corner, 0.0)) for corner in item.corners]
-        near, far = (choose(ahead for _, ahead in item.corners) for choose in (min, max))
-        corners = ((near, item.low), (near, item.high), (far, item.high), (far, item.low))
+            return [self._fine((*corner, 0.0)) for corner in nearby.corners]
+        depths = [ahead for _, ahead in nearby.corners]
+        near, far = min(depths), max(depths)
+        corners = ((near, nearby.low), (near, nearby.high), (far, nearby.high), (far, nearby.low))
         return [self._fine((0.0, ahead, height)) for ahead, height in corners]
 
-    def _flat(self, place: Place) -> _PanePoint:
-        right, ahead, up = place
+    def _flat(self, position: Place) -> _PanePoint:
+        right, ahead, up = position
         return (ahead, -right) if self._is_above else (ahead, up)
 
-    def _fine(self, place: Place) -> tuple[float, float]:
+    def _fine(self, position: Place) -> tuple[float, float]:
         """Return a point in the oversampled picture."""
-        x, y = self._flat(place)
+        x, y = self._flat(position)
         wide, high = self._size
         across = wide / 2 + (x - self._middle[0]) * self._per_metre
         down = _HEAD + (high - _HEAD) / 2 - (y - self._middle[1]) * self._per_metre
         return across * OVERSAMPLING, down * OVERSAMPLING
 
 
-def _is_in_view(item: NearbyObject, reach: Reach, *, is_above: bool) -> bool:
+def _is_in_view(nearby: NearbyObject, reach: Reach, *, is_above: bool) -> bool:
     """Return whether an object is at the depth of the episode."""
     if is_above:
-        return item.low <= reach.high[2] and reach.low[2] <= item.high
-    across = [right for right, _ in item.corners]
+        return nearby.low <= reach.high[2] and reach.low[2] <= nearby.high
+    across = [right for right, _ in nearby.corners]
     return min(across) <= reach.high[0] and reach.low[0] <= max(across)
 
 
 def _draw_dot(
-    pen: ImageDraw.ImageDraw, place: tuple[float, float], half: float, colour: str
+    pen: ImageDraw.ImageDraw, position: tuple[float, float], half: float, colour: str
 ) -> None:
-    x, y = place
+    x, y = position
     pen.ellipse((x - half, y - half, x + half, y + half), fill=colour)
 
 
-def _size(item: NearbyObject) -> float:
-    spans = (max(values) - min(values) for values in zip(*item.corners, strict=True))
-    return (item.high - item.low) * sum(spans)
+def _size(nearby: NearbyObject) -> float:
+    spans = (max(values) - min(values) for values in zip(*nearby.corners, strict=True))
+    return (nearby.high - nearby.low) * sum(spans)
 
 
 def _write_legend(pen: ImageDraw.ImageDraw, size: int) -> None:

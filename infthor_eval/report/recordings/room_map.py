@@ -68,7 +68,10 @@ class _Scale:
     """Converts metres to pixels; +z is up."""
 
     def __init__(self, room: RoomMap, points: Iterable[Point], size: int) -> None:
-        corners = [*points, *(corner for item in room.objects for corner in (item.low, item.high))]
+        corners = [
+            *points,
+            *(corner for shape in room.objects for corner in (shape.low, shape.high)),
+        ]
         corners += [
             (x + shift, z + shift) for x, z in room.floor for shift in (-_CELL / 2, _CELL / 2)
         ]
@@ -104,38 +107,38 @@ def _draw_room(pen: ImageDraw.ImageDraw, room: RoomMap, scale: _Scale) -> None:
         corners = (x - _CELL / 2, z - _CELL / 2), (x + _CELL / 2, z + _CELL / 2)
         pen.rectangle(scale.box(*corners), fill=_FLOOR, outline=_GRID)
     # Large objects first, those that the plan names last, on top.
-    for item in sorted(room.objects, key=lambda item: (item.is_named, -_area(item))):
+    for shape in sorted(room.objects, key=lambda shape: (shape.is_named, -_area(shape))):
         fill, edge, width = (
-            (NAMED, NAMED_EDGE, 3) if item.is_named else (FURNITURE, FURNITURE_EDGE, 1)
+            (NAMED, NAMED_EDGE, 3) if shape.is_named else (FURNITURE, FURNITURE_EDGE, 1)
         )
         pen.rectangle(
-            scale.box(item.low, item.high), fill=fill, outline=edge, width=width * OVERSAMPLING
+            scale.box(shape.low, shape.high), fill=fill, outline=edge, width=width * OVERSAMPLING
         )
-        if item.is_named:
-            _draw_ring(pen, item, scale)
+        if shape.is_named:
+            _draw_ring(pen, shape, scale)
 
 
-def _area(item: MapObject) -> float:
-    return (item.high[0] - item.low[0]) * (item.high[1] - item.low[1])
+def _area(shape: MapObject) -> float:
+    return (shape.high[0] - shape.low[0]) * (shape.high[1] - shape.low[1])
 
 
-def _draw_ring(pen: ImageDraw.ImageDraw, item: MapObject, scale: _Scale) -> None:
+def _draw_ring(pen: ImageDraw.ImageDraw, shape: MapObject, scale: _Scale) -> None:
     """Draw a ring around an object that is too small to be noticed."""
     half = _RING * OVERSAMPLING
-    left, top, right, bottom = scale.box(item.low, item.high)
+    left, top, right, bottom = scale.box(shape.low, shape.high)
     if max(right - left, bottom - top) < 2 * half:
-        x, y = scale.fine(_middle(item))
+        x, y = scale.fine(_middle(shape))
         pen.ellipse(
             (x - half, y - half, x + half, y + half), outline=NAMED_EDGE, width=2 * OVERSAMPLING
         )
 
 
 def _draw_path(pen: ImageDraw.ImageDraw, walked: Sequence[Point], scale: _Scale) -> None:
-    places = [scale.fine(point) for point in walked]
-    if len(places) > 1:
-        pen.line(places, fill=_PATH, width=4 * OVERSAMPLING, joint="curve")
+    points = [scale.fine(point) for point in walked]
+    if len(points) > 1:
+        pen.line(points, fill=_PATH, width=4 * OVERSAMPLING, joint="curve")
     half = 4 * OVERSAMPLING
-    for x, y in places:
+    for x, y in points:
         pen.ellipse((x - half, y - half, x + half, y + half), fill=_PATH)
 
 
@@ -178,21 +181,23 @@ def _write_names(
     agent = scale.at(observation.agent.at)
     occupied: list[_Area] = [(agent[0] - 16, agent[1] - 16, agent[0] + 16, agent[1] + 16)]
     named: list[MapObject] = []
-    for item in sorted(
-        observation.room.objects, key=lambda item: (item.is_named, _area(item)), reverse=True
+    for shape in sorted(
+        observation.room.objects, key=lambda shape: (shape.is_named, _area(shape)), reverse=True
     ):
-        if not item.is_named and any(_is_on(item, other) for other in named):
+        if not shape.is_named and any(_is_on(shape, other) for other in named):
             continue
-        words = _name(item, scale, size)
-        if words is None or any(_overlap(words.area, other) for other in occupied[item.is_named :]):
+        words = _name(shape, scale, size)
+        if words is None or any(
+            _overlap(words.area, other) for other in occupied[shape.is_named :]
+        ):
             continue
         occupied.append(words.area)
-        named.append(item)
+        named.append(shape)
         if not words.is_inside:
-            x, y = scale.at(_middle(item))
+            x, y = scale.at(_middle(shape))
             occupied.append((x - _RING, y - _RING, x + _RING, y + _RING))
         x, y = (words.area[0] + words.area[2]) / 2, (words.area[1] + words.area[3]) / 2
-        halo = FURNITURE if words.is_inside and not item.is_named else "white"
+        halo = FURNITURE if words.is_inside and not shape.is_named else "white"
         pen.multiline_text(
             (x, y), words.text, font=words.face, fill=_INK, anchor="mm", align="center", spacing=1,
             stroke_width=2, stroke_fill=halo,
@@ -211,33 +216,32 @@ class _Name(NamedTuple):
     is_inside: bool
 
 
-def _name(item: MapObject, scale: _Scale, size: int) -> _Name | None:
-    """Place a name in the object's box, or beside it if the plan names it and the box is too
-    small."""
-    face = font(14, "-Bold") if item.is_named else font(12)
-    x, y = scale.at(_middle(item))
-    wide, high = (
-        (high - low) * scale.per_metre for low, high in zip(item.low, item.high, strict=True)
-    )
-    for text in (item.name, "\n".join(_PARTS.findall(item.name))):
+def _name(shape: MapObject, scale: _Scale, size: int) -> _Name | None:
+    """Place a name in the object's box; beside it if the plan names it and the box is small."""
+    face = font(14, "-Bold") if shape.is_named else font(12)
+    x, y = scale.at(_middle(shape))
+    wide = (shape.high[0] - shape.low[0]) * scale.per_metre
+    high = (shape.high[1] - shape.low[1]) * scale.per_metre
+    for text in (shape.name, "\n".join(_PARTS.findall(shape.name))):
         lines = text.split("\n")
         half = max(map(face.getlength, lines)) / 2
         tall = len(lines) * 7.5
         if 2 * half <= wide + 8 and 2 * tall <= high + 4:
             return _Name(text, face, (x - half, y - tall, x + half, y + tall), True)
-    if not item.is_named:
+    if not shape.is_named:
         return None
-    half = face.getlength(item.name) / 2
+    half = face.getlength(shape.name) / 2
     x = min(max(x, half + 4), size - half - 4)
     offset = max(high / 2 + 12, 24)
     y += offset if y < size / 2 else -offset
-    return _Name(item.name, face, (x - half, y - 8, x + half, y + 8), False)
+    return _Name(shape.name, face, (x - half, y - 8, x + half, y + 8), False)
 
 
-def _is_on(item: MapObject, other: MapObject) -> bool:
-    middle = _middle(item)
+def _is_on(shape: MapObject, other: MapObject) -> bool:
+    middle = _middle(shape)
     return all(
-        low <= place <= high for low, place, high in zip(other.low, middle, other.high, strict=True)
+        low <= coordinate <= high
+        for low, coordinate, high in zip(other.low, middle, other.high, strict=True)
     )
 
 
@@ -245,15 +249,14 @@ def _overlap(one: _Area, other: _Area) -> bool:
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
-def _middle(item: MapObject) -> Point:
-    return (item.low[0] + item.high[0]) / 2, (item.low[1] + item.high[1]) / 2
+def _middle(shape: MapObject) -> Point:
+    return (shape.low[0] + shape.high[0]) / 2, (shape.low[1] + shape.high[1]) / 2
 
 
 def _draw_legend(
     pen: ImageDraw.ImageDraw, legend: Sequence[tuple[float, str, str]], size: int
 ) -> None:
-    """Draw the dots of the legend; its text is written into the final picture, as letters need no
-    oversampling."""
+    """Draw the legend's dots; its letters need no oversampling, and go into the final picture."""
     fine = size * OVERSAMPLING
     radius = 6 * OVERSAMPLING
     y = (size - _LEGEND / 2) * OVERSAMPLING
@@ -269,7 +272,7 @@ def _legend(observation: PlanObservation) -> Iterator[tuple[float, str, str]]:
     entries += [("where the expert ended", _GOAL)] if observation.room.goal is not None else []
     entries += (
         [("what the plan names", NAMED_EDGE)]
-        if any(item.is_named for item in observation.room.objects)
+        if any(shape.is_named for shape in observation.room.objects)
         else []
     )
     x = 6.0

@@ -1,5 +1,4 @@
-"""Presenter of manipulation: what an arm did step by step, its reward, and its success by
-radius."""
+"""Presenter of manipulation: an arm's episodes step by step, its reward, its success by radius."""
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -99,8 +98,7 @@ def _model_runs(runs: Sequence[ReportRun]) -> list[ArmRun]:
 
 
 def _runs_by_radius(runs: Sequence[ReportRun]) -> list[ArmRun]:
-    """Runs named after their models and radii, or by all options that differ if that is
-    ambiguous."""
+    """Runs named after models and radii, or by all options that differ if that is ambiguous."""
     named = label_by_radius(_model_runs(runs))
     return (
         named

@@ -1,5 +1,4 @@
-"""Chart of memories: accuracy against the tokens of a question, a curve for each memory over its
-budgets."""
+"""Chart of memories: accuracy against tokens per question, a curve over budgets for each memory."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -38,7 +37,7 @@ def memory_charts(runs: Sequence[ReportRun]) -> Iterator[Chart]:
 
 def _curves(runs: Sequence[ReportRun], task: str) -> dict[str, list[_Point]]:
     """Return the points of each memory, of each subject if there are several, by tokens."""
-    found: dict[tuple[str, str], list[_Point]] = {}
+    by_memory: dict[tuple[str, str], list[_Point]] = {}
     for run in runs:
         of_task = run.summary.summary.tasks.get(task)
         if of_task is None or of_task.memory is None or of_task.memory.n_tokens is None:
@@ -47,13 +46,13 @@ def _curves(runs: Sequence[ReportRun], task: str) -> dict[str, list[_Point]]:
         point = _Point(
             of_task.memory.n_tokens, of_task.by_clues["total"].scores[main_metric(of_task)]
         )
-        found.setdefault((run.model, memory), []).append(point)
-    several = len({subject for subject, _ in found}) > 1
+        by_memory.setdefault((run.model, memory), []).append(point)
+    several = len({subject for subject, _ in by_memory}) > 1
     return {
         f"{subject}, {memory}" if several else memory: sorted(
             points, key=lambda point: point.n_tokens
         )
-        for (subject, memory), points in found.items()
+        for (subject, memory), points in by_memory.items()
     }
 
 

@@ -35,8 +35,7 @@ class NiehPresenter(PlainPresenter):
         return True
 
     def further_scores(self, record: Record) -> Mapping[str, float]:
-        """See `Presenter.further_scores`: scores above guessing, of questions that guessing does
-        not solve."""
+        """See `Presenter.further_scores`: scores above guessing, where guessing is not right."""
         scores = {scorer: score_above_guessing(record.payload, scorer) for scorer in SCORERS}
         return {
             f"{scorer}, above guessing": score
@@ -63,8 +62,7 @@ class NiehPresenter(PlainPresenter):
         return record.payload.reply or ""
 
     def details(self, record: Record) -> Mapping[str, str]:
-        """See `Presenter.details`: evidence, guessing and thoughts; the page shows the rest
-        elsewhere."""
+        """See `Presenter.details`: evidence, guessing and thoughts; the rest is elsewhere."""
         payload = record.payload
         details: dict[str, str] = {}
         if payload.shown_clues is not None:

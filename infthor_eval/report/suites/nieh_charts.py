@@ -1,5 +1,4 @@
-"""Charts of NIEH results: accuracy by clues, type, evidence shown and depth, and gains over frames
-and guessing."""
+"""Charts of NIEH: accuracy by clues, type, evidence and depth, gains over frames and guessing."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -75,21 +74,24 @@ def _by_clues(task: str, lines: Sequence[_Line]) -> Chart:
 
 
 def _by_evidence(task: str, lines: Sequence[_Line]) -> Iterator[Chart]:
-    """Draw accuracy by the share of the clue frames that were shown, and by distance of the last
-    clue; by file."""
+    """Draw accuracy by share of the clues shown and by distance of the last clue; by file."""
     for file in lines[0].task.evidence:
         of_file = f"{task}, {short_name(file)}" if len(lines[0].task.evidence) > 1 else task
 
-        def shown(line: _Line, file: str = file) -> Mapping[str, Cell]:
+        def cells_by_share(line: _Line, file: str = file) -> Mapping[str, Cell]:
             return line.task.evidence[file].by_shown_clues if file in line.task.evidence else {}
 
         def far(line: _Line, file: str = file) -> Mapping[str, Cell]:
             return line.task.evidence[file].by_distance if file in line.task.evidence else {}
 
-        if any(shown(line).keys() - {"all"} for line in lines):
+        if any(cells_by_share(line).keys() - {"all"} for line in lines):
             title = f"{of_file}: accuracy by clue frames shown"
             yield _by_columns(
-                title, lines, SHOWN_CLUES, shown, "of the clue frames were shown (questions)"
+                title,
+                lines,
+                SHOWN_CLUES,
+                cells_by_share,
+                "of the clue frames were shown (questions)",
             )
         known = set().union(*map(far, lines))
         distances = [name for name in DISTANCES if name in known]
@@ -107,8 +109,7 @@ def _by_columns(
     cells_of: Callable[[_Line], Mapping[str, Cell]],
     label: str,
 ) -> Chart:
-    """Draw a column per name, with the dots of all lines; the counts are those of the first
-    line."""
+    """Draw a column per name, with the dots of all lines and the counts of the first."""
 
     def draw() -> Figure:
         figure = Figure(figsize=(_PANEL[0] + LEGEND, _PANEL[1]), layout="constrained")
@@ -188,8 +189,7 @@ def _describe(lines: Sequence[_Line]) -> str:
 
 
 def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
-    """Draw the gain of each run over blank frames, a row per task; None if no run on blank frames
-    is among them."""
+    """Draw each run's gain over blank frames, a row per task; None without a run on blank ones."""
     summaries = [run.summary for run in runs]
     rows = []
     for gain in find_gains(summaries):
@@ -230,9 +230,8 @@ def _by_rows(
         axes.set_yticks(range(len(rows)), [printable(name)[:60] for name, _ in reversed(rows)])
         axes.set_ylim(-0.6, len(rows) - 0.4)
         low, high = axes.get_xlim()
-        axes.set_xlim(
-            min(low, -5), max(high, 5)
-        )  # nothing at all would be drawn on a scale of hundredths
+        # Nothing at all would be drawn on a scale of hundredths.
+        axes.set_xlim(min(low, -5), max(high, 5))
         axes.set_xlabel(label)
         axes.grid(axis="y", visible=False)
         return figure
@@ -242,8 +241,7 @@ def _by_rows(
 
 
 def _heat_map(run: ReportRun) -> Chart | None:
-    """Draw accuracy by depth of the needle and size of the context; None if no task of the run has
-    depths."""
+    """Draw accuracy by depth of the needle and context size; None if no task has depths."""
     tasks: dict[int, TaskSummary] = {}
     for name, task in run.summary.summary.tasks.items():
         if any(variant.startswith(_DEPTH) for variant in task.by_variant):

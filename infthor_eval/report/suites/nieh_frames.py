@@ -1,5 +1,4 @@
-"""Frames of questions: the clues with their neighbours, or some of all frames where there are no
-clues."""
+"""Frames of questions: the clues with their neighbours, or some of all, and what logs say."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,9 +8,9 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.step_log import LoggedPose, Step, read_steps
 from infthor_eval.report.presenter import Timelines
 from infthor_eval.report.runs import ReportRun, choose_evenly, records_by_unit
-from infthor_eval.report.suites.nieh_frame_facts import read_frame_facts
 from infthor_eval.report.suites.nieh_sets import RunSets
 from infthor_eval.report.web.samples import FrameFacts, Timeline, TimelineFrame
 from infthor_eval.report.web.thumbnails import ThumbnailStore
@@ -39,12 +38,10 @@ def find_timelines(
         if opened is None or question is None:
             continue
         try:
-            chosen[key] = _choose_frames(
-                opened, question, logs.read(opened.folder(question.traj_id))
-            )
-        except (
-            DataError
-        ):  # the question was skipped or failed for it, and its record has the reason
+            facts_of_frames = logs.read(opened.folder(question.traj_id))
+            chosen[key] = _choose_frames(opened, question, facts_of_frames)
+        # The question was skipped or failed for it, and its record has the reason.
+        except DataError:
             continue
     thumbnails.expect(
         len(
@@ -90,7 +87,7 @@ class _TrajectoryFacts:
 
     def read(self, folder: Path) -> Sequence[FrameFacts]:
         if folder not in self._facts:
-            self._facts[folder] = read_frame_facts(folder)
+            self._facts[folder] = _read_frame_facts(folder)
         return self._facts[folder]
 
 
@@ -124,3 +121,31 @@ def _picture(frame: FrameRef, thumbnails: ThumbnailStore) -> int | None:
         return thumbnails.add(str(frame.path), frame.load)
     except DataError:  # an unreadable frame has its place on the timeline, without a picture
         return None
+
+
+def _read_frame_facts(folder: Path) -> Sequence[FrameFacts]:
+    """Return what the log of a trajectory's folder says of each frame, in time order.
+
+    Raises:
+        DataError: the log cannot be read.
+    """
+    return [_facts(step) for step in sorted(read_steps(folder), key=lambda step: step.img_idx)]
+
+
+def _facts(step: Step) -> FrameFacts:
+    refusal = "" if step.success else step.error or "refused by the simulator"
+    return FrameFacts(
+        step=step.step,
+        action=step.action or "",
+        error=refusal,
+        objects=tuple(step.object_log.visible),
+        held=tuple(step.object_log.inven_obj),
+        pose="" if step.pose is None else _pose(step.pose),
+    )
+
+
+def _pose(pose: LoggedPose) -> str:
+    return (
+        f"x {pose.x:.2f} m, z {pose.z:.2f} m; turned {pose.rotation:.0f}°, camera "
+        f"{pose.horizon:.0f}° down"
+    )

@@ -63,19 +63,19 @@ def _prompt(
         return Prompt(problem=str(rebuilder))
     try:
         request = rebuilder.rebuild(record)
-        places = {frame: place for place, frame in enumerate(data.frames(record.cluster))}
+        positions = {frame: position for position, frame in enumerate(data.frames(record.cluster))}
     except InfthorError as error:
         return Prompt(problem=str(error))
     before = request.text.removesuffix(record.payload.question)
     return Prompt(
-        (*_parts(request, places, ablation), before),
+        (*_parts(request, positions, ablation), before),
         _stretches(sorted(set(request.positions))),
         note=note,
     )
 
 
 def _parts(
-    request: RebuiltRequest, places: Mapping[FrameRef, int], ablation: str
+    request: RebuiltRequest, positions: Mapping[FrameRef, int], ablation: str
 ) -> Iterator[str | PromptFrames]:
     """Yield texts and frames; neighbours of one kind are one part."""
     for kind, group in groupby(request.context, type):
@@ -84,35 +84,37 @@ def _parts(
             yield "".join(part for part in parts if isinstance(part, str))
         elif kind is FrameRef:
             yield _frames(
-                "frames", [part for part in parts if isinstance(part, FrameRef)], places, ablation
+                "frames",
+                [part for part in parts if isinstance(part, FrameRef)],
+                positions,
+                ablation,
             )
         else:
-            yield from (_film(part, places, ablation) for part in parts)
+            yield from (_film(part, positions, ablation) for part in parts)
 
 
-def _film(part: ContextPart, places: Mapping[FrameRef, int], ablation: str) -> PromptFrames:
+def _film(part: ContextPart, positions: Mapping[FrameRef, int], ablation: str) -> PromptFrames:
     assert isinstance(part, Video)
-    return _frames(f"video of {part.fps:g} frames per second", part.frames, places, ablation)
+    return _frames(f"video of {part.fps:g} frames per second", part.frames, positions, ablation)
 
 
 def _frames(
-    what: str, frames: Sequence[FrameRef], places: Mapping[FrameRef, int], ablation: str
+    what: str, frames: Sequence[FrameRef], positions: Mapping[FrameRef, int], ablation: str
 ) -> PromptFrames:
-    """Return frames by their places; frames of another trajectory, blank or decoded ones have none
-    in this one."""
-    found = [places.get(frame) for frame in frames]
-    own = [place for place in found if place is not None]
-    is_own = len(own) == len(found)
-    shown = what if ablation == SHOWN else f"{what} ({ablation})"
-    return PromptFrames(shown, _stretches(own) if is_own else (), len(frames))
+    """Return frames by their positions; those of other trajectories, blank or decoded have none."""
+    frame_positions = [positions.get(frame) for frame in frames]
+    own = [position for position in frame_positions if position is not None]
+    is_own = len(own) == len(frame_positions)
+    description = what if ablation == SHOWN else f"{what} ({ablation})"
+    return PromptFrames(description, _stretches(own) if is_own else (), len(frames))
 
 
-def _stretches(places: Sequence[int]) -> tuple[tuple[int, int], ...]:
+def _stretches(positions: Sequence[int]) -> tuple[tuple[int, int], ...]:
     """Return first and last of each stretch of ascending neighbours."""
     stretches: list[tuple[int, int]] = []
-    for place in places:
-        if stretches and place == stretches[-1][1] + 1:
-            stretches[-1] = stretches[-1][0], place
+    for position in positions:
+        if stretches and position == stretches[-1][1] + 1:
+            stretches[-1] = stretches[-1][0], position
         else:
-            stretches.append((place, place))
+            stretches.append((position, position))
     return tuple(stretches)

@@ -154,8 +154,7 @@ class PlansPresenter(PlainPresenter):
 
 
 def _action_text(action: str, call: Mapping[str, Any] | None) -> str:
-    """Baselines give calls, of which the record's text has the name alone: the object's type is
-    added to it."""
+    """Return a call with its object's type, where the record has its name alone (baselines)."""
     object_id = (call or {}).get("objectId")
     if call is not None and action == call.get("action") and isinstance(object_id, str):
         return f"{action} {object_id.partition('|')[0]}"

@@ -27,8 +27,7 @@ class DrawnFigure(NamedTuple):
 
 
 def figure_section(key: str, title: str, build: Callable[[], DrawnFigure]) -> Section:
-    """Return a section with a figure and its table, or with the reason why the runs cannot be drawn
-    together."""
+    """Return a section with figure and table, or why the runs cannot be drawn together."""
     try:
         drawn = build()
         return Section(

@@ -76,8 +76,8 @@ def build_page(
     texts = SharedTexts()
     for same in by_suite.values():
         of_suite = build_samples(same, request.data, replays, thumbnails, texts, progress)
-        places = [runs.index(run) for run in same]
-        samples += [sample.spread_over(len(runs), places) for sample in of_suite.samples]
+        run_indices = [runs.index(run) for run in same]
+        samples += [sample.spread_over(len(runs), run_indices) for sample in of_suite.samples]
         notes += of_suite.notes
         facts |= of_suite.facts
     if thumbnails.n_left_out:
@@ -137,9 +137,9 @@ def _comparisons(suites: Iterable[Sequence[PresentedRun]]) -> Iterator[Section]:
 
 def _labels(runs: Sequence[PresentedRun], same: Sequence[PresentedRun]) -> SuiteLabels:
     presenter = same[0].presenter
-    places = tuple(runs.index(run) for run in same)
+    run_indices = tuple(runs.index(run) for run in same)
     return SuiteLabels(
-        places, presenter.target_label, presenter.reply_label, presenter.compares_scorers
+        run_indices, presenter.target_label, presenter.reply_label, presenter.compares_scorers
     )
 
 

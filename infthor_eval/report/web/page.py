@@ -29,8 +29,7 @@ _SCRIPTS = (
     "report.js",
 )  # one script on the page, in this order
 
-# In a script element "</script" and "<!--" would end or twist it; the line separators end a line of
-# a script.
+# "</script" and "<!--" would end or twist a script element; line separators end a script's line.
 _ESCAPED = {
     "<": "\\u003c",
     ">": "\\u003e",
@@ -162,8 +161,7 @@ def _data(page: Page) -> Markup:
 
 
 def _share_details(samples: list[Any]) -> tuple[list[Any], list[tuple[str, str]]]:
-    """Return samples with the numbers of their details, and the details: many samples have the
-    same."""
+    """Return samples with numbers of details, and the details: many have the same."""
     facts: Numbered[tuple[str, str]] = Numbered()
     for sample in samples:
         for result in filter(None, sample["results"]):

@@ -71,8 +71,7 @@ class EpisodeReplays:
             progress.begin(_WORK, n_episodes)
 
     def replay(self, run: PresentedRun) -> tuple[Mapping[UnitKey, EpisodePictures], list[str]]:
-        """Replay the chosen episodes of a run; return their pictures, and why a trajectory could
-        not be replayed."""
+        """Replay chosen episodes; return their pictures, and why a trajectory was not replayed."""
         pictures: dict[UnitKey, EpisodePictures] = {}
         notes: list[str] = []
         replay = run.presenter.replay

@@ -54,8 +54,7 @@ def _cost_row(run: PresentedRun) -> Row:
 
 
 def left_out_table(runs: Sequence[PresentedRun]) -> Table | None:
-    """Return the numbers of failed, excluded, retried, skipped and missing units by reason; None if
-    there are none."""
+    """Return counts of failed, excluded, retried, skipped and missing units by reason, or None."""
     rows = [
         Row((run.label, task, what, str(n), reason))
         for run in runs

@@ -117,8 +117,8 @@ def _sample(
 ) -> PageSample:
     first = next(record for record in records if record is not None)
     results = (
-        None if record is None else _result(source, record, shown or EpisodePictures())
-        for source, record, shown in zip(sources, records, pictures, strict=True)
+        None if record is None else _result(source, record, episode_pictures or EpisodePictures())
+        for source, record, episode_pictures in zip(sources, records, pictures, strict=True)
     )
     first_run = sources[0].run
     return PageSample(

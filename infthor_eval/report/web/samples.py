@@ -202,9 +202,9 @@ class PageSample(msgspec.Struct, frozen=True, omit_defaults=True):
     target: str = ""
     timeline: Timeline | None = None
 
-    def spread_over(self, n_runs: int, places: Sequence[int]) -> "PageSample":
+    def spread_over(self, n_runs: int, run_indices: Sequence[int]) -> "PageSample":
         """Return the same sample for a page of more runs: `places` are those of its results."""
         results: list[SampleResult | None] = [None] * n_runs
-        for place, result in zip(places, self.results, strict=True):
-            results[place] = result
+        for run_index, result in zip(run_indices, self.results, strict=True):
+            results[run_index] = result
         return msgspec.structs.replace(self, results=tuple(results))

@@ -17,8 +17,7 @@ _LARGE_QUALITY = 70  # about 5 kB for a frame of the embedded simulator
 
 
 class ThumbnailStore:
-    """Thumbnails by number; pictures that come first get the room, and every thumbnail before any
-    enlarged picture."""
+    """Thumbnails by number; the first get the room, and all before any enlarged picture."""
 
     def __init__(self, budget: int, side: int = 132, progress: PageProgress | None = None) -> None:
         """Start without pictures.
@@ -38,8 +37,7 @@ class ThumbnailStore:
 
     @property
     def encoded(self) -> Sequence[str]:
-        """All pictures as WebP in base64, in the order of their numbers: thumbnails, then enlarged
-        ones."""
+        """All pictures as WebP in base64 by number: thumbnails, then enlarged ones."""
         return [*self._encoded, *(picture for _, picture in self._enlarged)]
 
     @property
@@ -62,8 +60,7 @@ class ThumbnailStore:
             self._progress.begin(_WORK, n)
 
     def add(self, key: str, load: Callable[[], Image.Image], side: int | None = None) -> int | None:
-        """Add a picture, unless it was added before, and return its number; None if there is no
-        room for it.
+        """Add a picture, unless it is there; return its number, or None if there is no room.
 
         Args:
             key: name of the picture; the same name is the same picture.

@@ -1,5 +1,4 @@
-"""Reading the journal of a run while the run writes it: nothing is locked or written, so the run
-does not notice."""
+"""Reading the journal of a run while it goes on, without locks or writes that it would notice."""
 
 import os
 from collections import deque
@@ -67,8 +66,7 @@ class FollowedJournal:
         return self.log.header
 
     def read(self) -> bool:
-        """Read what is new; return whether there was anything. A last line without its end is left
-        for the next time.
+        """Read what is new; return whether there was any. A line without its end is left for later.
 
         Raises:
             DataError: a line is bad.
@@ -115,8 +113,7 @@ class FollowedJournal:
 
 
 def is_written(run: Path) -> bool | None:
-    """Return whether a process of this machine holds a journal, as runs do while they go on; None
-    if that is not known.
+    """Return whether a process here holds a journal, as a run does; None if that is not known.
 
     The system's list of locks is read: to try a lock would be to hold it for a moment, and a run
     that starts in that moment would be refused.

@@ -27,7 +27,7 @@ from infthor_eval.errors import DataError, UsageError, in_one_line, wrap_errors
 from infthor_eval.formats.reading import NOT_JSON, require_file
 from infthor_eval.runs.journals.records import (
     ArtifactRecord,
-    P,
+    Payload,
     RecordTypes,
     RunHeader,
     UnitKey,
@@ -54,14 +54,14 @@ _RETRY_S = 0.1  # between two attempts to lock
 _BAD_LINES = "bad_lines.txt"
 
 
-class Journal(Generic[P]):
+class Journal(Generic[Payload]):
     """Append-only record of one run, in a folder of shards; this process holds one of them."""
 
     def __init__(
         self,
         run: Path,
         header: RunHeader,
-        types: RecordTypes[P],
+        types: RecordTypes[Payload],
         worker: int = 0,
         wait_s: float = 0.0,
     ) -> None:
@@ -92,7 +92,7 @@ class Journal(Generic[P]):
         try:
             _lock(self._file, path, wait_s)
             self._types = types
-            self._log: RunLog[P] = read_shards(run, types)
+            self._log: RunLog[Payload] = read_shards(run, types)
             self._start_shard()
         except (DataError, UsageError):
             self._file.close()
@@ -105,36 +105,32 @@ class Journal(Generic[P]):
         self._file.close()
 
     @property
-    def records(self) -> list[UnitRecord[P]]:
+    def records(self) -> list[UnitRecord[Payload]]:
         """The latest record of each unit in all shards."""
         return self._log.records
 
-    def find_record(self, key: UnitKey, fingerprint: str) -> UnitRecord[P] | None:
-        """Return the record of a unit with a result from these inputs; a failed unit is tried again
-        by the next run."""
+    def find_record(self, key: UnitKey, fingerprint: str) -> UnitRecord[Payload] | None:
+        """Return a unit's result from these inputs; a failed one is tried again by the next run."""
         record = self._log.units.get(key)
         if record is None or record.failure is not None or record.fingerprint != fingerprint:
             return None
         return record
 
-    def latest_records(self, keys: Iterable[UnitKey]) -> tuple[UnitRecord[P], ...]:
-        """Return the latest records of these units, failed ones included; units without a record
-        are left out."""
+    def latest_records(self, keys: Iterable[UnitKey]) -> tuple[UnitRecord[Payload], ...]:
+        """Return these units' latest records, failed ones included; some may have none."""
         return tuple(self._log.units[key] for key in keys if key in self._log.units)
 
-    def result_of(self, key: UnitKey) -> UnitRecord[P] | None:
-        """Return the latest record of a unit if it has a result, from whatever inputs, else
-        None."""
+    def result_of(self, key: UnitKey) -> UnitRecord[Payload] | None:
+        """Return a unit's latest record if it has a result, from whatever inputs, else None."""
         record = self._log.units.get(key)
         return None if record is None or record.failure is not None else record
 
-    def add(self, record: UnitRecord[P]) -> None:
+    def add(self, record: UnitRecord[Payload]) -> None:
         """Add a record that is in another shard to what this process knows."""
         self._log.add(record)
 
-    def add_from(self, worker: int, record: UnitRecord[P]) -> None:
-        """Add a record that a worker has put on disk; where its shard is not visible here, write it
-        into this one.
+    def add_from(self, worker: int, record: UnitRecord[Payload]) -> None:
+        """Add a worker's record; where its shard is not visible here, write it into this one.
 
         Raises:
             DataError: it cannot be written.
@@ -149,14 +145,12 @@ class Journal(Generic[P]):
         if path.exists():
             read_shard(path, self._types, self._log)
 
-    def holds(self, record: UnitRecord[P]) -> bool:
-        """Return whether this very object is in the journal: a record that the suite found there
-        and yielded as is."""
+    def holds(self, record: UnitRecord[Payload]) -> bool:
+        """Return whether this very object is in the journal: found there and yielded as it is."""
         return self._log.units.get(record.key) is record
 
-    def append(self, record: UnitRecord[P]) -> UnitRecord[P]:
-        """Write a record; it is on disk when this returns. The returned record has the number of
-        its attempt.
+    def append(self, record: UnitRecord[Payload]) -> UnitRecord[Payload]:
+        """Write a record to disk before returning it with the number of its attempt.
 
         Raises:
             DataError: it cannot be written, or the shard was deleted or replaced.
@@ -202,10 +196,8 @@ class Journal(Generic[P]):
     def _write(self, record: msgspec.Struct) -> None:
         line = memoryview(msgspec.json.encode(record) + b"\n")
         hint = "make room and run the same command again, which resumes it"
-        with (
-            self._writing,
-            wrap_errors(f"{self._path}: cannot be written", hint),
-        ):  # threads must not mix their lines
+        # Threads must not mix their lines.
+        with self._writing, wrap_errors(f"{self._path}: cannot be written", hint):
             while line:  # an unbuffered write may take a part of the line only
                 line = line[self._file.write(line) :]
             # Before the record counts: after a crash of the machine a unit is done if and only if
@@ -244,8 +236,7 @@ def _lock(file: BinaryIO | FileIO, path: Path, wait_s: float = 0.0) -> None:
 
 
 def recover(run: Path, header: RunHeader, types: RecordTypes[Any]) -> int:
-    """Move the bad lines of a run's shards to a file beside them, so that their units are tried
-    again.
+    """Move the bad lines of a run's shards to a file beside them: their units are tried again.
 
     The header replaces a bad first line. Returns the number of bad lines.
 

@@ -12,14 +12,16 @@ import msgspec
 
 from infthor_eval.errors import InfthorError, describe_exception
 from infthor_eval.runs.config import Config, RunConfig
-from infthor_eval.runs.counts import Count
-from infthor_eval.runs.usage import NOTHING, Usage
+from infthor_eval.runs.usage import NOTHING, Count, Usage
 
 __all__ = [
     "FORMAT",
+    "Artifact",
     "ArtifactRecord",
+    "Payload",
     "RecordTypes",
     "RunHeader",
+    "SuiteUnit",
     "Tokens",
     "Unit",
     "UnitKey",
@@ -29,10 +31,10 @@ __all__ = [
 
 FORMAT = 3
 
-A = TypeVar("A")  # an artifact
-P = TypeVar("P")  # the payload of a suite's records
-P_co = TypeVar("P_co", covariant=True)
-U = TypeVar("U", bound="Unit[Any]")  # a suite's unit
+Artifact = TypeVar("Artifact")  # what a suite caches
+Payload = TypeVar("Payload")  # the payload of a suite's records
+Payload_co = TypeVar("Payload_co", covariant=True)
+SuiteUnit = TypeVar("SuiteUnit", bound="Unit[Any]")  # a suite's unit
 
 
 class UnitKey(NamedTuple):
@@ -62,8 +64,7 @@ class UnitKey(NamedTuple):
 
 
 class Tokens(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Tokens of a unit's requests, of those that were not encoded again, and of its replies; None
-    if not counted."""
+    """Tokens of requests, of those not encoded again, and of replies; None if not counted."""
 
     context: Count | None = None
     cached: Count | None = None
@@ -93,7 +94,7 @@ class RunHeader(
 
 class UnitRecord(
     msgspec.Struct,
-    Generic[P],
+    Generic[Payload],
     frozen=True,
     kw_only=True,
     omit_defaults=True,
@@ -121,7 +122,7 @@ class UnitRecord(
     id: str
     cluster: str
     fingerprint: str
-    payload: P
+    payload: Payload
     variant: str = ""
     repeat: Count = 1
     attempt: Count = 1
@@ -140,15 +141,14 @@ class UnitRecord(
 
 class ArtifactRecord(
     msgspec.Struct,
-    Generic[P],
+    Generic[Payload],
     frozen=True,
     kw_only=True,
     omit_defaults=True,
     tag_field="type",
     tag="artifact",
 ):
-    """A cached artifact: an intermediate result of a suite that a resumed run does not compute
-    again.
+    """A cached artifact: a suite's intermediate result, which a resumed run does not repeat.
 
     Attributes:
         fingerprint: hash of all its inputs, by which it is looked up.
@@ -157,12 +157,12 @@ class ArtifactRecord(
     """
 
     fingerprint: str
-    payload: P
+    payload: Payload
     usage: Usage = NOTHING
 
 
 @dataclass(frozen=True)
-class RecordTypes(Generic[P_co]):
+class RecordTypes(Generic[Payload_co]):
     """The types of what a suite writes into a journal; payloads are msgspec structs with a tag.
 
     Attributes:
@@ -172,7 +172,7 @@ class RecordTypes(Generic[P_co]):
         config: config of its runs.
     """
 
-    unit: type[P_co]
+    unit: type[Payload_co]
     artifact: type[Any] | UnionType | None = None
     config: type[RunConfig[Any]] = RunConfig[dict[str, Any]]
 
@@ -189,15 +189,14 @@ class RecordTypes(Generic[P_co]):
 
 
 def describe_failure(error: Exception) -> str:
-    """Return the message of an expected error, or type, place and message of another exception, in
-    one line."""
+    """Return an expected error's message; another's type, place and message, in one line."""
     if isinstance(error, InfthorError):
         return str(error)
     return f"{describe_exception(error)}; fix the suite and run the same command again"
 
 
 @dataclass(frozen=True)
-class Unit(Generic[P]):
+class Unit(Generic[Payload]):
     """The smallest piece of work with a record of its own: a sample or an episode.
 
     Attributes:
@@ -208,14 +207,13 @@ class Unit(Generic[P]):
 
     key: UnitKey
     cluster: str
-    payload: P
+    payload: Payload
 
-    def without_inputs(self) -> "Unit[P]":
-        """Return what can record its failure in another process, without the inputs that only the
-        suite needs."""
+    def without_inputs(self) -> "Unit[Payload]":
+        """Return what records its failure in another process, without the suite's own inputs."""
         return Unit(self.key, self.cluster, self.payload)
 
-    def record(self, fingerprint: str, payload: P, **envelope: Any) -> UnitRecord[P]:
+    def record(self, fingerprint: str, payload: Payload, **envelope: Any) -> UnitRecord[Payload]:
         """Return its record; further fields of the envelope (see `UnitRecord`) are keywords."""
         return UnitRecord(
             **self.key._asdict(),
@@ -225,10 +223,14 @@ class Unit(Generic[P]):
             **envelope,
         )
 
-    def record_failure(self, reason: str, fingerprint: str = "", **envelope: Any) -> UnitRecord[P]:
+    def record_failure(
+        self, reason: str, fingerprint: str = "", **envelope: Any
+    ) -> UnitRecord[Payload]:
         """Return its record if there is no result."""
         return self.record(fingerprint, self.payload, failure=reason, **envelope)
 
-    def record_exclusion(self, reason: str, fingerprint: str, **envelope: Any) -> UnitRecord[P]:
+    def record_exclusion(
+        self, reason: str, fingerprint: str, **envelope: Any
+    ) -> UnitRecord[Payload]:
         """Return its record if it turns out that no subject can be evaluated on it."""
         return self.record(fingerprint, self.payload, excluded=reason, **envelope)

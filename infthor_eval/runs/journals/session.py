@@ -5,25 +5,25 @@ from typing import Any, Generic
 import msgspec
 
 from infthor_eval.runs.journals.journal import Journal
-from infthor_eval.runs.journals.records import A, P, Unit, UnitRecord, describe_failure
+from infthor_eval.runs.journals.records import Artifact, Payload, Unit, UnitRecord, describe_failure
 from infthor_eval.runs.journals.tracebacks import TracebackFile
 from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = ["JournalSession"]
 
 
-class JournalSession(Generic[P]):
+class JournalSession(Generic[Payload]):
     """The `Session` of a run with a journal."""
 
-    def __init__(self, journal: Journal[P]) -> None:
+    def __init__(self, journal: Journal[Payload]) -> None:
         self.journal = journal
         self._tracebacks = TracebackFile(journal.folder)
 
-    def find_record(self, unit: Unit[P], fingerprint: str) -> UnitRecord[P] | None:
+    def find_record(self, unit: Unit[Payload], fingerprint: str) -> UnitRecord[Payload] | None:
         """See `Session`."""
         return self.journal.find_record(unit.key, fingerprint)
 
-    def describe_failure(self, unit: Unit[P], error: Exception) -> str:
+    def describe_failure(self, unit: Unit[Payload], error: Exception) -> str:
         """See `Session`."""
         attempt = 1 + max(
             (record.attempt for record in self.journal.latest_records([unit.key])), default=0
@@ -31,7 +31,7 @@ class JournalSession(Generic[P]):
         file = self._tracebacks.append(unit.key, attempt, error)
         return describe_failure(error) + (f"; traceback in {file}" if file else "")
 
-    def find_artifact(self, fingerprint: str, kind: type[A]) -> A | None:
+    def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
         """See `Session`."""
         artifact = self.journal.find_artifact(fingerprint)
         return artifact if isinstance(artifact, kind) else None
@@ -40,14 +40,13 @@ class JournalSession(Generic[P]):
         """See `Session`."""
         self.journal.cache_artifact(fingerprint, artifact, usage)
 
-    def append_new(self, record: UnitRecord[P]) -> tuple[UnitRecord[P], bool]:
-        """Put a suite's record on disk unless it is there already; return it, and True if it was
-        there."""
+    def append_new(self, record: UnitRecord[Payload]) -> tuple[UnitRecord[Payload], bool]:
+        """Put a suite's record on disk unless it is there; return it, and True if it was there."""
         if self.journal.holds(record):
             return record, True
         return self.journal.append(self._note_changed_inputs(record)), False
 
-    def _note_changed_inputs(self, record: UnitRecord[P]) -> UnitRecord[P]:
+    def _note_changed_inputs(self, record: UnitRecord[Payload]) -> UnitRecord[Payload]:
         """Add a fault to a record whose unit already has a result from other inputs."""
         earlier = self.journal.result_of(record.key)
         if earlier is None or not record.fingerprint or earlier.fingerprint == record.fingerprint:

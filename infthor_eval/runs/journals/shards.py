@@ -11,7 +11,7 @@ from infthor_eval.formats.reading import NOT_JSON, read_bytes, require_file
 from infthor_eval.runs.journals.records import (
     FORMAT,
     ArtifactRecord,
-    P,
+    Payload,
     RecordTypes,
     RunHeader,
     UnitKey,
@@ -46,17 +46,15 @@ _HINT = (
 
 
 @dataclass
-class RunLog(Generic[P]):
-    """The contents of all shards of a run: latest records of units, and artifacts by
-    fingerprint."""
+class RunLog(Generic[Payload]):
+    """The contents of all shards: latest records of units, and artifacts by fingerprint."""
 
     header: RunHeader | None = None
-    units: dict[UnitKey, UnitRecord[P]] = field(default_factory=dict)
+    units: dict[UnitKey, UnitRecord[Payload]] = field(default_factory=dict)
     artifacts: dict[str, ArtifactRecord[Any]] = field(default_factory=dict)
 
-    def add(self, record: UnitRecord[P] | ArtifactRecord[Any]) -> None:
-        """Add a record. Of several of one unit the last attempt counts; of one attempt by two
-        workers, the result."""
+    def add(self, record: UnitRecord[Payload] | ArtifactRecord[Any]) -> None:
+        """Add a record: a unit's last attempt counts; of one attempt by two workers, the result."""
         if isinstance(record, ArtifactRecord):
             self.artifacts[record.fingerprint] = record
             return
@@ -65,7 +63,7 @@ class RunLog(Generic[P]):
             self.units[record.key] = record
 
     @property
-    def records(self) -> list[UnitRecord[P]]:
+    def records(self) -> list[UnitRecord[Payload]]:
         """The latest record of each unit, in the order of the units' keys."""
         return [self.units[key] for key in sorted(self.units)]
 
@@ -101,7 +99,7 @@ def read_header(run: Path) -> RunHeader:
     raise DataError(f"{run}: no journal in it; give the folder of a run")
 
 
-def read_run(run: Path, types: RecordTypes[P]) -> tuple[RunHeader, list[UnitRecord[P]]]:
+def read_run(run: Path, types: RecordTypes[Payload]) -> tuple[RunHeader, list[UnitRecord[Payload]]]:
     """Read the header of the run in a folder, and the latest record of each unit of all shards.
 
     Raises:
@@ -111,7 +109,7 @@ def read_run(run: Path, types: RecordTypes[P]) -> tuple[RunHeader, list[UnitReco
     return header, log.records
 
 
-def read_run_log(run: Path, types: RecordTypes[P]) -> tuple[RunHeader, RunLog[P]]:
+def read_run_log(run: Path, types: RecordTypes[Payload]) -> tuple[RunHeader, RunLog[Payload]]:
     """Read the header of the run in a folder, and the contents of all its shards.
 
     Raises:
@@ -174,19 +172,19 @@ def find_shards(run: Path) -> list[Path]:
     return shards
 
 
-def read_shards(run: Path, types: RecordTypes[P]) -> RunLog[P]:
+def read_shards(run: Path, types: RecordTypes[Payload]) -> RunLog[Payload]:
     """Read all shards of a run; an empty log if there is none.
 
     Raises:
         DataError: a shard has a bad line, is of another format, or of another run than the others.
     """
-    log: RunLog[P] = RunLog()
+    log: RunLog[Payload] = RunLog()
     for path in find_shards(run):
         read_shard(path, types, log)
     return log
 
 
-def read_shard(path: Path, types: RecordTypes[P], log: RunLog[P]) -> None:
+def read_shard(path: Path, types: RecordTypes[Payload], log: RunLog[Payload]) -> None:
     """Add the contents of a shard to a log."""
     lines = read_lines(path)
     if not lines:
@@ -220,8 +218,7 @@ def parse_record(
 
 
 def read_lines(path: Path) -> list[bytes]:
-    """Return the complete lines of a shard; a last line without its end is still being written, or
-    never will be."""
+    """Return a shard's complete lines: a last one without its end may still be being written."""
     content = read_bytes(path, "restore the file")
     return content[: content.rfind(b"\n") + 1].splitlines()
 
@@ -231,8 +228,7 @@ class _AnyFormat(msgspec.Struct):
 
 
 def check_format(path: Path, line: bytes) -> None:
-    """Refuse a shard whose first line is the header of another format; a line that is no header
-    passes.
+    """Refuse a shard whose first line is a header of another format; any other line passes.
 
     Raises:
         DataError: names both formats, and what to do.

@@ -1,5 +1,4 @@
-"""Tracebacks of exceptions in adapters and suites, in a text file beside the shards of the
-journal."""
+"""Tracebacks of exceptions in adapters and suites, in a text file beside the journal's shards."""
 
 import re
 import traceback
@@ -33,8 +32,7 @@ class TracebackFile:
         self._lock = Lock()
 
     def append(self, key: UnitKey, attempt: int, error: Exception) -> str:
-        """Append the traceback of an unexpected exception, or of the cause of a `UserCodeError`,
-        that failed a unit.
+        """Append the traceback of an unexpected exception, or of a `UserCodeError`'s cause.
 
         Returns:
             Name of the file within the run's folder; empty for an expected error, which needs no
@@ -48,10 +46,10 @@ class TracebackFile:
         with self._lock:
             first = self._units.setdefault(text, unit)
             # The same fault often fails every unit: its traceback is written once.
-            shown = text if first == unit else f"{_SAME}{first}\n"
+            entry = text if first == unit else f"{_SAME}{first}\n"
             # One write in append mode: workers share the file, and must not interleave.
             with self._path.open("ab", buffering=0) as file:
-                file.write(f"== {unit}\n{shown}\n".encode())
+                file.write(f"== {unit}\n{entry}\n".encode())
         return f"{self._path.parent.name}/{_NAME}"
 
 

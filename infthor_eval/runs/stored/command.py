@@ -1,5 +1,4 @@
-"""The command of a run: its options in `run.yaml` beside the results, with which it can be
-repeated."""
+"""The command of a run: its options in `run.yaml` beside the results, to repeat it."""
 
 import shlex
 from collections.abc import Iterator, Mapping
@@ -101,16 +100,15 @@ def read_options(path: Path) -> dict[str, Any]:
 
 
 def _options_of(request: RunRequest) -> dict[str, Any]:
-    """Return all options of a request. Keys of servers are none: they come from the environment
-    only."""
+    """Return a request's options. Keys of servers are none: they come from the environment."""
     tasks = request.tasks
-    given = dict(request.model_options)
-    if _CHECKPOINT in given:
-        given[_CHECKPOINT] = _absolute(given[_CHECKPOINT])
+    model_options = dict(request.model_options)
+    if _CHECKPOINT in model_options:
+        model_options[_CHECKPOINT] = _absolute(model_options[_CHECKPOINT])
     every = {
         "model": request.model,
-        "model_args": given or None,
-        "tasks": list(request.asked),
+        "model_args": model_options or None,
+        "tasks": list(request.task_names),
         "include_path": [str(folder.absolute()) for folder in request.include] or None,
         "data": None if tasks.data is None else str(tasks.data.absolute()),
         "limit": tasks.limit,
@@ -127,17 +125,16 @@ def _non_default(options: Any) -> dict[str, Any]:
     """Return the fields of a dataclass that differ from their defaults."""
     if not is_dataclass(options):  # a suite without options
         return {}
-    values = [(item, getattr(options, item.name)) for item in fields(options)]
+    values = [(option, getattr(options, option.name)) for option in fields(options)]
     return {
-        item.name: _absolute(value) if item.metadata.get("is_place") else value
-        for item, value in values
-        if value != item.default
+        option.name: _absolute(value) if option.metadata.get("is_place") else value
+        for option, value in values
+        if value != option.default
     }
 
 
 def _absolute(text: str) -> str:
-    """Return a path that exists as an absolute one, which holds in any folder; a name of the hub as
-    it is."""
+    """Return a path that exists as an absolute one, for any folder; a name of the hub as it is."""
     return str(Path(text).absolute()) if Path(text).exists() else text
 
 
@@ -151,7 +148,7 @@ def _words(name: str, value: Any) -> Iterator[str]:
         return
     yield typed
     if isinstance(value, Mapping):
-        yield ",".join(f"{key}={item}" for key, item in value.items())
+        yield ",".join(f"{key}={setting}" for key, setting in value.items())
     elif isinstance(value, list):
         yield ",".join(map(str, value))
     elif value is not True:

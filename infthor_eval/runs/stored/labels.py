@@ -1,5 +1,4 @@
-"""Labels of runs that are shown beside each other: their names, and the options that differ where
-names are equal."""
+"""Labels of runs shown together: their names, and options that differ where names are equal."""
 
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -37,32 +36,31 @@ def label_runs(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str] =
         DataError: the `run.yaml` of a run is not valid.
     """
     same_name = defaultdict(list)
-    for place, (_, header) in enumerate(runs):
-        same_name[header.suite, header.name].append(place)
+    for position, (_, header) in enumerate(runs):
+        same_name[header.suite, header.name].append(position)
     labels = [header.name for _, header in runs]
-    for places in same_name.values():
-        if len(places) > 1:  # otherwise no file is read
-            for place, label in zip(
-                places, _label_alike([runs[place] for place in places], ignore), strict=True
-            ):
-                labels[place] = label
+    for positions in same_name.values():
+        if len(positions) > 1:  # otherwise no file is read
+            alike = _label_alike([runs[position] for position in positions], ignore)
+            for position, label in zip(positions, alike, strict=True):
+                labels[position] = label
     return labels
 
 
 def _label_alike(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str]) -> Iterator[str]:
     """Yield the labels of runs of one name."""
     options = [_options(folder) for folder, _ in runs]
-    names = sorted({name for given in options for name in given} - set(ignore))
-    values = {name: [given.get(name) for given in options] for name in names}
-    shown = {name: _shorten(given) for name, given in values.items() if len(set(given)) > 1}
+    names = sorted({name for of_run in options for name in of_run} - set(ignore))
+    values = {name: [of_run.get(name) for of_run in options] for name in names}
+    shortened = {name: _shorten(texts) for name, texts in values.items() if len(set(texts)) > 1}
     # A run that differs in nothing but ignored options is another row of the same label.
     keys = [
-        (given, sorted(header.config.tasks))
-        for given, (_, header) in zip(options, runs, strict=True)
+        (of_run, sorted(header.config.tasks))
+        for of_run, (_, header) in zip(options, runs, strict=True)
     ]
-    for given, key, (folder, header) in zip(options, keys, runs, strict=True):
+    for of_run, key, (folder, header) in zip(options, keys, runs, strict=True):
         differing = ", ".join(
-            f"{name}={texts[given[name]]}" for name, texts in shown.items() if name in given
+            f"{name}={texts[of_run[name]]}" for name, texts in shortened.items() if name in of_run
         )
         remarks = [
             *([differing] if differing else []),
@@ -83,10 +81,10 @@ def _options(folder: Path) -> dict[str, str]:
 
 def _shorten(values: Sequence[str | None]) -> Mapping[str, str]:
     """Return the values as they are; paths without the folders that all of them share."""
-    given = sorted({value for value in values if value is not None})
-    parts = {value: PurePath(value).parts for value in given}
-    if not all(PurePath(value).is_absolute() for value in given):
-        return {value: value for value in given}
+    known = sorted({value for value in values if value is not None})
+    parts = {value: PurePath(value).parts for value in known}
+    if not all(PurePath(value).is_absolute() for value in known):
+        return {value: value for value in known}
     shortest = min(map(len, parts.values())) - 1  # the last part is always shown
     n_shared = next(
         (n for n in range(shortest) if len({path[n] for path in parts.values()}) > 1), shortest

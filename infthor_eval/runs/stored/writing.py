@@ -1,12 +1,11 @@
-"""Runs whose records are made without a driver, as replies are there already: stored like any other
-run."""
+"""Runs made without a driver, as replies are there already: stored like any other run."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from infthor_eval.runs.journals.journal import Journal
-from infthor_eval.runs.journals.records import P, RunHeader, U, UnitRecord
+from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit, UnitRecord
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import run_folder
 from infthor_eval.runs.results import write_run_files
@@ -28,8 +27,8 @@ class Stored:
 def store_run(
     output: Path,
     header: RunHeader,
-    suite: Suite[U, P],
-    make_records: Callable[[Session[P]], Sequence[UnitRecord[P]]],
+    suite: Suite[SuiteUnit, Payload],
+    make_records: Callable[[Session[Payload]], Sequence[UnitRecord[Payload]]],
     n_missing: int,
 ) -> Stored:
     """Write journal and results of a run into its folder `<output>/<name>/<tasks>-<config hash>`.
@@ -62,7 +61,7 @@ def store_run(
     return Stored(folder, summary, usage)
 
 
-def _is_stored(record: UnitRecord[P], journal: Journal[P]) -> bool:
+def _is_stored(record: UnitRecord[Payload], journal: Journal[Payload]) -> bool:
     """Return whether the journal's latest record of this unit says the same."""
     return any(
         (latest.fingerprint, latest.failure, latest.payload)

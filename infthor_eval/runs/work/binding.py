@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Generic
 
 from infthor_eval.errors import UsageError
-from infthor_eval.runs.journals.records import P, RunHeader, U
+from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import BoundEvaluation, Need, Suite, Workload
 from model_adapters import Model, Policy, Subject, adapter_identity, load
@@ -20,11 +20,11 @@ _NEEDED: dict[Need, tuple[type, str]] = {
 
 
 @dataclass(frozen=True)
-class BoundRun(Generic[U, P]):
+class BoundRun(Generic[SuiteUnit, Payload]):
     """A run whose subject is loaded, and the header of its journal."""
 
     subject: Subject
-    evaluation: BoundEvaluation[U, P]
+    evaluation: BoundEvaluation[SuiteUnit, Payload]
     header: RunHeader
 
     def close(self) -> None:
@@ -34,7 +34,7 @@ class BoundRun(Generic[U, P]):
             stack.callback(self.evaluation.close)
 
 
-def bind_run(run: PreparedRun[U, P]) -> BoundRun[U, P]:
+def bind_run(run: PreparedRun[SuiteUnit, Payload]) -> BoundRun[SuiteUnit, Payload]:
     """Load the subject of a run and find its work.
 
     Raises:
@@ -52,7 +52,9 @@ def bind_run(run: PreparedRun[U, P]) -> BoundRun[U, P]:
     return bound
 
 
-def _header(run: PreparedRun[U, P], subject: Subject, workload: Workload[U]) -> RunHeader:
+def _header(
+    run: PreparedRun[SuiteUnit, Payload], subject: Subject, workload: Workload[SuiteUnit]
+) -> RunHeader:
     """Return the header of a run's journal."""
     request = run.request
     is_baseline = request.model in run.suite.baselines
@@ -69,7 +71,7 @@ def _header(run: PreparedRun[U, P], subject: Subject, workload: Workload[U]) -> 
     )
 
 
-def _load_subject(run: PreparedRun[U, P]) -> Subject:
+def _load_subject(run: PreparedRun[SuiteUnit, Payload]) -> Subject:
     request = run.request
     suite = run.suite
     if request.model in suite.baselines:
@@ -83,9 +85,8 @@ def _load_subject(run: PreparedRun[U, P]) -> Subject:
     return subject
 
 
-def require_capability(subject: Subject, name: str, suite: Suite[U, P]) -> None:
-    """Refuse a subject, by the name that it was requested by, that lacks what a suite needs
-    (UsageError)."""
+def require_capability(subject: Subject, name: str, suite: Suite[SuiteUnit, Payload]) -> None:
+    """Refuse a subject, by its requested name, that lacks what a suite needs (UsageError)."""
     kind, description = _NEEDED[suite.needs]
     if not isinstance(subject, kind):
         raise UsageError(f"{name} cannot be evaluated on {suite.name}, which needs {description}")

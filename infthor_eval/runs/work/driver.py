@@ -1,32 +1,33 @@
-"""One run of any suite: its journal, and the order of its work."""
+"""One run of any suite: its journal, the order of its work, its samples for other readers."""
 
-from collections.abc import Callable, Iterable
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol
 
+import msgspec
+
 from infthor_eval.runs.journals import journal as journals
 from infthor_eval.runs.journals.journal import Journal
-from infthor_eval.runs.journals.records import P, U, Unit, UnitRecord
+from infthor_eval.runs.journals.records import Payload, SuiteUnit, Unit, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.results import write_run_files
-from infthor_eval.runs.samples import StoredSamples
 from infthor_eval.runs.stored.command import write_command
 from infthor_eval.runs.suite import RunSummary, UnitSample, Workload
 from infthor_eval.runs.usage import Usage
 from infthor_eval.runs.work.executor import Executor, LocalExecutor
 from infthor_eval.runs.work.worker_executor import WorkerPoolExecutor
 
-__all__ = ["Observer", "RunOutcome", "Silent", "execute"]
+__all__ = ["Observer", "RunOutcome", "Silent", "StoredSamples", "execute"]
 
 
 class Observer(Protocol):
     """Follows a run."""
 
     def begin(self, workload: Workload[Unit[Any]], n_recovered: int) -> None:
-        """Called before the first unit, with all the work and the number of bad lines taken out of
-        the journal."""
+        """Called before the first unit, with all the work and the number of bad lines removed."""
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
         """Called for each unit; `resumed` if its record is that of an earlier, stopped run."""
@@ -49,7 +50,7 @@ class Silent:
 
 
 @dataclass(frozen=True)
-class RunOutcome(Generic[U, P]):
+class RunOutcome(Generic[SuiteUnit, Payload]):
     """A run that has ended.
 
     Attributes:
@@ -60,19 +61,19 @@ class RunOutcome(Generic[U, P]):
     """
 
     folder: Path
-    run: PreparedRun[U, P]
+    run: PreparedRun[SuiteUnit, Payload]
     summary: RunSummary
-    records: list[UnitRecord[P]]
+    records: list[UnitRecord[Payload]]
     n_missing: int
     usage: Usage
     samples: Iterable[UnitSample]
 
 
 def execute(
-    run: PreparedRun[U, P],
+    run: PreparedRun[SuiteUnit, Payload],
     observer: Observer | None = None,
     should_stop: Callable[[], bool] = lambda: False,
-) -> RunOutcome[U, P]:
+) -> RunOutcome[SuiteUnit, Payload]:
     """Load the model, do what the journal does not hold yet, and write the results.
 
     The folder `<output>/<name>/<tasks>-<config hash>/` holds the journal, `run.yaml` (the options
@@ -109,9 +110,8 @@ def execute(
                     observer.done(record, resumed)
             except Exception:
                 raise
-            except (
-                BaseException
-            ):  # stopped at once: the units that are done have their results all the same
+            # Stopped at once: the units that are done have their results all the same.
+            except BaseException:
                 _write_results(run, folder, workload, journal)
                 raise
             summary, records, usage = _write_results(run, folder, workload, journal)
@@ -121,21 +121,24 @@ def execute(
         )
 
 
-def _start_executor(run: PreparedRun[U, P], report: Callable[[str], None]) -> Executor[P]:
+def _start_executor(
+    run: PreparedRun[SuiteUnit, Payload], report: Callable[[str], None]
+) -> Executor[Payload]:
     if run.request.worker_settings.is_local:
         return LocalExecutor(run)
     return WorkerPoolExecutor(run, report)
 
 
 def _write_results(
-    run: PreparedRun[U, P], folder: Path, workload: Workload[Unit[Any]], journal: Journal[P]
-) -> tuple[RunSummary, list[UnitRecord[P]], Usage]:
-    """Write the results of the units that the journal has by now; return summary, records and
-    usage."""
-    asked = {
-        unit.key for group in workload.groups for unit in group.units
-    }  # the journal may hold more
-    records = [record for record in journal.records if record.key in asked]
+    run: PreparedRun[SuiteUnit, Payload],
+    folder: Path,
+    workload: Workload[Unit[Any]],
+    journal: Journal[Payload],
+) -> tuple[RunSummary, list[UnitRecord[Payload]], Usage]:
+    """Write the results of the units in the journal; return summary, records and usage."""
+    # The journal may hold more.
+    keys = {unit.key for group in workload.groups for unit in group.units}
+    records = [record for record in journal.records if record.key in keys]
     journal.check_file()
     summary = RunSummary(journal.header, run.suite.summarise(journal.header, records))
     n_missing = workload.n_units - len(records)
@@ -144,3 +147,21 @@ def _write_results(
     )
     write_run_files(folder, summary, run.suite, records, n_missing, usage)
     return summary, records, usage
+
+
+class StoredSamples:
+    """Samples in a temporary file, read as often as needed.
+
+    The evaluation that converts records to samples is closed with its run, but readers come later.
+    In memory the prompts of long trajectories would take gigabytes.
+    """
+
+    def __init__(self, samples: Iterable[UnitSample]) -> None:
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed with its owner
+        for sample in samples:
+            self._file.write(msgspec.json.encode(sample) + b"\n")
+
+    def __iter__(self) -> Iterator[UnitSample]:
+        self._file.seek(0)
+        for line in self._file:
+            yield msgspec.json.decode(line, type=UnitSample)

@@ -1,5 +1,4 @@
-"""Estimates of a run's time, requests, tokens and money: a few units are done, and the rest is
-estimated from them.
+"""Estimates of a run's time, requests, tokens and money, from a few units that are done.
 
 The first unit of a group pays for what the group shares (encoding or replaying a trajectory), the
 others only for themselves. So each quantity of a group with n units on f frames is estimated as
@@ -17,12 +16,19 @@ from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from infthor_eval.runs.journals.records import A, P, U, Unit, UnitRecord, describe_failure
+from infthor_eval.runs.journals.records import (
+    Artifact,
+    Payload,
+    SuiteUnit,
+    Unit,
+    UnitRecord,
+    describe_failure,
+)
 from infthor_eval.runs.request import RunRequest, prepare
 from infthor_eval.runs.suite import BoundEvaluation, Group, Suite, Workload
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.runs.work.binding import bind_run
-from infthor_eval.runs.work.groups import group_records
+from infthor_eval.runs.work.executor import group_records
 
 __all__ = ["Estimate", "Quantities", "TaskEstimate", "estimate_run", "estimate_tasks"]
 
@@ -71,8 +77,7 @@ class Quantities:
 
 @dataclass(frozen=True)
 class _MeasuredGroup:
-    """The frames of a group, task and quantities of each measured unit, and task and reason of each
-    failed one."""
+    """A group's frames, task and quantities of measured units, task and reason of failed ones."""
 
     frames: int
     quantities: Sequence[tuple[str, Quantities]]
@@ -92,8 +97,7 @@ class TaskEstimate:
 
 @dataclass(frozen=True)
 class Estimate:
-    """The estimate of a run by task (none if all measured units failed), and task and reason of
-    each failed unit."""
+    """A run's estimate by task (none if all failed), and task and reason of each failed unit."""
 
     workload: Workload
     tasks: Sequence[TaskEstimate]
@@ -101,8 +105,7 @@ class Estimate:
 
 
 class _MeasuringSession:
-    """A `Session` without records, as every unit is to be measured; artifacts are cached in
-    memory."""
+    """A `Session` without records: every unit is measured; artifacts are cached in memory."""
 
     def __init__(self) -> None:
         self._artifacts: dict[str, Any] = {}
@@ -114,7 +117,7 @@ class _MeasuringSession:
         """See `Session`; nothing is written."""
         return describe_failure(error)
 
-    def find_artifact(self, fingerprint: str, kind: type[A]) -> A | None:
+    def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
         """See `Session`."""
         return self._artifacts.get(fingerprint)
 
@@ -124,7 +127,10 @@ class _MeasuringSession:
 
 
 def estimate_run(
-    request: RunRequest, suite: Suite[U, P], n_units: int, progress: Callable[[], None]
+    request: RunRequest,
+    suite: Suite[SuiteUnit, Payload],
+    n_units: int,
+    progress: Callable[[], None],
 ) -> Estimate:
     """Load the subject, do about `n_units` units of each task, and estimate the quantities of all.
 
@@ -144,9 +150,10 @@ def estimate_run(
     return Estimate(workload, estimate_tasks(workload, groups) if is_measured else (), failures)
 
 
-def _measure(evaluation: BoundEvaluation[U, P], n_units: int) -> Iterator[_MeasuredGroup]:
-    """Do a few units of each task: of groups of all sizes, the first, the middle and the last
-    unit."""
+def _measure(
+    evaluation: BoundEvaluation[SuiteUnit, Payload], n_units: int
+) -> Iterator[_MeasuredGroup]:
+    """Do a few units of each task: of groups of all sizes, the first, middle and last unit."""
     session = _MeasuringSession()
     for group in _choose_groups(
         evaluation.workload.groups, max(1, round(n_units / _UNITS_OF_A_GROUP))
@@ -167,9 +174,9 @@ def _measure(evaluation: BoundEvaluation[U, P], n_units: int) -> Iterator[_Measu
         yield _MeasuredGroup(group.frames, quantities, failures)
 
 
-def _choose_groups(groups: Sequence[Group[U]], n: int) -> Iterator[Group[U]]:
+def _choose_groups(groups: Sequence[Group[SuiteUnit]], n: int) -> Iterator[Group[SuiteUnit]]:
     """Yield n groups of each task, evenly from the smallest to the largest."""
-    by_task: dict[str, list[Group[U]]] = {}
+    by_task: dict[str, list[Group[SuiteUnit]]] = {}
     for group in groups:
         by_task.setdefault(group.units[0].key.task, []).append(group)
     for same in by_task.values():
@@ -181,8 +188,7 @@ def _choose_groups(groups: Sequence[Group[U]], n: int) -> Iterator[Group[U]]:
 def estimate_tasks(
     workload: Workload[Unit[Any]], measured: Sequence[_MeasuredGroup]
 ) -> list[TaskEstimate]:
-    """Estimate each task of a workload by measured groups of it, with at least one unit that has
-    not failed."""
+    """Estimate each task of a workload by measured groups with a unit that has not failed."""
     later = _later_units(measured)
     excess = _first_unit_excess(measured, later)
     estimates = []
@@ -204,8 +210,7 @@ def estimate_tasks(
 
 
 def _later_units(measured: Sequence[_MeasuredGroup]) -> Mapping[str, Quantities]:
-    """Return the mean quantities of units that are not the first of their group, by task; under ""
-    of all tasks."""
+    """Return mean quantities of units not first in their group, by task; under "" of all tasks."""
     by_task: dict[str, list[Quantities]] = {}
     for group in measured:
         for task, quantities in group.quantities[1:] or group.quantities:
@@ -217,8 +222,7 @@ def _later_units(measured: Sequence[_MeasuredGroup]) -> Mapping[str, Quantities]
 def _first_unit_excess(
     measured: Sequence[_MeasuredGroup], later: Mapping[str, Quantities]
 ) -> Callable[[Group[Unit[Any]]], Quantities]:
-    """Return a function of a group: the excess of a first unit over a later one per frame, in
-    groups of its task."""
+    """Return a function of a group: a first unit's excess over later ones per frame in its task."""
     totals: dict[str, Quantities] = {}
     frames: Counter[str] = Counter()
     for group in measured:
@@ -234,8 +238,8 @@ def _first_unit_excess(
     return excess
 
 
-def _mean(items: Sequence[Quantities]) -> Quantities:
+def _mean(measured: Sequence[Quantities]) -> Quantities:
     total = Quantities()
-    for quantities in items:
-        total = total.plus(quantities, 1 / len(items))
+    for quantities in measured:
+        total = total.plus(quantities, 1 / len(measured))
     return total

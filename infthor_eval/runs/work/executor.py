@@ -4,24 +4,25 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Generic, Protocol
 
+import msgspec
+
+from infthor_eval.errors import ModelError
 from infthor_eval.runs.journals.journal import Journal
-from infthor_eval.runs.journals.records import P, RunHeader, U, Unit, UnitRecord
+from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit, Unit, UnitRecord
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.suite import UnitSample, Workload
+from infthor_eval.runs.suite import BoundEvaluation, Group, Session, UnitSample, Workload
 from infthor_eval.runs.work.binding import bind_run
-from infthor_eval.runs.work.groups import group_records
 from infthor_eval.runs.work.scheduling import run_groups
 
-__all__ = ["Executor", "LocalExecutor", "Recorded"]
+__all__ = ["Executor", "LocalExecutor", "Recorded", "group_records"]
 
 
-Recorded = tuple[
-    UnitRecord[P], bool
-]  # a record that is on disk; True if an earlier run had put it there
+# A record that is on disk; True if an earlier run had put it there.
+Recorded = tuple[UnitRecord[Payload], bool]
 
 
-class Executor(Protocol[P]):
+class Executor(Protocol[Payload]):
     """Does the work of a run. It is ready as soon as it is created."""
 
     @property
@@ -33,22 +34,21 @@ class Executor(Protocol[P]):
         """All the work."""
 
     def evaluate(
-        self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
-    ) -> Iterator[tuple[UnitRecord[P], bool]]:
-        """Do all groups, or stop after the units in hand; yield every record as soon as it is on
-        disk."""
+        self, folder: Path, journal: Journal[Payload], should_stop: Callable[[], bool]
+    ) -> Iterator[tuple[UnitRecord[Payload], bool]]:
+        """Do all groups, or stop after the units in hand; yield each record once it is on disk."""
 
-    def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
+    def samples(self, records: Sequence[UnitRecord[Payload]]) -> Iterator[UnitSample]:
         """Convert records for other readers, in their order; not after `close`."""
 
     def close(self) -> None:
         """Release everything, in whatever state it is."""
 
 
-class LocalExecutor(Generic[U, P]):
+class LocalExecutor(Generic[SuiteUnit, Payload]):
     """The executor of this process."""
 
-    def __init__(self, run: PreparedRun[U, P]) -> None:
+    def __init__(self, run: PreparedRun[SuiteUnit, Payload]) -> None:
         """Load the subject and find the work.
 
         Raises:
@@ -59,8 +59,8 @@ class LocalExecutor(Generic[U, P]):
         self.workload = self._bound.evaluation.workload
 
     def evaluate(
-        self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
-    ) -> Iterator[tuple[UnitRecord[P], bool]]:
+        self, folder: Path, journal: Journal[Payload], should_stop: Callable[[], bool]
+    ) -> Iterator[tuple[UnitRecord[Payload], bool]]:
         """See `Executor`."""
         session = JournalSession(journal)
         evaluation = self._bound.evaluation
@@ -72,10 +72,37 @@ class LocalExecutor(Generic[U, P]):
             if should_stop():
                 return
 
-    def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
+    def samples(self, records: Sequence[UnitRecord[Payload]]) -> Iterator[UnitSample]:
         """See `Executor`."""
         return map(self._bound.evaluation.to_sample, records)
 
     def close(self) -> None:
         """See `Executor`."""
         self._bound.close()
+
+
+def group_records(
+    evaluation: BoundEvaluation[SuiteUnit, Payload],
+    group: Group[SuiteUnit],
+    session: Session[Payload],
+) -> Iterator[UnitRecord[Payload]]:
+    """Yield the records of a group; units without a record when it ends have failed.
+
+    Raises:
+        MemoryError: the machine has no more memory; the run ends.
+    """
+    waiting = {unit.key: unit for unit in group.units}
+    fault: Exception = ModelError("the suite gives no record of it; fix the suite")
+    try:
+        for record in evaluation.run(group, session):
+            # A record that cannot be written must fail here, not in the journal.
+            msgspec.json.encode(record)
+            waiting.pop(record.key, None)
+            yield record
+    except MemoryError:  # the next group would have no more memory than this one
+        raise
+    except Exception as error:  # noqa: BLE001 - a suite is anybody's code, and may raise anything
+        fault = error
+    yield from (
+        unit.record_failure(session.describe_failure(unit, fault)) for unit in waiting.values()
+    )

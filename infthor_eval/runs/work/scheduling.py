@@ -4,19 +4,18 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 
-from infthor_eval.runs.journals.records import P, U, UnitRecord
+from infthor_eval.runs.journals.records import Payload, SuiteUnit, UnitRecord
 from infthor_eval.runs.suite import Group
 
 __all__ = ["run_groups"]
 
 
 def run_groups(
-    groups: Sequence[Group[U]],
-    do: Callable[[Group[U]], Iterable[UnitRecord[P]]],
+    groups: Sequence[Group[SuiteUnit]],
+    do: Callable[[Group[SuiteUnit]], Iterable[UnitRecord[Payload]]],
     max_in_flight: int,
-) -> Iterator[UnitRecord[P]]:
-    """Yield the records of all groups as soon as they are there; several in flight are done in a
-    thread each."""
+) -> Iterator[UnitRecord[Payload]]:
+    """Yield all groups' records when they are there; several in flight have a thread each."""
     if max_in_flight == 1 or len(groups) <= 1:
         for group in groups:
             yield from do(group)
@@ -25,14 +24,15 @@ def run_groups(
 
 
 def _in_threads(
-    groups: Sequence[Group[U]], do: Callable[[Group[U]], Iterable[UnitRecord[P]]], n_threads: int
-) -> Iterator[UnitRecord[P]]:
-    waiting: SimpleQueue[Group[U]] = SimpleQueue()
+    groups: Sequence[Group[SuiteUnit]],
+    do: Callable[[Group[SuiteUnit]], Iterable[UnitRecord[Payload]]],
+    n_threads: int,
+) -> Iterator[UnitRecord[Payload]]:
+    waiting: SimpleQueue[Group[SuiteUnit]] = SimpleQueue()
     for group in groups:
         waiting.put(group)
-    results: SimpleQueue[UnitRecord[P] | BaseException | None] = (
-        SimpleQueue()
-    )  # None: a thread has ended
+    # None: a thread has ended.
+    results: SimpleQueue[UnitRecord[Payload] | BaseException | None] = SimpleQueue()
     stop = Event()
     threads = [
         Thread(target=_work, args=(waiting, do, results, stop), daemon=True)
@@ -43,21 +43,21 @@ def _in_threads(
     running = n_threads
     try:
         while running:
-            item = results.get()
-            if isinstance(item, BaseException):
-                raise item
-            if item is None:
+            result = results.get()
+            if isinstance(result, BaseException):
+                raise result
+            if result is None:
                 running -= 1
             else:
-                yield item
+                yield result
     finally:
         stop.set()
 
 
 def _work(
-    waiting: "SimpleQueue[Group[U]]",
-    do: Callable[[Group[U]], Iterable[UnitRecord[P]]],
-    results: "SimpleQueue[UnitRecord[P] | BaseException | None]",
+    waiting: "SimpleQueue[Group[SuiteUnit]]",
+    do: Callable[[Group[SuiteUnit]], Iterable[UnitRecord[Payload]]],
+    results: "SimpleQueue[UnitRecord[Payload] | BaseException | None]",
     stop: Event,
 ) -> None:
     try:
@@ -72,7 +72,7 @@ def _work(
         results.put(None)
 
 
-def _next(waiting: "SimpleQueue[Group[U]]") -> Group[U] | None:
+def _next(waiting: "SimpleQueue[Group[SuiteUnit]]") -> Group[SuiteUnit] | None:
     """Return the next group, or None if there is none."""
     try:  # rather than a check whether it is empty: another thread may take the last group after it
         return waiting.get_nowait()

@@ -13,12 +13,19 @@ from typing import Any, Generic
 from infthor_eval.errors import UsageError
 from infthor_eval.runs.config import RunConfig
 from infthor_eval.runs.journals.journal import Journal
-from infthor_eval.runs.journals.records import P, RunHeader, U, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.journals.records import (
+    Payload,
+    RunHeader,
+    SuiteUnit,
+    Unit,
+    UnitKey,
+    UnitRecord,
+)
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Group, UnitSample, Workload
 from infthor_eval.runs.work.binding import bind_run
-from infthor_eval.runs.work.groups import group_records
+from infthor_eval.runs.work.executor import group_records
 from infthor_eval.workers import (
     Event,
     JobFailed,
@@ -42,8 +49,7 @@ _BATCH = 256  # records that a worker converts at a time
 
 @dataclass(frozen=True)
 class _Greeting:
-    """What the driver learns from a worker before it hands out work: units without what only the
-    suite needs."""
+    """What a worker tells before it gets work: units without what only the suite needs."""
 
     header: RunHeader
     workload: Workload[Unit[Any]]
@@ -56,49 +62,49 @@ class _Portion:
     group: int
     unit: int | None = None
 
-    def select(self, groups: Sequence[Group[U]]) -> Group[U]:
+    def select(self, groups: Sequence[Group[SuiteUnit]]) -> Group[SuiteUnit]:
         group = groups[self.group]
         return group if self.unit is None else replace(group, units=[group.units[self.unit]])
 
 
 @dataclass(frozen=True)
-class _GroupJob(Generic[P]):
+class _GroupJob(Generic[Payload]):
     """A portion for a worker to do, with the latest records of its units."""
 
     portion: _Portion
     folder: Path
-    earlier: tuple[UnitRecord[P], ...]
+    earlier: tuple[UnitRecord[Payload], ...]
 
 
 @dataclass(frozen=True)
-class _SampleJob(Generic[P]):
+class _SampleJob(Generic[Payload]):
     """Records for a worker to convert to samples."""
 
-    records: tuple[UnitRecord[P], ...]
+    records: tuple[UnitRecord[Payload], ...]
 
 
 @dataclass(frozen=True)
-class _OpenEvaluator(Generic[U, P]):
+class _OpenEvaluator(Generic[SuiteUnit, Payload]):
     """Creates a worker in the process where it works; pickled and sent there."""
 
-    run: PreparedRun[U, P]
+    run: PreparedRun[SuiteUnit, Payload]
 
-    def __call__(self, number: int) -> "_Evaluator[U, P]":
+    def __call__(self, number: int) -> "_Evaluator[SuiteUnit, Payload]":
         return _Evaluator(self.run, number)
 
 
-def _without_inputs(group: Group[U]) -> Group[Unit[Any]]:
+def _without_inputs(group: Group[SuiteUnit]) -> Group[Unit[Any]]:
     return Group([unit.without_inputs() for unit in group.units], group.frames)
 
 
-class _Evaluator(Generic[U, P]):
+class _Evaluator(Generic[SuiteUnit, Payload]):
     """A worker of a run; see `infthor_eval.workers.Worker`."""
 
-    def __init__(self, run: PreparedRun[U, P], number: int) -> None:
+    def __init__(self, run: PreparedRun[SuiteUnit, Payload], number: int) -> None:
         self._records = run.suite.records
         self._number = number
         self._bound = bind_run(run)
-        self._session: JournalSession[P] | None = None
+        self._session: JournalSession[Payload] | None = None
 
     @property
     def greeting(self) -> _Greeting:
@@ -108,8 +114,8 @@ class _Evaluator(Generic[U, P]):
         return _Greeting(self._bound.header, Workload(groups, *parts))
 
     def do(
-        self, job: _GroupJob[P] | _SampleJob[P]
-    ) -> Iterator[tuple[UnitRecord[P], bool] | UnitSample]:
+        self, job: _GroupJob[Payload] | _SampleJob[Payload]
+    ) -> Iterator[tuple[UnitRecord[Payload], bool] | UnitSample]:
         evaluation = self._bound.evaluation
         if isinstance(job, _SampleJob):
             yield from map(evaluation.to_sample, job.records)
@@ -125,7 +131,7 @@ class _Evaluator(Generic[U, P]):
     def close(self) -> None:
         self._bound.close()
 
-    def _open_session(self, folder: Path) -> JournalSession[P]:
+    def _open_session(self, folder: Path) -> JournalSession[Payload]:
         if self._session is None:
             # A worker of a driver that was killed may still be ending, and holds the lock of the
             # shard until then.
@@ -137,20 +143,19 @@ class _Evaluator(Generic[U, P]):
 
 
 @dataclass(frozen=True)
-class _Progress(Generic[P]):
-    """The state of a run that all its portions share; `done` are the units whose records were
-    yielded."""
+class _Progress(Generic[Payload]):
+    """A run's state that all portions share; `done` are the units whose records were yielded."""
 
     folder: Path
-    journal: Journal[P]
+    journal: Journal[Payload]
     should_stop: Callable[[], bool]
     done: set[UnitKey] = field(default_factory=set)
 
 
-class WorkerPoolExecutor(Generic[U, P]):
+class WorkerPoolExecutor(Generic[SuiteUnit, Payload]):
     """The executor of several workers; see `infthor_eval.runs.work.executor.Executor`."""
 
-    def __init__(self, run: PreparedRun[U, P], report: Callable[[str], None]) -> None:
+    def __init__(self, run: PreparedRun[SuiteUnit, Payload], report: Callable[[str], None]) -> None:
         """Start the workers and wait for the first; `report` gets a line when one is lost or cannot
         be started.
 
@@ -174,8 +179,8 @@ class WorkerPoolExecutor(Generic[U, P]):
         self.workload = greeting.workload
 
     def evaluate(
-        self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
-    ) -> Iterator[tuple[UnitRecord[P], bool]]:
+        self, folder: Path, journal: Journal[Payload], should_stop: Callable[[], bool]
+    ) -> Iterator[tuple[UnitRecord[Payload], bool]]:
         """See `Executor`."""
         groups = self.workload.groups
         progress = _Progress(folder, journal, should_stop)
@@ -200,14 +205,13 @@ class WorkerPoolExecutor(Generic[U, P]):
             journal.reread(worker)  # for cached artifacts, which workers do not send
 
     def _do_portions(
-        self, portions: Sequence[_Portion], progress: _Progress[P], max_losses: int
-    ) -> Generator[tuple[UnitRecord[P], bool], None, dict[_Portion, str]]:
-        """Have portions done; yield the records, and return the portions that were given up, with
-        the reason."""
+        self, portions: Sequence[_Portion], progress: _Progress[Payload], max_losses: int
+    ) -> Generator[tuple[UnitRecord[Payload], bool], None, dict[_Portion, str]]:
+        """Have portions done; yield records, and return those given up, with the reason."""
         journal = progress.journal
         given_up: dict[_Portion, str] = {}
 
-        def job(number: int) -> _GroupJob[P]:
+        def job(number: int) -> _GroupJob[Payload]:
             keys = [unit.key for unit in portions[number].select(self.workload.groups).units]
             return _GroupJob(portions[number], progress.folder, journal.latest_records(keys))
 
@@ -221,14 +225,13 @@ class WorkerPoolExecutor(Generic[U, P]):
                     progress.done.add(record.key)
                     yield record, resumed
             elif isinstance(event, WorkerLost | JobFailed):
-                journal.reread(
-                    event.worker
-                )  # it may have written records that it could no longer send
+                # It may have written records that it could no longer send.
+                journal.reread(event.worker)
             if isinstance(event, JobFailed):
                 given_up[portions[event.job]] = event.reason
         return given_up
 
-    def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
+    def samples(self, records: Sequence[UnitRecord[Payload]]) -> Iterator[UnitSample]:
         """See `Executor`.
 
         Raises:
@@ -256,8 +259,7 @@ class WorkerPoolExecutor(Generic[U, P]):
         self._pool.close()
 
     def _check_config(self, greeting: _Greeting) -> None:
-        """Refuse a worker that would evaluate something else: another version, a model that has
-        changed."""
+        """Refuse a worker that would evaluate something else: another version, a changed model."""
         theirs = greeting.header.config
         if self._expected is None:
             self._expected = theirs

@@ -329,7 +329,7 @@ def test_people_are_told_apart(session: Callable[..., Session], data: Path, tmp_
         one.tab.locator("#unknown").click()
         assert one.end() == 0
     folders = list((tmp_path / "out/human").iterdir())
-    assert {read_run(folder, RECORDS)[0].config["model"]["reader"] for folder in folders} == {
+    assert {read_run(folder, RECORDS)[0].config.model["reader"] for folder in folders} == {
         "ann",
         "ben",
     }

@@ -14,7 +14,7 @@ from infthor_eval.nieh.asking.baselines import (
     Random,
 )
 from infthor_eval.nieh.contexts import Sample
-from infthor_eval.nieh.guessing.forms import question_type
+from infthor_eval.nieh.guessing.chains import question_type
 from model_adapters import names
 
 

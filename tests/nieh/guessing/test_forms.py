@@ -1,7 +1,7 @@
 import pytest
 
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.guessing.forms import form_of, question_type
+from infthor_eval.nieh.guessing.chains import form_of, question_type
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ try:
     require_page_extra()
 except UsageError as error:
     pytest.skip(str(error), allow_module_level=True)
-from infthor_eval.report.live.page import live_routes
+from infthor_eval.report.live.state import live_routes
 
 EXPECT_MS = 60_000  # a guard against hangs
 
