@@ -3,10 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import msgspec
-
 from infthor_eval.episodes.records import DONE
-from infthor_eval.plans.config import PlansConfig
+from infthor_eval.formats.object_ids import Words
+from infthor_eval.plans.config import PlansConfig, PlansTaskConfig
 from infthor_eval.plans.recorded.runs import PlansRun
 from infthor_eval.plans.records import PlanRecord, StepRecord
 from infthor_eval.runs import RunHeader, Tokens, UnitRecord
@@ -22,24 +21,23 @@ def make_plans_config(
     task: str = TASK,
     rewards: Mapping[str, Any] | None = None,
     after_failure: str = "continue",
-) -> dict[str, Any]:
-    """What identifies a run on these trajectories, as in its header."""
-    about = {
-        "trajectories": {name: f"digest of {name}" for name in trajectories},
-        "rewards": dict(rewards or RULES),
-        "words": "published",
-        "after_failure": after_failure,
-        "broken": [],
-        "config": {"dataset_kwargs": {}},
-    }
-    model = dict(model or {"name": "a model"})
-    return {
-        "suite": "plans",
-        "model": model,
-        "simulator": simulator,
-        "frames": "shown",
-        "tasks": {task: about},
-    }
+) -> PlansConfig:
+    """The config of a run on these trajectories, as in its header."""
+    config = PlansTaskConfig(
+        settings={"dataset_kwargs": {}},
+        trajectories={name: f"digest of {name}" for name in trajectories},
+        rewards=dict(rewards or RULES),
+        words=Words.PUBLISHED,
+        after_failure=after_failure,
+        broken=(),
+    )
+    return PlansConfig(
+        suite="plans",
+        model=dict(model or {"name": "a model"}),
+        simulator=simulator,
+        frames="shown",
+        tasks={task: config},
+    )
 
 
 def make_plan_record(
@@ -88,8 +86,7 @@ def make_plan_record(
 def make_plans_run(label: str, records: Sequence[UnitRecord[PlanRecord]], **about: Any) -> PlansRun:
     """A run of these plans; `about` is what `make_plans_config` takes."""
     names = list(dict.fromkeys(record.cluster for record in records))
-    config = msgspec.convert(make_plans_config(names, **about), PlansConfig)
-    header = RunHeader(suite="plans", name=label, config=config)
+    header = RunHeader(suite="plans", name=label, config=make_plans_config(names, **about))
     return PlansRun(label, header, records)
 
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs import read_header, read_run
+from infthor_eval.runs import read_run
 from infthor_eval.runs.journals.journal import Journal
 
 from ...helpers.command_line import assert_refused, option_words
@@ -83,7 +83,7 @@ def test_fresh_without_an_earlier_run_changes_nothing(ask, tmp_path):
 def test_the_journal_of_an_active_run_is_left_alone(ask, tmp_path, option):
     ask(model="oracle")
     folder = find_one(tmp_path / "out", "journal").parent
-    with Journal(folder, read_header(folder), RECORDS):
+    with Journal(folder, read_run(folder, RECORDS)[0], RECORDS):
         code, out, err = ask(option, model="oracle")
     assert (code, out) == (2, "")
     assert "another run is writing it; wait for it or stop it" in err
