@@ -26,7 +26,7 @@ KEPT = (
     "tests/generation/test_factory.py::test_a_thousand_steps_are_made_with_the_defaults",
     "tests/nieh/test_suite.py::test_the_tiny_model_runs_through_and_shares_prefixes",
     "tests/model_adapters/hf/test_conversation.py::test_sharing_changes_no_reply",
-    "tests/manipulation/test_episodes.py::test_the_planner_picks_up_all_and_puts_nearly_all",
+    "tests/manipulation/test_episodes.py::test_the_planner_picks_up_and_puts_all",
     "tests/runs/work/test_driver.py::test_a_killed_command_goes_on_and_shows_progress_table_results_and_export",
     "tests/docs/test_commands.py::test_the_commands_of_a_page_run_one_after_the_other[docs/tutorial.md-2]",
     "tests/test_statistics.py::test_the_interval_covers_the_truth_as_often_as_it_says",
