@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from infthor_sim.arm.metadata import arm_metadata
-from infthor_sim.geometry import Array, corners, matrix_euler, round_vector, round_xyz
+from infthor_sim.geometry import Array, corners, euler_matrix, matrix_euler, round_vector, round_xyz
 from infthor_sim.objects import DOOR_SWING, SimObject
 from infthor_sim.physics.obstacles import door_leaf
 from infthor_sim.pictures.cameras import ThirdPartyCamera
@@ -161,23 +161,25 @@ def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]
 
 
 def _hand_pose(world: World) -> dict[str, Any]:
-    """Return the hand's pose in the world and the camera's frame; zeros where nothing is held.
+    """Return the hand's pose in the world and the camera's frame; zeros for an arm.
 
-    AI2-THOR calls it the held object's, but it is the hand's: 0 in the camera's frame until the
-    hand is turned, however the object lies in it.
+    AI2-THOR calls it the held object's, but it is the hand's. An empty hand is level, as the
+    agent's body is, so the camera's frame has it turned back by the horizon. A full one is 0 in the
+    camera's frame until it is turned, however the object lies in it.
     """
-    if world.held is None:
+    if world.arm is not None:
         return dict.fromkeys(
             ("position", "rotation", "localPosition", "localRotation"), round_xyz(np.zeros(3))
         )
     agent = world.agent
     hand = world.hand
     camera = agent.camera_matrix()
+    turn = hand.turn if world.held is not None else euler_matrix((-agent.horizon, 0.0, 0.0))
     return {
         "position": round_xyz(agent.camera_position() + camera @ hand.offset),
-        "rotation": round_xyz(matrix_euler(camera @ hand.turn)),
+        "rotation": round_xyz(matrix_euler(camera @ turn)),
         "localPosition": round_xyz(hand.offset),
-        "localRotation": round_xyz(matrix_euler(hand.turn)),
+        "localRotation": round_xyz(matrix_euler(turn)),
     }
 
 

@@ -142,7 +142,7 @@ class World:
             content.parent = None
             self.mark_changed(content)
         if self.held == item.object_id:
-            self.held = None
+            self._empty_hand()
         if self.arm is not None:
             self.arm.let_go(item.object_id)
             for content_id in item.contents:
@@ -240,14 +240,17 @@ class World:
     def let_go(self, item: SimObject) -> None:
         """Let go of one object, if it is held, with its contents; it stays where it is."""
         if item.object_id == self.held:
-            self.held = self.grip = None
-            self.hand = _HAND
+            self._empty_hand()
         if self.arm is not None:
             for part in (item, *self.descendants(item)):
                 part.state.picked_up = part.state.picked_up and part.object_id not in self.arm.held
                 self.arm.let_go(part.object_id)
         item.state.picked_up = False
         self.mark_changed(item)
+
+    def _empty_hand(self) -> None:
+        self.held = self.grip = None
+        self.hand = _HAND
 
     def move_hand(self, hand: Grip) -> None:
         """Move the hand to a pose in the camera's frame, with what it holds."""
