@@ -55,7 +55,7 @@ def test_an_object_can_be_teleported_from_the_hand_and_picked_up_again(bench):
 def test_the_hand_of_an_arm_agent_is_zero():
     bench = Bench(size=20)
     pose = bench.reset("kitchen-1", agentMode="arm")["heldObjectPose"]
-    assert pose == dict.fromkeys(pose, {"x": 0, "y": 0, "z": 0})
+    assert pose == {part: {"x": 0, "y": 0, "z": 0} for part in pose}
 
 
 @pytest.mark.parametrize(
