@@ -1,6 +1,6 @@
 """The state of one scene: its objects, its agent, and which object contains which."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -166,6 +166,27 @@ class World:
             receptacle.contents.remove(item.object_id)
             item.parent = None
             self.mark_changed(item, receptacle)
+
+    def rename(self, new_ids: Mapping[str, str]) -> None:
+        """Give objects other ids (new by old), with all that names them; ids stay unique."""
+
+        def new(old: str) -> str:
+            return new_ids.get(old, old)
+
+        for item in self.objects.values():
+            item.object_id = new(item.object_id)
+            item.parent = None if item.parent is None else new(item.parent)
+            item.contents = [new(content) for content in item.contents]
+            item.controls = tuple(new(controlled) for controlled in item.controls)
+        self.objects = {item.object_id: item for item in self.objects.values()}
+        self.held = None if self.held is None else new(self.held)
+        if self.arm is not None:
+            self.arm.held = {new(old): grip for old, grip in self.arm.held.items()}
+            inside = self.arm.held_contents
+            self.arm.held_contents = {new(old): grip for old, grip in inside.items()}
+        finishes = self.appearance.finishes
+        self.appearance.finishes = {new(old): finish for old, finish in finishes.items()}
+        self.mark_changed(*self.objects.values())
 
     def children(self, item: SimObject) -> list[SimObject]:
         """Return what `item` contains directly."""
