@@ -5,7 +5,7 @@ from typing import Any
 
 from infthor_sim.actions.registry import Vector3, action
 from infthor_sim.actions.targets import check_in_frame, object_at
-from infthor_sim.errors import ActionError
+from infthor_sim.errors import ActionError, DataError, ErrorCode
 from infthor_sim.geometry import convex_hull, round_vector, to_array, to_xyz
 from infthor_sim.objects import SimObject
 from infthor_sim.pictures.cameras import map_camera
@@ -14,8 +14,16 @@ from infthor_sim.simulation import Simulation
 
 @action("GetScenesInBuild", query=True)
 def get_scenes_in_build(sim: Simulation) -> list[str]:
-    """Return no names, so that the client accepts every name: procedural ones are unlimited."""
-    return []
+    """Return the names of scenes; ai2thor's Controller refuses others, or takes one of them.
+
+    Raises:
+        ActionError: the recorded floor plans cannot be read. By its code the Controller takes it as
+            a build without this action, and goes on to Reset, which says so.
+    """
+    try:
+        return sim.catalogue.names()
+    except DataError as error:
+        raise ActionError(str(error), ErrorCode.INVALID_ARGUMENT) from error
 
 
 @action("GetShortestPath", "GetShortestPathToPoint", query=True)
