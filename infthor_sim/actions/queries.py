@@ -33,10 +33,19 @@ def get_shortest_path(
     objectType: str | None = None,
     position: Vector3 | None = None,
     target: Vector3 | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    z: float | None = None,
+    rotation: Vector3 | None = None,
     allowedError: float = 0.05,
 ) -> dict[str, Any]:
-    """Return the corners of a shortest way to the standing place nearest to an object or point."""
+    """Return the corners of a shortest way to the standing place nearest to an object or point.
+
+    The point is `target`, or `x`, `y`, `z`. The rotation at the start changes no way.
+    """
     world = sim.world
+    if x is not None and y is not None and z is not None:
+        target = Vector3(x=x, y=y, z=z)
     goal = _goal(sim, objectId, objectType, target)
     start = world.agent.position if position is None else to_array(position)
     path = world.nav.path((start[0], start[2]), world.nav.nearest(goal[0], goal[2]))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from ai2thor.util import metrics
 
 from .conftest import need_data
 
@@ -100,3 +101,16 @@ def test_same_seed_same_bytes(kitchen):
     again = kitchen.reset("kitchen-5")
     assert np.array_equal(first.frame, again.frame)
     assert first.metadata["objects"] == again.metadata["objects"]
+
+
+def test_the_shortest_ways_of_ai2thor_s_metrics(kitchen):
+    objects = kitchen.reset("kitchen-1").metadata["objects"]
+    start = kitchen.last_event.metadata["agent"]["position"]
+    turn = {"x": 0, "y": 90, "z": 0}
+    fridge = next(o for o in objects if o["objectType"] == "Fridge")
+    name, at = fridge["objectId"], fridge["axisAlignedBoundingBox"]["center"]
+    plain = metrics.get_shortest_path_to_object(kitchen, name, start)
+    assert len(plain) > 1
+    assert metrics.get_shortest_path_to_object(kitchen, name, start, turn) == plain
+    assert metrics.get_shortest_path_to_object_type(kitchen, "Fridge", start, turn) == plain
+    assert metrics.get_shortest_path_to_point(kitchen, start, at) == plain
