@@ -80,7 +80,6 @@ class World:
         hand: pose of the hand in the camera's frame; the held object keeps its place in it.
         arm: the agent's arm; None for an agent that holds things in front of its camera.
         disabled: objects that are out of the scene until they are enabled again, by id.
-        unbreakable: types of objects that no fall breaks.
         appearance: randomized looks.
         standing_height: height in metres of the agent's position on the floor.
     """
@@ -101,7 +100,6 @@ class World:
     hand: Grip = _HAND
     arm: Arm | None = None
     disabled: dict[str, SimObject] = field(default_factory=dict)
-    unbreakable: set[str] = field(default_factory=set)
     appearance: Appearance = field(default_factory=Appearance)
     standing_height: float = field(init=False)
 

@@ -315,6 +315,23 @@ def test_random_placement_keeps_what_an_arm_holds():
     bench.ok("ReleaseObject")
 
 
+@pytest.mark.parametrize("mode", ["default", "arm", "stretch"])
+def test_physics_actions_move_nothing(mode):
+    bench = Bench(size=20)
+    before = bench.reset("kitchen-1", agentMode=mode)["objects"]
+    for action, arguments in (
+        ("MakeObjectsStaticKinematicMassThreshold", {}),
+        ("PausePhysicsAutoSim", {}),
+        ("AdvancePhysicsStep", {"timeStep": 0.01, "simSeconds": 0.5, "allowAutoSimulation": True}),
+        ("UnpausePhysicsAutoSim", {}),
+        ("ChangeOpenSpeed", {"x": 10000.0}),
+        ("MakeObjectBreakable", {"objectId": bench.first("Mug")}),
+    ):
+        assert bench.ok(action, **arguments)["objects"] == before
+    assert "timeStep between" in bench.refused("AdvancePhysicsStep", timeStep=0.1)
+    bench.refused("MakeObjectBreakable", objectId="Mug|none")
+
+
 def test_a_pile_of_plates_is_carried_however_high_it_is(bench):
     world = bench.sim.world
     pile = [world.objects[bench.first("Plate")]]
