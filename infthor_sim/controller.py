@@ -73,6 +73,11 @@ class Controller(ai2thor.controller.Controller):
         """Folder of ai2thor's logs and releases: a temporary one."""
         return self._files.name
 
+    @property
+    def scenes_in_build(self) -> set[str]:
+        """No names, so that every scene is tried: there is no last procedural one."""
+        return set()
+
     def unity_command(self, width: int, height: int, headless: bool) -> list[str]:
         """Return the command line of the simulator's process."""
         # ai2thor takes one from CUDA_VISIBLE_DEVICES, and would run vulkaninfo to find it.

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from infthor_sim.arm.metadata import arm_metadata
-from infthor_sim.geometry import Array, corners, matrix_euler, round_vector, round_xyz
+from infthor_sim.geometry import Array, corners, euler_matrix, matrix_euler, round_vector, round_xyz
 from infthor_sim.objects import DOOR_SWING, SimObject
 from infthor_sim.physics.obstacles import door_leaf
-from infthor_sim.pictures.cameras import ThirdPartyCamera
+from infthor_sim.pictures.cameras import ThirdPartyCamera, map_camera
 from infthor_sim.simulation import Simulation
 from infthor_sim.world import World
 
@@ -130,7 +130,7 @@ def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
         "arm": None if world.arm is None else arm_metadata(world, world.arm),
         "fov": sim.settings.field_of_view,
         "cameraPosition": round_xyz(agent.camera_position()),
-        "cameraOrthSize": 0.0,
+        "cameraOrthSize": _orthographic_size(sim, outcome),
         "thirdPartyCameras": [
             third_party_metadata(index, camera) for index, camera in enumerate(sim.cameras)
         ],
@@ -145,9 +145,22 @@ def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
         "screenHeight": sim.display.height,
         "agentId": 0,
         "depthFormat": "Meters",
-        "currentTime": 0.0,
+        "currentTime": round(sim.time, 6),
         "sceneBounds": _box((low + high) / 2, high - low),
     }
+
+
+def _orthographic_size(sim: Simulation, outcome: Outcome) -> float:
+    """Return the agent camera's orthographic size, metres, as AI2-THOR reports it.
+
+    It is told once, in the reply to the action that switches to the map; other replies have -1, and
+    that to Reset 0.
+    """
+    if outcome.action == "ToggleMapView" and sim.display.map_view and not outcome.error:
+        size = map_camera(sim.world).orthographic_size
+        assert size is not None
+        return size
+    return 0.0 if outcome.action == "Reset" else -1.0
 
 
 def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]:
@@ -161,23 +174,25 @@ def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]
 
 
 def _hand_pose(world: World) -> dict[str, Any]:
-    """Return the hand's pose in the world and the camera's frame; zeros where nothing is held.
+    """Return the hand's pose in the world and the camera's frame; zeros for an arm.
 
-    AI2-THOR calls it the held object's, but it is the hand's: 0 in the camera's frame until the
-    hand is turned, however the object lies in it.
+    AI2-THOR calls it the held object's, but it is the hand's. An empty hand is level, as the
+    agent's body is, so the camera's frame has it turned back by the horizon. A full one is 0 in the
+    camera's frame until it is turned, however the object lies in it.
     """
-    if world.held is None:
+    if world.arm is not None:
         return dict.fromkeys(
             ("position", "rotation", "localPosition", "localRotation"), round_xyz(np.zeros(3))
         )
     agent = world.agent
     hand = world.hand
     camera = agent.camera_matrix()
+    turn = hand.turn if world.held is not None else euler_matrix((-agent.horizon, 0.0, 0.0))
     return {
         "position": round_xyz(agent.camera_position() + camera @ hand.offset),
-        "rotation": round_xyz(matrix_euler(camera @ hand.turn)),
+        "rotation": round_xyz(matrix_euler(camera @ turn)),
         "localPosition": round_xyz(hand.offset),
-        "localRotation": round_xyz(matrix_euler(hand.turn)),
+        "localRotation": round_xyz(matrix_euler(turn)),
     }
 
 

@@ -64,6 +64,7 @@ class SimObject:
         parent: id of the receptacle that contains it.
         controls: ids of the objects that its switch controls, as a knob its burner.
         contents: ids of the objects that it contains directly.
+        unbreakable: no fall breaks it.
         version: number of its last change, see `World.mark_changed`.
     """
 
@@ -85,6 +86,7 @@ class SimObject:
     controls: tuple[str, ...] = ()
     state: SimObjectState = field(default_factory=SimObjectState)
     contents: list[str] = field(default_factory=list)
+    unbreakable: bool = False
     version: int = 0
     _bounds: tuple[bytes, Array, Array] | None = field(default=None, init=False, repr=False)
 

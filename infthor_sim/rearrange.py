@@ -1,7 +1,7 @@
 """Rearranging a scene's loose objects, to recorded poses or at random."""
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.receptacles import find_parent
 from infthor_sim.world import World
 
-__all__ = ["NamedPose", "assign_parents", "set_poses", "spawn_randomly"]
+__all__ = ["NamedPose", "assign_parents", "ids_by_position", "set_poses", "spawn_randomly"]
 
 _SUNK = 0.2  # metres below a surface; what lies deeper is inside the furniture
 
@@ -51,7 +51,9 @@ def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = Fa
             if not keep_moveable:
                 world.set_pose(template, pose.position, pose.rotation)
             continue
-        item = template.duplicate(_unused_id(world, pose.name.split("_", 1)[0], pose.position))
+        item = template.duplicate(
+            _unused_id(world.objects, pose.name.split("_", 1)[0], pose.position)
+        )
         item.name, item.position, item.rotation = (
             pose.name,
             pose.position.copy(),
@@ -128,14 +130,30 @@ class _Templates:
         return self._chosen[name]
 
 
-def _unused_id(world: World, object_type: str, position: Array) -> str:
+def _unused_id(taken: Container[str], object_type: str, position: Array) -> str:
     base = object_id(object_type, position)
     number = 1
     unused = base
-    while unused in world.objects:
+    while unused in taken:
         unused = f"{base}|{number}"
         number = number + 1
     return unused
+
+
+def ids_by_position(world: World) -> dict[str, str]:
+    """Return the ids that AI2-THOR gives loose objects where they are now, by their present ids."""
+    # A slice keeps its id, whose number says how it is drawn.
+    loose = [o for o in world.objects.values() if o.type.pickupable and not _is_slice(o)]
+    taken = {*world.objects, *world.disabled}.difference(o.object_id for o in loose)
+    renamed = {}
+    for item in loose:
+        renamed[item.object_id] = _unused_id(taken, item.object_type, item.position)
+        taken.add(renamed[item.object_id])
+    return renamed
+
+
+def _is_slice(item: SimObject) -> bool:
+    return f"|{item.object_type}_" in item.object_id
 
 
 def spawn_randomly(

@@ -2,10 +2,18 @@
 
 from dataclasses import dataclass
 
-__all__ = ["AGENT_MODES", "ARM_MODES", "SMOOTH_LEVELS", "SMOOTH_QUALITIES", "SimulatorSettings"]
+__all__ = [
+    "AGENT_MODES",
+    "ARM_MODES",
+    "PHYSICS_STEP",
+    "SMOOTH_LEVELS",
+    "SMOOTH_QUALITIES",
+    "SimulatorSettings",
+]
 
 ARM_MODES = ("arm", "stretch")
 AGENT_MODES = ("default", *ARM_MODES)
+PHYSICS_STEP = 0.02  # seconds of one step of Unity's physics
 SMOOTH_QUALITIES = {"High": 5, "Very High": 6, "Ultra": 7, "High WebGL": 8}
 """The `quality` values whose pictures are anti-aliased, with the numbers that the Controller passes
 to the player."""

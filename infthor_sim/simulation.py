@@ -28,6 +28,7 @@ class Simulation:
         cameras: third-party cameras, by their ids.
         random: random numbers of the actions that draw some.
         object_filter: ids of the objects that replies list; None for all.
+        time: simulated seconds since the scene was loaded.
         failed_reset: why the last Reset loaded no scene. Initialize repeats it, as the client reads
             only its reply.
         world: the scene.
@@ -41,6 +42,7 @@ class Simulation:
     cameras: list[ThirdPartyCamera] = field(default_factory=list)
     random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
     object_filter: frozenset[str] | None = None
+    time: float = 0.0
     failed_reset: str = ""
     world: World = field(init=False)
     views: Views = field(init=False)
@@ -51,6 +53,7 @@ class Simulation:
 
     def load(self, world: World) -> None:
         """Make `world` the present scene; settings stay until the next Initialize."""
+        self.time = 0.0
         self.cameras.clear()
         self.object_filter = None
         self.random = np.random.default_rng(world.seed)

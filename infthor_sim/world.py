@@ -1,6 +1,6 @@
 """The state of one scene: its objects, its agent, and which object contains which."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -80,7 +80,6 @@ class World:
         hand: pose of the hand in the camera's frame; the held object keeps its place in it.
         arm: the agent's arm; None for an agent that holds things in front of its camera.
         disabled: objects that are out of the scene until they are enabled again, by id.
-        unbreakable: types of objects that no fall breaks.
         appearance: randomized looks.
         standing_height: height in metres of the agent's position on the floor.
     """
@@ -101,7 +100,6 @@ class World:
     hand: Grip = _HAND
     arm: Arm | None = None
     disabled: dict[str, SimObject] = field(default_factory=dict)
-    unbreakable: set[str] = field(default_factory=set)
     appearance: Appearance = field(default_factory=Appearance)
     standing_height: float = field(init=False)
 
@@ -142,7 +140,7 @@ class World:
             content.parent = None
             self.mark_changed(content)
         if self.held == item.object_id:
-            self.held = None
+            self._empty_hand()
         if self.arm is not None:
             self.arm.let_go(item.object_id)
             for content_id in item.contents:
@@ -166,6 +164,27 @@ class World:
             receptacle.contents.remove(item.object_id)
             item.parent = None
             self.mark_changed(item, receptacle)
+
+    def rename(self, new_ids: Mapping[str, str]) -> None:
+        """Give objects other ids (new by old), with all that names them; ids stay unique."""
+
+        def new(old: str) -> str:
+            return new_ids.get(old, old)
+
+        for item in self.objects.values():
+            item.object_id = new(item.object_id)
+            item.parent = None if item.parent is None else new(item.parent)
+            item.contents = [new(content) for content in item.contents]
+            item.controls = tuple(new(controlled) for controlled in item.controls)
+        self.objects = {item.object_id: item for item in self.objects.values()}
+        self.held = None if self.held is None else new(self.held)
+        if self.arm is not None:
+            self.arm.held = {new(old): grip for old, grip in self.arm.held.items()}
+            inside = self.arm.held_contents
+            self.arm.held_contents = {new(old): grip for old, grip in inside.items()}
+        finishes = self.appearance.finishes
+        self.appearance.finishes = {new(old): finish for old, finish in finishes.items()}
+        self.mark_changed(*self.objects.values())
 
     def children(self, item: SimObject) -> list[SimObject]:
         """Return what `item` contains directly."""
@@ -240,14 +259,17 @@ class World:
     def let_go(self, item: SimObject) -> None:
         """Let go of one object, if it is held, with its contents; it stays where it is."""
         if item.object_id == self.held:
-            self.held = self.grip = None
-            self.hand = _HAND
+            self._empty_hand()
         if self.arm is not None:
             for part in (item, *self.descendants(item)):
                 part.state.picked_up = part.state.picked_up and part.object_id not in self.arm.held
                 self.arm.let_go(part.object_id)
         item.state.picked_up = False
         self.mark_changed(item)
+
+    def _empty_hand(self) -> None:
+        self.held = self.grip = None
+        self.hand = _HAND
 
     def move_hand(self, hand: Grip) -> None:
         """Move the hand to a pose in the camera's frame, with what it holds."""

@@ -35,6 +35,7 @@ class SafeController(ai2thor.controller.Controller):
             SimulatorError: the simulator does not start.
         """
         self.server: SafeFifoServer | None = None
+        self._embedded = launch.label == "embedded"
         self._folder = None if launch.executable is None else ScratchFolder()
         try:
             super().__init__(
@@ -76,6 +77,14 @@ class SafeController(ai2thor.controller.Controller):
     def base_dir(self) -> str:
         """Folder of ai2thor's log and releases."""
         return super().base_dir if self._folder is None else str(self._folder.path)
+
+    @property
+    def scenes_in_build(self) -> set[str]:
+        """Scenes that can be loaded; none for all: the embedded simulator has no last one."""
+        if self._embedded:
+            return set()
+        listed: set[str] = super().scenes_in_build
+        return listed
 
     def reset(self, scene: str | dict[str, Any] | None = None, **init_params: Any) -> Any:
         """Load a scene as ai2thor's method does, but raise SimulatorError if the simulator

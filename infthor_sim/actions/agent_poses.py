@@ -1,15 +1,19 @@
 """Positions that the agent can reach, and poses from which it can interact with an object."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice, product
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from infthor_sim.actions.registry import Vector3, action
-from infthor_sim.agent import MAX_DOWN, MAX_UP
+from infthor_sim.agent import MAX_DOWN, MAX_UP, Agent
 from infthor_sim.errors import ActionError
-from infthor_sim.geometry import level_gaps, to_array
+from infthor_sim.geometry import Array, euler_matrix, level_gaps, to_array
 from infthor_sim.objects import SimObject
+from infthor_sim.render.probe import VisibilityProbe
 from infthor_sim.simulation import Simulation
 
 _FINEST = 0.01  # metres; finer grids have millions of points
@@ -63,28 +67,43 @@ def get_interactable_poses(
     near = [p for p in places if level_gaps(to_array(p)[[0, 2]], *item.bounds()) <= reach]
     if sim.world.is_hidden(item):
         return []
-    return list(islice(_seeing_poses(sim, item, product(near, tilts, turns, heights)), maxPoses))
+    return list(islice(_seeing_poses(sim, item, near, (tilts, turns, heights)), maxPoses))
 
 
 def _seeing_poses(
     sim: Simulation,
     item: SimObject,
-    poses: Iterable[tuple[Mapping[str, float], float, float, bool]],
+    places: Iterable[Mapping[str, float]],
+    angles: tuple[Sequence[float], Sequence[float], Sequence[bool]],
 ) -> Iterator[dict[str, Any]]:
-    """Yield those poses (position, horizon, rotation, standing) from which an object is seen."""
+    """Yield the poses (places by horizons, rotations, standings) from which an object is seen."""
+    tilts, turns, heights = angles
+    if not (tilts and turns and heights):
+        return
     probe = sim.vision.probe(item)
-    for position, tilt, turn, standing in poses:
-        if sim.vision.sees_from(
-            replace(
-                sim.world.agent,
-                position=to_array(position),
-                yaw=turn % 360.0,
-                horizon=tilt,
-                standing=standing,
-            ),
-            probe,
-        ):
-            yield {**position, "rotation": turn, "standing": standing, "horizon": tilt}
+    matrices = np.array(
+        [euler_matrix((tilt, turn % 360.0, 0.0)) for tilt, turn in product(tilts, turns)]
+    ).reshape(len(tilts), len(turns), 3, 3)
+    for place in places:
+        agent = replace(sim.world.agent, position=to_array(place))
+        seen = [_seen(sim, replace(agent, standing=h), turns, matrices, probe) for h in heights]
+        for (i, tilt), (j, turn), (k, standing) in product(*map(enumerate, angles)):
+            if seen[k][i, j]:
+                yield {**place, "rotation": turn, "standing": standing, "horizon": tilt}
+
+
+def _seen(
+    sim: Simulation, agent: Agent, turns: Sequence[float], matrices: Array, probe: VisibilityProbe
+) -> NDArray[np.bool_]:
+    """Return in which directions (tilts, turns) of (tilts, turns, 3, 3) the object is seen."""
+    if agent.eye[0] == agent.eye[2] == 0:  # turning does not move the camera
+        seen = sim.vision.sees_from(agent, matrices.reshape(-1, 3, 3), probe)
+        return seen.reshape(matrices.shape[:2])
+    columns = [
+        sim.vision.sees_from(replace(agent, yaw=turn % 360.0), matrices[:, index], probe)
+        for index, turn in enumerate(turns)
+    ]
+    return np.stack(columns, axis=1)
 
 
 def _range(first: float, last: float, step: float) -> list[float]:

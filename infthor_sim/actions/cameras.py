@@ -9,6 +9,7 @@ from infthor_sim.actions.registry import Vector3, action
 from infthor_sim.errors import ActionError
 from infthor_sim.geometry import Array, to_array
 from infthor_sim.pictures.cameras import ThirdPartyCamera
+from infthor_sim.render.camera import FAR, NEAR
 from infthor_sim.settings import SMOOTH_QUALITIES
 from infthor_sim.simulation import Simulation
 
@@ -39,12 +40,21 @@ def add_third_party_camera(
     orthographic: bool = False,
     orthographicSize: float = _DEFAULT_SIZE,
     skyboxColor: Any = None,
+    nearClippingPlane: float | None = None,
+    farClippingPlane: float | None = None,
+    antiAliasing: str = "none",
 ) -> None:
     """Add a camera; its frames come with every reply from now on."""
-    size = orthographicSize if orthographic else None
-    sim.cameras.append(
-        _camera(to_array(position or {}), to_array(rotation or {}), fieldOfView, size)
+    camera = ThirdPartyCamera(
+        to_array(position or {}),
+        to_array(rotation or {}),
+        float(fieldOfView),
+        orthographicSize if orthographic else None,
+        nearClippingPlane,
+        farClippingPlane,
     )
+    _check(camera)
+    sim.cameras.append(camera)
 
 
 @action("UpdateThirdPartyCamera")
@@ -57,17 +67,23 @@ def update_third_party_camera(
     skyboxColor: Any = None,
     orthographic: bool | None = None,
     orthographicSize: float | None = None,
+    nearClippingPlane: float | None = None,
+    farClippingPlane: float | None = None,
 ) -> None:
     """Move a third-party camera or change its lens; each component that is not passed stays."""
     if not 0 <= thirdPartyCameraId < len(sim.cameras):
         raise ActionError(f"There is no third party camera with id {thirdPartyCameraId}")
     old = sim.cameras[thirdPartyCameraId]
-    sim.cameras[thirdPartyCameraId] = _camera(
+    camera = ThirdPartyCamera(
         _update_vector(old.position, position),
         _update_vector(old.rotation, rotation),
-        old.field_of_view if fieldOfView is None else fieldOfView,
+        old.field_of_view if fieldOfView is None else float(fieldOfView),
         _update_size(old, orthographic, orthographicSize),
+        old.near if nearClippingPlane is None else nearClippingPlane,
+        old.far if farClippingPlane is None else farClippingPlane,
     )
+    _check(camera)
+    sim.cameras[thirdPartyCameraId] = camera
 
 
 def _update_vector(old: Array, new: Vector3 | None) -> Array:
@@ -91,9 +107,21 @@ def toggle_map_view(sim: Simulation) -> None:
     sim.display.map_view = not sim.display.map_view
 
 
-def _camera(position: Array, rotation: Array, angle: float, size: float | None) -> ThirdPartyCamera:
+def _check(camera: ThirdPartyCamera) -> None:
+    """Refuse a lens that draws nothing.
+
+    Raises:
+        ActionError: the camera has one.
+    """
+    size, angle = camera.orthographic_size, camera.field_of_view
     if size is not None and size <= 0:
         raise ActionError(f"orthographicSize must be positive, not {size}")
     if not 0 < angle < 180:
         raise ActionError(f"fieldOfView must be in (0, 180) noninclusive, not {angle}")
-    return ThirdPartyCamera(position, rotation, float(angle), size)
+    near = NEAR if camera.near is None else camera.near
+    far = FAR if camera.far is None else camera.far
+    if not 0 < near < far:
+        raise ActionError(
+            "clipping planes must be 0 < nearClippingPlane < farClippingPlane, not "
+            f"{near} and {far}"
+        )

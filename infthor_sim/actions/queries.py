@@ -5,7 +5,7 @@ from typing import Any
 
 from infthor_sim.actions.registry import Vector3, action
 from infthor_sim.actions.targets import check_in_frame, object_at
-from infthor_sim.errors import ActionError
+from infthor_sim.errors import ActionError, DataError, ErrorCode
 from infthor_sim.geometry import convex_hull, round_vector, to_array, to_xyz
 from infthor_sim.objects import SimObject
 from infthor_sim.pictures.cameras import map_camera
@@ -14,8 +14,16 @@ from infthor_sim.simulation import Simulation
 
 @action("GetScenesInBuild", query=True)
 def get_scenes_in_build(sim: Simulation) -> list[str]:
-    """Return no names, so that the client accepts every name: procedural ones are unlimited."""
-    return []
+    """Return the names of scenes; ai2thor's Controller refuses others, or takes one of them.
+
+    Raises:
+        ActionError: the recorded floor plans cannot be read. By its code the Controller takes it as
+            a build without this action, and goes on to Reset, which says so.
+    """
+    try:
+        return sim.catalogue.names()
+    except DataError as error:
+        raise ActionError(str(error), ErrorCode.INVALID_ARGUMENT) from error
 
 
 @action("GetShortestPath", "GetShortestPathToPoint", query=True)
@@ -25,10 +33,19 @@ def get_shortest_path(
     objectType: str | None = None,
     position: Vector3 | None = None,
     target: Vector3 | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    z: float | None = None,
+    rotation: Vector3 | None = None,
     allowedError: float = 0.05,
 ) -> dict[str, Any]:
-    """Return the corners of a shortest way to the standing place nearest to an object or point."""
+    """Return the corners of a shortest way to the standing place nearest to an object or point.
+
+    The point is `target`, or `x`, `y`, `z`. The rotation at the start changes no way.
+    """
     world = sim.world
+    if x is not None and y is not None and z is not None:
+        target = Vector3(x=x, y=y, z=z)
     goal = _goal(sim, objectId, objectType, target)
     start = world.agent.position if position is None else to_array(position)
     path = world.nav.path((start[0], start[2]), world.nav.nearest(goal[0], goal[2]))

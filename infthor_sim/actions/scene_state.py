@@ -11,7 +11,7 @@ from infthor_sim.actions.interaction import set_openness
 from infthor_sim.actions.registry import action, is_vector
 from infthor_sim.errors import ActionError, UsageError
 from infthor_sim.geometry import to_array
-from infthor_sim.rearrange import NamedPose, set_poses, spawn_randomly
+from infthor_sim.rearrange import NamedPose, ids_by_position, set_poses, spawn_randomly
 from infthor_sim.simulation import Simulation
 
 # Poses that SetObjectPoses takes; real scenes have up to 60. The variable raises the limit.
@@ -180,6 +180,7 @@ def initial_random_spawn(
 ) -> None:
     """Spread the pickupable objects over the receptacles, the same way for the same seed.
 
+    Loose objects get ids by their new positions, moved or not, as AI2-THOR sets up its scene anew.
     Without `randomSeed` it continues the random numbers that SetRandomSeed started.
     """
     if numDuplicatesOfType:
@@ -193,6 +194,10 @@ def initial_random_spawn(
         kept=frozenset(excludedObjectIds or ()),
         in_open_only=forceVisible,
     )
+    new_ids = ids_by_position(sim.world)
+    sim.world.rename(new_ids)
+    if sim.object_filter is not None:  # which goes on to list the same objects
+        sim.object_filter = frozenset(new_ids.get(old, old) for old in sim.object_filter)
 
 
 @action("SetRandomSeed")

@@ -49,7 +49,7 @@ def let_fall(world: World, item: SimObject, point: Array) -> None:
     world.detach(item)
     if landing.parent is not None:
         world.attach(item, landing.parent)
-    breakable = item.type.breakable and item.object_type not in world.unbreakable
+    breakable = item.type.breakable and not item.unbreakable
     if breakable and not item.state.broken and fall > _BREAKING:
         break_object(world, item)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from infthor_sim.agent import Agent
 from infthor_sim.geometry import Array, euler_matrix
-from infthor_sim.render.camera import FAR, PinholeCamera
+from infthor_sim.render.camera import FAR, NEAR, PinholeCamera
 from infthor_sim.world import World
 
 __all__ = ["ThirdPartyCamera", "agent_camera", "map_camera", "pinhole_camera"]
@@ -24,12 +24,16 @@ class ThirdPartyCamera:
         field_of_view: vertical, degrees.
         orthographic_size: metres from the middle of an orthographic picture to its upper edge; None
             for perspective.
+        near, far: depths of the clipping planes, metres; None for the agent's far one, and the
+            agent's near one in perspective or the camera itself.
     """
 
     position: Array
     rotation: Array
     field_of_view: float = 90.0
     orthographic_size: float | None = None
+    near: float | None = None
+    far: float | None = None
 
 
 def map_camera(world: World) -> ThirdPartyCamera:
@@ -53,11 +57,15 @@ def agent_camera(agent: Agent, field_of_view: float, width: int, height: int) ->
 def pinhole_camera(camera: ThirdPartyCamera, width: int, height: int) -> PinholeCamera:
     """Return the pinhole camera that draws what a third-party camera sees."""
     matrix = euler_matrix(camera.rotation)
+    far = FAR if camera.far is None else camera.far
     if camera.orthographic_size is None:
-        return PinholeCamera(camera.position, matrix, camera.field_of_view, width, height)
+        near = NEAR if camera.near is None else camera.near
+        angle = camera.field_of_view
+        return PinholeCamera(camera.position, matrix, angle, width, height, near, far)
     # The ray caster has no parallel rays. A long lens from far away differs from them by less than
     # a pixel.
     away = camera.orthographic_size * 40.0
     angle = float(np.degrees(2 * np.arctan(camera.orthographic_size / away)))
     eye = camera.position - matrix[:, 2] * away
-    return PinholeCamera(eye, matrix, angle, width, height, near=away, far=away + FAR)
+    near = away if camera.near is None else away + camera.near
+    return PinholeCamera(eye, matrix, angle, width, height, near, away + far)

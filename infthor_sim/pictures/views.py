@@ -17,6 +17,7 @@ from infthor_sim.render.picture import (
     colour_picture,
     compiled_rasterizer,
 )
+from infthor_sim.render.primitives import CENTER, HALF, INSTANCE
 from infthor_sim.render.scene import SceneModel
 from infthor_sim.settings import SimulatorSettings
 from infthor_sim.world import World
@@ -121,8 +122,12 @@ class Views:
         """Return what a third-party camera sees."""
         held, names = self._list_held()
         pinhole = pinhole_camera(camera, self._display.width, self._display.height)
+        rows = self.primitives()[0]
+        # Unity's ceilings have no upper side, so that a camera above them sees into the rooms.
+        lower = rows[:, CENTER + 1] - rows[:, HALF + 1]
+        hidden = (rows[:, INSTANCE] == names.index("Ceiling")) & (lower < camera.position[1])
         return cast_picture(
-            np.concatenate([self.primitives()[0], held]), names, pinhole, self._display.rasterizer
+            np.concatenate([rows[~hidden], held]), names, pinhole, self._display.rasterizer
         )
 
     def colours(self, picture: Picture) -> NDArray[np.uint8]:

@@ -99,16 +99,16 @@ class AgentVision:
         rows, _, names = self._views.primitives()
         return VisibilityProbe(rows, names.index(item.object_id), self._display.rasterizer)
 
-    def sees_from(self, agent: Agent, probe: VisibilityProbe) -> bool:
-        """Return whether the agent would see the probe's object well in a pose, at any distance.
+    def sees_from(self, agent: Agent, matrices: Array, probe: VisibilityProbe) -> NDArray[np.bool_]:
+        """Return in which directions (n, 3, 3) of its camera the agent would see an object well.
 
-        A sliver at the edge of the frame does not count: AI2-THOR looks for points inside an
-        object's outline.
+        At any distance. A sliver at the edge of the frame does not count: AI2-THOR looks for points
+        inside an object's outline.
         """
         slope = _POSE_FRAME * np.tan(np.radians(self.settings.field_of_view) / 2)
         field_of_view = float(np.degrees(2 * np.arctan(slope)))
         camera = agent_camera(agent, field_of_view, self._display.width, self._display.height)
-        return probe.is_seen_by(camera, _least_pixels(camera))
+        return probe.seen_by(camera, matrices, _least_pixels(camera))
 
     def point_at(self, x: float, y: float) -> Array | None:
         """Return the point (3,) at (x, y), shares of the frame from its bottom left, or None."""

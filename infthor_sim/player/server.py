@@ -14,6 +14,7 @@ from infthor_sim.player.fifo import FieldType, FifoPipes
 from infthor_sim.player.packing import MetadataPacker
 from infthor_sim.render.normals import normal_image
 from infthor_sim.render.picture import Picture
+from infthor_sim.settings import PHYSICS_STEP
 from infthor_sim.simulation import Simulation
 
 __all__ = ["SimulatorServer"]
@@ -70,8 +71,10 @@ class SimulatorServer:
             value = action.run(self._sim, **arguments)
             if not action.query:
                 apply_sources(self._sim.world)
+                self._sim.time += PHYSICS_STEP
             return Outcome(name, value=value), action.query
         except ActionError as error:
+            self._sim.time += PHYSICS_STEP
             return Outcome(name, error.message, str(error.code)), False
 
     def _reply(self, outcome: Outcome, sequence: int, message: Mapping[str, Any]) -> Frames:

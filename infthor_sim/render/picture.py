@@ -20,7 +20,7 @@ Creases = Callable[[Array], Array]
 Shade = Callable[
     [Array, Projection, PinholeCamera, Array, NDArray[np.int32], Array, Lights], Pixels
 ]
-IsVisible = Callable[[Array, Projection, PinholeCamera, NDArray[np.bool_], int], bool]
+Sees = Callable[[Array, NDArray[np.bool_], PinholeCamera, Array, int], NDArray[np.bool_]]
 Smooth = Callable[
     [Array, Projection, PinholeCamera, NDArray[np.int32], Array, Lights, Pixels], None
 ]
@@ -35,14 +35,15 @@ class Rasterizer:
         creases: function that returns factors of brightness from the depth.
         shade: function that returns the colours of cast pixels.
         smooth: function that smooths jagged pixels of an RGB picture in place.
-        is_visible: function that returns whether enough pixels show some of the primitives.
+        sees: function that returns in which directions of a camera enough pixels show some of the
+            primitives.
     """
 
     cast: Cast
     creases: Creases
     shade: Shade
     smooth: Smooth
-    is_visible: IsVisible
+    sees: Sees
 
 
 @dataclass(frozen=True)
@@ -72,12 +73,12 @@ def compiled_rasterizer() -> Rasterizer:
     """Return the rasterizer compiled by numba."""
     drop_stale_kernels()  # before the imports, which load cached kernels
     from infthor_sim.render.creases_numba import crease_factors
-    from infthor_sim.render.probe_numba import is_visible
+    from infthor_sim.render.probe_numba import sees
     from infthor_sim.render.raster_numba import cast
     from infthor_sim.render.shading_numba import shade
     from infthor_sim.render.smoothing_numba import smooth
 
-    return Rasterizer(cast, crease_factors, shade, smooth, is_visible)
+    return Rasterizer(cast, crease_factors, shade, smooth, sees)
 
 
 def cast_picture(

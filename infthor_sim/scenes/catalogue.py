@@ -18,7 +18,9 @@ from infthor_sim.world import RoomShell, World
 
 __all__ = ["Catalogue"]
 
+_LISTED = 1000  # procedural scenes of each kind that `names` has; there is no last one
 _PROCEDURAL = re.compile(r"([a-z-]+)-(\d+)")
+_ITHOR = re.compile(r"FloorPlan\d+")
 _FLOOR_PLAN = re.compile(r"FloorPlan(_[A-Za-z0-9_]+|\d+)")
 # What a floor plan whose fields are missing or of other types raises.
 _MALFORMED = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
@@ -55,6 +57,19 @@ class Catalogue:
             return build_scene(procedural[1], int(procedural[2]))
         names = ", ".join(f"{scene_type}-<seed>" for scene_type in SCENE_TYPES)
         raise DataError(f"Scene {name!r} is unknown; use {names}, or FloorPlan<N> with --data")
+
+    def names(self) -> list[str]:
+        """Return names as AI2-THOR has them: recorded floor plans, the first procedural scenes.
+
+        Raises:
+            DataError: the recorded floor plans cannot be read.
+        """
+        recorded = [] if self._data is None else self._data.scenes()
+        return [
+            *(f"{name}_physics" if _ITHOR.fullmatch(name) else name for name in recorded),
+            *(f"{kind}-{seed}" for kind in SCENE_TYPES for seed in range(1, _LISTED + 1)),
+            "Procedural",
+        ]
 
     def empty(self) -> World:
         """Return a bare room, the state before the first Reset and before CreateHouse."""

@@ -43,6 +43,14 @@ class FloorPlanData:
         self._root = root
         self._lines: dict[str, str] | None = None
 
+    def scenes(self) -> list[str]:
+        """Return the names of the floor plans, in the order of the file.
+
+        Raises:
+            DataError: the file cannot be read.
+        """
+        return list(self._index())
+
     def objects(self, scene: str) -> list[dict[str, Any]]:
         """Return the metadata of every object of a floor plan.
 

@@ -101,6 +101,40 @@ def test_a_camera_becomes_orthographic_and_back(kitchen):
     assert np.array_equal(seen(orthographic=False), plain)
 
 
+def test_the_usual_view_from_above_looks_into_the_rooms(kitchen):
+    """The recipe of ProcTHOR's scripts, and the same without the lines about perspective."""
+    event = kitchen.reset("kitchen-1")
+    pose = kitchen.step("GetMapViewCameraProperties").metadata["actionReturn"]
+    bounds = event.metadata["sceneBounds"]["size"]
+    high = {**pose["position"], "y": pose["position"]["y"] + 1.1 * max(bounds["x"], bounds["z"])}
+    lens = {"position": high, "rotation": pose["rotation"], "farClippingPlane": 50}
+    flat = {key: pose[key] for key in ("orthographic", "orthographicSize")}
+    perspective = {"fieldOfView": 50, "orthographic": False}
+    for extra in (perspective, flat):
+        event = kitchen.step("AddThirdPartyCamera", **lens, **extra, skyboxColor="white",
+                             raise_for_failure=True)  # fmt: skip
+        seen = event.third_party_instance_masks[-1]
+        assert {name.split("|")[0] for name in seen} >= {"CounterTop", "Fridge", "Floor"}
+        assert "Ceiling" not in seen
+
+
+def test_clipping_planes_cut_the_picture(kitchen):
+    kitchen.reset("kitchen-1")
+    above = {"position": {"x": 0, "y": 2.5, "z": 0}, "rotation": {"x": 90, "y": 0, "z": 0}}
+
+    def depth(event):
+        return event.third_party_depth_frames[0]
+
+    usual = depth(kitchen.step("AddThirdPartyCamera", **above, antiAliasing="fxaa"))
+    near = depth(kitchen.step("UpdateThirdPartyCamera", nearClippingPlane=2.0))
+    assert usual.min() < 2 <= near.min()
+    far = depth(kitchen.step("UpdateThirdPartyCamera", nearClippingPlane=0.1, farClippingPlane=2.0))
+    assert np.array_equal(far < 2, usual < 2)
+    for wrong in ({"nearClippingPlane": 0}, {"nearClippingPlane": 3}, {"farClippingPlane": 0.05}):
+        refused = kitchen.step("UpdateThirdPartyCamera", **wrong)
+        assert "clipping planes must be" in refused.metadata["errorMessage"]
+
+
 def test_normals_face_the_camera(kitchen):
     kitchen.reset("kitchen-1", renderNormalsImage=True)
     kitchen.step("RotateLook", rotation=0, horizon=0)

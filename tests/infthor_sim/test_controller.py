@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+from ai2thor.util import metrics
+
+from .conftest import need_data
 
 
 def test_first_state_has_frame_depth_and_ids(kitchen):
@@ -53,9 +56,36 @@ def test_look_limits(kitchen):
     assert refused.metadata["agent"]["cameraHorizon"] == 60
 
 
-def test_unknown_scene_is_one_clear_error(launch):
+def test_unknown_scene_is_one_clear_error(kitchen):
+    """ai2thor's Controller refuses what is not listed; what it lets through, the simulator does."""
+    with pytest.raises(ValueError, match="'FloorPlan1_physics' not contained in build"):
+        kitchen.reset("FloorPlan1")
+    kitchen._scenes_in_build = set()
     with pytest.raises(RuntimeError, match="FloorPlan1 needs recorded data"):
-        launch("FloorPlan1")
+        kitchen.reset("FloorPlan1")
+    kitchen._scenes_in_build = None
+
+
+def test_a_controller_starts_without_a_scene(launch):
+    controller = launch(None)
+    assert controller.last_event.metadata["lastActionSuccess"]
+    assert {"kitchen-1", "bathroom-1000", "house-1"} < controller.scenes_in_build
+    assert controller.reset("kitchen-1").metadata["sceneName"] == "kitchen-1"
+
+
+def test_a_controller_with_data_starts_in_a_floor_plan(launch):
+    controller = launch(None, "--data", str(need_data()))
+    assert controller.scene == "FloorPlan11_physics"
+    assert len(controller.last_event.metadata["objects"]) > 30
+    recorded = {name for name in controller.scenes_in_build if name.startswith("FloorPlan")}
+    assert len(recorded) == 116
+
+
+def test_damaged_data_are_named_when_a_scene_is_loaded(launch, tmp_path):
+    (tmp_path / "thor_scenes").mkdir()
+    (tmp_path / "thor_scenes" / "objects.jsonl.gz").write_bytes(b"no archive")
+    with pytest.raises(RuntimeError, match=r"objects.jsonl.gz: cannot be read"):
+        launch("FloorPlan1", "--data", str(tmp_path))
 
 
 def test_the_quality_of_the_controller_decides_on_smooth_edges(launch, kitchen):
@@ -71,3 +101,16 @@ def test_same_seed_same_bytes(kitchen):
     again = kitchen.reset("kitchen-5")
     assert np.array_equal(first.frame, again.frame)
     assert first.metadata["objects"] == again.metadata["objects"]
+
+
+def test_the_shortest_ways_of_ai2thor_s_metrics(kitchen):
+    objects = kitchen.reset("kitchen-1").metadata["objects"]
+    start = kitchen.last_event.metadata["agent"]["position"]
+    turn = {"x": 0, "y": 90, "z": 0}
+    fridge = next(o for o in objects if o["objectType"] == "Fridge")
+    name, at = fridge["objectId"], fridge["axisAlignedBoundingBox"]["center"]
+    plain = metrics.get_shortest_path_to_object(kitchen, name, start)
+    assert len(plain) > 1
+    assert metrics.get_shortest_path_to_object(kitchen, name, start, turn) == plain
+    assert metrics.get_shortest_path_to_object_type(kitchen, "Fridge", start, turn) == plain
+    assert metrics.get_shortest_path_to_point(kitchen, start, at) == plain

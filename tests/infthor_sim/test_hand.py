@@ -20,14 +20,42 @@ def change(bench: Bench, before: dict, pose: str) -> list[float]:
     return [now[axis] - before[pose][axis] for axis in "xyz"]
 
 
-def test_the_pose_is_there_with_and_without_an_object(bench):
+def test_the_pose_of_a_full_hand(bench):
     held = bench.metadata["heldObjectPose"]
     assert bench.metadata["hand"] == held
     assert held["localRotation"] == {"x": 0, "y": 0, "z": 0}
-    assert held["localPosition"]["z"] > 0.2
+    assert held["localPosition"] == {"x": 0, "y": -0.16, "z": 0.38}
+
+
+@pytest.mark.parametrize("horizon", [0, 30, -30])
+def test_an_empty_hand_is_level_where_a_full_one_rests(bench, horizon):
+    bench.ok("RotateLook", rotation={"y": 90}, horizon=horizon)
+    full = bench.metadata["heldObjectPose"]
+    bench.ok("MoveHeldObject", ahead=0.1, forceVisible=True)
     bench.ok("DropHeldObject")
-    nothing = {"x": 0, "y": 0, "z": 0}
-    assert bench.metadata["heldObjectPose"] == dict.fromkeys(held, nothing)
+    empty = bench.metadata["heldObjectPose"]
+    assert bench.metadata["hand"] == empty
+    assert empty["localRotation"] == {"x": -horizon % 360, "y": 0, "z": 0}
+    assert empty["rotation"] == {"x": 0, "y": 90, "z": 0}
+    for pose in ("position", "localPosition"):
+        assert empty[pose] == full[pose]
+
+
+def test_an_object_can_be_teleported_from_the_hand_and_picked_up_again(bench):
+    """As scripts of rearrangement do, which check that the empty hand is where it usually is."""
+    bottle = bench.metadata["inventoryObjects"][0]["objectId"]
+    pose = {"position": {"x": 0, "y": 1.5, "z": 0}, "rotation": {"x": 0, "y": 0, "z": 0}}
+    bench.ok("TeleportObject", objectId=bottle, **pose, forceAction=True, forceKinematic=True,
+             allowTeleportOutOfHand=True)  # fmt: skip
+    assert bench.metadata["inventoryObjects"] == []
+    assert bench.metadata["hand"]["localPosition"] == {"x": 0, "y": -0.16, "z": 0.38}
+    bench.ok("PickupObject", objectId=bottle, forceAction=True)
+
+
+def test_the_hand_of_an_arm_agent_is_zero():
+    bench = Bench(size=20)
+    pose = bench.reset("kitchen-1", agentMode="arm")["heldObjectPose"]
+    assert pose == {part: {"x": 0, "y": 0, "z": 0} for part in pose}
 
 
 @pytest.mark.parametrize(

@@ -108,6 +108,31 @@ def test_open_object_takes_the_old_name_of_openness():
         )
 
 
+def test_time_passes_with_actions():
+    bench = Bench(size=20)
+    start = bench.reset("kitchen-1")["currentTime"]
+    assert start == 0.04  # Reset and Initialize
+    assert bench.ok("GetReachablePositions")["currentTime"] == start
+    assert bench.ok("Pass")["currentTime"] == 0.06
+    bench.refused("PickupObject", objectId="Mug|none")
+    assert bench.metadata["currentTime"] == 0.08
+    for _ in range(50):
+        bench.ok("RotateRight")
+    assert bench.metadata["currentTime"] == 1.08
+    assert bench.reset("kitchen-1")["currentTime"] == start
+
+
+def test_the_size_of_the_map_is_told_once():
+    bench = Bench(size=20)
+    assert bench.ok("Reset", sceneName="kitchen-1")["cameraOrthSize"] == 0
+    assert bench.ok("Initialize", fastActionEmit=False)["cameraOrthSize"] == -1
+    size = bench.ok("GetMapViewCameraProperties")["actionReturn"]["orthographicSize"]
+    assert bench.metadata["cameraOrthSize"] == -1
+    assert bench.ok("ToggleMapView")["cameraOrthSize"] == size
+    assert bench.ok("Pass")["cameraOrthSize"] == -1
+    assert bench.ok("ToggleMapView")["cameraOrthSize"] == -1
+
+
 def test_old_keys_are_there_and_empty(kitchen):
     metadata = kitchen.reset("kitchen-1").metadata
     assert metadata["actionIntReturn"] == metadata["actionFloatReturn"] == 0

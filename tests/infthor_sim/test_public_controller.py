@@ -117,6 +117,11 @@ def test_a_refused_scene_ends_the_process(scene, monkeypatch):
     assert started[0].poll() is not None
 
 
+def test_there_is_no_last_procedural_scene():
+    with Controller(scene="bathroom-1234567", width=20, height=20) as controller:
+        assert controller.last_event.metadata["sceneName"] == "bathroom-1234567"
+
+
 def test_a_process_that_cannot_start_is_one_line(monkeypatch):
     monkeypatch.setattr(
         "infthor_sim.controller.player_command",

@@ -4,7 +4,11 @@ import itertools
 
 import pytest
 
+from infthor_sim.arm.holding import pick_up
+from infthor_sim.geometry import object_id
+
 from .harness import Bench
+from .test_invariants import consistent
 
 
 @pytest.fixture
@@ -271,6 +275,61 @@ def test_random_placement_follows_its_seed(bench):
         drawn.append(places())
     assert drawn[0] == drawn[1]
     assert drawn[0] != third
+
+
+def test_random_placement_gives_ids_by_the_new_positions(bench):
+    bench.ok("PickupObject", objectId=bench.first("Egg"), forceAction=True)
+    bench.ok("RandomizeColors")
+    looks = bench.sim.world.appearance
+    before = [(o["name"], o["objectId"]) for o in bench.metadata["objects"]]
+    finishes = {name: looks.finishes[old] for name, old in before}
+    bench.ok("SetObjectFilter", objectIds=[bench.first("SoapBottle")])
+
+    only = bench.ok("InitialRandomSpawn", randomSeed=3)["objects"]
+    assert [o["objectType"] for o in only] == ["SoapBottle"]
+    metadata = bench.ok("ResetObjectFilter")
+    consistent(metadata)
+    assert [o["name"] for o in metadata["objects"]] == [name for name, _ in before]
+    old = dict(before)
+    for item in metadata["objects"]:
+        at = bench.sim.world.objects[item["objectId"]].position
+        if item["pickupable"]:
+            assert item["objectId"].startswith(object_id(item["objectType"], at))
+        else:
+            assert item["objectId"] == old[item["name"]]
+        assert looks.finishes[item["objectId"]] is finishes[item["name"]]
+    assert sum(o["objectId"] != old[o["name"]] for o in metadata["objects"]) > 10
+    assert metadata["inventoryObjects"][0]["objectId"] == bench.sim.world.held
+    bench.ok("DropHeldObject")
+
+
+def test_random_placement_keeps_what_an_arm_holds():
+    bench = Bench(size=20)
+    bench.reset("kitchen-9", agentMode="arm")
+    world = bench.sim.world
+    bowl = next(o for o in world.objects.values() if o.object_type == "Bowl")
+    pick_up(world, world.arm, [bowl])
+    bench.ok("InitialRandomSpawn", randomSeed=1)
+    assert bench.metadata["arm"]["heldObjects"] == [bowl.object_id]
+    assert world.objects[bowl.object_id] is bowl
+    bench.ok("ReleaseObject")
+
+
+@pytest.mark.parametrize("mode", ["default", "arm", "stretch"])
+def test_physics_actions_move_nothing(mode):
+    bench = Bench(size=20)
+    before = bench.reset("kitchen-1", agentMode=mode)["objects"]
+    for action, arguments in (
+        ("MakeObjectsStaticKinematicMassThreshold", {}),
+        ("PausePhysicsAutoSim", {}),
+        ("AdvancePhysicsStep", {"timeStep": 0.01, "simSeconds": 0.5, "allowAutoSimulation": True}),
+        ("UnpausePhysicsAutoSim", {}),
+        ("ChangeOpenSpeed", {"x": 10000.0}),
+        ("MakeObjectBreakable", {"objectId": bench.first("Mug")}),
+    ):
+        assert bench.ok(action, **arguments)["objects"] == before
+    assert "timeStep between" in bench.refused("AdvancePhysicsStep", timeStep=0.1)
+    bench.refused("MakeObjectBreakable", objectId="Mug|none")
 
 
 def test_a_pile_of_plates_is_carried_however_high_it_is(bench):

@@ -5,11 +5,11 @@ Every formula has the order of operations of its counterpart in `infthor_sim.ren
 
 from infthor_sim.render.picture import Rasterizer
 
-from .probe import is_visible
+from .probe import sees
 from .raster import cast
 from .shading import crease_factors, shade
 from .smoothing import smooth
 
 __all__ = ["NUMPY"]
 
-NUMPY = Rasterizer(cast, crease_factors, shade, smooth, is_visible)
+NUMPY = Rasterizer(cast, crease_factors, shade, smooth, sees)

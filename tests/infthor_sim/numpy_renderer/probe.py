@@ -1,4 +1,4 @@
-"""Whether an object is visible, in numpy; the same answer as `probe_numba`."""
+"""Whether an object is visible, in numpy; the same answers as `probe_numba`."""
 
 from dataclasses import replace
 
@@ -6,14 +6,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infthor_sim.geometry import Array
-from infthor_sim.render.camera import PinholeCamera, Projection
+from infthor_sim.render.camera import PinholeCamera, Projection, project
 
 from .raster import cast, hit
 
-__all__ = ["is_visible"]
+__all__ = ["sees"]
 
 
-def is_visible(
+def sees(
+    prims: Array,
+    own: NDArray[np.bool_],
+    camera: PinholeCamera,
+    matrices: Array,
+    min_pixels: int,
+) -> NDArray[np.bool_]:
+    """Return in which directions at least `min_pixels` pixels show a primitive marked in `own`."""
+    seen = np.zeros(len(matrices), dtype=bool)
+    for index, matrix in enumerate(matrices):
+        turned = replace(camera, matrix=matrix)
+        projection = project(prims, turned)
+        mine = own[projection.index]
+        seen[index] = mine.any() and _is_visible(prims, projection, turned, mine, min_pixels)
+    return seen
+
+
+def _is_visible(
     prims: Array,
     projection: Projection,
     camera: PinholeCamera,
