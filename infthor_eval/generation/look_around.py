@@ -1,13 +1,13 @@
 """Looking around: in long walks the camera is level, so that frames show rooms and not floors.
 
 The generator that the authors published in July 2026 has this as an option, and a script does it to
-trajectories that exist. The camera is raised after the first action of a walk's stretch and lowered
-again before the next interaction, which so has the horizon that the planner chose. With an object
-in the hand nothing is inserted: it moves with the camera, and can hit walls. Insertions are equal
-to the published function's; the code is our own.
+trajectories that exist. The camera is raised before a long stretch of moves and turns, and lowered
+again after it, so that each interaction has the horizon that the planner chose. With an object in
+the hand nothing is inserted: it moves with the camera, and can hit walls. Insertions are equal to
+the published function's.
 
-To change where the camera is raised: `level_walks` here; `tests/goldens/look_around.jsonl.gz` has
-the published insertions.
+To add or change where the camera is raised: `level_walks` here; what the published function does is
+in `tests/goldens/look_around.jsonl.gz`.
 """
 
 from collections.abc import Callable, Sequence
@@ -44,12 +44,12 @@ class LevelWalk(NamedTuple):
     Attributes:
         first: index of its first action, before which the camera is raised.
         end: index of the action after it, before which the camera is lowered.
-        count: number of LookUp actions, and of LookDown actions.
+        n_looks: number of LookUp actions, and of LookDown actions.
     """
 
     first: int
     end: int
-    count: int
+    n_looks: int
 
 
 def level_walks(
@@ -72,7 +72,7 @@ def level_walks(
         holds = _IN_HAND.get(name, holds)
         walk = LevelWalk(index + 1, _end_of_stretch(names, index + 1), int(horizon // HORIZON_STEP))
         is_long = walk.end - walk.first >= min_run
-        if is_long and walk.end < len(names) and 1 <= walk.count <= _MAX_LOOKS and not holds:
+        if is_long and walk.end < len(names) and 1 <= walk.n_looks <= _MAX_LOOKS and not holds:
             walks.append(walk)
     return walks
 
@@ -99,16 +99,16 @@ def with_looks(
     done = 0
     for walk in walks:
         result += actions[done : walk.first]
-        result += (look("LookUp", walk) for _ in range(walk.count))
+        result += (look("LookUp", walk) for _ in range(walk.n_looks))
         result += actions[walk.first : walk.end]
-        result += (look("LookDown", walk) for _ in range(walk.count))
+        result += (look("LookDown", walk) for _ in range(walk.n_looks))
         done = walk.end
     return [*result, *actions[done:]]
 
 
 def inserted_before(walks: Sequence[LevelWalk], index: int) -> int:
     """Return how many actions are inserted before the original action of this index."""
-    return sum(walk.count * ((index >= walk.first) + (index >= walk.end)) for walk in walks)
+    return sum(walk.n_looks * ((index >= walk.first) + (index >= walk.end)) for walk in walks)
 
 
 def look_around(trace: Trace, start: SimulatorMark) -> None:

@@ -108,7 +108,7 @@ def test_walks_are_long_and_level_and_with_an_empty_hand(names, horizon):
         assert walk.end - walk.first >= MIN_RUN
         assert set(names[walk.first : walk.end]) <= set(WALKING)
         before = names[: walk.first]
-        assert 0 <= poses(before, horizon)[-1] - 30 * walk.count < 30
+        assert 0 <= poses(before, horizon)[-1] - 30 * walk.n_looks < 30
         hands = [name for name in before if name in ("PickupObject", "PutObject")]
         assert hands[-1:] != ["PickupObject"]
 
