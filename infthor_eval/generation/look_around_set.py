@@ -135,8 +135,9 @@ def add_look_around(document: dict[str, Any], place: str, min_run: int = MIN_RUN
         action["low_idx"] = index
     document["plan"]["low_actions"] = changed
     n_inserted = len(changed) - len(actions)
-    info = document.setdefault("gen_info", {})
-    info["look_around_retrofit"] = {"added": n_inserted, "min_run": min_run}
+    if document.get("gen_info") is None:
+        document["gen_info"] = {}
+    document["gen_info"]["look_around_retrofit"] = {"added": n_inserted, "min_run": min_run}
     return n_inserted
 
 

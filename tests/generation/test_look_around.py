@@ -192,6 +192,24 @@ def test_what_is_no_trajectory_is_refused_in_one_line(run, tmp_path, name, said)
     assert err.count("\n") == 1
 
 
+def test_a_file_that_cannot_be_written_is_told(run, tmp_path):
+    file = tmp_path / "given.json"
+    file.write_text(goldens("look_around_files.jsonl.gz")[1]["given"])
+    for out, said in ((tmp_path, "not a file"), (file / "x", "cannot be written to")):
+        code, _, err = run("look-around", file, out)
+        assert code == 2
+        assert said in err
+        assert "another place with OUT" in err
+
+
+def test_what_a_file_tells_of_its_generation_may_be_null(tmp_path):
+    document = json.loads(goldens("look_around_files.jsonl.gz")[1]["given"]) | {"gen_info": None}
+    (tmp_path / "given.json").write_text(json.dumps(document))
+    look_around_files(tmp_path / "given.json", tmp_path / "new.json")
+    info = json.loads((tmp_path / "new.json").read_text())["gen_info"]
+    assert list(info) == ["look_around_retrofit"]
+
+
 def test_a_bundled_trajectory_that_looks_around_is_replayed(simulator, tmp_path):
     source = next(iter_sources(BUNDLED))
     (tmp_path / "given.json").write_bytes(source.raw)
