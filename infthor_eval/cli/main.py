@@ -43,6 +43,7 @@ _COMMANDS = {
     },
     "Make data": {
         "generate": "Generate long-horizon trajectories in a scene.",
+        "look-around": "Level the camera in the long walks of trajectories.",
         "replay": "Replay trajectories in the simulator into frames and metadata.",
         "questions": "Generate NIEH questions on replayed trajectories.",
         "validate": "Keep the questions of a set that one of several models answers.",

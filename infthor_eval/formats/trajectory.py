@@ -132,12 +132,13 @@ class DiscreteAction(_Fields, omit_defaults=False):
 
 
 class LowAction(_Fields, omit_defaults=False):
-    """One low-level action."""
+    """One low-level action; `inserted` is "look_around" if it only moves the camera for frames."""
 
     api_action: ApiAction
     high_idx: int = 0
     discrete_action: DiscreteAction | None = None
     low_idx: int | None = None
+    inserted: str | msgspec.UnsetType | None = msgspec.UNSET
 
 
 class PlannerAction(_Fields):

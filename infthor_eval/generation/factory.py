@@ -15,6 +15,7 @@ from infthor_eval.formats.trajectory import InitAction, Trajectory
 from infthor_eval.generation.draft import Draft, initial_scene
 from infthor_eval.generation.final_task import end_types
 from infthor_eval.generation.known_failures import KnownFailures
+from infthor_eval.generation.look_around import look_around
 from infthor_eval.generation.rehearsal import rehearse
 from infthor_eval.generation.rollout import Rollout
 from infthor_eval.generation.sampling import TaskPool
@@ -344,6 +345,8 @@ class _Factory:
         trace = Trace(self._simulator, self._draft.length.high)
         try:
             Rollout(trace, Walker(trace)).run(operators)
+            if self._settings.look_around:
+                look_around(trace, mark)
         except RolloutError as error:
             self._simulator.rewind(mark)
             return _Outcome(error, executed=bool(trace.actions))

@@ -20,6 +20,7 @@ def trajectory_jobs(
     final_task: bool,
     max_fail: int = MAX_FAIL,
     save_floor: int = 0,
+    look_around: bool = False,
 ) -> list[TrajectorySettings]:
     """Return the settings of all trajectories of a set, scene by scene.
 
@@ -33,6 +34,7 @@ def trajectory_jobs(
         max_fail: number of failed tasks in a row after which the last sub-goals are dropped.
         save_floor: number of steps from which a trajectory that gives up is kept as far as it got;
             0: never.
+        look_around: True to walk long stretches with a level camera.
 
     Raises:
         UsageError: the number of trajectories exceeds the limit.
@@ -45,7 +47,14 @@ def trajectory_jobs(
     seeds = range(seed, seed + count)
     return [
         TrajectorySettings(
-            scene, k, min_steps, min_subgoals, final_task, max_fail=max_fail, save_floor=save_floor
+            scene,
+            k,
+            min_steps,
+            min_subgoals,
+            final_task,
+            max_fail=max_fail,
+            save_floor=save_floor,
+            look_around=look_around,
         )
         for scene in scenes
         for k in seeds

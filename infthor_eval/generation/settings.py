@@ -30,6 +30,7 @@ class TrajectorySettings:
         max_fail: number of failed tasks in a row after which the last sub-goals are dropped.
         save_floor: number of steps from which a trajectory that gives up is kept as far as it got;
             0: never.
+        look_around: True to walk long stretches with a level camera (see the module `look_around`).
     """
 
     scene: str
@@ -40,6 +41,7 @@ class TrajectorySettings:
     task_types: tuple[TaskType, ...] = SAMPLED
     max_fail: int = MAX_FAIL
     save_floor: int = 0
+    look_around: bool = False
 
     @property
     def traj_id(self) -> str:
@@ -47,5 +49,11 @@ class TrajectorySettings:
         return f"{self.scene}-seed{self.seed}"
 
     def document(self) -> dict[str, Any]:
-        """Return the settings as JSON values, as they are stored in trajectories."""
-        return msgspec.json.decode(msgspec.json.encode(self), type=dict[str, Any])
+        """Return the settings as JSON values, as they are stored in trajectories.
+
+        `look_around` is among them only where it is used: older trajectories have no such setting.
+        """
+        document = msgspec.json.decode(msgspec.json.encode(self), type=dict[str, Any])
+        if not self.look_around:
+            del document["look_around"]
+        return document

@@ -34,10 +34,11 @@ class RolloutError(Exception):
 
 @dataclass(frozen=True)
 class ExecutedAction:
-    """One executed action in its stored form, with the state after it."""
+    """One executed action in its stored form, with the state after it and the call's arguments."""
 
     low: LowAction
     view: SimulatorView
+    arguments: dict[str, Any]
 
 
 class Trace:
@@ -84,7 +85,7 @@ class Trace:
         name = f"{api.action}_{suffix}" if suffix else api.action
         number = self._first_high + len(self.high) - 1
         low = LowAction(api, number, DiscreteAction(name, _box(before, arguments)))
-        self.actions.append(ExecutedAction(low, after))
+        self.actions.append(ExecutedAction(low, after, arguments))
 
 
 def _box(view: SimulatorView, arguments: dict[str, Any]) -> dict[str, Any]:

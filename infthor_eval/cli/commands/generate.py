@@ -85,6 +85,11 @@ __all__ = ["command"]
     is_flag=True,
     help="Generate a test set as published: with a final task, without bathrooms.",
 )
+@click.option(
+    "--look-around",
+    is_flag=True,
+    help="Walk long stretches with a level camera, as an option of the published generator does.",
+)
 @click.option("--out", required=True, type=PATH, help="Folder for the trajectory files.")
 @floor_plans_option
 @worker_options
@@ -101,6 +106,7 @@ def command(
     count: int,
     final_task: bool,
     test_set: bool,
+    look_around: bool,
     out: Path,
     data: Path | None,
     as_json: bool,
@@ -131,6 +137,7 @@ def command(
         final_task=final_task or test_set,
         max_fail=max_fail,
         save_floor=save_floor,
+        look_around=look_around,
     )
     prepare_folder(out)
     with progress_bar(notes) as progress:

@@ -1,0 +1,47 @@
+"""`infthor-eval look-around`: level the camera in the long walks of trajectories that exist."""
+
+from pathlib import Path
+
+import click
+
+from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.options.values import PATH
+
+__all__ = ["command"]
+
+
+@click.command(
+    "look-around",
+    cls=ExampleCommand,
+    example="infthor-eval look-around trajectories trajectories_level",
+)
+@click.argument("trajectories", type=PATH)
+@click.argument("out", type=PATH)
+@click.option(
+    "--min-run",
+    type=click.IntRange(1),
+    default=6,
+    show_default=True,
+    help="Moves and turns in a row for which the camera is raised, at least.",
+)
+def command(trajectories: Path, out: Path, min_run: int) -> int:
+    """Write TRAJECTORIES (a .json file, or a folder of them) to OUT with a level camera in walks.
+
+    LookUp and LookDown actions are inserted as by the published script: around long walks with an
+    empty hand, so that frames show the room. The object log and the names of frames stay those of
+    the actions before; a replay makes new ones.
+    """
+    from infthor_eval.generation.look_around_set import look_around_files
+    from infthor_eval.storage.files import prepare_file, prepare_folder
+    from infthor_eval.terminal import print_line
+
+    if trajectories.is_dir():
+        prepare_folder(out, "OUT")
+    else:
+        prepare_file(out, "OUT")
+    summary = look_around_files(trajectories, out, min_run)
+    print_line(
+        f"{summary.trajectories} trajectories ({summary.changed} changed), {summary.inserted} "
+        f"camera actions inserted, {summary.steps} steps: {out}"
+    )
+    return 0
