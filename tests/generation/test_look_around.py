@@ -141,13 +141,13 @@ def test_files_are_written_byte_for_byte_as_by_the_published_script(tmp_path):
         assert f"(+{summary.inserted} Look)" in row["said"]
 
 
-def test_a_folder_is_written_under_the_same_names(run, tmp_path):
+def test_a_folder_is_written_under_the_same_names(run_cli, tmp_path):
     rows = [row for row in goldens("look_around_files.jsonl.gz") if row["min_run"] == MIN_RUN][:3]
     for number, row in enumerate(rows):
         file = tmp_path / "given" / str(number) / "traj_data.json"
         file.parent.mkdir(parents=True)
         file.write_text(row["given"])
-    code, out, err = run("look-around", tmp_path / "given", tmp_path / "new")
+    code, out, err = run_cli("look-around", tmp_path / "given", tmp_path / "new")
     assert (code, err) == (0, "")
     assert out.startswith("3 trajectories (")
     written = sorted((tmp_path / "new").rglob("*.json"))
@@ -166,12 +166,12 @@ def _changed(document):
     ("change", "said"),
     [(_broken, "a task has the actions 999 to 1, of "), (_changed, "looks around already")],
 )
-def test_what_cannot_be_changed_is_refused_in_one_line(run, tmp_path, change, said):
+def test_what_cannot_be_changed_is_refused_in_one_line(run_cli, tmp_path, change, said):
     document = json.loads(goldens("look_around_files.jsonl.gz")[1]["given"])
     change(document)
     file = tmp_path / "given.json"
     file.write_text(json.dumps(document))
-    code, out, err = run("look-around", file, tmp_path / "new.json")
+    code, out, err = run_cli("look-around", file, tmp_path / "new.json")
     assert (code, out) == (2, "")
     assert said in err
     assert err.count("\n") == 1
@@ -182,21 +182,21 @@ def test_what_cannot_be_changed_is_refused_in_one_line(run, tmp_path, change, sa
     ("name", "said"), [("nowhere.json", "cannot be read"), ("a.jsonl", "not a .json file"),
                        ("none.json", "not a trajectory"), ("empty", "no .json")],
 )  # fmt: skip
-def test_what_is_no_trajectory_is_refused_in_one_line(run, tmp_path, name, said):
+def test_what_is_no_trajectory_is_refused_in_one_line(run_cli, tmp_path, name, said):
     (tmp_path / "empty").mkdir()
     (tmp_path / "none.json").write_text("[1]")
     (tmp_path / "a.jsonl").write_text("{}\n")
-    code, out, err = run("look-around", tmp_path / name, tmp_path / "out")
+    code, out, err = run_cli("look-around", tmp_path / name, tmp_path / "out")
     assert (code, out) == (2, "")
     assert said in err
     assert err.count("\n") == 1
 
 
-def test_a_file_that_cannot_be_written_is_told(run, tmp_path):
+def test_a_file_that_cannot_be_written_is_told(run_cli, tmp_path):
     file = tmp_path / "given.json"
     file.write_text(goldens("look_around_files.jsonl.gz")[1]["given"])
     for out, said in ((tmp_path, "not a file"), (file / "x", "cannot be written to")):
-        code, _, err = run("look-around", file, out)
+        code, _, err = run_cli("look-around", file, out)
         assert code == 2
         assert said in err
         assert "another place with OUT" in err
