@@ -36,13 +36,9 @@ def test_its_model_is_evaluated_and_answers_from_the_frames(tmp_path, run_cli):
     )
     code, out, err = run_cli(*words)
     assert (code, "thumbnails" in out) == (0, True), err
-    on_true_frames, on_blank_frames = sorted(
-        json.loads(path.read_text())["summary"]["tasks"]["nieh_mini_gt"]["by_clues"]["total"][
-            "scores"
-        ]["strict"]["mean"]
-        for path in tmp_path.rglob("results.json")
-    )
-    assert on_true_frames != on_blank_frames
+    # Question by question: the means can be equal by chance.
+    first, second = (path.read_text() for path in tmp_path.rglob("scores.jsonl"))
+    assert first != second
 
 
 def test_its_task_runs_beside_ours(tmp_path, run_cli):
