@@ -39,8 +39,5 @@ class EpisodesConfig(
         floor_plans: digest of the recorded floor plans; None where none are given.
     """
 
-    tasks: dict[str, EpisodeTaskConfigType]
-    simulator: str
-    frames: str
     ai2thor: str = ""
     floor_plans: str | None = None

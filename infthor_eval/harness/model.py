@@ -13,7 +13,6 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.harness.registration import NAME, say_model_takes_references
 from infthor_eval.harness.requests import Payload, RequestAdapter, SuiteUnit
 from infthor_eval.runs import RunHeader, Suite, UnitRecord
-from infthor_eval.runs.config import RunConfig
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.work.binding import require_capability
@@ -152,11 +151,10 @@ class InfthorLM(LM):
         """Return the session of a suite, whose journal is in a folder of the suite's name."""
         if suite.name not in self._sessions:
             model = {"name": self._model.name, **self._model.identity()}
-            config: RunConfig[dict[str, Any]] = RunConfig(host="lm-eval")
-            config = config.complete(suite.name, model, adapter=self._code, seed=self._seed)
-            header = RunHeader(suite=suite.name, name=self._name, config=config)
-            types = replace(suite.records, config=RunConfig[dict[str, Any]])  # no task is known
-            journal = Journal(self._folder / suite.name, header, types)
+            config = suite.records.config(host="lm-eval")
+            whole = config.complete(suite.name, model, adapter=self._code, seed=self._seed)
+            header = RunHeader(suite=suite.name, name=self._name, config=whole)
+            journal = Journal(self._folder / suite.name, header, suite.records)
             self._sessions[suite.name] = JournalSession(journal)
         return self._sessions[suite.name]
 

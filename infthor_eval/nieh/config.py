@@ -130,8 +130,6 @@ class NiehConfig(RunConfig[NiehTaskConfig], frozen=True, kw_only=True, omit_defa
         rescored: who scored its replies again; None for a run that asked.
     """
 
-    tasks: dict[str, NiehTaskConfig]
-    frames: str
     k_tokens: int | None = None
     tokens_per_frame: int | None = None
     prompt: str | None = None

@@ -12,6 +12,7 @@ from infthor_eval.nieh.results.tables import overview, tables
 from infthor_eval.nieh.task import check_task_file
 from infthor_eval.rates import Rate
 from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord
+from infthor_eval.runs.config import require_tasks
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject
@@ -39,7 +40,8 @@ class NiehSuite:
     def summarise(
         self, header: RunHeader, records: Sequence[UnitRecord[NiehAnswer]]
     ) -> NiehSummary:
-        """See `Suite.summarise`."""
+        """See `Suite.summarise`; raises DataError for a journal without tasks."""
+        require_tasks(header.config, header.name)
         return summarise(header.config, records)
 
     def scores(self, record: UnitRecord[NiehAnswer]) -> Mapping[str, float]:

@@ -19,6 +19,7 @@ from infthor_eval.runs import (
     TaskRequest,
     UnitRecord,
 )
+from infthor_eval.runs.config import require_tasks
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject
@@ -46,7 +47,8 @@ class PlansSuite:
     def summarise(
         self, header: RunHeader, records: Sequence[UnitRecord[PlanRecord]]
     ) -> PlansSummary:
-        """See `Suite.summarise`."""
+        """See `Suite.summarise`; raises DataError for a journal without tasks."""
+        require_tasks(header.config, header.name)
         return summarise_plans(header.config, records)
 
     def scores(self, record: UnitRecord[PlanRecord]) -> Mapping[str, float]:

@@ -6,9 +6,10 @@ from typing import Any, Generic, Self, TypeVar
 import msgspec
 
 import infthor_eval
+from infthor_eval.errors import DataError
 from infthor_eval.storage.digests import fingerprint
 
-__all__ = ["Config", "RunConfig", "TaskConfig", "TaskConfigType"]
+__all__ = ["Config", "RunConfig", "TaskConfig", "TaskConfigType", "require_tasks"]
 
 
 class TaskConfig(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -92,8 +93,7 @@ class RunConfig(
             limit=limit,
             seed=seed,
         )
-        written = msgspec.json.encode(whole, enc_hook=_plain_text)
-        return msgspec.json.decode(written, type=type(self))
+        return msgspec.json.decode(whole._encode(), type=type(self))
 
     @property
     def simulators(self) -> list[str]:
@@ -103,8 +103,11 @@ class RunConfig(
     @property
     def document(self) -> dict[str, Any]:
         """The config as JSON values."""
-        document: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(self))
+        document: dict[str, Any] = msgspec.json.decode(self._encode())
         return document
+
+    def _encode(self) -> bytes:
+        return msgspec.json.encode(self, enc_hook=_plain_text)
 
     @property
     def hash(self) -> str:
@@ -123,6 +126,19 @@ def _plain_text(value: Any) -> str:
     if isinstance(value, str):
         return str(value)
     raise TypeError(f"{type(value).__name__} cannot be written into a run's config")
+
+
+def require_tasks(config: RunConfig[Any], run: str) -> None:
+    """Check that a config has tasks; that of a journal of another harness's requests has none.
+
+    Raises:
+        DataError: names the run.
+    """
+    if not config.tasks:
+        raise DataError(
+            f"{run}: not the config of a run of {config.suite or 'a suite'} (it has no tasks); run "
+            "the evaluation again"
+        )
 
 
 Config = TypeVar("Config", bound=RunConfig[Any])
