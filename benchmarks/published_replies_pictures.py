@@ -18,8 +18,7 @@ from matplotlib.figure import Figure
 from infthor_eval.cli.results import read_run_results
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.published import published_tables
-from infthor_eval.nieh.guessing.audit import audit, groups
-from infthor_eval.nieh.guessing.guessers import GUESSERS
+from infthor_eval.nieh.guessing.audit import audit
 from infthor_eval.nieh.results.evidence_tables import short_name
 from infthor_eval.nieh.results.summary import DISTANCES, SHOWN_CLUES, Cell, NiehSummary, TaskSummary
 from infthor_eval.report.figures.style import LEGEND, add_legend, looks_of, save_figure
@@ -66,12 +65,12 @@ def save(draw: Callable[[], Figure], name: str) -> None:
 def draw_guessing(data: NiehSet, tasks: Mapping[str, TaskSummary]) -> Figure:
     """Draw what guessers get on each file, above what is published of models that see the
     frames."""
-    files = groups(audit(data), "file")
+    files = audit(data).groups("file")
     printed = next(table for table in published_tables("nieh") if table.context == "trajectory")
     figure = Figure(figsize=(8.6, 3.6), layout="constrained")
     panels = figure.subplots(1, len(files), sharey=True)
     for axes, file in zip(panels, files, strict=True):
-        means = dict(zip((guesser.name for guesser in GUESSERS), file.means(), strict=True))
+        means = dict(zip(file.guessers, file.means(), strict=True))
         rows = [
             ("no frame: one answer for all", LOOKS["guess"], 100 * means["one answer a file"]),
             ("no frame: words (blind)", LOOKS["guess"], 100 * means["words (blind)"]),

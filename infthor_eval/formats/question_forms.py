@@ -20,7 +20,8 @@ class QuestionForm:
     Attributes:
         question_type: its type in the words of the `question_type` column: one of Table 3's, or one
             of ours.
-        words: the question with {} for each object.
+        words: the question with {} for each object, and a/b/c where either word stands: our texts
+            and the published ones differ in some.
     """
 
     question_type: str
@@ -28,8 +29,13 @@ class QuestionForm:
 
     def matches(self, text: str) -> bool:
         """Return True if a question is of this form."""
-        pattern = re.escape(self.words).replace(r"\{\}", _ONE_TYPE).replace("in/on", "(?:in|on)")
+        pattern = re.sub(r"(\w+(?:/\w+)+)", _either, re.escape(self.words))
+        pattern = pattern.replace(r"\{\}", _ONE_TYPE)
         return re.fullmatch(pattern, text.strip(), flags=re.IGNORECASE) is not None
+
+
+def _either(words: re.Match[str]) -> str:
+    return f"(?:{words[1].replace('/', '|')})"
 
 
 # In this order: the first that matches is taken, so a form comes before one that its words fit,
@@ -38,11 +44,11 @@ FORMS = (
     QuestionForm("object_presence", "Is there any {} in this room?"),
     QuestionForm("object_presence", "Have you seen {}?"),
     QuestionForm("open_state", "Was {} open?"),
-    QuestionForm("location_tracing", "Where was {} before you put it to {}?"),
+    QuestionForm("location_tracing", "Where was {} before you put it in/on/to {}?"),
     QuestionForm("location_tracing", "Where did you move {} from {}?"),
     QuestionForm("location_tracing", "Where is {} now?"),
     QuestionForm("slicing", "What did you slice?"),
-    QuestionForm("slicing", "What objects were in/on {} when you slice {}?"),
+    QuestionForm("slicing", "What objects were in/on {} when you slice/sliced {}?"),
     QuestionForm("container_content", "What objects were in/on {}?"),
     QuestionForm("put_action", "What object did you put in/on {}?"),
     QuestionForm("final_state", "What objects are in/on {}?"),

@@ -29,14 +29,15 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
     """Print what can be guessed of a set's answers without a frame, and what runs got beside that.
 
     SET is a folder with question files, or one of them. It needs no frames. Guessers know the words
-    of a question, the number of its clue frames or their place, and learn from questions on other
-    trajectories.
+    of a question, number and place of its clue frames, and, where the set has the logs of frames,
+    whether the hand was full and how much was in view. They learn from questions on other
+    trajectories, and from those in other scenes alone.
     """
     from infthor_eval.cli.progress.notes import print_left_out, print_note
     from infthor_eval.errors import DataError, UsageError
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.formats.qa_csv import encode_questions, write_questions
-    from infthor_eval.nieh.guessing.audit import audit, sentences
+    from infthor_eval.nieh.guessing.audit import audit
     from infthor_eval.nieh.guessing.audit_tables import (
         audit_tables,
         balanced_table,
@@ -54,13 +55,13 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
     if not data.questions:
         raise DataError(f"{set_folder}: no question can be audited; fix the set, or give another")
     summaries = [_read_summary(folder) for folder in runs]
-    questions = audit(data)
+    audited = audit(data)
     console = table_console()
-    for table in (guessers_table(questions), *audit_tables(questions)):
+    for table in (guessers_table(audited), *audit_tables(audited)):
         print_table(table, console)
     if summaries:
         print_table(runs_table(summaries), console)
-    for sentence in sentences(questions):
+    for sentence in audited.sentences():
         click.echo(f"- {sentence}")
     if balanced is not None:
         part = balance(data.questions)

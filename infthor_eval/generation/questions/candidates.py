@@ -124,21 +124,22 @@ def type_question(
 
 
 def listing_question(
-    question_type: str, form: str, events: Iterable[tuple[str, int | None]]
+    question_type: str, form: str, events: Iterable[tuple[str, tuple[int, ...] | None]]
 ) -> Iterator[Candidate]:
-    """Yield a question on all types of some events, with the first frame that shows each type's.
+    """Yield a question on all types of some events, with the frames of the first shown of each.
 
     Args:
         question_type: type of the question.
         form: the question, without names in it.
-        events: object type and frame (None if no frame shows it) of each event. If no frame shows
-            one of the types, there is no question.
+        events: object type and frames (None if none show it) of each event. If no event of a type
+            is shown, there is no question.
     """
     types: set[str] = set()
-    first: dict[str, int] = {}
-    for name, frame in events:
+    first: dict[str, tuple[int, ...]] = {}
+    for name, frames in events:
         types.add(canonical_type(name))
-        if frame is not None:
-            first.setdefault(canonical_type(name), frame)
+        if frames is not None:
+            first.setdefault(canonical_type(name), frames)
     if len(first) == len(types):
-        yield from type_question(question_type, form, (), tuple(first.values()), list(first))
+        clues = tuple(sorted({frame for frames in first.values() for frame in frames}))
+        yield from type_question(question_type, form, (), clues, list(first))

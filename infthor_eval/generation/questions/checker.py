@@ -1,9 +1,9 @@
 """An independent check of questions, which answers their text in another way than the rules.
 
 The answer is computed from the facts of frames (see `facts`). Facts of the whole log have the
-true states of all objects. Facts of clue frames have only what the frame's entry shows: the action
-before it, and the objects that are large enough to be seen. A question is sound if both give its
-gold answer, and no smaller set of clues does.
+true states of all objects, and the actions. Facts of clue frames have only what the pictures show:
+the objects that are large enough to be seen, and no logged action. A question is sound if both give
+its gold answer, and no smaller set of clues does.
 """
 
 from collections.abc import Sequence
@@ -11,10 +11,12 @@ from dataclasses import dataclass
 
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import Step
-from infthor_eval.generation.questions.facts import FrameFacts, frame_facts
+from infthor_eval.generation.questions.facts import FrameFacts, facts_shown, frame_facts
 from infthor_eval.generation.questions.solvers import answer
 
 __all__ = ["Checker", "Verdict"]
+
+_SHOWN_BY_TWO_FRAMES = ("How many times did you open", "How many times did you put")
 
 
 @dataclass(frozen=True)
@@ -42,15 +44,14 @@ class Checker:
 
     def __init__(self, steps: Sequence[Step], share: float) -> None:
         """Read the log; objects that fill this share of the frame's pixels count as seen."""
-        self._whole = frame_facts(steps, share)
-        each_frame = frame_facts(steps, share, range(len(steps)))
-        self._single = {frame.number: frame for frame in each_frame}
+        self._whole = frame_facts(steps)
+        self._single = {frame.number: frame for frame in facts_shown(steps, share)}
 
     def verdict(self, question: Question) -> Verdict:
         """Check one question.
 
         The clues of an absence question, for which no frame is evidence, count as minimal. For a
-        further count, the number of necessary clues must be the answer, and there must be others.
+        further count, each event must have its own clues, and there must be others.
         """
         gold = sorted(map(str, question.answers))
         clues = question.clues
@@ -64,8 +65,15 @@ class Checker:
         for skipped in clues:
             n_necessary += not gives_gold([frame for frame in shown if frame.number != skipped])
         if question.question_type == "movement_counting_further":
-            minimal = [str(n_necessary)] == gold and n_necessary < len(clues)
+            minimal = n_necessary < len(clues) and self._are_needed(question, n_necessary)
         else:
             absence = question.text.startswith(("Is there any", "Have you seen")) and gold == ["no"]
             minimal = absence or n_necessary == len(clues)
         return Verdict(gives_gold(self._whole), gives_gold(shown), minimal)
+
+    def _are_needed(self, question: Question, n_necessary: int) -> bool:
+        """Return True if so many necessary clues fit a further count."""
+        (count,) = map(int, question.answers)
+        if question.text.startswith(_SHOWN_BY_TWO_FRAMES):
+            return n_necessary == 2 * count
+        return n_necessary <= count  # an object that was held may be seen in several clues

@@ -1,9 +1,9 @@
 """The balanced choice of questions, so that their words do not give the answers away.
 
-No answer to a form is more frequent than the next ones: than the next for yes and no, the next two
-for numbers, the next four for other answers. The same holds for the answers on each object in each
-kind of room, as "the fridge was open" or "there is a sofa" would hold in most kitchens and living
-rooms, whatever the form.
+No answer to a form is more frequent than the next ones: than the next for yes and no, than the mean
+of the next six for numbers, of the next ten for other answers. Answers of a list count one by one.
+The same holds for the answers on each object in each kind of room, as "the fridge was open" or
+"there is a sofa" would hold in most kitchens and living rooms, whatever the form.
 """
 
 import random
@@ -15,8 +15,8 @@ from infthor_eval.generation.questions.candidates import Candidate
 __all__ = ["Chooser"]
 
 _YES_NO = ("yes", "no")
-_NEXT_NUMBERS = 3
-_NEXT_ANSWERS = 6
+_NEXT_NUMBERS = 6
+_NEXT_ANSWERS = 10
 
 
 class Chooser:
@@ -66,13 +66,13 @@ class Chooser:
         if not self._by_subject and not candidate.is_closed:
             return False
         return any(
-            self._leads(self._answers.get(key, Counter()), candidate)
+            self._leads(self._answers.get(key, Counter()), candidate, answer)
             for key in self._keys(candidate, rooms)
+            for answer in _answers(candidate)
         )
 
-    def _leads(self, answers: Counter[str], candidate: Candidate) -> bool:
-        """Return True if the answer is more frequent than the mean of the next ones."""
-        answer = _answer(candidate)
+    def _leads(self, answers: Counter[str], candidate: Candidate, answer: str) -> bool:
+        """Return True if an answer is more frequent than the mean of the next ones."""
         counts = (count for other, count in answers.items() if other != answer)
         others = sorted(counts, reverse=True)
         if not self._by_subject:
@@ -98,7 +98,7 @@ class Chooser:
         self._clues[_clue_class(candidate)] += 1
         self._subjects.update((group, subject) for subject in candidate.subjects)
         for key in self._keys(candidate, rooms):
-            self._answers.setdefault(key, Counter())[_answer(candidate)] += 1
+            self._answers.setdefault(key, Counter()).update(_answers(candidate))
 
     def _use(self, candidate: Candidate) -> tuple[int, int, int, int]:
         group = _group(candidate)
@@ -111,8 +111,9 @@ class Chooser:
         )
 
 
-def _answer(candidate: Candidate) -> str:
-    return ", ".join(sorted(map(str, candidate.answers)))
+def _answers(candidate: Candidate) -> set[str]:
+    """Return the answers of a list one by one: each that is guessed has its share of the score."""
+    return set(map(str, candidate.answers))
 
 
 def _group(candidate: Candidate) -> str:

@@ -44,10 +44,15 @@ FormAndNames = tuple[str, tuple[str, ...]]
 
 def slicings(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Yield the question on what the agent sliced."""
-    events = [event for event in history.events if event.action == "SliceObject"]
-    if all(history.shows_slices(event.frame, event.target) for event in events):
-        clues = tuple(event.frame for event in events)
-        types = [event.object_type for event in events]
+    sliced = {event.target: event for event in history.events if event.action == "SliceObject"}
+    seen_at = {
+        event.frame: frozenset(key for key in sliced if history.shows_slices(event.frame, key))
+        for event in sliced.values()
+    }
+    # A later frame may show the slices of the one before, too, which then needs none.
+    clues = minimal_cover(sliced.keys(), seen_at, lambda frame, _: -frame)
+    if clues:
+        types = [event.object_type for event in sliced.values()]
         yield from type_question(SLICING, "What did you slice?", (), clues, types)
 
 
@@ -74,7 +79,7 @@ def at_slicing(history: TrajectoryHistory) -> Iterator[Candidate]:
         if slices and others:
             receptacle_type = history.states(event.frame)[receptacle].type
             wording = (
-                "What objects were {} when you slice {}?",
+                "What objects were {} when you sliced {}?",
                 (in_or_on(receptacle_type), with_the(event.object_type)),
             )
             frames = _unchanged_frames(history, event.frame, receptacle)

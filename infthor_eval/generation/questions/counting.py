@@ -1,13 +1,14 @@
 """Movement counting: how often something was moved; further: openings, puts, different objects.
 
 The clues of Table 3's form are one frame per counted event, so the number of clue frames alone
-gives the answer away. The further questions therefore have frames without an event among their
-clues: 8 frames in all for answers up to 7, 16 for answers up to 15, and so on.
+gives the answer away. The further questions therefore have clues without an event: 8 in all for
+answers up to 7, 16 for answers up to 15, and so on. Only two successive frames show that something
+was opened or put, so there each clue is two frames, those without an event, too.
 """
 
 import random
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from infthor_eval.generation.questions.candidates import Candidate, further_type, in_or_on, with_the
@@ -18,7 +19,7 @@ __all__ = ["FURTHER", "QUESTION_TYPE", "counts", "further_counts"]
 
 QUESTION_TYPE = "movement_counting"
 FURTHER = further_type(QUESTION_TYPE)
-_FRAMES = 8  # of a further question whose answer is smaller
+_CLUES = 8  # of a further question whose answer is smaller
 
 
 def counts(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -37,21 +38,34 @@ def counts(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def further_counts(history: TrajectoryHistory, rng: random.Random) -> Iterator[Candidate]:
-    """Yield all other counts, with frames without an event, chosen at random, among their clues."""
-    idle = sorted(set(range(1, len(history))) - {event.frame for event in history.events})
-    for candidate in (*_openings(history), *_puts(history), *_items(history)):
-        n_added = _number_of_frames(len(candidate.clues)) - len(candidate.clues)
-        if n_added <= len(idle):
-            yield replace(
-                candidate, clues=tuple(sorted({*candidate.clues, *rng.sample(idle, n_added)}))
-            )
+    """Yield all other counts, with clues without an event, chosen at random, among theirs."""
+    for candidate in (*_openings(history), *_puts(history)):
+        yield from _with_idle_clues(history, candidate, 2, rng)
+    for candidate in _items(history):
+        yield from _with_idle_clues(history, candidate, 1, rng)
 
 
-def _number_of_frames(count: int) -> int:
-    number = _FRAMES
+def _with_idle_clues(
+    history: TrajectoryHistory, candidate: Candidate, length: int, rng: random.Random
+) -> Iterator[Candidate]:
+    """Yield a count with clues of so many frames without an event, unless there are too few."""
+    count = len(candidate.clues) // length
+    number = _CLUES
     while number <= count:
         number *= 2
-    return number
+    taken = {event.frame for event in history.events} | set(candidate.clues)
+    starts = list(range(1, len(history) - length + 1))
+    rng.shuffle(starts)
+    for start in starts:
+        frames = range(start, start + length)
+        if count == number:
+            break
+        if taken.isdisjoint(frames):
+            taken.update(frames)
+            candidate = replace(candidate, clues=tuple(sorted({*candidate.clues, *frames})))
+            count += 1
+    if count == number:
+        yield candidate
 
 
 def _openings(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -61,11 +75,11 @@ def _openings(history: TrajectoryHistory) -> Iterator[Candidate]:
         if event.action == "OpenObject":
             by_type[event.object_type].append(event)
     for object_type, events in sorted(by_type.items()):
-        if all(history.shows(event.frame, event.target) for event in events):
-            single = all(history.is_only_one(event.frame, event.target) for event in events)
-            name = with_the(object_type) if single else with_article(noun(object_type))
-            frames = [event.frame for event in events]
-            yield _count(FURTHER, "How many times did you open {}?", (name,), frames, object_type)
+        single = all(history.is_only_one(event.frame, event.target) for event in events)
+        name = with_the(object_type) if single else with_article(noun(object_type))
+        form = "How many times did you open {}?"
+        shown = [history.opening_clues(event) for event in events]
+        yield from _count_pairs(form, name, shown, object_type)
 
 
 def _puts(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -74,24 +88,36 @@ def _puts(history: TrajectoryHistory) -> Iterator[Candidate]:
     for move in history.moves:
         by_target[move.target].append(move)
     for target, moves in sorted(by_target.items()):
-        is_shown = all(history.shows_put(move) for move in moves)
-        if is_shown and all(history.is_only_one(move.after, target) for move in moves):
+        if all(history.is_only_one(move.after, target) for move in moves):
             place_type = history.target_type(moves[0])
-            frames = [move.after for move in moves]
             form = "How many times did you put something {}?"
-            yield _count(FURTHER, form, (in_or_on(place_type),), frames, place_type)
+            shown = [history.put_clues(move) for move in moves]
+            yield from _count_pairs(form, in_or_on(place_type), shown, place_type)
 
 
 def _items(history: TrajectoryHistory) -> Iterator[Candidate]:
-    # The clues are the frames in which each object is held for the first time.
+    # The clues are the frames in which each object is held for the first time. Two of a type look
+    # alike, so nobody could tell whether they were two.
     first: dict[str, int] = {}
     for event in history.events:
         if event.action == "PickupObject":
             first.setdefault(event.target, event.frame)
-    if first and all(history.shows(frame, item) for item, frame in first.items()):
+    are_alike = any(len(items) > 1 for items in history.picked_up_by_type.values())
+    is_shown = all(history.shows(frame, item) for item, frame in first.items())
+    if first and is_shown and not are_alike:
         yield _count(
             FURTHER, "How many different objects did you pick up?", (), sorted(first.values()), "#"
         )
+
+
+def _count_pairs(
+    form: str, name: str, pairs: Sequence[tuple[int, int] | None], subject: str
+) -> Iterator[Candidate]:
+    """Yield a count of events of which each is shown by two frames, if all are."""
+    shown = [pair for pair in pairs if pair is not None]
+    if len(shown) == len(pairs):
+        clues = tuple(frame for pair in shown for frame in pair)
+        yield Candidate(FURTHER, form, (name,), clues, (str(len(shown)),), (subject,))
 
 
 def _count(

@@ -1,17 +1,23 @@
 """Facts of frames, for the independent check of questions, and how to read them.
 
-They share no code with the rules, so they do not share their errors.
+They share no code with the rules, so they do not share their errors. Facts of the whole log have
+the logged actions. Facts of clue frames have only what pictures show: an object in the hand was
+picked up, slices were cut, a light is on; only two successive frames show that something was put
+(in the hand in the first, elsewhere in the second) or opened.
 """
 
 import re
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
 
 __all__ = [
+    "FactEvent",
     "FrameFacts",
     "events_of",
+    "facts_shown",
     "frame_facts",
     "holder_of",
     "ids_inside",
@@ -20,12 +26,26 @@ __all__ = [
     "only_loose",
     "place_of",
     "plain_name",
-    "target_is",
-    "target_name",
+    "type_of_id",
     "whole_id",
 ]
 
 _FRAME_PIXELS = 300 * 300
+
+
+@dataclass(frozen=True)
+class FactEvent:
+    """An action on an object.
+
+    Attributes:
+        action: name of the action.
+        target: id of the object.
+        frame: facts of the frame after it.
+    """
+
+    action: str
+    target: str
+    frame: "FrameFacts"
 
 
 @dataclass(frozen=True)
@@ -34,8 +54,8 @@ class FrameFacts:
 
     Attributes:
         number: number of the frame.
-        action: name of the successful action before it, or empty.
-        target: id of the object acted on.
+        logged: name of the successful action before it and id of the object acted on; None if there
+            is none, and in facts of clue frames.
         objects: states of the known objects by id.
         in_frame: ids of all objects in the frame, however small.
         everything: True if `objects` has all objects, False if only those in the frame.
@@ -44,40 +64,46 @@ class FrameFacts:
     """
 
     number: int
-    action: str
-    target: str | None
+    logged: tuple[str, str] | None
     objects: dict[str, ObjectState]
     in_frame: frozenset[str]
     everything: bool
     loose: frozenset[str]
 
 
-def frame_facts(
-    steps: Sequence[Step], share: float, frames: Container[int] | None = None
-) -> list[FrameFacts]:
-    """Return the facts of the log, or what clue frames show: objects of this share of pixels."""
-    facts = []
+def frame_facts(steps: Sequence[Step]) -> list[FrameFacts]:
+    """Return the facts of the whole log, a frame each."""
     loose = frozenset(name for step in steps for name in step.object_log.pickupable)
+    facts = []
     for step, states in zip(steps, iter_object_states(steps), strict=True):
-        objects = {key: state for key, state in states.items() if state.exists}
-        if frames is not None:
-            if step.img_idx not in frames:
-                continue
-            seen = step.seen or {}
-            large = {key for key in seen if seen[key].pixels >= share * _FRAME_PIXELS}
-            objects = {key: state for key, state in objects.items() if key in large}
+        logged = None
+        if step.success and step.action is not None and step.target is not None:
+            logged = step.action.split(" ")[0], step.target
         facts.append(
             FrameFacts(
                 number=step.img_idx,
-                action=(step.action or "").split(" ")[0] if step.success else "",
-                target=step.target,
-                objects=objects,
+                logged=logged,
+                objects={key: state for key, state in states.items() if state.exists},
                 in_frame=frozenset(step.seen or {}),
-                everything=frames is None,
+                everything=True,
                 loose=loose,
             )
         )
     return facts
+
+
+def facts_shown(steps: Sequence[Step], share: float) -> list[FrameFacts]:
+    """Return what each frame shows: the objects that fill this share of its pixels."""
+    return [
+        replace(whole, objects=_large_objects(step, whole, share), logged=None, everything=False)
+        for step, whole in zip(steps, frame_facts(steps), strict=True)
+    ]
+
+
+def _large_objects(step: Step, facts: FrameFacts, share: float) -> dict[str, ObjectState]:
+    seen = step.seen or {}
+    large = {key for key in seen if seen[key].pixels >= share * _FRAME_PIXELS}
+    return {key: state for key, state in facts.objects.items() if key in large}
 
 
 def plain_name(object_type: str) -> str:
@@ -134,27 +160,62 @@ def ids_inside(frame: FrameFacts, words: str) -> set[str]:
 
 def events_of(
     facts: Sequence[FrameFacts], action: str, words: str | None = None
-) -> list[FrameFacts]:
-    """Return the facts right after an action on an object of a type, if they include the object."""
-    events = [frame for frame in facts if frame.action == action and _is_target_known(frame)]
-    return [frame for frame in events if words is None or target_is(frame, words)]
+) -> list[FactEvent]:
+    """Return the known actions of this name, on objects of the type that some words name."""
+    events = _logged_events(facts) if facts[0].everything else _events_shown(facts)
+    return [
+        event
+        for event in events
+        if event.action == action
+        and (words is None or type_of_id(event.target) == named_type(words))
+    ]
 
 
-def _is_target_known(frame: FrameFacts) -> bool:
-    """Return True if the object acted on, or a slice of it, is among the known objects."""
-    target = frame.target or ""
-    return target in frame.objects or any(key.startswith(f"{target}|") for key in frame.objects)
+def _logged_events(facts: Sequence[FrameFacts]) -> list[FactEvent]:
+    return [FactEvent(*frame.logged, frame) for frame in facts if frame.logged is not None]
 
 
-def target_name(frame: FrameFacts) -> str:
-    """Return the type of the object acted on, from its id: its last part for slices and basins."""
-    parts = (frame.target or "").split("|")
+def _events_shown(facts: Sequence[FrameFacts]) -> list[FactEvent]:
+    """Return the actions that pictures show, in order of the frames."""
+    events = []
+    for previous, frame in pairwise([None, *facts]):
+        assert frame is not None
+        events += [FactEvent(*event, frame) for event in _results_shown(frame)]
+        if previous is not None and frame.number == previous.number + 1:
+            events += [FactEvent(*event, frame) for event in _changes_shown(previous, frame)]
+    return events
+
+
+def _results_shown(frame: FrameFacts) -> list[tuple[str, str]]:
+    """Return the actions, with their objects, whose results one frame shows."""
+    events = []
+    for key, state in frame.objects.items():
+        if state.held:
+            events.append(("PickupObject", key))
+        if state.is_on:
+            events.append(("ToggleObjectOn", key))
+        if state.type.endswith("Sliced"):
+            events.append(("SliceObject", key.rpartition("|")[0]))
+    return list(dict.fromkeys(events))
+
+
+def _changes_shown(previous: FrameFacts, frame: FrameFacts) -> list[tuple[str, str]]:
+    """Return the actions, with their objects, that two successive frames show."""
+    events = []
+    for key in previous.objects.keys() & frame.objects.keys():
+        before = previous.objects[key]
+        after = frame.objects[key]
+        if before.held and not after.held:
+            events.append(("PutObject", key))
+        if after.is_open and before.is_open is False:
+            events.append(("OpenObject", key))
+    return sorted(events)
+
+
+def type_of_id(key: str) -> str:
+    """Return the type in an object's id as answers have it: the last part of slices and basins."""
+    parts = key.split("|")
     return plain_name(re.sub(r"_\d+$", "", parts[-1]) if len(parts) > 4 else parts[0])
-
-
-def target_is(frame: FrameFacts, words: str) -> bool:
-    """Return True if the object acted on is of the type that some words name."""
-    return target_name(frame) == named_type(words)
 
 
 def only_loose(frame: FrameFacts) -> FrameFacts:

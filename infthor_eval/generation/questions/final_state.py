@@ -1,6 +1,7 @@
 """Final object state, in Table 3's forms: is an object in a receptacle, what is, how many are."""
 
 from collections.abc import Iterator
+from itertools import combinations
 
 from infthor_eval.generation.questions.candidates import (
     MANY,
@@ -71,12 +72,24 @@ def _what(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
     receptacle_type = states[receptacle].type
     types = sorted(states[key].type for key in inside)
     where = (in_or_on(receptacle_type),)
-    count = str(len(inside))
-    yield Candidate(
-        QUESTION_TYPE, "How many objects were {}?", where, clues, (count,), (receptacle_type, "#")
-    )
+    if _can_be_counted(history, clues, inside):
+        form = "How many objects were {}?"
+        count = str(len(inside))
+        yield Candidate(QUESTION_TYPE, form, where, clues, (count,), (receptacle_type, "#"))
     form = "What objects are {}?"
     yield from type_question(QUESTION_TYPE, form, where, clues, types, (receptacle_type,))
+
+
+def _can_be_counted(
+    history: TrajectoryHistory, clues: tuple[int, ...], items: frozenset[str]
+) -> bool:
+    """Return True if no two objects are of one type, or a clue shows the two side by side."""
+    states = history.states(len(history) - 1)
+    return all(
+        states[one].type != states[other].type
+        or any(history.shows_apart(frame, one, other) for frame in clues)
+        for one, other in combinations(sorted(items), 2)
+    )
 
 
 def _arrival(history: TrajectoryHistory, item: str, receptacle: str) -> int:

@@ -97,6 +97,15 @@ class TrajectoryHistory:
         seen = self.objects_in_frame(frame)
         return all(key in seen and seen[key].pixels >= self.min_pixels for key in ids)
 
+    def shows_apart(self, frame: int, one: str, other: str) -> bool:
+        """Return True if a frame shows both objects, and their boxes there do not touch."""
+        if not self.shows(frame, one, other):
+            return False
+        seen = self.objects_in_frame(frame)
+        left, top, right, bottom = seen[one].box
+        x_min, y_min, x_max, y_max = seen[other].box
+        return right + 1 < x_min or x_max + 1 < left or bottom + 1 < y_min or y_max + 1 < top
+
     def clarity(self, frame: int, *ids: str) -> tuple[bool, int]:
         """Return how well a frame shows objects: whether all are well inside, the least size."""
         seen = [self.objects_in_frame(frame)[key] for key in ids]
@@ -110,9 +119,28 @@ class TrajectoryHistory:
         return max(shown, key=lambda frame: self.clarity(frame, *ids), default=None)
 
     def shows_put(self, move: ObjectMove) -> bool:
-        """Return True if the frame after a move shows the object where it was put."""
+        """Return True if the frame after a move shows the object where it was put, told apart."""
+        return self._shows_end(move) and self.is_alone_in_frame(move.after, move.item)
+
+    def _shows_end(self, move: ObjectMove) -> bool:
         shown = self.shows(move.after, move.item, move.target)
         return shown and self.parent(move.after, move.item) == move.target
+
+    def put_clues(self, move: ObjectMove) -> tuple[int, int] | None:
+        """Return the two frames that show a put, or None if they do not.
+
+        After a put other loose things lie there, too: only the object in the hand, in the frame
+        before, tells which was put.
+        """
+        before = move.after - 1
+        is_shown = self.shows(before, move.item) and self._shows_end(move)
+        return (before, move.after) if is_shown else None
+
+    def opening_clues(self, event: Event) -> tuple[int, int] | None:
+        """Return the two frames that show an opening, closed and open, or None if they do not."""
+        before = event.frame - 1
+        shown = self.shows(before, event.target) and self.shows(event.frame, event.target)
+        return (before, event.frame) if shown else None
 
     def shows_slices(self, frame: int, whole: str) -> bool:
         """Return True if a frame shows a slice of an object."""

@@ -7,7 +7,7 @@ picked up twice.
 from collections.abc import Iterator, Sequence
 
 from infthor_eval.generation.questions import candidates
-from infthor_eval.generation.questions.candidates import Candidate, with_the
+from infthor_eval.generation.questions.candidates import Candidate, in_or_on, with_the
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
 from infthor_eval.household.wording import canonical_type
 
@@ -50,10 +50,10 @@ def _before_put(
     once = [history.target_type(other) for other in moves].count(to) == 1
     is_shown = _shows_origin(history, move) and history.shows_put(move)
     if once and is_shown and _changes(history, move):
-        form = "Where was {} before you put it to {}?"
-        yield _candidate(
-            QUESTION_TYPE, form, (move.before, move.after), [_start(history, move)], object_type, to
-        )
+        form = "Where was {} before you put it {}?"
+        clues = (move.before, move.after)
+        places = [_start(history, move)]
+        yield _candidate(QUESTION_TYPE, form, clues, places, object_type, in_or_on(to))
 
 
 def _moved_from(
@@ -70,12 +70,13 @@ def _moved_from(
         return
     origin = _start(history, move)
     others = [_start(history, other) for other in moves[:-1]]
-    if _changes(history, move) and origin not in others and None not in others:
+    if origin is None or None in others:
+        return
+    if _changes(history, move) and origin not in others:
         form = "Where did you move {} from {}?"
         clues = (move.before, move.after)
-        yield _candidate(
-            QUESTION_TYPE, form, clues, [history.target_type(move)], object_type, origin
-        )
+        places = [history.target_type(move)]
+        yield _candidate(QUESTION_TYPE, form, clues, places, object_type, with_the(origin))
 
 
 def _now(
@@ -157,10 +158,10 @@ def _candidate(
     object_type: str,
     named: str | None = None,
 ) -> Candidate:
-    """Return a question on an object, and on a place if the form names one."""
+    """Return a question on an object, and on a place, in words, if the form names one."""
     types = [place for place in places if place is not None]
-    names = [object_type] if named is None else [object_type, named]
+    names = [with_the(object_type)]
+    if named is not None:
+        names.append(named)
     answers = tuple(map(candidates.answer_of, types))
-    return Candidate(
-        question_type, form, tuple(map(with_the, names)), clues, answers, (object_type, *types)
-    )
+    return Candidate(question_type, form, tuple(names), clues, answers, (object_type, *types))

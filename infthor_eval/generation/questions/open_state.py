@@ -54,10 +54,7 @@ def further_open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
             if event.action in _ASKED_AT and phrases[phrase] == 1 and not involved:
                 yield from _then(history, key, event, phrase)
     opened = (event for event in history.events if event.action == "OpenObject")
-    shown = (
-        (event.object_type, event.frame if history.shows(event.frame, event.target) else None)
-        for event in opened
-    )
+    shown = ((event.object_type, history.opening_clues(event)) for event in opened)
     yield from listing_question(FURTHER, "What did you open?", shown)
 
 
@@ -84,23 +81,24 @@ def _phrase(history: TrajectoryHistory, event: Event) -> str:
 
 def _then(history: TrajectoryHistory, key: str, event: Event, phrase: str) -> Iterator[Candidate]:
     states = history.states(event.frame)
-    if key in states and history.shows(event.frame, key) and _shows_event(history, event):
+    clues = _event_clues(history, event)
+    if key in states and history.shows(event.frame, key) and clues is not None:
         answer = "yes" if states[key].is_open else "no"
         names = (with_the(states[key].type), phrase)
         subjects = (states[key].type, event.object_type)
-        yield Candidate(
-            FURTHER, "Was {} open when you {}?", names, (event.frame,), (answer,), subjects
-        )
+        yield Candidate(FURTHER, "Was {} open when you {}?", names, clues, (answer,), subjects)
 
 
-def _shows_event(history: TrajectoryHistory, event: Event) -> bool:
-    """Return True if the frame after an event shows its result."""
+def _event_clues(history: TrajectoryHistory, event: Event) -> tuple[int, ...] | None:
+    """Return the frames that show an event, or None if they do not."""
+    if event.action == "PutObject":
+        return history.put_clues(next(m for m in history.moves if m.after == event.frame))
     if event.action == "SliceObject":
-        return history.shows_slices(event.frame, event.target)
-    if event.receptacle is None:
-        return history.shows(event.frame, event.target)
-    inside = history.parent(event.frame, event.target) == event.receptacle
-    return inside and history.shows(event.frame, event.target, event.receptacle)
+        is_shown = history.shows_slices(event.frame, event.target)
+    else:
+        is_shown = history.shows(event.frame, event.target)
+        is_shown = is_shown and history.is_alone_in_frame(event.frame, event.target)
+    return (event.frame,) if is_shown else None
 
 
 def _now(history: TrajectoryHistory, key: str) -> Iterator[Candidate]:

@@ -1,12 +1,12 @@
 """Object presence: "Is there any mug in this room?", "Have you seen a mug?"
 
-The clue of a yes-question is the first frame that shows such an object. A no-question names a type
+The clue of a yes-question is the frame that shows such an object best. A no-question names a type
 that the scene does not have, or, in the second form, one that no frame shows, and that is not
 easily mistaken for one that is there. The type is one of other rooms of the same kind in the set,
 so that neither its name nor a look at the room gives the answer away, or another that is common in
 AI2-THOR's rooms of the kind if there are few of these. No frame is evidence for an absence, so its
-clue is a sampled frame. It has one, like a yes-question, or the number of frames would give the
-answer away.
+clue is that of a yes-question, of one on a thing to carry if it names one itself: place in the
+trajectory, hand and what is in view then do not tell yes from no, nor does the number of frames.
 
 In a house of several rooms "this room" would be ambiguous, so only the second form is used.
 """
@@ -17,6 +17,7 @@ from collections.abc import Iterable, Iterator
 from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.questions.rooms import COMMON_TYPES, rooms_of
+from infthor_eval.household.affordances import STOWABLE
 from infthor_eval.household.wording import noun, with_article
 
 __all__ = ["QUESTION_TYPE", "no_questions", "yes_questions"]
@@ -25,7 +26,6 @@ QUESTION_TYPE = "object_presence"
 _IN_ROOM = "Is there any {} in this room?"
 _SEEN = "Have you seen {}?"
 _FEW = 8  # with fewer types of other rooms, AI2-THOR's are added
-_BUSY = 3  # minimum number of objects in a sampled frame, if the trajectory has such frames
 
 # Never in questions: structures, parts, and types that people would not call by these names.
 _UNASKED = frozenset({
@@ -69,27 +69,34 @@ _SIMILAR_TYPES = (
 
 
 def yes_questions(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield the yes-questions, each with the first frame that shows such an object."""
-    first: dict[str, int] = {}
-    for frame in range(len(history)):
-        states = history.states(frame)
-        for key in history.objects_in_frame(frame):
-            if key in states and history.shows(frame, key):
-                first.setdefault(states[key].type, frame)
-    for object_type, frame in sorted(first.items()):
-        if _is_nameable(object_type):
-            yield from _questions(_forms(history), object_type, frame, "yes")
+    """Yield the yes-questions, each with the frame that shows such an object best."""
+    for object_type, frame in _best_frames(history).items():
+        yield from _questions(_forms(history), object_type, frame, "yes")
 
 
 def no_questions(
     history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random
 ) -> Iterator[Candidate]:
-    """Yield no-questions, with random frames, on types of `vocabulary` that the scene lacks."""
-    frames = [frame for frame in range(len(history)) if _is_busy(history, frame)] or [0]
+    """Yield no-questions, with yes-questions' clues, on types of `vocabulary` that are absent."""
+    best = _best_frames(history)
     absent = _other_types(history, vocabulary, history.all_object_types)
     for object_type in sorted(absent | _other_types(history, vocabulary, history.types_in_frames)):
         forms = _forms(history) if object_type in absent else (_SEEN,)
-        yield from _questions(forms, object_type, rng.choice(frames), "no")
+        is_carried = object_type in STOWABLE
+        alike = [frame for name, frame in best.items() if (name in STOWABLE) == is_carried]
+        yield from _questions(forms, object_type, rng.choice(alike or [0]), "no")
+
+
+def _best_frames(history: TrajectoryHistory) -> dict[str, int]:
+    """Return by nameable type, in order, the frame that shows one best, the earliest of equals."""
+    best: dict[str, tuple[tuple[bool, int], int]] = {}
+    for frame in range(len(history)):
+        states = history.states(frame)
+        for key in history.objects_in_frame(frame):
+            if key in states and _is_nameable(states[key].type) and history.shows(frame, key):
+                sighting = history.clarity(frame, key), -frame
+                best[states[key].type] = max(sighting, best.get(states[key].type, sighting))
+    return {object_type: -negated for object_type, (_, negated) in sorted(best.items())}
 
 
 def _forms(history: TrajectoryHistory) -> tuple[str, ...]:
@@ -127,10 +134,6 @@ def _other_types(
     own = set(filter(_is_nameable, vocabulary - excluded))
     others = set(filter(_is_nameable, common - excluded))
     return own if len(own) >= _FEW else own | others
-
-
-def _is_busy(history: TrajectoryHistory, frame: int) -> bool:
-    return sum(history.shows(frame, key) for key in history.objects_in_frame(frame)) >= _BUSY
 
 
 def _is_nameable(object_type: str) -> bool:

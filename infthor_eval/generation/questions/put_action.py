@@ -1,7 +1,7 @@
 """Put action: "What object did you put in the fridge?"; further forms ask about several puts.
 
-Table 3's form has two successive frames as clues: the object in the hand, and the object where it
-was put.
+Each put has two successive frames as clues, as in Table 3: the object in the hand, and the object
+where it was put.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,13 +20,12 @@ def puts(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Yield the questions on what was put into a container, if one put was into its type."""
     for receptacle_type, moves in sorted(_by_type(history).items()):
         move, *others = moves
-        before = move.after - 1
-        if not others and history.shows(before, move.item) and history.shows_put(move):
+        pair = history.put_clues(move)
+        if not others and pair is not None:
             form = "What object did you put {}?"
             names = (in_or_on(receptacle_type),)
-            clues = (before, move.after)
             yield from type_question(
-                QUESTION_TYPE, form, names, clues, [move.object_type], (receptacle_type,)
+                QUESTION_TYPE, form, names, pair, [move.object_type], (receptacle_type,)
             )
 
 
@@ -36,10 +35,7 @@ def further_puts(history: TrajectoryHistory) -> Iterator[Candidate]:
         if len(moves) > 1 and len({move.target for move in moves}) == 1:
             yield from _what(history, "What did you put {}?", (receptacle_type,), moves)
     yield from _what(history, "What did you put down?", (), history.moves)
-    shown = (
-        (history.target_type(move), move.after if history.shows_put(move) else None)
-        for move in history.moves
-    )
+    shown = ((history.target_type(move), history.put_clues(move)) for move in history.moves)
     yield from candidates.listing_question(FURTHER, "Where did you put things?", shown)
 
 
@@ -54,10 +50,11 @@ def _by_type(history: TrajectoryHistory) -> dict[str, list[ObjectMove]]:
 def _what(
     history: TrajectoryHistory, form: str, receptacles: tuple[str, ...], moves: Sequence[ObjectMove]
 ) -> Iterator[Candidate]:
-    """Yield a question on the moved objects, with the frame after the first put of each."""
+    """Yield a question on the moved objects, with the frames of the first put of each."""
     first_puts = list({move.item: move for move in reversed(moves)}.values())[::-1]
-    if all(history.shows_put(move) for move in first_puts):
-        clues = tuple(move.after for move in first_puts)
+    shown = [pair for move in first_puts if (pair := history.put_clues(move)) is not None]
+    if len(shown) == len(first_puts):
+        clues = tuple(frame for pair in shown for frame in pair)
         types = [move.object_type for move in first_puts]
         yield from type_question(
             FURTHER, form, tuple(map(in_or_on, receptacles)), clues, types, receptacles

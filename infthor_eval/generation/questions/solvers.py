@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from infthor_eval.generation.questions.facts import (
+    FactEvent,
     FrameFacts,
     events_of,
     holder_of,
@@ -18,8 +19,7 @@ from infthor_eval.generation.questions.facts import (
     only_loose,
     place_of,
     plain_name,
-    target_is,
-    target_name,
+    type_of_id,
     whole_id,
 )
 
@@ -37,15 +37,11 @@ def answer(text: str, facts: Sequence[FrameFacts]) -> list[str] | None:
 
 def _handled_object(facts: Sequence[FrameFacts], words: str) -> str | None:
     """Return the object of a type that is acted on, or else the only known one."""
-    acted = {
-        frame.target
-        for frame in facts
-        if frame.target in frame.objects and is_of_type(frame.objects[frame.target], words)
-    }
     known = {
         key for frame in facts for key, state in frame.objects.items() if is_of_type(state, words)
     }
-    candidates = acted or known
+    acted = {event.target for event in events_of(facts, "PickupObject", words)}
+    candidates = acted & known or known
     return next(iter(candidates)) if len(candidates) == 1 else None
 
 
@@ -70,7 +66,7 @@ def _seen(facts: Sequence[FrameFacts], words: str) -> list[str]:
 
 
 def _before(facts: Sequence[FrameFacts], words: str, first: str | None) -> list[str]:
-    picked = [frame.number for frame in events_of(facts, "PickupObject", words)]
+    picked = [event.frame.number for event in events_of(facts, "PickupObject", words)]
     if len(picked) > 1 and not first:
         return []  # ambiguous
     places = [
@@ -79,12 +75,17 @@ def _before(facts: Sequence[FrameFacts], words: str, first: str | None) -> list[
     return places[-1:]
 
 
-def _before_put(facts: Sequence[FrameFacts], words: str, place: str) -> list[str]:
+def _before_put(
+    facts: Sequence[FrameFacts], words: str, _preposition: str, place: str
+) -> list[str]:
     """Return where it was before the only put into a place, if that was only one place."""
     track = _track(facts, words)
-    puts = {frame.number for frame in events_of(facts, "PutObject", words)}
+    # Clue frames show where it lay first and then; that it was put there is in the question.
+    puts = {event.frame.number for event in events_of(facts, "PutObject", words)}
     there = [
-        frame.number for frame, name in track if frame.number in puts and name == named_type(place)
+        frame.number
+        for frame, name in track
+        if name == named_type(place) and (frame.number in puts or not frame.everything)
     ]
     before = {name for frame, name in track if there and frame.number < there[0]}
     return list(before) if len(there) == len(before) == 1 else []
@@ -98,8 +99,13 @@ def _moved_from(facts: Sequence[FrameFacts], words: str, place: str) -> list[str
 
 
 def _moved_to(facts: Sequence[FrameFacts], words: str) -> list[str]:
-    puts = {frame.number for frame in events_of(facts, "PutObject", words)}
-    return [place for frame, place in _track(facts, words) if frame.number in puts][-1:]
+    puts = {event.frame.number for event in events_of(facts, "PutObject", words)}
+    places = [
+        place
+        for frame, place in _track(facts, words)
+        if frame.number in puts or not frame.everything
+    ]
+    return places[-1:]
 
 
 def _now(facts: Sequence[FrameFacts], words: str) -> list[str]:
@@ -111,44 +117,42 @@ def _journey(facts: Sequence[FrameFacts], words: str) -> list[str]:
     return places[:1] + [place for previous, place in pairwise(places) if place != previous]
 
 
-def _puts_at(facts: Sequence[FrameFacts], place: str, words: str | None = None) -> list[FrameFacts]:
-    """Return the facts right after puts (of a type of object) into a type of receptacle."""
-    events = [
-        frame for frame in events_of(facts, "PutObject", words) if frame.target in frame.objects
+def _puts_at(facts: Sequence[FrameFacts], place: str, words: str | None = None) -> list[FactEvent]:
+    """Return the puts (of a type of object) into a type of receptacle."""
+    return [
+        event
+        for event in events_of(facts, "PutObject", words)
+        if _place_put(event) == named_type(place)
     ]
-    return [frame for frame in events if place_of(frame, frame.target or "") == named_type(place)]
+
+
+def _place_put(event: FactEvent) -> str | None:
+    """Return the type of what an object is in or on after a put."""
+    return place_of(event.frame, event.target) if event.target in event.frame.objects else None
 
 
 def _put_into(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
-    return list({frame.target: target_name(frame) for frame in _puts_at(facts, place)}.values())
-
-
-def _put_object(facts: Sequence[FrameFacts], _preposition: str, words: str) -> list[str]:
-    """Return what is in the hand at one frame and in or on a receptacle at the next."""
-    names = []
-    for previous, frame in pairwise(facts):
-        target = frame.target or ""
-        if frame.action != "PutObject" or target not in frame.objects:
-            continue
-        was_held = target in previous.objects and previous.objects[target].held
-        if was_held and place_of(frame, target) == named_type(words):
-            names.append(target_name(frame))
-    return names
+    return _types_put(_puts_at(facts, place))
 
 
 def _put_down(facts: Sequence[FrameFacts]) -> list[str]:
     puts = events_of(facts, "PutObject")
-    known = [frame for frame in puts if place_of(frame, frame.target or "") is not None]
-    return list({frame.target: target_name(frame) for frame in known}.values())
+    return _types_put([event for event in puts if _place_put(event) is not None])
+
+
+def _types_put(events: Sequence[FactEvent]) -> list[str]:
+    """Return the type of each object that was put, once an object."""
+    return list({event.target: type_of_id(event.target) for event in events}.values())
 
 
 def _put_places(facts: Sequence[FrameFacts]) -> list[str]:
-    places = (place_of(frame, frame.target or "") for frame in events_of(facts, "PutObject"))
+    places = map(_place_put, events_of(facts, "PutObject"))
     return list(dict.fromkeys(place for place in places if place is not None))
 
 
 def _opened_types(facts: Sequence[FrameFacts]) -> list[str]:
-    return list(dict.fromkeys(target_name(frame) for frame in events_of(facts, "OpenObject")))
+    opened = (type_of_id(event.target) for event in events_of(facts, "OpenObject"))
+    return list(dict.fromkeys(opened))
 
 
 def _open(frame: FrameFacts, words: str) -> list[str]:
@@ -170,18 +174,19 @@ def _open_now(facts: Sequence[FrameFacts], words: str) -> list[str]:
 def _open_then(facts: Sequence[FrameFacts], words: str, verb: str, item: str) -> list[str]:
     actions = {"picked up": "PickupObject", "sliced": "SliceObject", "turned on": "ToggleObjectOn"}
     events = events_of(facts, actions[verb], item)
-    return _open(events[0], words) if len(events) == 1 else []
+    return _open(events[0].frame, words) if len(events) == 1 else []
 
 
 def _open_at_put(
     facts: Sequence[FrameFacts], words: str, item: str, _preposition: str, place: str
 ) -> list[str]:
     events = _puts_at(facts, place, item)
-    return _open(events[0], words) if len(events) == 1 else []
+    return _open(events[0].frame, words) if len(events) == 1 else []
 
 
 def _sliced_types(facts: Sequence[FrameFacts]) -> list[str]:
-    return [target_name(frame) for frame in events_of(facts, "SliceObject")]
+    sliced = {event.target: type_of_id(event.target) for event in events_of(facts, "SliceObject")}
+    return list(sliced.values())
 
 
 def _at_slicing(facts: Sequence[FrameFacts], _preposition: str, place: str, item: str) -> list[str]:
@@ -191,35 +196,36 @@ def _at_slicing(facts: Sequence[FrameFacts], _preposition: str, place: str, item
 
 
 def _at_opening(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
-    events = events_of(facts, "OpenObject", place)
-    if not events:
-        return []  # nothing shows when that was
-    since = events[:1]
-    if not facts[0].everything:
-        since = [frame for frame in facts if frame.number >= events[0].number]
+    if facts[0].everything:
+        opened = [event.frame for event in events_of(facts, "OpenObject", place)]
+        since = opened[:1]
+    else:
+        opened = [frame for frame in facts if _open(frame, place) == ["yes"]]
+        since = [frame for frame in facts if opened and frame.number >= opened[0].number]
     return _all_contents([only_loose(frame) for frame in since], "", place)
 
 
 def _left_at_pickup(
     facts: Sequence[FrameFacts], _preposition: str, place: str, item: str
 ) -> list[str]:
-    events = events_of(facts, "PickupObject", item)
-    if len(events) != 1:
+    everything = facts[0].everything
+    picked = [event.frame.number for event in events_of(facts, "PickupObject", item)]
+    if not picked or (everything and len(picked) > 1):
         return []  # nothing shows when that was, or it was not once
-    since = [frame for frame in facts if facts[0].everything or frame.number >= events[0].number]
-    return _left_at([only_loose(frame) for frame in since], "PickupObject", place, item)
+    since = [only_loose(frame) for frame in facts if everything or frame.number >= picked[0]]
+    return _left_at(since, "PickupObject", place, item)
 
 
 def _left_at(facts: Sequence[FrameFacts], action: str, place: str, item: str) -> list[str]:
     """Return what is in the receptacle in which an object was until an action on it."""
     if not facts[0].everything:
         return _all_contents(facts, "", place)
-    for previous, event in pairwise(facts):
-        if event.action == action and event.target is not None and target_is(event, item):
-            holder = whole_id(holder_of(previous, event.target))
-            objects = event.objects
-            inside = [key for key in objects if whole_id(holder_of(event, key)) == holder]
-            return sorted(plain_name(objects[key].type) for key in inside)
+    for event in events_of(facts, action, item):
+        after = event.frame
+        previous = next(frame for frame in facts if frame.number == after.number - 1)
+        holder = whole_id(holder_of(previous, event.target))
+        inside = [key for key in after.objects if whole_id(holder_of(after, key)) == holder]
+        return sorted(plain_name(after.objects[key].type) for key in inside)
     return []
 
 
@@ -266,8 +272,12 @@ def _how_many(facts: Sequence[FrameFacts], _preposition: str, place: str) -> lis
 
 def _moves(facts: Sequence[FrameFacts], words: str) -> list[str]:
     """Return how often it was put down; the whole log must have as many pick-ups."""
-    count = len(events_of(facts, "PutObject", words))
-    paired = not facts[0].everything or count == len(events_of(facts, "PickupObject", words)) > 1
+    if facts[0].everything:
+        count = len(events_of(facts, "PutObject", words))
+        paired = count == len(events_of(facts, "PickupObject", words)) > 1
+    else:  # by Table 3's rule each clue shows it put down once
+        count = len(_track(facts, words))
+        paired = True
     return [str(count)] if count and paired else []
 
 
@@ -282,7 +292,7 @@ def _puts(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[st
 
 
 def _n_picked_up(facts: Sequence[FrameFacts]) -> list[str]:
-    count = len({frame.target for frame in events_of(facts, "PickupObject")})
+    count = len({event.target for event in events_of(facts, "PickupObject")})
     return [str(count)] if count else []
 
 
@@ -290,13 +300,13 @@ _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"Is there any (.+) in this room\?", _presence),
     (r"Have you seen (.+)\?", _seen),
     (r"Was the (.+) open\?", _ever_open),
-    (r"Where was the (.+) before you put it to the (.+)\?", _before_put),
+    (r"Where was the (.+) before you put it (in|on) the (.+)\?", _before_put),
     (r"Where did you move the (.+) from the (.+)\?", _moved_from),
     (r"Where is the (.+) now\?", _now),
     (r"What did you slice\?", _sliced_types),
-    (r"What objects were (in|on) the (.+) when you slice the (.+)\?", _at_slicing),
+    (r"What objects were (in|on) the (.+) when you sliced the (.+)\?", _at_slicing),
     (r"What objects were (in|on) the ((?:(?! when you ).)+)\?", _all_contents),
-    (r"What object did you put (in|on) the (.+)\?", _put_object),
+    (r"What object did you put (in|on) the (.+)\?", _put_into),
     (r"Is the (.+) (in|on) the (.+)\?", _is_in),
     (r"What objects are (in|on) the (.+)\?", _what_now),
     (r"How many objects were (in|on) the (.+)\?", _how_many),

@@ -1,4 +1,8 @@
-"""The audit of a set: what guessers that see no frame get in each group of its questions."""
+"""The audit of a set: what guessers that see no frame get in each group of its questions.
+
+Each question is guessed twice: without its trajectory, and without all trajectories of its scene,
+as a model that is tuned on other homes would know them.
+"""
 
 import math
 from collections import Counter
@@ -10,11 +14,12 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.chains import form_of
-from infthor_eval.nieh.guessing.guessers import GUESSERS
+from infthor_eval.nieh.guessing.clue_facts import read_clue_facts, read_scenes
+from infthor_eval.nieh.guessing.guessers import GUESSERS, facts_guesser
 from infthor_eval.nieh.guessing.guesses import questions_by_file, score_guesses
-from infthor_eval.nieh.scoring import Scorer
+from infthor_eval.nieh.scoring import score
 
-__all__ = ["BY", "AuditedQuestion", "Group", "audit", "groups", "sentences"]
+__all__ = ["BY", "Audit", "AuditedQuestion", "Group", "audit", "chance_of"]
 
 _YES_NO = ("yes", "no")
 _MANY = 20  # questions of a group that a sentence is worth
@@ -22,10 +27,18 @@ _MANY = 20  # questions of a group that a sentence is worth
 
 @dataclass(frozen=True)
 class AuditedQuestion:
-    """A question with the scores of the guessers, in the order of `GUESSERS`."""
+    """A question with the strict scores of the audit's guessers, in their order.
+
+    Attributes:
+        question: the question.
+        scores: scores of guesses that are learned on other trajectories.
+        scene_scores: scores of guesses that are learned on other scenes; empty if the set does not
+            tell its scenes.
+    """
 
     question: Question
     scores: tuple[float, ...]
+    scene_scores: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -35,11 +48,13 @@ class Group:
     Attributes:
         by: what they share: file, type, form or clues.
         name: the file, type, form or column itself.
+        guessers: names of the guessers.
         questions: the questions.
     """
 
     by: str
     name: str
+    guessers: Sequence[str]
     questions: Sequence[AuditedQuestion]
 
     @property
@@ -61,35 +76,43 @@ class Group:
 
     @property
     def chance(self) -> float:
-        """Mean over the questions of one over the number of answers that their form has here."""
-        answers: dict[str, set[str]] = {}
+        """Mean score of an answer that is drawn from those that a question's form has here."""
+        by_form: dict[str, list[Question]] = {}
         for audited in self.questions:
-            answers.setdefault(form_of(audited.question), set()).add(
-                doc_target(audited.question).lower()
-            )
-        return sum(1 / len(answers[form_of(audited.question)]) for audited in self.questions) / len(
-            self.questions
-        )
+            by_form.setdefault(form_of(audited.question), []).append(audited.question)
+        total = sum(chance_of(questions) * len(questions) for questions in by_form.values())
+        return total / len(self.questions)
 
     def means(self) -> tuple[float, ...]:
         """Return the mean score of each guesser."""
-        columns = zip(*(audited.scores for audited in self.questions), strict=True)
-        return tuple(sum(column) / len(self.questions) for column in columns)
+        return _means([audited.scores for audited in self.questions])
 
     def best(self) -> tuple[str, float]:
         """Return the name of the best guesser, the simplest of equals, and its score."""
         means = self.means()
         best = max(range(len(means)), key=means.__getitem__)
-        return GUESSERS[best].name, means[best]
+        return self.guessers[best], means[best]
+
+    def best_without_scene(self) -> float | None:
+        """Return the best guesser's score without the question's scene; None if that is unknown."""
+        return max(_means([audited.scene_scores for audited in self.questions]), default=None)
 
 
-def audit(data: NiehSet, scorer: Scorer = "strict") -> list[AuditedQuestion]:
-    """Return a set's questions that can be asked, with the guessers' scores, file by file."""
-    return [
-        AuditedQuestion(question, scores)
-        for questions in questions_by_file(data).values()
-        for question, scores in zip(questions, score_guesses(questions, scorer), strict=True)
-    ]
+def _means(rows: Sequence[tuple[float, ...]]) -> tuple[float, ...]:
+    return tuple(sum(column) / len(rows) for column in zip(*rows, strict=True))
+
+
+def chance_of(questions: Sequence[Question]) -> float:
+    """Return the mean strict score of an answer that is drawn from those to questions of one form.
+
+    A list that is drawn has partial credit, so for lists this is more than one over their number.
+    """
+    answers = {doc_target(question).lower() for question in questions}
+    golds = Counter(question.answers for question in questions)
+    total = sum(
+        n * sum(score(answer, gold, "strict") for answer in answers) for gold, n in golds.items()
+    )
+    return total / len(answers) / len(questions)
 
 
 def _yes_no(question: Question) -> str:
@@ -105,38 +128,62 @@ BY: Mapping[str, Callable[[Question], str]] = {
 }
 
 
-def groups(questions: Sequence[AuditedQuestion], by: str) -> list[Group]:
-    """Return groups of questions; of several files, all but whole files are split by file."""
-    split: dict[str, list[AuditedQuestion]] = {}
-    for audited in questions:
-        name = BY[by](audited.question)
-        file = audited.question.file
-        split.setdefault(f"{file}: {name}" if file and by != "file" else name, []).append(audited)
-    return [Group(by, name, items) for name, items in sorted(split.items())]
+@dataclass(frozen=True)
+class Audit:
+    """What can be guessed of a set.
+
+    Attributes:
+        guessers: names of the guessers, from the simplest on.
+        questions: the questions that can be asked, file by file.
+    """
+
+    guessers: Sequence[str]
+    questions: Sequence[AuditedQuestion]
+
+    def groups(self, by: str) -> list[Group]:
+        """Return groups of questions; of several files, all but whole files are split by file."""
+        split: dict[str, list[AuditedQuestion]] = {}
+        for audited in self.questions:
+            name = BY[by](audited.question)
+            file = audited.question.file
+            split.setdefault(f"{file}: {name}" if file and by != "file" else name, []).append(
+                audited
+            )
+        return [Group(by, name, self.guessers, items) for name, items in sorted(split.items())]
+
+    def sentences(self) -> Iterator[str]:
+        """Yield what is striking about the set, in sentences."""
+        for group in self.groups("answers"):
+            file, _, _ = group.name.rpartition(": ")
+            where = f"of {file}" if file else "of this set"
+            if group.share_yes in (0, 1) and len(group.questions) >= _MANY:
+                answer = "yes" if group.share_yes else "no"
+                yield f"All {len(group.questions)} yes/no questions {where} are {answer}."
+        for group in self.groups("form"):
+            if len(group.questions) >= _MANY:
+                yield from _sentences_on_form(group)
+        for group in self.groups("file"):
+            name, mean = group.best()
+            yield f"{group.name}: {100 * mean:.2f} % can be had without a frame ({name})."
 
 
-def sentences(questions: Sequence[AuditedQuestion]) -> Iterator[str]:
-    """Yield what is striking about a set, in sentences."""
-    for group in groups(questions, "answers"):
-        file, _, _ = group.name.rpartition(": ")
-        where = f"of {file}" if file else "of this set"
-        if group.share_yes in (0, 1) and len(group.questions) >= _MANY:
-            answer = "yes" if group.share_yes else "no"
-            yield f"All {len(group.questions)} yes/no questions {where} are {answer}."
-    for group in groups(questions, "form"):
-        if len(group.questions) < _MANY:
-            continue
-        name, mean = group.best()
-        if len(group.answers) == 1:
-            yield (
-                f"{group.name} ({len(group.questions)} questions): the answer is always "
-                f"{next(iter(group.answers))}."
-            )
-        elif mean > 0.9:
-            yield (
-                f"{group.name} ({len(group.questions)} questions): {name} gets {100 * mean:.1f} % "
-                "without a frame."
-            )
-    for group in groups(questions, "file"):
-        name, mean = group.best()
-        yield f"{group.name}: {100 * mean:.2f} % can be had without a frame ({name})."
+def _sentences_on_form(group: Group) -> Iterator[str]:
+    name, mean = group.best()
+    n = len(group.questions)
+    if len(group.answers) == 1:
+        yield f"{group.name} ({n} questions): the answer is always {next(iter(group.answers))}."
+    elif mean > 0.9:
+        yield f"{group.name} ({n} questions): {name} gets {100 * mean:.1f} % without a frame."
+
+
+def audit(data: NiehSet) -> Audit:
+    """Guess each question of a set that can be asked, in all ways that the set allows."""
+    facts = read_clue_facts(data)
+    scenes = read_scenes(data)
+    guessers = (*GUESSERS, facts_guesser(facts)) if facts else GUESSERS
+    audited: list[AuditedQuestion] = []
+    for questions in questions_by_file(data).values():
+        scores = score_guesses(questions, guessers)
+        of_scenes = score_guesses(questions, guessers, scenes) if scenes else [()] * len(questions)
+        audited += map(AuditedQuestion, questions, scores, of_scenes)
+    return Audit([guesser.name for guesser in guessers], audited)

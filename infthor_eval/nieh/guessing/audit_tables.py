@@ -2,9 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-from infthor_eval.nieh.guessing.audit import AuditedQuestion, groups
+from infthor_eval.nieh.guessing.audit import Audit, Group
 from infthor_eval.nieh.guessing.balancing import MARGIN, Balanced
-from infthor_eval.nieh.guessing.guessers import GUESSERS
 from infthor_eval.nieh.results.above_guessing import FormScore
 from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.summary import NiehSummary, main_metric
@@ -22,13 +21,13 @@ _HEADS = {
 }
 
 
-def guessers_table(questions: Sequence[AuditedQuestion]) -> Table:
+def guessers_table(audited: Audit) -> Table:
     """Return what each guesser gets on each file."""
-    files = groups(questions, "file")
+    files = audited.groups("file")
     rows = []
-    for number, guesser in enumerate(GUESSERS):
+    for number, name in enumerate(audited.guessers):
         means = [f"{100 * group.means()[number]:.2f}" for group in files]
-        rows.append(Row((guesser.name, *means)))
+        rows.append(Row((name, *means)))
     columns = (Column("guesser", False), *(Column(group.name) for group in files))
     note = (
         "Each question is guessed from questions on other trajectories in its file; nobody sees a "
@@ -39,29 +38,46 @@ def guessers_table(questions: Sequence[AuditedQuestion]) -> Table:
     )
 
 
-def audit_tables(questions: Sequence[AuditedQuestion]) -> list[Table]:
+def audit_tables(audited: Audit) -> list[Table]:
     """Return a table for each way to group the questions."""
     tables = []
-    numbers = ("questions", "answers", "entropy, bits", "yes, %", "chance, %", "best guess, %")
+    numbers = (
+        "questions",
+        "answers",
+        "entropy, bits",
+        "yes, %",
+        "chance, %",
+        "other scenes, %",
+        "best guess, %",
+    )
+    note = (
+        "chance: an answer drawn from those of the form; other scenes: the best guess from "
+        "questions in other scenes alone."
+    )
     for by, head in _HEADS.items():
-        rows = []
-        for group in groups(questions, by):
-            yes = group.share_yes
-            (best, mean) = group.best()
-            cells = (
-                group.name,
-                str(len(group.questions)),
-                str(len(group.answers)),
-                f"{group.entropy:.2f}",
-                "-" if yes is None else f"{100 * yes:.1f}",
-                f"{100 * group.chance:.1f}",
-                f"{100 * mean:.1f}",
-                best,
-            )
-            rows.append(Row(cells))
+        rows = tuple(Row(_cells(group)) for group in audited.groups(by))
         columns = (Column(head, False), *map(Column, numbers), Column("by", False))
-        tables.append(Table(f"By {head}", columns, tuple(rows)))
+        tables.append(Table(f"By {head}", columns, rows, (note,)))
     return tables
+
+
+def _cells(group: Group) -> tuple[str, ...]:
+    name, mean = group.best()
+    return (
+        group.name,
+        str(len(group.questions)),
+        str(len(group.answers)),
+        f"{group.entropy:.2f}",
+        _percent(group.share_yes),
+        _percent(group.chance),
+        _percent(group.best_without_scene()),
+        _percent(mean),
+        name,
+    )
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100 * share:.1f}"
 
 
 def runs_table(runs: Sequence[RunSummary]) -> Table:

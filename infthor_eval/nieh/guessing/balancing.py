@@ -1,8 +1,8 @@
 """A large part of a set in which guessing without frames does not help.
 
 The algorithm is iterative pruning, as in the debiased sets of Brown et al. (arXiv:2511.04655). The
-part is one file, so all questions count as one file here. Chance is one over the number of answers
-that a form has in the part.
+part is one file, so all questions count as one file here. Chance is the mean score of an answer
+that is drawn from those that a form has in the part.
 
 1. In each form the commonest answer is cut to chance and 3 points: of all ways to keep the k
    commonest answers, each up to some number of questions, the one that keeps most. A form with one
@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.docs import doc_target
+from infthor_eval.nieh.guessing.audit import chance_of
 from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS
 from infthor_eval.nieh.guessing.guesses import score_guesses
@@ -68,7 +69,7 @@ def balance(questions: Sequence[Question]) -> Balanced:
     means = [n_right / len(left) for n_right in _right_by_guesser(left, right)]
     best = max(range(len(means)), key=means.__getitem__)
     by_form = _by_form(left)
-    chance = sum(_chance(group) * len(group) for group in by_form.values()) / len(left)
+    chance = sum(chance_of(group) * len(group) for group in by_form.values()) / len(left)
     return Balanced(left, chance, GUESSERS[best].name, means[best], kept)
 
 
@@ -81,10 +82,6 @@ def _by_form(questions: Sequence[Question]) -> dict[str, list[Question]]:
     for question in questions:
         groups.setdefault(form_of(question), []).append(question)
     return groups
-
-
-def _chance(questions: Sequence[Question]) -> float:
-    return 1 / len({doc_target(question) for question in questions})
 
 
 def _cut_answers(questions: Sequence[Question]) -> list[Question]:
@@ -139,7 +136,7 @@ def _surplus(
     """Return half of what each form's best guesser gets beyond chance, where above the margin."""
     surplus = {}
     for form, group in _by_form(questions).items():
-        chance = _chance(group)
+        chance = chance_of(group)
         best = max(_right_by_guesser(group, right))
         if best > (chance + MARGIN) * len(group):
             surplus[form] = max(1, round((best - chance * len(group)) / 2))

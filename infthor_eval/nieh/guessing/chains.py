@@ -9,7 +9,8 @@ alone, so that a right guess is no memory of the answer key.
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from infthor_eval.nieh.docs import doc_target
 
 __all__ = [
     "Guesser",
+    "HoldOut",
     "chains_of_words",
     "chains_of_words_and_count",
     "chains_of_words_and_place",
@@ -30,6 +32,7 @@ __all__ = [
 ]
 
 Chain = Sequence[Hashable]
+HoldOut = Callable[[Sample], str]  # the name of what is left out when a sample is guessed
 _LEADING_WORDS = 2  # the type of a question whose file names none
 _STEM = 3  # leading words that tell the forms of questions apart
 _PLACE = 100  # frames that count as one place
@@ -65,19 +68,35 @@ def words_of(question: Question) -> list[str]:
     return re.findall(r"\w+", question.text.lower())
 
 
-def held_out(samples: Sequence[Sample]) -> Callable[[Sample], str]:
-    """Return what a sample is left out with: its trajectory, or itself if there is one alone."""
-    is_alone = len({sample.question.traj_id for sample in samples}) == 1
-    return lambda sample: sample.question.id if is_alone else sample.question.traj_id
+def held_out(
+    samples: Sequence[Sample], scenes: Mapping[str, str] = MappingProxyType({})
+) -> HoldOut:
+    """Return what a sample is left out with: its trajectory, or itself if there is one alone.
+
+    Args:
+        samples: all samples that are guessed.
+        scenes: scene by id of the trajectory, to leave out whole scenes.
+    """
+
+    def group(sample: Sample) -> str:
+        return scenes.get(sample.question.traj_id, sample.question.traj_id)
+
+    is_alone = len(set(map(group, samples))) == 1
+    return (lambda sample: sample.question.id) if is_alone else group
 
 
 class Guesser:
     """Guesses at samples from the answers to others."""
 
-    def __init__(self, samples: Sequence[Sample], chains: Callable[[Sample], list[Chain]]) -> None:
-        """Count the answer key; on one trajectory alone, a question is guessed from the others."""
+    def __init__(
+        self,
+        samples: Sequence[Sample],
+        chains: Callable[[Sample], list[Chain]],
+        hold_out: HoldOut | None = None,
+    ) -> None:
+        """Count the answer key; a sample is guessed without those held out, by `held_out`."""
         self._chains = chains
-        self._held_out = held_out(samples)
+        self._held_out = hold_out or held_out(samples)
         self._answers = sorted({doc_target(sample.question) for sample in samples})
         self._number = {answer: number for number, answer in enumerate(self._answers)}
         self._seen: dict[Hashable, Counter[int]] = defaultdict(Counter)

@@ -1,7 +1,7 @@
 """Guessers without frames: each guesses the questions of a file from other trajectories."""
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Flag, auto
 from functools import partial
@@ -11,15 +11,17 @@ from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.chains import (
     Chain,
     Guesser,
+    HoldOut,
     chains_of_words,
     chains_of_words_and_count,
     chains_of_words_and_place,
     form_of,
     held_out,
 )
+from infthor_eval.nieh.guessing.clue_facts import ClueFacts
 from infthor_eval.nieh.guessing.learner import guess_by_learning
 
-__all__ = ["GUESSERS", "Knowledge", "NamedGuesser"]
+__all__ = ["GUESSERS", "Knowledge", "NamedGuesser", "facts_guesser"]
 
 
 class Knowledge(Flag):
@@ -29,6 +31,7 @@ class Knowledge(Flag):
     WORDS = auto()
     NUMBER = auto()  # of clue frames
     PLACE = auto()  # of the clue frames in the trajectory
+    FACTS = auto()  # of the clue frames, without their evidence: `ClueFacts`
 
 
 @dataclass(frozen=True)
@@ -38,18 +41,25 @@ class NamedGuesser:
     Attributes:
         name: its name in tables.
         knows: what it knows.
-        guess: returns a guess for each sample of a file (on the clue frames); an empty text for
-            none.
+        rule: how it guesses samples from those that are not held out with them.
     """
 
     name: str
     knows: Knowledge
-    guess: Callable[[Sequence[Sample]], list[str]]
+    rule: Callable[[Sequence[Sample], HoldOut], list[str]]
+
+    def guess(self, samples: Sequence[Sample], hold_out: HoldOut | None = None) -> list[str]:
+        """Return a guess for each sample of a file (on the clue frames); an empty text for none.
+
+        A sample is guessed without those that are held out with it; by default see `held_out`.
+        """
+        return self.rule(samples, hold_out or held_out(samples))
 
 
-def _guess_constant(samples: Sequence[Sample], group_of: Callable[[Sample], str]) -> list[str]:
+def _guess_constant(
+    samples: Sequence[Sample], own_of: HoldOut, group_of: Callable[[Sample], str]
+) -> list[str]:
     """Guess the commonest answer of a group on other trajectories; of equals the first by name."""
-    own_of = held_out(samples)
     everywhere: dict[str, Counter[str]] = defaultdict(Counter)
     own: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
     for sample in samples:
@@ -66,9 +76,9 @@ def _guess_constant(samples: Sequence[Sample], group_of: Callable[[Sample], str]
 
 
 def _guess_by_chains(
-    samples: Sequence[Sample], chains: Callable[[Sample], list[Chain]]
+    samples: Sequence[Sample], hold_out: HoldOut, chains: Callable[[Sample], list[Chain]]
 ) -> list[str]:
-    guesser = Guesser(samples, chains)
+    guesser = Guesser(samples, chains, hold_out)
     return [guesser.guess(sample) for sample in samples]
 
 
@@ -107,3 +117,12 @@ GUESSERS = (
         partial(guess_by_learning, number=True, place=True),
     ),
 )
+
+
+def facts_guesser(facts: Mapping[str, Sequence[ClueFacts]]) -> NamedGuesser:
+    """Return the guesser that also knows facts of the clue frames, by id of the question."""
+    return NamedGuesser(
+        "learner: words, number, place, facts of the clues",
+        _WORDS | _NUMBER | _PLACE | Knowledge.FACTS,
+        partial(guess_by_learning, number=True, place=True, facts=facts),
+    )

@@ -6,6 +6,7 @@ from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from threading import Lock
+from types import MappingProxyType
 
 import msgspec
 
@@ -14,10 +15,10 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import NOT_JSON
 from infthor_eval.nieh import scoring
 from infthor_eval.nieh.contexts import Sample
-from infthor_eval.nieh.guessing.chains import form_of
-from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
+from infthor_eval.nieh.guessing.chains import form_of, held_out
+from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge, NamedGuesser
 from infthor_eval.nieh.records import Guess
-from infthor_eval.nieh.scoring import SCORERS, Scorer, score, scores
+from infthor_eval.nieh.scoring import SCORERS, score, scores
 from infthor_eval.storage.digests import digest_of_files, fingerprint
 from infthor_eval.storage.files import write_atomically
 from infthor_eval.storage.folders import user_cache
@@ -101,15 +102,24 @@ def questions_by_file(data: NiehSet) -> dict[str, list[Question]]:
 
 
 def score_guesses(
-    questions: Sequence[Question], scorer: Scorer = "strict"
+    questions: Sequence[Question],
+    guessers: Sequence[NamedGuesser] = GUESSERS,
+    scenes: Mapping[str, str] = MappingProxyType({}),
 ) -> list[tuple[float, ...]]:
-    """Return for each question of a file the scores of all guessers, in their order."""
+    """Return for each question of a file the guessers' strict scores, in their order.
+
+    Args:
+        questions: the questions.
+        guessers: who guesses.
+        scenes: scene by id of the trajectory, to guess without the question's whole scene.
+    """
     samples = [sample_on_clues(question) for question in questions]
-    by_guesser = [guesser.guess(samples) for guesser in GUESSERS]
+    hold_out = held_out(samples, scenes)
+    by_guesser = [guesser.guess(samples, hold_out) for guesser in guessers]
     by_question = zip(*by_guesser, strict=True)
     rows = []
     for question, guesses in zip(questions, by_question, strict=True):
-        rows.append(tuple(score(guess, question.answers, scorer) for guess in guesses))
+        rows.append(tuple(score(guess, question.answers, "strict") for guess in guesses))
     return rows
 
 

@@ -1,48 +1,59 @@
-"""A strong guesser: logistic regression on a question's words, and number and place of its clues.
+"""A strong guesser: logistic regression on a question's words, and on facts of its clues.
 
 As in the stress test of test sets by Brown et al. (arXiv:2511.04655), it is trained on the
 questions alone, and guesses those of a tenth of the trajectories from the others. What it gets
 right is there to be exploited by any model that is tuned on such a set.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
+from types import MappingProxyType
 
 import numpy as np
 
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
-from infthor_eval.nieh.guessing.chains import form_of, held_out, words_of
+from infthor_eval.nieh.guessing.chains import HoldOut, form_of, words_of
+from infthor_eval.nieh.guessing.clue_facts import ClueFacts
 
 __all__ = ["guess_by_learning"]
 
 _FOLDS = 10
-_PLACE = 100  # frames that count as one place
+_PLACES = (15, 100)  # frames that count as one place
 # On the published files strengths from 1 to 10 differ by less than a point; no more is tuned.
 _INVERSE_PENALTY = 3.0
 _TOLERANCE = 1e-2
 _ITERATIONS = 1000
 
 
-def guess_by_learning(samples: Sequence[Sample], *, number: bool, place: bool) -> list[str]:
+def guess_by_learning(
+    samples: Sequence[Sample],
+    hold_out: HoldOut,
+    *,
+    number: bool,
+    place: bool,
+    facts: Mapping[str, Sequence[ClueFacts]] = MappingProxyType({}),
+) -> list[str]:
     """Return a guess per sample, learned on other trajectories; "" if there is nothing to learn.
 
     Args:
         samples: samples on the clue frames.
+        hold_out: what is not learned from when a sample is guessed, as its trajectory.
         number: whether it knows the number of clue frames.
         place: whether it knows where in the trajectory they are.
+        facts: what else it knows of the clue frames, by id of the question.
     """
     from sklearn.feature_extraction import DictVectorizer  # a second to import
     from sklearn.linear_model import LogisticRegression
     from sklearn.model_selection import GroupKFold
     from threadpoolctl import threadpool_limits
 
-    groups = list(map(held_out(samples), samples))
+    groups = list(map(hold_out, samples))
     n_groups = len(set(groups))
     if n_groups < 2:
         return [""] * len(samples)
     features = DictVectorizer().fit_transform(
-        [_features(sample, number, place) for sample in samples]
+        [_features(sample, number, place, facts.get(sample.question.id, ())) for sample in samples]
     )
     answers = np.array([doc_target(sample.question) for sample in samples], dtype=object)
     guesses = np.empty(len(samples), dtype=object)
@@ -57,7 +68,9 @@ def guess_by_learning(samples: Sequence[Sample], *, number: bool, place: bool) -
     return list(guesses)
 
 
-def _features(sample: Sample, number: bool, place: bool) -> dict[str, float]:
+def _features(
+    sample: Sample, number: bool, place: bool, facts: Sequence[ClueFacts]
+) -> dict[str, float]:
     """Return features by name, each also crossed with the form of the question."""
     form = form_of(sample.question)
     words = words_of(sample.question)
@@ -65,14 +78,31 @@ def _features(sample: Sample, number: bool, place: bool) -> dict[str, float]:
     if number:
         names.append(f"#number {len(sample.frames)}")
     if place:
-        first, last = sample.frames[0], sample.frames[-1]
-        names += [
-            f"#first {first // _PLACE}",
-            f"#last {last // _PLACE}",
-            f"#span {(last - first).bit_length()}",
-        ]
+        names += _place_names(sample)
+    names += _fact_names(facts)
     return {
         f"#form {form}": 1.0,
         **dict.fromkeys(names, 1.0),
         **{f"{form}: {name}": 1.0 for name in names},
     }
+
+
+def _place_names(sample: Sample) -> Iterator[str]:
+    """Yield the places of the first and the last clue, in bins of several sizes, and their span."""
+    first, last = sample.frames[0], sample.frames[-1]
+    yield f"#span {(last - first).bit_length()}"
+    for name, frame in (("first", first), ("last", last)):
+        for size in _PLACES:
+            yield f"#{name} {frame // size} of {size}"
+        yield f"#{name} below {1 << frame.bit_length()}"
+
+
+def _fact_names(facts: Sequence[ClueFacts]) -> Iterator[str]:
+    """Yield the facts of the first and the last clue, and of how many the hand is full."""
+    if facts:
+        yield f"#hands {sum(fact.hand_full for fact in facts)}"
+        for name, fact in (("first", facts[0]), ("last", facts[-1])):
+            yield f"#{name} tenth {int(10 * fact.progress)}"
+            yield f"#{name} hand {fact.hand_full}"
+            yield f"#{name} in view {fact.n_in_view.bit_length()}"
+            yield f"#{name} at edge {fact.n_at_edge.bit_length()}"

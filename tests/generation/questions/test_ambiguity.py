@@ -1,6 +1,7 @@
 """What is asked only where it is clear what is meant, on logs made by hand."""
 
 import random
+from dataclasses import replace
 
 import pytest
 
@@ -12,6 +13,7 @@ from infthor_eval.generation.questions import (
     location,
     open_state,
     presence,
+    put_action,
 )
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
@@ -99,7 +101,7 @@ def test_which_pickup_is_meant_is_clear():
     start = {**PLACES, APPLE: state(APPLE, TABLE)}
     once = history(start, *moved(APPLE, TABLE, FRIDGE))
     assert check(once, location.locations(once)) == {
-        "Where was the apple before you put it to the fridge?": ("diningtable",),
+        "Where was the apple before you put it in the fridge?": ("diningtable",),
         "Where did you move the apple from the dining table?": ("fridge",),
         "Where is the apple now?": ("fridge",),
     }
@@ -120,7 +122,7 @@ def test_of_several_moves_only_those_at_the_ends_are_asked_about():
     start = {**PLACES, APPLE: state(APPLE, TABLE)}
     twice = history(start, *moved(APPLE, TABLE, FRIDGE), *moved(APPLE, FRIDGE, DESK))
     assert check(twice, location.locations(twice)) == {
-        "Where was the apple before you put it to the fridge?": ("diningtable",),
+        "Where was the apple before you put it in the fridge?": ("diningtable",),
         "Where did you move the apple from the fridge?": ("desk",),
         "Where is the apple now?": ("desk",),
     }
@@ -133,6 +135,62 @@ def test_of_several_moves_only_those_at_the_ends_are_asked_about():
     assert not [text for text in texts(location.locations(back)) if "before you put" in text]
 
 
+def test_a_put_is_shown_by_what_was_in_the_hand_before():
+    start = {**PLACES, APPLE: state(APPLE, TABLE), MUG: state(MUG, DESK)}
+    log = history(start, *moved(APPLE, TABLE, DESK), *moved(MUG, DESK, FRIDGE))
+    puts = list(put_action.further_puts(log))
+    assert check(log, puts) == {
+        "What did you put down?": ("apple", "mug"),
+        "Where did you put things?": ("desk", "fridge"),
+    }
+    assert {candidate.clues for candidate in puts} == {(1, 2, 3, 4)}
+    # What lies on the desk alone does not tell what was put there.
+    for question in (candidate.question("made") for candidate in puts):
+        after = replace(question, clues=(2, 4))
+        assert not Checker(log.steps, DEFAULT_SHARE).verdict(after).sufficient
+
+
+def test_an_opening_is_shown_by_what_was_closed_before():
+    closed, opened = (state(FRIDGE, is_open=is_open) for is_open in (False, True))
+    log = history(
+        {**PLACES, FRIDGE: closed},
+        ("LookUp", None, None, {}),
+        ("OpenObject", FRIDGE, None, {FRIDGE: opened}),
+    )
+    asked = [
+        item for item in open_state.further_open_states(log) if item.text == "What did you open?"
+    ]
+    assert check(log, asked) == {"What did you open?": ("fridge",)}
+    assert asked[0].clues == (1, 2)
+
+
+@pytest.mark.parametrize(
+    ("box", "expected"), [((200, 200, 220, 220), True), ((110, 110, 130, 130), False)]
+)
+def test_two_of_a_type_are_counted_where_they_are_seen_apart(box, expected):
+    other = "Apple|2"
+    start = {**PLACES, APPLE: state(APPLE, TABLE), other: state(other, DESK)}
+    boxes = {number: {other: box} for number in range(3)}
+    log = history(start, *moved(APPLE, TABLE, DESK), boxes=boxes)
+    asked = texts(final_state.final_states(log))
+    assert ("How many objects were on the desk?" in asked) == expected
+
+
+def test_different_objects_are_counted_if_none_looks_like_another():
+    other = "Apple|2"
+    start = {
+        **PLACES,
+        APPLE: state(APPLE, TABLE),
+        other: state(other, TABLE),
+        MUG: state(MUG, TABLE),
+    }
+    look = ("LookUp", None, None, {})
+    for second, expected in ((MUG, True), (other, False)):
+        log = history(start, *moved(APPLE, TABLE, DESK), *moved(second, TABLE, DESK), *[look] * 20)
+        counted = check(log, counting.further_counts(log, random.Random(0)))
+        assert ("How many different objects did you pick up?" in counted) == expected
+
+
 def test_moves_are_counted_of_what_was_moved_more_than_once():
     start = {**PLACES, APPLE: state(APPLE, TABLE), MUG: state(MUG, TABLE)}
     log = history(
@@ -141,12 +199,25 @@ def test_moves_are_counted_of_what_was_moved_more_than_once():
     assert check(log, counting.counts(log)) == {"How many times did you move the apple?": ("2",)}
 
 
-def test_the_first_sighting_is_shown():
-    log = history({**PLACES, MUG: state(MUG, TABLE)}, ("LookUp", None, None, {}))
-    del log.steps[0].seen[MUG]
+def test_the_best_sighting_is_shown():
+    look = ("LookUp", None, None, {})
+    boxes = {0: {MUG: (0, 100, 20, 120)}}
+    log = history({**PLACES, MUG: state(MUG, TABLE)}, look, look, boxes=boxes)
     clues = {candidate.text: candidate.clues for candidate in presence.yes_questions(log)}
     assert clues["Have you seen a mug?"] == clues["Is there any mug in this room?"] == (1,)
     assert clues["Have you seen a fridge?"] == (0,)
+
+
+def test_an_absence_has_a_clue_of_a_presence_of_its_kind():
+    look = ("LookUp", None, None, {})
+    boxes = {number: {MUG: (0, 100, 20, 120)} for number in (0, 1, 3)}
+    boxes[0] |= dict.fromkeys(PLACES, (0, 0, 40, 40))
+    log = history({**PLACES, MUG: state(MUG, TABLE)}, look, look, look, boxes=boxes)
+    vocabulary = frozenset({"Toaster", "Cup", "Bread", "Egg", "Fork", "Potato", "Tomato", "Kettle"})
+    absences = list(presence.no_questions(log, vocabulary, random.Random(0)))
+    clues = {candidate.subjects[0]: candidate.clues for candidate in absences}
+    assert clues["Bread"] == clues["Potato"] == (2,)  # where the mug is seen best
+    assert clues["Toaster"] == (1,)  # where the tables are
 
 
 def test_no_room_is_meant_in_a_house_of_several():

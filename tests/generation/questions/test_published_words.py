@@ -39,8 +39,8 @@ WORDS = [
     (
         "Where was CellPhone before you put it to SideTable?",
         "CoffeeTable",
-        "Where was {} before you put it to {}?",
-        ("the cell phone", "the side table"),
+        "Where was {} before you put it {}?",
+        ("the cell phone", "on the side table"),
         "coffeetable",
     ),
     (
@@ -55,7 +55,7 @@ WORDS = [
     (
         "What objects were in DiningTable when you slice Potato?",
         "Potato",
-        "What objects were {} when you slice {}?",
+        "What objects were {} when you sliced {}?",
         ("on the dining table", "the potato"),
         "potato",
     ),

@@ -1,13 +1,14 @@
 """The audit of a set, by hand and on the published files."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
-from infthor_eval.nieh.guessing.audit import BY, AuditedQuestion, Group, audit, groups, sentences
+from infthor_eval.nieh.guessing.audit import BY, Audit, AuditedQuestion, Group, audit, chance_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS
 
 from ...helpers.questions import make_question
@@ -24,11 +25,16 @@ def audited(text, answer, *scores, file="", clues=(1,), number=0):
     return AuditedQuestion(make_question(f"t{number}", text, answer, clues, file=file), right)
 
 
+def sentences(questions):
+    return list(Audit(NAMES, questions).sentences())
+
+
 def test_a_group_tells_its_answers_and_its_best_guesser():
     answers = ("Yes", "yes", "no", "Bed")
     group = Group(
         "file",
         "all",
+        NAMES,
         [audited(PRESENCE, answer, i < 1, i < 3, i < 3) for i, answer in enumerate(answers)],
     )
     assert group.answers == {"yes": 2, "no": 1, "bed": 1}
@@ -39,8 +45,22 @@ def test_a_group_tells_its_answers_and_its_best_guesser():
 
 
 def test_one_answer_has_no_entropy_and_open_questions_no_share_of_yes():
-    group = Group("file", "all", [audited(OPEN, "Bed")] * 3)
+    group = Group("file", "all", NAMES, [audited(OPEN, "Bed")] * 3)
     assert (group.entropy, math.copysign(1, group.entropy), group.share_yes) == (0, 1, None)
+
+
+def test_chance_of_a_list_has_its_partial_credit():
+    lists = [("bed", "sofa"), ("bed", "desk"), ("bed", "desk"), ("cup", "safe")]
+    questions = [
+        replace(make_question(f"t{number}", "What did you open?"), answers=answers)
+        for number, answers in enumerate(lists)
+    ]
+    # F1 of the three answers: for the first 1, 1/2 and 0; for each of the next two 1/2, 1 and 0;
+    # for the last 0, 0 and 1.
+    assert chance_of(questions) == pytest.approx((1.5 + 1.5 + 1.5 + 1) / 3 / 4)
+    assert chance_of([make_question(f"t{i}", OPEN, answer) for i, answer in enumerate("abc")]) == (
+        pytest.approx(1 / 3)
+    )
 
 
 def test_groups_are_split_by_file_unless_they_are_files():
@@ -49,7 +69,10 @@ def test_groups_are_split_by_file_unless_they_are_files():
         audited(OPEN, "Bed", file="a", clues=(1, 2)),
         audited(PRESENCE, "no", file="b"),
     ]
-    sizes = {by: {group.name: len(group.questions) for group in groups(items, by)} for by in BY}
+    sizes = {
+        by: {group.name: len(group.questions) for group in Audit(NAMES, items).groups(by)}
+        for by in BY
+    }
     assert sizes == {
         "file": {"a": 2, "b": 1},
         "answers": {"a: open-ended": 1, "a: yes/no": 1, "b: yes/no": 1},
@@ -57,23 +80,23 @@ def test_groups_are_split_by_file_unless_they_are_files():
         "type": {"a: final_state": 1, "a: location_tracing": 1, "b: final_state": 1},
         "form": {"a: Is {} in/on {}?": 1, "a: Where is {} now?": 1, "b: Is {} in/on {}?": 1},
     }
-    (alone,) = groups([audited("Why?", "x")], "file")
-    (untyped,) = groups([audited("Why?", "x")], "type")
+    (alone,) = Audit(NAMES, [audited("Why?", "x")]).groups("file")
+    (untyped,) = Audit(NAMES, [audited("Why?", "x")]).groups("type")
     assert (alone.name, untyped.name) == ("all", "untyped")
 
 
 def test_sentences_tell_what_is_striking():
     yes = [audited(PRESENCE, "yes", 1.0, number=i) for i in range(20)]
     places = [audited(OPEN, ("Bed", "Shelf")[i % 2], 0.0, i > 0, number=i) for i in range(20)]
-    assert list(sentences([*yes, *places])) == [
+    assert sentences([*yes, *places]) == [
         "All 20 yes/no questions of this set are yes.",
         "Is {} in/on {}? (20 questions): the answer is always yes.",
         f"Where is {{}} now? (20 questions): {NAMES[1]} gets 95.0 % without a frame.",
         f"all: 50.00 % can be had without a frame ({NAMES[0]}).",
     ]
     # One question fewer is too few, and 90 % is not striking.
-    assert len(list(sentences(yes[:19]))) == 1
-    assert len(list(sentences([*places[:19], audited(OPEN, "Bed")]))) == 1
+    assert len(sentences(yes[:19])) == 1
+    assert len(sentences([*places[:19], audited(OPEN, "Bed")])) == 1
     both = [*yes[:19], audited(PRESENCE, "no")]
     assert not [sentence for sentence in sentences(both) if sentence.startswith("All")]
 
@@ -81,7 +104,7 @@ def test_sentences_tell_what_is_striking():
 def test_a_set_is_audited_question_by_question(tmp_path):
     questions = [make_question(f"t{i}", PRESENCE, "yes" if i else "no") for i in range(4)]
     write_questions(tmp_path / "qa_set_test.csv", questions)
-    audited_questions = audit(NiehSet(tmp_path))
+    audited_questions = audit(NiehSet(tmp_path)).questions
     assert [item.question for item in audited_questions] == questions
     assert [item.scores for item in audited_questions] == [
         (float(i > 0),) * len(GUESSERS) for i in range(4)
@@ -92,8 +115,8 @@ def test_a_set_is_audited_question_by_question(tmp_path):
     not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data"
 )
 def test_what_the_published_files_give_without_a_frame():
-    audited_questions = audit(NiehSet(PUBLISHED))
-    single, multi = groups(audited_questions, "file")
+    published = audit(NiehSet(PUBLISHED))
+    single, multi = published.groups("file")
     assert [(group.name, len(group.questions)) for group in (single, multi)] == [
         (SINGLE, 829),
         (MULTI, 474),
@@ -106,7 +129,7 @@ def test_what_the_published_files_give_without_a_frame():
         assert (means[constant], means[blind]) == (of_constant, of_blind)
         assert means[learner] >= of_blind
         assert group.best()[1] == max(group.means()) >= group.means()[learner]
-    summary = list(sentences(audited_questions))
+    summary = list(published.sentences())
     assert summary[:2] == [
         f"All 525 yes/no questions of {SINGLE} are yes.",
         f"All 213 yes/no questions of {MULTI} are no.",

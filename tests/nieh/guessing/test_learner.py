@@ -1,7 +1,11 @@
 """The learner, on sets in which one thing alone gives the answer away."""
 
+from dataclasses import replace
+
 import pytest
 
+from infthor_eval.nieh.guessing.chains import held_out
+from infthor_eval.nieh.guessing.clue_facts import ClueFacts
 from infthor_eval.nieh.guessing.learner import guess_by_learning
 
 from ...helpers.questions import make_question, make_samples_on_clues
@@ -10,7 +14,7 @@ TEXTS = ("Is Mug on the Bed?", "Is Box on the Bed?")
 
 
 def right(samples, **knowledge):
-    guesses = guess_by_learning(samples, **knowledge)
+    guesses = guess_by_learning(samples, held_out(samples), **knowledge)
     return sum(
         guess == sample.question.answers[0] for guess, sample in zip(guesses, samples, strict=True)
     )
@@ -49,11 +53,37 @@ def test_number_and_place_are_learned_by_those_that_know_them_alone(clues, knowl
     assert right(samples, number=False, place=False) == 6
 
 
+@pytest.mark.parametrize("field", ["hand_full", "n_in_view", "n_at_edge", "progress"])
+def test_facts_of_the_clues_are_learned_by_who_knows_them_alone(field):
+    samples = of_both(((1,), (1,)))
+    facts = {}
+    for sample in samples:
+        is_yes = sample.question.answers == ("yes",)
+        fact = ClueFacts(progress=0.0, hand_full=False, n_in_view=0, n_at_edge=0)
+        facts[sample.question.id] = (replace(fact, **{field: int(is_yes)}),)
+    knowledge = {"number": False, "place": False}
+    assert right(samples, **knowledge, facts=facts) == 12
+    assert right(samples, **knowledge) == 6
+
+
+def test_of_a_scene_that_is_held_out_nothing_is_learned():
+    # Each scene has one answer, and two trajectories: who knows the other one is right.
+    questions = [make_question(f"t{i}", f"{i // 2}?", ("yes", "no")[i // 2 % 2]) for i in range(8)]
+    samples = make_samples_on_clues(*questions)
+    scenes = {f"t{i}": f"scene-{i // 2}" for i in range(8)}
+    for hold_out, expected in ((held_out(samples), 8), (held_out(samples, scenes), 0)):
+        guesses = guess_by_learning(samples, hold_out, number=False, place=False)
+        assert (
+            sum(guess == item.answers[0] for guess, item in zip(guesses, questions, strict=True))
+            == expected
+        )
+
+
 def test_without_another_trajectory_or_answer_there_is_nothing_to_fit():
     (alone,) = make_samples_on_clues(make_question("t", TEXTS[0], "yes"))
-    assert guess_by_learning([alone], number=True, place=True) == [""]
+    assert guess_by_learning([alone], held_out([alone]), number=True, place=True) == [""]
     same = make_samples_on_clues(*(make_question(f"t{i}", TEXTS[0], "yes") for i in range(3)))
-    assert guess_by_learning(same, number=True, place=True) == ["yes"] * 3
+    assert guess_by_learning(same, held_out(same), number=True, place=True) == ["yes"] * 3
 
 
 def test_on_one_trajectory_each_question_is_guessed_from_the_others():
