@@ -230,6 +230,11 @@ class TrajectorySource:
         """File and line, for messages."""
         return str(self.path) if self.line is None else f"{self.path}:{self.line}"
 
+    @property
+    def digest(self) -> str:
+        """Hash of the trajectory's JSON, by which replays are recognised."""
+        return digest(self.raw.strip())
+
     def read(self) -> Trajectory:
         """Decode and check the trajectory; a missing `traj_id` becomes the task's id or the file's.
 
