@@ -174,8 +174,7 @@ class ActionReplay:
     """
 
     def __init__(self, simulator: Simulator, trajectory: Trajectory, report: ReplayReport) -> None:
-        restored = restore(simulator, trajectory.scene)
-        report.restore = [f"no {name} here" for name in restored.dropped] + restored.refused
+        report.restore = restore(simulator, trajectory.scene).lines()
         self._simulator = simulator
         self._report = report
         self._grounding = Grounding(simulator.view)

@@ -29,7 +29,9 @@ class ScriptedSimulator:
         self._script = case["script"]
         actions = json.loads(case["given"])["plan"]["low_actions"]
         calls = [low["api_action"] for low in actions]
-        ids = {call[key] for call in calls for key in ("objectId", "receptacleObjectId") if key in call}
+        ids = {
+            call[key] for call in calls for key in ("objectId", "receptacleObjectId") if key in call
+        }
         self._objects = [ThorObject(key, key.split("|")[0], "Hidden_1", Vector()) for key in ids]
         self.step_number = 0
         self.poses_between: list[tuple[int, AgentPose]] = []
@@ -140,9 +142,7 @@ def rendered(generated, tmp_path_factory):
     with Simulator(embedded_launch(), **settings.simulator_options) as simulator:
         replayed = replay_set(select([generated]), simulator, out, form=settings)
         again = replay_set(select([generated]), simulator, out, form=settings)
-        other = replay_set(
-            select([generated]), simulator, out, form=RenderSettings(2, 64, 48)
-        )
+        other = replay_set(select([generated]), simulator, out, form=RenderSettings(2, 64, 48))
     assert not replayed.failures and again.resumed == 1
     assert "rendered with other settings" in other.failures[0].message
     return out / JOB.traj_id

@@ -95,4 +95,3 @@ def parse_form(
     elif "quality" in given:
         raise UsageError("--quality: is Unity's; add --unity, or leave it out")
     return RenderSettings(**given, keep_going=keep_going)
-
