@@ -197,4 +197,4 @@ class _StepLog:
 
 def _name_of(name: str) -> str:
     """Return the part of a Unity object's name before its number ("Mug_291e6e8a(Clone)")."""
-    return name.split("(Clone)")[0].split("_")[0]
+    return name.split("(Clone)", maxsplit=1)[0].split("_", maxsplit=1)[0]

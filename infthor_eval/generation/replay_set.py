@@ -49,6 +49,7 @@ __all__ = [
 ]
 
 _REPORT = "replay.json"
+_SET = SetForm()
 Item = tuple[TrajectorySource, Trajectory]
 
 
@@ -167,9 +168,11 @@ def replay_set(
     simulator: Simulator,
     out: Path,
     progress: Callable[[bool], None] = lambda _: None,
-    form: ReplayForm = SetForm(),
+    form: ReplayForm = _SET,
 ) -> ReplayedSet:
-    """Replay trajectories into folders (a set's are `out/metadata/<traj_id>`); a failure does not stop the others.
+    """Replay trajectories into folders, those of a set into `out/metadata/<traj_id>`.
+
+    A failure does not stop the others.
 
     Args:
         selection: the trajectories.
@@ -188,7 +191,7 @@ def replay_with_workers(
     launch: Launch,
     out: Path,
     worker_settings: WorkerSettings,
-    form: ReplayForm = SetForm(),
+    form: ReplayForm = _SET,
     progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> ReplayedSet:

@@ -12,7 +12,7 @@ from infthor_eval.formats.trajectory import InitAction, ObjectPose, Scene
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.settling import settle
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import AgentPose, ThorObject, Vector
+from infthor_eval.thor.view import ThorObject, Vector
 
 from .views import view
 
