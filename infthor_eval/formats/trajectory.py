@@ -44,8 +44,16 @@ __all__ = [
 ]
 
 _SUFFIXES = (".json", ".jsonl", ".jsonl.gz")
-# Other JSON files of a replayed set.
-_NOT_TRAJECTORIES = {"metadata.json", "expert_log.json", "state_summary.json"}
+# Other JSON files of what is replayed, and of a folder of the published generator.
+_NOT_TRAJECTORIES = {
+    "expert_log.json",
+    "metadata.json",
+    "replay.json",
+    "set.json",
+    "state_summary.json",
+    "status.json",
+    "timeline.json",
+}
 _HINT = "restore the file or leave it out"
 _ALWAYS: dict[str, Callable[[], Any]] = {
     "long_horizon_task": dict,

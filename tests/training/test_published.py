@@ -280,3 +280,12 @@ def test_of_several_steps_the_last_is_taken_as_by_the_published_trainer(tmp_path
 def test_no_folder_and_no_hub_id_is_one_line(place):
     with pytest.raises(ModelError, match=r"^[^\n]*: there is no such folder, and hub ids have"):
         find_weights(place)
+
+
+def test_without_network_the_download_of_the_folder_is_named(monkeypatch, tmp_path):
+    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_OFFLINE", True)
+    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path))
+    inside = f"checkpoints/{LABEL}"
+    download = rf"`hf download {REPOSITORY} --include '{inside}/\*' --local-dir DIR`"
+    with pytest.raises(ModelError, match=f"{download} and give DIR/{inside}$"):
+        find_weights(f"{REPOSITORY}/{inside}")

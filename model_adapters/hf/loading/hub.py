@@ -70,7 +70,7 @@ def fetch(
             "login`"
         ) from error
     except (HTTPError, OSError) as error:
-        root = _cached_folder(repository, revision, at, option, error)
+        root = _cached_folder(repository, inside, revision, at, option, error)
     folder = root / inside
     if not folder.is_dir():
         raise ModelError(
@@ -81,15 +81,17 @@ def fetch(
 
 
 def _cached_folder(
-    repository: str, revision: str | None, at: str, option: str, reason: Exception
+    repository: str, inside: str, revision: str | None, at: str, option: str, reason: Exception
 ) -> Path:
     try:
         return Path(snapshot_download(repository, revision=revision, local_files_only=True))
     except LocalEntryNotFoundError as error:
+        files = f" --include '{inside}*'" if inside else ""
+        folder = "/".join(("DIR", *filter(None, inside.split("/"))))
         raise ModelError(
             f"{at} is not in the local cache and the hub cannot be reached "
             f"({_first_line(reason)}); download it where there is network with `hf download "
-            f"{repository} --local-dir DIR` and give {option}DIR"
+            f"{repository}{files} --local-dir DIR` and give {option}{folder}"
         ) from error
 
 
