@@ -25,6 +25,8 @@ JOB = TrajectorySettings("kitchen-3", 4, min_steps=20, min_subgoals=1)
 class ScriptedSimulator:
     """A simulator that succeeds, fails and sees as a golden case says."""
 
+    label = "embedded"
+
     def __init__(self, case: dict) -> None:
         self._script = case["script"]
         actions = json.loads(case["given"])["plan"]["low_actions"]
