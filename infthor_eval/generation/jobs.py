@@ -21,6 +21,7 @@ def trajectory_jobs(
     max_fail: int = MAX_FAIL,
     save_floor: int = 0,
     look_around: bool = False,
+    scene_goal_filter: bool = True,
 ) -> list[TrajectorySettings]:
     """Return the settings of all trajectories of a set, scene by scene.
 
@@ -35,6 +36,7 @@ def trajectory_jobs(
         save_floor: number of steps from which a trajectory that gives up is kept as far as it got;
             0: never.
         look_around: True to walk long stretches with a level camera.
+        scene_goal_filter: False to sample task types that a scene's room type has not, too.
 
     Raises:
         UsageError: the number of trajectories exceeds the limit.
@@ -55,6 +57,7 @@ def trajectory_jobs(
             max_fail=max_fail,
             save_floor=save_floor,
             look_around=look_around,
+            scene_goal_filter=scene_goal_filter,
         )
         for scene in scenes
         for k in seeds

@@ -90,6 +90,11 @@ __all__ = ["command"]
     is_flag=True,
     help="Walk long stretches with a level camera, as an option of the published generator does.",
 )
+@click.option(
+    "--no-scene-goal-filter",
+    is_flag=True,
+    help="Sample tasks of all types in every room, not only those published for its kind.",
+)
 @click.option("--out", required=True, type=PATH, help="Folder for the trajectory files.")
 @floor_plans_option
 @worker_options
@@ -107,6 +112,7 @@ def command(
     final_task: bool,
     test_set: bool,
     look_around: bool,
+    no_scene_goal_filter: bool,
     out: Path,
     data: Path | None,
     as_json: bool,
@@ -138,6 +144,7 @@ def command(
         max_fail=max_fail,
         save_floor=save_floor,
         look_around=look_around,
+        scene_goal_filter=not no_scene_goal_filter,
     )
     prepare_folder(out)
     with progress_bar(notes) as progress:
