@@ -38,6 +38,7 @@ __all__ = [
     "TrajectorySource",
     "encode_trajectory",
     "folder_name",
+    "is_trajectory_file",
     "iter_sources",
     "iter_trajectories",
     "trajectory_files",
@@ -285,6 +286,11 @@ def iter_sources(path: Path) -> Iterator[TrajectorySource]:
         raise DataError(
             f"{path}: not a trajectory file; give a {', '.join(_SUFFIXES)} file or a folder"
         )
+
+
+def is_trajectory_file(path: Path) -> bool:
+    """Return True for a file whose name is one of a trajectory file."""
+    return path.is_file() and path.name.endswith(_SUFFIXES)
 
 
 def trajectory_files(path: Path) -> list[Path]:

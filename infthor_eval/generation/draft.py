@@ -1,13 +1,13 @@
 """A trajectory while it is generated; the actions of a failed task can be removed again."""
 
 import copy
-from importlib.metadata import version
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import msgspec
 from msgspec.structs import asdict
 
-from infthor_eval import __version__
 from infthor_eval.formats.trajectory import (
     ExpertPlan,
     HighAction,
@@ -19,6 +19,7 @@ from infthor_eval.formats.trajectory import (
     SubTrajectory,
     Trajectory,
 )
+from infthor_eval.generation.provenance import provenance
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.trace import Trace
 from infthor_eval.thor.recorder import object_log
@@ -49,8 +50,22 @@ def initial_scene(settings: TrajectorySettings, view: SimulatorView, start: Init
     )
 
 
+@dataclass(frozen=True)
+class _SubGoal:
+    """A task or a put-down: its planning problem, its seed if it was sampled, and where it ends."""
+
+    task: SubTask
+    problem: str
+    sample_seed: int | None
+    end: Length
+
+
 class Draft:
-    """The actions, sub-goals and tasks so far, and the log of every frame."""
+    """The actions, sub-goals and tasks so far, and the log of every frame.
+
+    Every action belongs to a task or to the put-down of what a task left in the hand, as published.
+    Algorithm 1 calls both sub-goals, as here; those of `plan.high_pddl` are parts of them.
+    """
 
     def __init__(self, settings: TrajectorySettings, scene: Scene, view: SimulatorView) -> None:
         self._settings = settings
@@ -59,10 +74,8 @@ class Draft:
         self._high: list[HighAction] = []
         # Encoded: thousands of Python objects per frame would slow down the garbage collector.
         self._log: list[bytes] = []
-        self._sub_tasks: list[SubTask] = []
-        self._sub_trajs: list[SubTrajectory] = []
-        self._final: SubTask | None = None
-        self._n_put_downs = 0
+        self._subgoals: list[_SubGoal] = []
+        self._has_final = False
         self._log_frame(view)
 
     @property
@@ -71,48 +84,44 @@ class Draft:
         return Length(len(self._low), len(self._high))
 
     @property
-    def n_tasks(self) -> int:
-        """Number of tasks so far."""
-        return len(self._sub_tasks)
+    def n_subgoals(self) -> int:
+        """Number of tasks and put-downs so far."""
+        return len(self._subgoals)
 
     @property
-    def n_subgoals(self) -> int:
-        """Number of sub-goals as Algorithm 1 counts: tasks, and put-downs of what they left."""
-        return len(self._sub_tasks) + self._n_put_downs
+    def problems(self) -> list[str]:
+        """The planning problem of each task and put-down, as PDDL."""
+        return [subgoal.problem for subgoal in self._subgoals]
 
     def add(self, trace: Trace) -> None:
-        """Add the actions and sub-goals of a rollout."""
+        """Add the actions of a rollout, which belong to the next task or put-down."""
         for action in trace.actions:
             action.low.low_idx = len(self._low)
             self._low.append(action.low)
             self._log_frame(action.view)
         self._high += trace.high
 
-    def cut(self, length: Length) -> None:
-        """Remove what was added after the trajectory had this length."""
-        del self._low[length.low :]
-        del self._high[length.high :]
-        del self._log[length.low + 1 :]
+    def end_task(self, task: SubTask, problem: str) -> None:
+        """End a sampled task, after its last action."""
+        seed = self._settings.seed  # that of all random choices; the published ones differ by task
+        self._subgoals.append(_SubGoal(task, problem, seed, self.length))
 
-    def add_task(self, task: SubTask, start: Length, end: Length) -> None:
-        """Add a completed task, with the lengths before its first action and after its last one.
+    def end_put_down(self, task: SubTask, problem: str) -> None:
+        """End the put-down of what the last task left in the hand, after its last action.
 
-        Actions after its end, which are part of the draft already, put down what it left in the
-        hand.
+        It gets the parameters of that task, as published.
         """
-        number = len(self._sub_tasks)
-        self._n_put_downs += self.length.low > end.low
-        self._sub_trajs.append(
-            SubTrajectory(number, (start.high, end.high), (start.low, end.low), task.task_desc)
-        )
-        self._sub_tasks.append(task)
+        params = self._subgoals[-1].task.pddl_params
+        task = msgspec.structs.replace(task, pddl_params=params)
+        self._subgoals.append(_SubGoal(task, problem, None, self.length))
 
-    def drop_last_task(self) -> None:
-        """Remove the last task with its actions, and those that put down what it left."""
-        self._sub_tasks.pop()
-        part = self._sub_trajs.pop()
-        self._n_put_downs -= self.length.low > part.low_pddl_idx[1]
-        self.cut(Length(part.low_pddl_idx[0], part.high_pddl_idx[0]))
+    def keep(self, n_subgoals: int) -> None:
+        """Remove everything after the first tasks and put-downs."""
+        del self._subgoals[n_subgoals:]
+        end = self._subgoals[-1].end if self._subgoals else Length(0, 0)
+        del self._low[end.low :]
+        del self._high[end.high :]
+        del self._log[end.low + 1 :]
 
     def copy(self) -> "Draft":
         """Return a copy, which changes of this draft leave as it is."""
@@ -124,7 +133,7 @@ class Draft:
 
     def make_last_task_final(self) -> None:
         """Make the last task the final one, which test sets name once more beside the others."""
-        self._final = self._sub_tasks[-1]
+        self._has_final = True
 
     def object_log(self) -> list[dict[str, Any]]:
         """Return the log of each frame, by object type."""
@@ -136,18 +145,27 @@ class Draft:
             scene=self._scene,
             plan=ExpertPlan(self._low, self._high),
             traj_id=self._settings.traj_id,
-            sub_tasks=self._sub_tasks,
-            sub_trajs=self._sub_trajs,
-            long_horizon_task=self._final,
+            sub_tasks=[subgoal.task for subgoal in self._subgoals],
+            sub_trajs=list(self._spans()),
+            long_horizon_task=self._subgoals[-1].task if self._has_final else None,
             object_log=self.object_log(),
             images=[_image(low) for low in self._low],
             gen_info={
-                "generator": f"infthor-eval {__version__}",
-                "ai2thor": version("ai2thor"),
-                "settings": self._settings.document(),
+                **self._settings.document(),
+                **provenance(),
+                "sample_seeds": [subgoal.sample_seed for subgoal in self._subgoals],
                 **history,
             },
         )
+
+    def _spans(self) -> Iterator[SubTrajectory]:
+        start = Length(0, 0)
+        for number, subgoal in enumerate(self._subgoals):
+            end = subgoal.end
+            yield SubTrajectory(
+                number, (start.high, end.high), (start.low, end.low), subgoal.task.task_desc
+            )
+            start = end
 
     def _log_frame(self, view: SimulatorView) -> None:
         entry = {"step": len(self._log), **msgspec.to_builtins(object_log(view))}

@@ -7,12 +7,12 @@ attempt. (They begin anew with the pool of tasks, which ends an attempt there.)
 """
 
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.object_ids import Words
-from infthor_eval.formats.trajectory import InitAction, Trajectory
+from infthor_eval.formats.trajectory import InitAction, SubTask, Trajectory
 from infthor_eval.generation.draft import Draft, initial_scene
 from infthor_eval.generation.final_task import end_types
 from infthor_eval.generation.known_failures import KnownFailures
@@ -29,10 +29,9 @@ from infthor_eval.household.goals import goal_holds, is_achieved
 from infthor_eval.household.pddl import problem
 from infthor_eval.household.planner import is_feasible, plan
 from infthor_eval.household.possible_tasks import tasks_of
-from infthor_eval.household.scene_types import usual_tasks
 from infthor_eval.household.scout import reachable_grid
 from infthor_eval.household.symbolic import Operator, SymbolicRoom
-from infthor_eval.household.tasks import Task, sub_task
+from infthor_eval.household.tasks import Task, TaskType, sub_task
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator, SimulatorMark
 
@@ -45,7 +44,7 @@ _OTHER_SETTINGS = "choose another scene or seed or a higher --max-fail"
 
 @dataclass
 class GeneratedTrajectory:
-    """One trajectory, with each of its tasks' planning problems as PDDL, the final one last."""
+    """One trajectory, with the planning problems of its tasks and put-downs as PDDL, in order."""
 
     trajectory: Trajectory
     statistics: AttemptStatistics
@@ -75,6 +74,14 @@ class _GaveUp(Exception):
 
 
 @dataclass(frozen=True)
+class _Start:
+    """The state before a task, and the number of tasks and put-downs before it."""
+
+    mark: SimulatorMark
+    n_subgoals: int
+
+
+@dataclass(frozen=True)
 class _Outcome:
     """How a task that was sampled ended.
 
@@ -96,17 +103,16 @@ class _Factory:
         # One stream for all random choices, seeded by a text, which Python hashes alike in every
         # process. Another order of draws would be another trajectory.
         self._rng = random.Random(f"{settings.scene}/{settings.seed}")
-        self._task_types = usual_tasks(settings.scene).intersection(settings.task_types)
+        self._task_types = settings.sampled_types()
         self._pool = TaskPool(self._rng)
         self._known_failures = KnownFailures()
         self._statistics = AttemptStatistics()
         self._n_in_row = 0  # failures of executed tasks since the last one that was accepted
         self._n_roll_backs = 0  # since the last task that was accepted
         self._n_not_executed = 0  # failures of tasks with nothing executed, since the pool began
-        self._problems: list[str] = []
-        self._marks: list[SimulatorMark] = []  # the state before each task
+        self._starts: list[_Start] = []  # of each task
         self._draft = self._start_draft()
-        self._longest = self._draft.copy(), list(self._problems)
+        self._longest = self._draft.copy()
 
     def _start_draft(self) -> Draft:
         view = self._simulator.reset(self._settings.scene)
@@ -132,7 +138,7 @@ class _Factory:
 
     def result(self) -> GeneratedTrajectory:
         trajectory = self._draft.trajectory(self._statistics.document())
-        return GeneratedTrajectory(trajectory, self._statistics, self._problems)
+        return GeneratedTrajectory(trajectory, self._statistics, self._draft.problems)
 
     def bank(self, reason: str) -> GeneratedTrajectory:
         """Return the longest trajectory so far, if it has `save_floor` steps.
@@ -143,7 +149,7 @@ class _Factory:
             UsageError: it has fewer, or none are to be kept.
         """
         self._note_longest()
-        self._draft, self._problems = self._longest
+        self._draft = self._longest
         floor = self._settings.save_floor
         if not floor or self._draft.length.low < floor:
             raise UsageError(f"{self._name}: {reason}")
@@ -234,17 +240,16 @@ class _Factory:
         Raises:
             _GaveUp: there is nothing to drop.
         """
-        if not self._draft.n_tasks:
+        if not self._starts:
             raise _GaveUp(self._no_further_task(_OTHER_SETTINGS))
         self._note_longest()
         before = self._draft.length
         n_before = self._draft.n_subgoals
         n_to_drop = min(2**self._n_roll_backs, max(1, n_before - 1))
-        while self._draft.n_tasks and n_before - self._draft.n_subgoals < n_to_drop:
-            self._draft.drop_last_task()
-            self._problems.pop()
-            mark = self._marks.pop()
-        self._simulator.rewind(mark, exactly=True)
+        while self._starts and n_before - self._draft.n_subgoals < n_to_drop:
+            start = self._starts.pop()
+            self._draft.keep(start.n_subgoals)
+        self._simulator.rewind(start.mark, exactly=True)
         self._known_failures.forget()
         self._n_in_row = 0
         self._n_roll_backs += 1
@@ -252,8 +257,8 @@ class _Factory:
         self._statistics.roll_backs.append(RollBack(before.low, self._draft.length.low, dropped))
 
     def _note_longest(self) -> None:
-        if self._draft.length.low > self._longest[0].length.low:
-            self._longest = self._draft.copy(), list(self._problems)
+        if self._draft.length.low > self._longest.length.low:
+            self._longest = self._draft.copy()
 
     def _no_further_task(self, hint: str) -> str:
         statistics = self._statistics
@@ -286,31 +291,34 @@ class _Factory:
         objection = self._objection(task, operators)
         if objection is not None:
             return self._failed(task, _Outcome(objection, executed=False))
-        mark = self._simulator.mark()
-        start = self._draft.length
-        outcome = self._execute(operators)
+        start = _Start(self._simulator.mark(), self._draft.n_subgoals)
+        outcome = self._execute(lambda rollout: rollout.run(operators), look=True)
         if outcome.failure is None:
             outcome = _Outcome(_unmet_goal(task, self._simulator), outcome.executed)
-        end = self._draft.length
-        if outcome.failure is None and not is_last:
-            outcome = _Outcome(self._put_down(), outcome.executed)
+        if outcome.failure is None:
+            self._draft.end_task(*self._documents(task, room))
+            if not is_last:
+                outcome = _Outcome(self._put_down(), outcome.executed)
         if outcome.failure is not None:
-            self._simulator.rewind(mark)
-            self._draft.cut(start)
+            self._simulator.rewind(start.mark)
+            self._draft.keep(start.n_subgoals)
             return self._failed(task, outcome)
         self._statistics.tried[_name(task)] += 1
         self._statistics.accepted[_name(task)] += 1
         self._known_failures.task_done()
-        self._problems.append(problem(task, room, f"task-{len(self._problems):03d}"))
-        self._marks.append(mark)
-        self._draft.add_task(sub_task(task, self._settings.scene, self._words()), start, end)
+        self._starts.append(start)
         return outcome
+
+    def _documents(self, task: Task, room: SymbolicRoom) -> tuple[SubTask, str]:
+        """Return a task in the form of trajectories, and its problem in the room before it."""
+        name = f"task-{self._draft.n_subgoals:03d}"
+        return sub_task(task, self._settings.scene, self._words()), problem(task, room, name)
 
     def _words(self) -> random.Random | None:
         """Return what draws the next task's words, which depend on nothing but seed and number."""
         if self._settings.words == Words.NATURAL:
             return None
-        return random.Random(f"{self._settings.seed}/{self._draft.n_tasks}")
+        return random.Random(f"{self._settings.seed}/{self._draft.n_subgoals}")
 
     def _objection(self, task: Task, operators: list[Operator]) -> RolloutError | None:
         """Return why a task is not worth walking for."""
@@ -334,7 +342,7 @@ class _Factory:
         return outcome
 
     def _put_down(self) -> RolloutError | None:
-        """Put a held object into a random receptacle that has room for it."""
+        """Put a held object into a random receptacle that has room for it, as a sub-goal."""
         room = self._room()
         held = room.start.held
         if held is None:
@@ -342,17 +350,35 @@ class _Factory:
         fitting = sorted(key for key in room.places & room.receptacles if room.fits(held, key))
         self._rng.shuffle(fitting)
         for receptacle in fitting:
-            if self._execute([Operator("PutObject", held, receptacle)]).failure is None:
+            task = Task(TaskType.PUT_AWAY, held.partition("|")[0], room.types[receptacle])
+            if self._put_into(task, held, receptacle):
+                self._draft.end_put_down(*self._documents(task, room))
                 return None
         return RolloutError(f"no receptacle has room for {room.types[held]}", held)
 
-    def _execute(self, operators: list[Operator]) -> _Outcome:
-        """Run operators and add their actions; if one fails, rewind and add nothing."""
+    def _put_into(self, task: Task, held: str, receptacle: str) -> bool:
+        """Put a held object down; returns False if that fails, with everything as before."""
+        mark = self._simulator.mark()
+        # As published, the camera is not raised in put-downs.
+        outcome = self._execute(lambda rollout: rollout.put_down(held, receptacle), look=False)
+        if outcome.failure is not None:
+            return False
+        if _unmet_goal(task, self._simulator) is not None:
+            self._simulator.rewind(mark)
+            self._draft.keep(self._draft.n_subgoals)
+            return False
+        return True
+
+    def _execute(self, act: Callable[[Rollout], None], look: bool) -> _Outcome:
+        """Act and add the actions, with those of looking around if `look`.
+
+        If an action fails, the simulator is rewound and nothing is added.
+        """
         mark = self._simulator.mark()
         trace = Trace(self._simulator, self._draft.length.high)
         try:
-            Rollout(trace, Walker(trace)).run(operators)
-            if self._settings.look_around:
+            act(Rollout(trace, Walker(trace)))
+            if look and self._settings.look_around:
                 look_around(trace, mark)
         except RolloutError as error:
             self._simulator.rewind(mark)

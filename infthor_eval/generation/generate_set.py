@@ -231,7 +231,7 @@ def _write(generated: GeneratedTrajectory, path: Path) -> None:
 def _check_earlier(path: Path, job: TrajectorySettings) -> int:
     """Check that a trajectory has the same settings, and return its number of actions."""
     trajectory = next(iter_sources(path)).read()
-    if (trajectory.gen_info or {}).get("settings") != job.document():
+    if not job.document().items() <= (trajectory.gen_info or {}).items():
         raise UsageError(
             f"{path}: generated with other settings; remove it or choose another --out"
         )

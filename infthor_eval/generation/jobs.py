@@ -23,6 +23,7 @@ def trajectory_jobs(
     save_floor: int = 0,
     look_around: bool = False,
     words: Words = Words.NATURAL,
+    scene_goal_filter: bool = True,
 ) -> list[TrajectorySettings]:
     """Return the settings of all trajectories of a set, scene by scene.
 
@@ -38,6 +39,7 @@ def trajectory_jobs(
             0: never.
         look_around: True to walk long stretches with a level camera.
         words: the words of tasks, plain English or the published generator's.
+        scene_goal_filter: False to sample task types that a scene's room type has not, too.
 
     Raises:
         UsageError: the number of trajectories exceeds the limit.
@@ -59,6 +61,7 @@ def trajectory_jobs(
             save_floor=save_floor,
             look_around=look_around,
             words=words,
+            scene_goal_filter=scene_goal_filter,
         )
         for scene in scenes
         for k in seeds

@@ -25,7 +25,7 @@ class _Stage:
     def go(self, object_ids: list[str], inside: str | None = None) -> None:
         """Do nothing."""
 
-    def step_aside(self, item: str) -> None:
+    def step_aside(self, item: str, inside: str | None = None) -> None:
         """Do nothing."""
 
     def forget_grid(self) -> None:

@@ -24,8 +24,8 @@ class Walking(Protocol):
         """Walk to where objects can be acted on."""
         ...
 
-    def step_aside(self, item: str) -> None:
-        """Walk to where an object is visible, within the current sub-goal."""
+    def step_aside(self, item: str, inside: str | None = None) -> None:
+        """Walk to where an object can be acted on, within the current sub-goal."""
         ...
 
     def forget_grid(self) -> None:
@@ -59,6 +59,23 @@ class Rollout:
                 # Each sub-goal includes its walk: its object is known only then.
                 _SUBGOALS[operator.name](self, operator)
 
+    def put_down(self, item: str, receptacle: str) -> None:
+        """Put down a held object in one sub-goal that includes its walk, as published.
+
+        The sub-goal has the type of the receptacle, and that of the whole of a slice; the ids are
+        in the action that puts it.
+
+        Raises:
+            RolloutError: as `run`.
+        """
+        held = item.partition("|")[0]
+        place = self._view.objects[receptacle].object_type
+        action = PlannerAction("PutObject", object_id=held, receptacle_id=place)
+        self.trace.begin([held, place], action)
+        outer = self._closed_around(receptacle)
+        self._walker.step_aside(outer or receptacle, receptacle if outer else None)
+        self._put_from_here(item, receptacle, outer)
+
     # -- sub-goals
 
     def _pickup_or_slice(self, operator: Operator) -> None:
@@ -74,8 +91,7 @@ class Rollout:
         outer = self._closed_around(receptacle)  # as a drawer with the pan
         self._walker.go([outer or receptacle], inside=receptacle if outer else None)
         self._begin("PutObject", item, receptacle)
-        holder = receptacle if self._is_closed(receptacle) else outer
-        self._inside(holder, lambda: self._interact("PutObject", item, receptacle))
+        self._put_from_here(item, receptacle, outer)
 
     def _toggle(self, operator: Operator) -> None:
         self._walker.go([operator.item])
@@ -110,6 +126,11 @@ class Rollout:
         ids = [key for key in (item, receptacle) if key is not None]
         words = [compact_name(self._view.objects[key].object_type) for key in ids]
         self.trace.begin(words, PlannerAction(name, object_id=item, receptacle_id=receptacle))
+
+    def _put_from_here(self, item: str, receptacle: str, outer: str | None) -> None:
+        """Put an object into a receptacle, which may be closed or in another that is."""
+        holder = receptacle if self._is_closed(receptacle) else outer
+        self._inside(holder, lambda: self._interact("PutObject", item, receptacle))
 
     def _inside(self, holder: str | None, act: Callable[[], None]) -> None:
         """Open a receptacle, act, and close it; without a receptacle, only act."""

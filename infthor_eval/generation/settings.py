@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
-import msgspec
-
 from infthor_eval.formats.object_ids import Words
+from infthor_eval.household.scene_types import usual_tasks
 from infthor_eval.household.tasks import SAMPLED, TaskType
 
 __all__ = ["MAX_FAIL", "MIN_STEPS", "MIN_SUBGOALS", "TrajectorySettings"]
@@ -28,6 +27,8 @@ class TrajectorySettings:
             the final task.
         final_task: True to end with a final task (see the module `final_task`).
         task_types: task types to sample from, if the scene's room type has them.
+        scene_goal_filter: True to sample only task types that the published tables name for the
+            scene's room type; False to sample any that its objects allow.
         max_fail: number of failed tasks in a row after which the last sub-goals are dropped.
         save_floor: number of steps from which a trajectory that gives up is kept as far as it got;
             0: never.
@@ -41,6 +42,7 @@ class TrajectorySettings:
     min_subgoals: int = MIN_SUBGOALS
     final_task: bool = False
     task_types: tuple[TaskType, ...] = SAMPLED
+    scene_goal_filter: bool = True
     max_fail: int = MAX_FAIL
     save_floor: int = 0
     look_around: bool = False
@@ -51,15 +53,26 @@ class TrajectorySettings:
         """Name of the trajectory."""
         return f"{self.scene}-seed{self.seed}"
 
-    def document(self) -> dict[str, Any]:
-        """Return the settings as JSON values, as they are stored in trajectories.
+    def sampled_types(self) -> frozenset[TaskType]:
+        """Return the task types that tasks are sampled from."""
+        usual = usual_tasks(self.scene) if self.scene_goal_filter else SAMPLED
+        return frozenset(usual).intersection(self.task_types)
 
-        `look_around` and `words` are among them only where they are used: older trajectories have
-        no such settings.
-        """
-        document = msgspec.json.decode(msgspec.json.encode(self), type=dict[str, Any])
-        if not self.look_around:
-            del document["look_around"]
-        if self.words == Words.NATURAL:
-            del document["words"]
-        return document
+    def document(self) -> dict[str, Any]:
+        """Return the settings as JSON values for `gen_info`, by the published names if they have
+        one."""
+        return {
+            "scene": self.scene,
+            "min_step": self.min_steps,
+            "min_subgoal": self.min_subgoals,
+            "max_fail": self.max_fail,
+            "seed": self.seed,
+            "save_floor": self.save_floor,
+            # Never: the embedded simulator repeats every action exactly.
+            "replay_every": 0,
+            "scene_goal_filter": self.scene_goal_filter,
+            "look_around": self.look_around,
+            "final_task": self.final_task,
+            "task_types": [str(task_type) for task_type in self.task_types],
+            "words": str(self.words),
+        }

@@ -61,7 +61,11 @@ class AttemptStatistics:
         self.pool_restarts += other.pool_restarts
 
     def document(self) -> dict[str, Any]:
-        """Return the numbers as JSON values, as they are stored in `gen_info`."""
+        """Return the numbers as JSON values, as they are stored in `gen_info`.
+
+        `banked_on_giveup` is there only if it is true, as published.
+        """
+        banked = {"banked_on_giveup": True} if self.gave_up else {}
         return {
             "tried": dict(self.tried),
             "accepted": dict(self.accepted),
@@ -69,5 +73,5 @@ class AttemptStatistics:
             "not_executed": dict(self.not_executed.most_common()),
             "roll_backs": [vars(item) for item in self.roll_backs],
             "pool_restarts": self.pool_restarts,
-            "banked_on_giveup": self.gave_up,
+            **banked,
         }

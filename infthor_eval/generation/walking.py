@@ -46,13 +46,9 @@ class Walker:
         self._trace.begin([compact_name(target.object_type)], action)
         self._walk(viewpoint, object_ids)
 
-    def step_aside(self, item: str) -> None:
-        """Walk to where an object is visible, within the current sub-goal.
-
-        Raises:
-            RolloutError: as `go`.
-        """
-        self._walk(self._viewpoint([item]), [item])
+    def step_aside(self, item: str, inside: str | None = None) -> None:
+        """Walk to where an object can be acted on, within the current sub-goal; see `go`."""
+        self._walk(self._viewpoint([item], inside), [item])
 
     def forget_grid(self) -> None:
         """Discard the cached grid, after an action that may have blocked or freed cells."""

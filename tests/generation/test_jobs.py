@@ -2,6 +2,7 @@ import pytest
 
 from infthor_eval.errors import UsageError
 from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
+from infthor_eval.household.tasks import SAMPLED, TaskType
 
 
 def test_every_scene_has_as_many_seeds_as_asked_for():
@@ -26,3 +27,14 @@ def test_bathrooms_are_known_by_their_names():
     assert skipped == ["FloorPlan401", "FloorPlan430", "bathroom-2"]
     with pytest.raises(UsageError, match=r"FloorPlan401, bathroom-2: bathrooms are left out"):
         without_bathrooms(["bathroom-2", "FloorPlan401"])
+
+
+def test_a_room_is_asked_for_what_is_usual_there_unless_the_filter_is_off():
+    length = {"min_steps": 5, "min_subgoals": 1, "final_task": False}
+    (usual,) = trajectory_jobs(["bathroom-1"], seed=0, count=1, **length)
+    (all_types,) = trajectory_jobs(
+        ["bathroom-1"], seed=0, count=1, **length, scene_goal_filter=False
+    )
+    assert usual.sampled_types() == {TaskType.PLACE, TaskType.PLACE_TWO, TaskType.CLEAN}
+    assert all_types.sampled_types() == set(SAMPLED)
+    assert usual.document() != all_types.document()

@@ -231,7 +231,7 @@ def test_a_generated_trajectory_looks_around_and_is_replayed(made, simulator, tm
     assert added.count("LookUp") == added.count("LookDown") >= 1
     assert [low.low_idx for low in actions] == list(range(len(actions)))
     assert len(made.object_log) == len(actions) + 1
-    assert made.gen_info["settings"]["look_around"] is True
+    assert made.gen_info["look_around"] is True
     (tmp_path / "made.json").write_bytes(encode_trajectory(made))
     replayed = replay_set(select([tmp_path / "made.json"]), simulator, tmp_path / "set")
     assert summarise(replayed).complete == 1
@@ -241,7 +241,7 @@ def test_a_generated_trajectory_looks_around_and_is_replayed(made, simulator, tm
 
 def test_apart_from_what_is_inserted_the_actions_are_the_same(made, simulator):
     without = generate(TrajectorySettings("kitchen-31", 1, 40, 2), simulator).trajectory
-    assert "look_around" not in without.gen_info["settings"]
+    assert without.gen_info["look_around"] is False
     assert b'"inserted"' not in encode_trajectory(without)
     kept = [low for low in made.plan.low_actions if low.inserted != INSERTED]
     both = list(zip(kept, without.plan.low_actions, strict=False))

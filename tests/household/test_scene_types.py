@@ -29,3 +29,26 @@ def test_what_is_done_where():
     assert usual_tasks("FloorPlan301") >= {TaskType.EXAMINE, TaskType.STACK}
     assert usual_tasks("bathroom-1") == {TaskType.PLACE, TaskType.PLACE_TWO, TaskType.CLEAN}
     assert usual_tasks("house-2") == set(SAMPLED)
+
+
+# `GOALS_VALID` of the published generator (July 2026), by kind of room
+@pytest.mark.parametrize(
+    ("scene", "goals"),
+    [
+        ("kitchen-1", "simple two clean heat cool movable"),
+        ("living-room-1", "simple two light movable"),
+        ("bedroom-1", "simple two light movable"),
+        ("bathroom-1", "simple two clean"),
+    ],
+)
+def test_the_goals_of_each_kind_of_room_are_the_published_ones(scene, goals):
+    names = {
+        "simple": "pick_and_place_simple",
+        "two": "pick_two_obj_and_place",
+        "light": "look_at_obj_in_light",
+        "clean": "pick_clean_then_place_in_recep",
+        "heat": "pick_heat_then_place_in_recep",
+        "cool": "pick_cool_then_place_in_recep",
+        "movable": "pick_and_place_with_movable_recep",
+    }
+    assert usual_tasks(scene) == {names[goal] for goal in goals.split()}

@@ -97,6 +97,11 @@ __all__ = ["command"]
     show_default=True,
     help="Tasks in plain English, or in the words of the published generator, drawn by the seed.",
 )
+@click.option(
+    "--no-scene-goal-filter",
+    is_flag=True,
+    help="Sample tasks of all types in every room, not only those published for its kind.",
+)
 @click.option("--out", required=True, type=PATH, help="Folder for the trajectory files.")
 @floor_plans_option
 @worker_options
@@ -115,6 +120,7 @@ def command(
     test_set: bool,
     look_around: bool,
     words: str,
+    no_scene_goal_filter: bool,
     out: Path,
     data: Path | None,
     as_json: bool,
@@ -148,6 +154,7 @@ def command(
         save_floor=save_floor,
         look_around=look_around,
         words=Words(words),
+        scene_goal_filter=not no_scene_goal_filter,
     )
     prepare_folder(out)
     with progress_bar(notes) as progress:

@@ -1,4 +1,4 @@
-"""`infthor-eval show`: the results of runs again."""
+"""`infthor-eval show`: the results of runs again, or what is in trajectory files."""
 
 import sys
 from pathlib import Path
@@ -10,6 +10,8 @@ from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.show import ShowOptions, sample_options
 from infthor_eval.cli.options.values import PATH
 from infthor_eval.cli.results import print_results, read_run_results
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.trajectory import is_trajectory_file
 
 __all__ = ["command"]
 
@@ -19,24 +21,49 @@ __all__ = ["command"]
     cls=ExampleCommand,
     example="infthor-eval show results/oracle/RUN results/blind/RUN --full",
 )
-@click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=PATH)
+@click.argument("paths", metavar="RUN|TRAJECTORY...", nargs=-1, required=True, type=PATH)
 @sample_options
-def command(folders: tuple[Path, ...], per_sample: bool, **params: Any) -> None:
+def command(paths: tuple[Path, ...], per_sample: bool, **params: Any) -> None:
     """Print the results of the runs in the folders RUN..., made from their journals, as `run`
-    prints them at its end.
+    prints them at its end; or what is in the files TRAJECTORY...: scene, tasks and their steps,
+    how it was generated.
 
     Several runs of one suite stand in one table. With `--per-sample` the samples are printed
     instead, for other programs: `infthor-eval show RUN --format parquet > samples.parquet`.
     """
     options = ShowOptions.from_click(params)
-    if per_sample or options.format == "parquet":
-        _print_samples(folders, options)
+    if any(map(is_trajectory_file, paths)):
+        if per_sample or options.full or options.format not in {None, "json"}:
+            raise UsageError(
+                "--per-sample, --format and --full: are for runs, not for trajectories"
+            )
+        _print_trajectories(paths, options)
+    elif per_sample or options.format == "parquet":
+        _print_samples(paths, options)
     else:
-        print_results([read_run_results(folder) for folder in folders], options)
+        print_results([read_run_results(folder) for folder in paths], options)
+
+
+def _print_trajectories(paths: tuple[Path, ...], options: ShowOptions) -> None:
+    import msgspec
+
+    from infthor_eval.formats.trajectory import iter_trajectories
+    from infthor_eval.generation.trajectory_table import summary_of, trajectory_table
+    from infthor_eval.report.terminal import print_table, table_console
+
+    runs = [path for path in paths if not is_trajectory_file(path)]
+    if runs:
+        raise UsageError(f"{runs[0]}: not a trajectory file; give runs in a call of their own")
+    found = [summary_of(item) for path in paths for item in iter_trajectories(path)]
+    if options.format == "json":
+        click.echo(msgspec.json.format(msgspec.json.encode(found), indent=2))
+        return
+    output = table_console()
+    for summary in found:
+        print_table(trajectory_table(summary), output)
 
 
 def _print_samples(folders: tuple[Path, ...], options: ShowOptions) -> None:
-    from infthor_eval.errors import UsageError
     from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.sample_table import FORMS, encode_samples, sample_table
 
