@@ -1,6 +1,6 @@
 """Facts of frames, for the independent check of questions, and how to read them.
 
-They share no code with the rules, so they do not share their errors.
+They share no code with the rules, so they do not share their errors; they share the table of sizes.
 """
 
 import re
@@ -8,6 +8,7 @@ from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 
 from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
+from infthor_eval.generation.questions.history import SHARE_FACTOR
 
 __all__ = [
     "FrameFacts",
@@ -64,8 +65,11 @@ def frame_facts(
             if step.img_idx not in frames:
                 continue
             seen = step.seen or {}
-            large = {key for key in seen if seen[key].pixels >= share * _FRAME_PIXELS}
-            objects = {key: state for key, state in objects.items() if key in large}
+            smallest = share * _FRAME_PIXELS
+            objects = {
+                key: state for key, state in objects.items()
+                if key in seen and seen[key].pixels >= smallest * SHARE_FACTOR.get(state.type, 1.0)
+            }  # fmt: skip
         facts.append(
             FrameFacts(
                 number=step.img_idx,

@@ -14,12 +14,12 @@ def pillow(b: Builder) -> None:
     color = shade_of(pick(CLOTHS, b.style), 1.25)
     width, depth = float(b.half[0]), float(b.half[2])
     slant = math.degrees(math.atan2(depth, width))
-    corner = 0.3 * math.hypot(width, depth)
+    corner = 0.42 * math.hypot(width, depth)
     for x in (-1, 1):
         for z in (-1, 1):
             b.ball((x * 0.47, -0.03, z * 0.47), (0.5, 0.66, 0.5), color, Material.FABRIC)
-            half = (corner / width, 0.3, 0.5 * corner / depth)
-            b.ball((x * 0.66, -0.03, z * 0.66), half, color, Material.FABRIC,
+            half = (corner / width, 0.36, 0.5 * corner / depth)
+            b.ball((x * 0.53, -0.03, z * 0.53), half, color, Material.FABRIC,
                    tilt=(0, -x * z * slant, 0))  # fmt: skip
     b.ball((0, 0, 0), (0.97, 1, 0.97), color, Material.FABRIC)
 
