@@ -67,10 +67,10 @@ def newspaper(b: Builder) -> None:
 def disc(b: Builder) -> None:
     """A shiny disc with a hole and a coloured label."""
     b.tube((0, 0, 0), (1, 1, 1), (0.75, 0.8, 0.88), Material.METAL)
-    b.tube((0, 0.08, 0), (0.72, 1, 0.72), pick(_LABELS, b.style))
+    b.tube((0, 0.08, 0), (0.72, 1, 0.72), pick(_LABELS, b.mark))
     b.tube((0, 0.12, 0), (0.38, 1, 0.38), (0.82, 0.86, 0.92), Material.METAL)
     b.tube((0, 0.16, 0), (0.18, 1, 0.18), (0.25, 0.26, 0.3))
-    b.box((0, 0.1, 0.54), (0.4, 1, 0.06), pick((WHITE, BLACK), b.style // len(_LABELS)))
+    b.box((0, 0.1, 0.54), (0.4, 1, 0.06), pick((WHITE, BLACK), b.mark // len(_LABELS)))
 
 
 @draws
@@ -196,13 +196,13 @@ def spray_bottle(b: Builder) -> None:
 @draws
 def soap_bar(b: Builder) -> None:
     """A rounded bar with an oval mark on top."""
-    color = pick(_SOAPS, b.style)
+    color = pick(_SOAPS, b.mark)
     b.box((0, -0.1, 0), (0.76, 0.9, 1), color)
     b.box((0, -0.1, 0), (1, 0.9, 0.84), color)
     for x in (-0.76, 0.76):
         for z in (-0.84, 0.84):
             b.tube((x, -0.1, z), (0.24, 0.9, 0.16), color)
-    mark = pick((1.1, 0.72, 0.88), b.style // len(_SOAPS))
+    mark = pick((1.1, 0.72, 0.88), b.mark // len(_SOAPS))
     b.tube((0, 0.8, 0), (0.55, 0.1, 0.62), shade_of(color, mark))
 
 

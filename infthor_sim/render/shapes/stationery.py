@@ -74,9 +74,9 @@ def keys(b: Builder) -> None:
             Material.METAL,
             tilt=(0, angle, 0),
         )
-    _key(b, 14.0, pick((BRASS, STEEL, (0.72, 0.42, 0.28)), b.style // len(_TAGS)))
+    _key(b, 14.0, pick((BRASS, STEEL, (0.72, 0.42, 0.28)), b.mark // len(_TAGS)))
     _key(b, -20.0, STEEL)
-    b.tube((-0.82, 0.1, 0.3), (0.2, 0.9, 0.34), pick(_TAGS, b.style))
+    b.tube((-0.82, 0.1, 0.3), (0.2, 0.9, 0.34), pick(_TAGS, b.mark))
 
 
 def _key(b: Builder, angle: float, color: Color) -> None:
