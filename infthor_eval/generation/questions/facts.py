@@ -1,6 +1,7 @@
 """Facts of frames, for the independent check of questions, and how to read them.
 
-They share no code with the rules, so they do not share their errors. Facts of the whole log have
+They share no code with the rules, so they do not share their errors; they share the table of sizes.
+Facts of the whole log have
 the logged actions. Facts of clue frames have only what pictures show: an object in the hand was
 picked up, slices were cut, a light is on; only two successive frames show that something was put
 (in the hand in the first, elsewhere in the second) or opened.
@@ -12,6 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
+from infthor_eval.generation.questions.history import SHARE_FACTOR
 
 __all__ = [
     "FactEvent",
@@ -102,8 +104,12 @@ def facts_shown(steps: Sequence[Step], share: float) -> list[FrameFacts]:
 
 def _large_objects(step: Step, facts: FrameFacts, share: float) -> dict[str, ObjectState]:
     seen = step.seen or {}
-    large = {key for key in seen if seen[key].pixels >= share * _FRAME_PIXELS}
-    return {key: state for key, state in facts.objects.items() if key in large}
+    smallest = share * _FRAME_PIXELS
+    return {
+        key: state
+        for key, state in facts.objects.items()
+        if key in seen and seen[key].pixels >= smallest * SHARE_FACTOR.get(state.type, 1.0)
+    }
 
 
 def plain_name(object_type: str) -> str:

@@ -36,6 +36,9 @@ def coffee_machine(b: Builder) -> None:
     color = pick((BLACK, STEEL, (0.5, 0.15, 0.14)), b.style)
     b.box((0, 0, -0.6), (0.9, 1, 0.4), color, Material.METAL)
     b.box((0, 0.72, 0.1), (0.9, 0.28, 0.85), shade_of(color, 1.15), Material.METAL)
+    b.box((0, 0.1, -1.0), (0.62, 0.7, 0.015), (0.5, 0.68, 0.76), Material.GLASS)
+    for side in (-1, 1):
+        b.box((side * 0.9, 0.1, -0.6), (0.02, 0.7, 0.22), (0.5, 0.68, 0.76), Material.GLASS)
     b.span((-0.95, -1, -0.8), (0.95, b.support, 1), DARK)
     b.tube((0, 0.36, 0.25), (0.2, 0.1, 0.2), CHROME, Material.METAL, bottom=0.5)
     lamp: Color = (0.2, 1.0, 0.3) if b.state.toggled else (0.4, 0.1, 0.1)
@@ -91,6 +94,7 @@ def laptop(b: Builder) -> None:
     b.box((0, -1 + 2 * y, 0.1), (0.88, 0.02, 0.5), DARK)
     z = b.thick(0.008, 2)
     b.box((0, 0, -0.88), (1, 1, z), STEEL, Material.METAL)
+    b.coin(2, (0, 0.1, -0.88 - z), (0.14, 0.2, z * 0.3), WHITE)
     screen = _SCREEN if b.state.toggled else (0.07, 0.08, 0.1)
     b.box(
         (0, 0.05, -0.88 + z),

@@ -6,7 +6,7 @@ from functools import partialmethod
 import numpy as np
 
 from infthor_sim.geometry import Array, euler_matrix, yaw_matrix
-from infthor_sim.objects import WALL, SimObject, SimObjectState
+from infthor_sim.objects import WALL, SimObject, SimObjectState, style_of
 from infthor_sim.render.primitives import Color, Form, Material, ShapePart
 
 __all__ = ["Builder", "Vector", "shade_of"]
@@ -30,6 +30,8 @@ class Builder:
     Attributes:
         parts: primitives so far.
         half: half extents of the object's box seen from its front, metres (3,).
+        style: index that varies colours; recorded objects of one model share it.
+        mark: number of this one object, by which things that are otherwise alike differ.
     """
 
     def __init__(self, item: SimObject) -> None:
@@ -37,6 +39,7 @@ class Builder:
         self.state: SimObjectState = item.state
         self.parts: list[ShapePart] = []
         self.style = item.style
+        self.mark = style_of(item.object_id)
         self._turn = yaw_matrix(item.front)
         self.half: Array = item.front_size / 2
 

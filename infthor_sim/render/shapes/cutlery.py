@@ -8,6 +8,7 @@ from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import CHROME, DARK, STEEL
 
 _BRIGHT: Color = (0.9, 0.92, 0.95)
+_IVORY: Color = (0.88, 0.82, 0.66)
 _GRIP: Color = (0.15, 0.13, 0.12)
 
 
@@ -25,8 +26,8 @@ def knife(b: Builder) -> None:
 
 @draws
 def butter_knife(b: Builder) -> None:
-    """All of bright steel: a stout round handle, a neck, a blade with a round end and a notch."""
-    b.ball((0, 0, 0.58), (0.75, 1, 0.42), shade_of(STEEL, 0.85), Material.METAL)
+    """A stout round handle of ivory, a neck, a blade with a round end and a notch."""
+    b.ball((0, 0, 0.58), (0.75, 1, 0.42), _IVORY)
     b.box((0, 0, 0.12), (0.35, 0.7, 0.1), CHROME, Material.METAL)
     b.box((0.1, 0, -0.36), (0.9, 0.5, 0.4), _BRIGHT, Material.METAL)
     b.ball((0.1, 0, -0.76), (0.9, 0.5, 0.22), _BRIGHT, Material.METAL)
@@ -35,11 +36,12 @@ def butter_knife(b: Builder) -> None:
 
 @draws
 def fork(b: Builder) -> None:
-    """A handle and tines."""
-    b.box((0, 0, 0.35), (0.3, 0.6, 0.65), STEEL, Material.METAL)
-    b.box((0, 0, -0.4), (1, 0.6, 0.14), STEEL, Material.METAL)
-    for at in (-0.8, -0.27, 0.27, 0.8):
-        b.box((at, 0.2, -0.75), (0.16, 0.5, 0.25), STEEL, Material.METAL)
+    """A handle that widens to its end, and a broad head with three long tines well apart."""
+    b.box((0, 0, 0.74), (0.42, 0.6, 0.26), STEEL, Material.METAL)
+    b.box((0, 0, 0.2), (0.22, 0.6, 0.3), STEEL, Material.METAL)
+    b.ball((0, 0, -0.28), (1, 0.6, 0.22), STEEL, Material.METAL)
+    for at in (-0.8, 0.0, 0.8):
+        b.box((at, 0.2, -0.64), (0.2, 0.5, 0.36), CHROME, Material.METAL)
 
 
 @draws

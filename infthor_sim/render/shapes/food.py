@@ -3,6 +3,7 @@
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
 from infthor_sim.render.shapes.catalogue import draws
+from infthor_sim.render.shapes.palette import pick
 
 __all__ = ["APPLES", "CRUST", "LETTUCE", "POTATO", "TOMATO"]
 
@@ -11,6 +12,8 @@ CRUST: Color = (0.72, 0.48, 0.24)
 LETTUCE: Color = (0.4, 0.66, 0.25)
 POTATO: Color = (0.7, 0.55, 0.32)
 TOMATO: Color = (0.85, 0.16, 0.1)
+_EGGS: tuple[Color, ...] = ((0.93, 0.86, 0.76), (0.97, 0.95, 0.91), (0.9, 0.76, 0.62))
+_EGG_TURN = 40.0  # degrees: rooms have their things square to the walls, and seen so an egg is long
 
 
 @draws
@@ -91,16 +94,23 @@ def loaf(
 
 @draws
 def lettuce(b: Builder) -> None:
-    """A head of leaves."""
-    b.ball((0, 0, 0), (1, 1, 1), LETTUCE, Material.STONE)
+    """A head of dark leaves with pale ones around it, a yellow heart, frills, a white stalk."""
+    b.ball((0, -0.3, 0), (1, 0.68, 1), shade_of(LETTUCE, 0.72), Material.STONE)
+    pale: Color = (0.55, 0.78, 0.32)
     for x, z in ((-0.4, 0.3), (0.4, 0.2), (0.0, -0.45)):
-        b.ball((x, 0.25, z), (0.6, 0.7, 0.55), (0.52, 0.76, 0.34))
+        b.ball((x, 0.25, z), (0.6, 0.7, 0.55), pale)
+    for x, z in ((0.05, 0.62), (-0.5, -0.33), (0.52, -0.33)):
+        b.ball((x, 0.1, z), (0.42, 0.72, 0.36), shade_of(LETTUCE, 0.9), Material.STONE)
+    for x, z in ((-0.5, 0.42), (0.5, 0.34), (0.0, -0.6)):
+        b.ball((x, 0.72, z), (0.4, 0.22, 0.34), (0.74, 0.9, 0.46))
+    b.ball((0, 0.6, 0), (0.46, 0.36, 0.46), (0.88, 0.9, 0.5))
+    b.tube((0, -0.9, 0), (0.42, 0.1, 0.42), (0.93, 0.94, 0.82))
 
 
 @draws
 def egg(b: Builder) -> None:
-    """An egg."""
-    b.ball((0, 0, 0), (1, 1, 1), (0.93, 0.86, 0.76))
+    """A white, cream or tan egg on its side."""
+    b.ball((0, -0.26, 0), (0.74, 0.74, 1.06), pick(_EGGS, b.style), tilt=(0, _EGG_TURN, 0))
 
 
 @draws

@@ -23,6 +23,15 @@ _COVERS: tuple[Color, ...] = (
     (0.2, 0.42, 0.3),
     (0.55, 0.42, 0.2),
 )
+_NEWSPRINT: Color = (0.87, 0.86, 0.81)
+_LABELS: tuple[Color, ...] = (
+    (0.8, 0.2, 0.18), (0.16, 0.35, 0.72), (0.2, 0.6, 0.32), (0.95, 0.76, 0.2), (0.5, 0.25, 0.6),
+    (0.93, 0.93, 0.93), (0.15, 0.15, 0.17),
+)  # fmt: skip
+_SOAPS: tuple[Color, ...] = (
+    (0.95, 0.86, 0.74), (0.92, 0.66, 0.68), (0.68, 0.83, 0.66), (0.66, 0.78, 0.9),
+    (0.8, 0.72, 0.9),
+)  # fmt: skip
 
 
 @draws
@@ -43,16 +52,25 @@ def book(b: Builder) -> None:
 
 @draws
 def newspaper(b: Builder) -> None:
-    """A folded paper with lines."""
-    b.box((0, 0, 0), (1, 1, 1), (0.85, 0.85, 0.82), Material.PAPER)
-    b.box((0, 0.95, 0.75), (0.9, 0.08, 0.12), DARK)
+    """A folded paper: a title, a picture and columns of text on top, its leaves at the sides."""
+    for level, half, size in ((-0.6, 0.4, 1.0), (-0.04, 0.16, 0.97), (0.5, 0.4, 0.985)):
+        color = _NEWSPRINT if half > 0.2 else shade_of(_NEWSPRINT, 0.6)
+        b.box((0, level, 0), (size, half, size), color)
+    b.box((-0.1, 0.92, -0.7), (0.72, 0.06, 0.15), BLACK)
+    b.box((0, 0.92, -0.44), (0.92, 0.05, 0.025), DARK)
+    b.box((-0.48, 0.92, 0.22), (0.42, 0.06, 0.5), (0.42, 0.45, 0.5))
+    for at in (0.14, 0.46, 0.78):
+        b.box((at, 0.92, 0.25), (0.12, 0.05, 0.56), shade_of(_NEWSPRINT, 0.72))
 
 
 @draws
 def disc(b: Builder) -> None:
-    """A shiny disc with a hole."""
+    """A shiny disc with a hole and a coloured label."""
     b.tube((0, 0, 0), (1, 1, 1), (0.75, 0.8, 0.88), Material.METAL)
-    b.tube((0, 0.1, 0), (0.2, 1, 0.2), (0.35, 0.36, 0.4))
+    b.tube((0, 0.08, 0), (0.72, 1, 0.72), pick(_LABELS, b.mark))
+    b.tube((0, 0.12, 0), (0.38, 1, 0.38), (0.82, 0.86, 0.92), Material.METAL)
+    b.tube((0, 0.16, 0), (0.18, 1, 0.18), (0.25, 0.26, 0.3))
+    b.box((0, 0.1, 0.54), (0.4, 1, 0.06), pick((WHITE, BLACK), b.mark // len(_LABELS)))
 
 
 @draws
@@ -177,9 +195,15 @@ def spray_bottle(b: Builder) -> None:
 
 @draws
 def soap_bar(b: Builder) -> None:
-    """A rounded bar."""
-    b.ball((0, 0, 0), (1.05, 1, 1.05), (0.93, 0.82, 0.7))
-    b.box((0, 0, 0), (0.85, 0.9, 0.88), (0.95, 0.86, 0.74))
+    """A rounded bar with an oval mark on top."""
+    color = pick(_SOAPS, b.mark)
+    b.box((0, -0.1, 0), (0.76, 0.9, 1), color)
+    b.box((0, -0.1, 0), (1, 0.9, 0.84), color)
+    for x in (-0.76, 0.76):
+        for z in (-0.84, 0.84):
+            b.tube((x, -0.1, z), (0.24, 0.9, 0.16), color)
+    mark = pick((1.1, 0.72, 0.88), b.mark // len(_SOAPS))
+    b.tube((0, 0.8, 0), (0.55, 0.1, 0.62), shade_of(color, mark))
 
 
 @draws
@@ -208,20 +232,25 @@ def tissue_box(b: Builder) -> None:
 
 @draws
 def plunger(b: Builder) -> None:
-    """A red bell on a stick."""
-    _stick_tool(b, (0.65, 0.2, 0.15))
+    """A red bell of rubber with a flange, on a stick of wood."""
+    color: Color = (0.65, 0.2, 0.15)
+    b.tube((0, -0.94, 0), (1, 0.06, 1), shade_of(color, 0.8))
+    b.tube((0, -0.8, 0), (0.94, 0.1, 0.94), color, top=0.85)
+    b.tube((0, -0.63, 0), (0.8, 0.08, 0.8), color, top=0.35)
+    b.tube((0, 0.2, 0), (0.16, 0.8, 0.16), pick(WOODS, b.style))
 
 
 @draws
 def scrub_brush(b: Builder) -> None:
-    """White bristles on a stick."""
-    _stick_tool(b, (0.9, 0.9, 0.92))
-
-
-def _stick_tool(b: Builder, color: Color) -> None:
-    """A stick with a working end at its foot."""
-    b.tube((0, -0.8, 0), (1, 0.2, 1), color, top=0.6)
-    b.tube((0, 0.15, 0), (0.16, 0.85, 0.16), pick(WOODS, b.style))
+    """A toilet brush in its tall white pot: bristles at its rim, a long plastic handle."""
+    color = pick(((0.2, 0.45, 0.75), (0.15, 0.55, 0.5)), b.style)
+    b.tube((0, -0.66, 0), (0.9, 0.34, 0.9), WHITE)
+    b.tube((0, -0.95, 0), (1, 0.05, 1), color)
+    b.tube((0, -0.34, 0), (0.98, 0.04, 0.98), color)
+    for turn in (0, 45, 90, 135):
+        b.box((0, -0.19, 0), (0.66, 0.11, 0.1), (0.8, 0.86, 0.9), tilt=(0, turn, 0))
+    b.tube((0, 0.38, 0), (0.17, 0.48, 0.17), color)
+    b.ball((0, 0.88, 0), (0.32, 0.12, 0.32), color)
 
 
 @draws

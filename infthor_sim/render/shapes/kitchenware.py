@@ -103,14 +103,18 @@ def pot(b: Builder) -> None:
 
 @draws
 def pan(b: Builder) -> None:
-    """A shallow pan with a long handle."""
+    """A shallow pan: a long round handle, thicker at its end, on a steel mount at the rim."""
     ratio = min(0.95, b.slenderness)
     at = b.lengthwise(ratio - 1, 0, 0)
     half = b.lengthwise(ratio, 0.95, 1)
     b.cup(at, half, DARK, Material.METAL, bottom=0.88)
     _inner_floor(b, 0.88, (0.14, 0.14, 0.15), at, half)
     length = max(1 - ratio, 0.05)
-    b.box(b.lengthwise(1 - length, 0.6, 0), b.lengthwise(length, 0.25, 0.08), BLACK)
+    axis = 0 if b.half[0] >= b.half[2] else 2
+    rim = 1 - 2 * length
+    b.bar(axis, rim - 0.03, rim + 0.4 * length, (0.008, 0.008), STEEL, Material.METAL)
+    b.bar(axis, rim + 0.4 * length, 0.97, (0.01, 0.014), BLACK)
+    b.bar(axis, 0.97, 1.0, (0.014, 0.009), BLACK)
 
 
 @draws

@@ -17,6 +17,7 @@ _RUFFLES = (
     (0.46, -0.42),
     (-0.46, -0.42),
 )
+_FLESH: Color = (0.96, 0.9, 0.6)  # of potatoes
 _TOAST: Color = (0.55, 0.33, 0.15)
 _CRUMB: Color = (0.95, 0.86, 0.66)
 
@@ -60,16 +61,23 @@ def tomato_slice(b: Builder) -> None:
 
 @draws
 def potato_slice(b: Builder) -> None:
-    """Brown skin around yellow, golden when cooked."""
-    _round(b, shade_of(POTATO, 0.8), (0.96, 0.9, 0.6))
+    """Brown skin around yellow, golden when cooked, and lopsided."""
+    skin = shade_of(POTATO, 0.56 if b.state.cooked else 0.8)
+    size = _relative_width(b)
+    _disc(b, 0.78 * size, 0.55, skin, (0.2 * size, -0.16 * size))
+    _round(b, shade_of(POTATO, 0.8), _FLESH)
+    _disc(b, 0.72 * size, 1.0, shade_of(_FLESH, 0.78) if b.state.cooked else _FLESH,
+          (0.2 * size, -0.16 * size))  # fmt: skip
 
 
 @draws
 def lettuce_slice(b: Builder) -> None:
     """A ruffled leaf, paler within, with a broad white rib from its foot that becomes veins."""
-    for aside, up in _RUFFLES:
-        _disc(b, 0.34, 0.76, shade_of(LETTUCE, 0.66), (aside, up))
-    _disc(b, 0.82, 0.84, shade_of(LETTUCE, 1.15), (0.0, 0.0))
+    for index, (aside, up) in enumerate(_RUFFLES):
+        off = 0.36 if index % 2 else -0.36
+        shade = 1.2 if index % 2 else 0.66
+        _disc(b, 0.34, 0.48, shade_of(LETTUCE, shade), (aside, up), off)
+    _disc(b, 0.82, 0.85, shade_of(LETTUCE, 1.15), (0.0, 0.0))
     _rib(b, (0.0, -0.2), 0.0, (0.09, 0.72))
     _rib(b, (0.0, -0.62), 0.0, (0.17, 0.36))
     for side in (-1, 1):
@@ -96,10 +104,10 @@ def _rib(b: Builder, at: tuple[float, float], angle: float, half: tuple[float, f
 
 
 def _round(b: Builder, rind: Color, flesh: Color) -> None:
-    """A round slice; darker when cooked."""
+    """A round slice; darker when cooked. Its flesh shows beside the rind from the edge, too."""
     size = _relative_width(b)
-    _disc(b, size, 0.92, shade_of(rind, 0.7) if b.state.cooked else rind, (0.0, 0.0))
-    _disc(b, 0.86 * size, 1.0, shade_of(flesh, 0.78) if b.state.cooked else flesh, (0.0, 0.0))
+    _disc(b, size, 0.6, shade_of(rind, 0.7) if b.state.cooked else rind, (0.0, 0.0))
+    _disc(b, 0.93 * size, 1.0, shade_of(flesh, 0.78) if b.state.cooked else flesh, (0.0, 0.0))
 
 
 def _spots(b: Builder, places: tuple[tuple[float, float], ...], size: float, color: Color) -> None:
@@ -125,9 +133,12 @@ def _thin_axis(b: Builder) -> int:
     return min((0, 2), key=lambda axis: float(b.half[axis]))
 
 
-def _disc(b: Builder, radius: float, thick: float, color: Color, at: tuple[float, float]) -> None:
-    """Add a disc across the thin axis, with its middle aside and up."""
+def _disc(
+    b: Builder, radius: float, thick: float, color: Color, at: tuple[float, float],
+    off: float = 0.0,
+) -> None:  # fmt: skip
+    """Add a disc across the thin axis, with its middle aside, up, and `off` along that axis."""
     thin = _thin_axis(b)
     half = (thick, radius, radius) if thin == 0 else (radius, radius, thick)
-    middle = (0.0, at[1], at[0]) if thin == 0 else (at[0], at[1], 0.0)
+    middle = (off, at[1], at[0]) if thin == 0 else (at[0], at[1], off)
     b.coin(thin, middle, half, color)

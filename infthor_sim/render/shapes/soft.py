@@ -1,5 +1,7 @@
 """Things of cloth: pillows, cloths, towels."""
 
+import math
+
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
 from infthor_sim.render.shapes.catalogue import draws
@@ -8,12 +10,17 @@ from infthor_sim.render.shapes.palette import CLOTHS, WHITE, pick
 
 @draws
 def pillow(b: Builder) -> None:
-    """A puffed cushion with corners, thickest in the middle, and a seam around it."""
+    """A puffed cushion of one cloth, thickest in the middle, with drawn-out corners."""
     color = shade_of(pick(CLOTHS, b.style), 1.25)
-    b.box((0, -0.05, 0), (0.96, 0.07, 0.96), shade_of(color, 0.6), Material.FABRIC)
-    for x in (-0.47, 0.47):
-        for z in (-0.47, 0.47):
-            b.ball((x, -0.03, z), (0.5, 0.66, 0.5), color, Material.FABRIC)
+    width, depth = float(b.half[0]), float(b.half[2])
+    slant = math.degrees(math.atan2(depth, width))
+    corner = 0.42 * math.hypot(width, depth)
+    for x in (-1, 1):
+        for z in (-1, 1):
+            b.ball((x * 0.47, -0.03, z * 0.47), (0.5, 0.66, 0.5), color, Material.FABRIC)
+            half = (corner / width, 0.36, 0.5 * corner / depth)
+            b.ball((x * 0.53, -0.03, z * 0.53), half, color, Material.FABRIC,
+                   tilt=(0, -x * z * slant, 0))  # fmt: skip
     b.ball((0, 0, 0), (0.97, 1, 0.97), color, Material.FABRIC)
 
 

@@ -7,6 +7,11 @@ from infthor_sim.render.shapes.builder import Builder, shade_of
 from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import BLACK, BRASS, CHROME, STEEL, WHITE, pick
 
+_TAGS: tuple[Color, ...] = (
+    (0.75, 0.15, 0.15), (0.12, 0.32, 0.75), (0.15, 0.58, 0.25), (0.95, 0.78, 0.15),
+    (0.55, 0.25, 0.65), (0.93, 0.5, 0.12), (0.12, 0.12, 0.14),
+)  # fmt: skip
+
 
 @draws
 def card(b: Builder) -> None:
@@ -54,7 +59,7 @@ def _thickness(b: Builder) -> float:
 
 @draws
 def keys(b: Builder) -> None:
-    """A ring with two keys spread apart and a tag."""
+    """A ring with two keys spread apart and a tag, whose colours tell one from another."""
     wide = float(b.half[0])
     deep = float(b.half[2])
     for index in range(10):
@@ -69,9 +74,9 @@ def keys(b: Builder) -> None:
             Material.METAL,
             tilt=(0, angle, 0),
         )
-    _key(b, 14.0, BRASS)
+    _key(b, 14.0, pick((BRASS, STEEL, (0.72, 0.42, 0.28)), b.mark // len(_TAGS)))
     _key(b, -20.0, STEEL)
-    b.tube((-0.82, 0.1, 0.3), (0.2, 0.9, 0.34), (0.75, 0.15, 0.15))
+    b.tube((-0.82, 0.1, 0.3), (0.2, 0.9, 0.34), pick(_TAGS, b.mark))
 
 
 def _key(b: Builder, angle: float, color: Color) -> None:

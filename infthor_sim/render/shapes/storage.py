@@ -16,6 +16,7 @@ _BODY = 0.82
 _TRAY = 0.9  # top of a drawer's sides, in fractions: a little lower than its front
 _COLD: Color = (0.93, 0.97, 1.0)
 _TINTED: Color = (0.55, 0.76, 0.84)
+_BOLT: Color = (0.82, 0.84, 0.86)
 _WINDOW: Color = (0.13, 0.14, 0.16)
 # Of a fridge's shelves, in fractions: one looks down between glass and rim onto the lower ones, as
 # through clear glass.
@@ -172,7 +173,7 @@ def _door_racks(b: Builder) -> None:
 
 @draws
 def microwave(b: Builder) -> None:
-    """A microwave oven: a dark window, a panel of keys; lit inside while it runs."""
+    """A microwave oven: a dark window, a panel of keys, vents behind; lit inside while it runs."""
     body = (STEEL, DARK, WHITE)[b.style % 3]
     x, z = b.thick(0.02, 0), b.thick(0.01, 2)
     lit = 0.75 if b.state.toggled else 0.0
@@ -212,21 +213,34 @@ def microwave(b: Builder) -> None:
             CHROME,
             Material.METAL,
         )
+    _vents(b)
     b.box((-0.76, 0.1, 1 - z / 2), (0.18, 0.7, z), BLACK)
     b.box((-0.76, 0.62, 1), (0.14, 0.12, z), (0.2, 0.85, 0.45), glow=0.6)
     for row in range(3):
         b.box((-0.76, 0.25 - 0.25 * row, 1), (0.12, 0.07, z), (0.55, 0.56, 0.58))
 
 
+def _vents(b: Builder) -> None:
+    """Dark slots, a plate of data and the root of the cord on the back, and slots on both sides."""
+    x, z = b.thick(0.003, 0), b.thick(0.003, 2)
+    for level in (0.6, 0.28, -0.04):
+        b.box((0.35, level, -1), (0.5, 0.09, z), BLACK)
+        for side in (-1, 1):
+            b.box((side, level, -0.4), (x, 0.09, 0.36), BLACK)
+    b.box((-0.55, 0.3, -1), (0.24, 0.3, z), (0.75, 0.77, 0.8), Material.PAPER)
+    b.ball((-0.6, -0.7, -1), (0.1, 0.14, 4 * z), DARK)
+
+
 @draws
 def safe(b: Builder) -> None:
-    """A steel box with a thick door that has a dial and a wheel of spokes."""
+    """A strongbox with bands and bolts on all sides; its thick door has a dial and keys."""
     body: Color = (0.3, 0.32, 0.35)
     if b.state.openness == 0:
         z = b.thick(0.02, 2)
         b.box((0, 0, -z), (1, 1, 1 - z), body, Material.METAL)
     else:
         b.open_front(body, shade_of(body, 1.7), Material.METAL, b.item.floors[0], glow=_LIT)
+    _bands(b, shade_of(body, 1.7))
     _door(b, shade_of(body, 1.25), Material.METAL, CHROME)
     if b.state.openness == 0:
         b.coin(2, (0, 0.2, 1), (0.3, 0.3, b.thick(0.008, 2)), DARK)
@@ -235,6 +249,20 @@ def safe(b: Builder) -> None:
         b.box((0.0, -0.35, 1), (0.34, 0.28, b.thick(0.006, 2)), (0.1, 0.1, 0.11))
         for row in range(3):
             b.box((0.0, -0.17 - 0.18 * row, 1), (0.26, 0.05, b.thick(0.009, 2)), (0.75, 0.78, 0.8))
+
+
+def _bands(b: Builder, color: Color) -> None:
+    """Steel bands up the sides and along the edges of back and sides, with bolts."""
+    x, y, z = b.thick(0.004, 0), b.thick(0.004, 1), b.thick(0.004, 2)
+    front = 1 - b.thick(0.04, 2)
+    for level in (-0.86, 0.86):
+        b.span((-1 - x, level - 0.14, -1 - z), (1 + x, level + 0.14, -1), color, Material.METAL)
+        for side in (-1, 1):
+            b.box((side, level, (front - 1) / 2), (x, 0.14, (front + 1) / 2), color, Material.METAL)
+            b.box((side * 0.86, 0, -1), (0.14, 0.86, z), color, Material.METAL)
+            b.ball((side, level, -0.86), (3 * x, 0.06, 0.06), _BOLT)
+            b.ball((side * 0.86, level, -1), (0.06, 0.06, 3 * z), _BOLT)
+    b.box((0, 1, (front - 1) / 2), (0.14, y, (front + 1) / 2), color, Material.METAL)
 
 
 @draws

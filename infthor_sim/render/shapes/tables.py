@@ -12,6 +12,9 @@ __all__ = ["cut_slab"]
 
 _STONES: tuple[Color, ...] = ((0.55, 0.53, 0.5), (0.35, 0.35, 0.37), (0.72, 0.69, 0.63))
 
+# metres from a chest's front to the backs of the drawers' fronts, which procedural rooms put in it
+_INSET = 0.026
+
 
 @draws
 def counter(b: Builder) -> None:
@@ -220,6 +223,8 @@ def chest(b: Builder) -> None:
     b.box((0, top - board, 0), (1, board, 1), color, Material.WOOD)
     if b.item.hollow:
         _carcass(b, color, top - 2 * board)
+        if not b.item.asset_id:
+            _drawer_frame(b, shade_of(color, 0.85), top - 2 * board)
         return
     middle = (top - 2 * board - 1) / 2
     half = (top - 2 * board + 1) / 2
@@ -233,6 +238,15 @@ def chest(b: Builder) -> None:
                 (b.thick(0.015, 0), b.thick(0.015, 1), b.thick(0.015, 2)),
                 CHROME,
             )
+
+
+def _drawer_frame(b: Builder, color: Color, top: float) -> None:
+    """Add what is seen between the fronts of two columns of drawers, and above them."""
+    front = 1 - b.thick(_INSET, 2)
+    post = b.thick(0.017, 0)
+    b.span((-post, -1, front - b.thick(0.02, 2)), (post, top, front), color, Material.WOOD)
+    rail = top - b.thick(0.037, 1) * 2
+    b.span((-1, rail, front - b.thick(0.02, 2)), (1, top, front), color, Material.WOOD)
 
 
 @draws
