@@ -27,6 +27,18 @@ def drop(sim: Simulation, forceAction: bool = False, autoSimulation: bool = True
     _let_go(sim, 0.0)
 
 
+@action("DropHeldObjectAhead")
+def drop_ahead(
+    sim: Simulation,
+    forceAction: bool = False,
+    autoSimulation: bool = True,
+    randomMagnitude: float = 0.0,
+    actionSimulationSeconds: float | None = None,
+) -> None:
+    """Drop the held object in front of the agent, farther than its arms hold it."""
+    _let_go(sim, _THROW_REACH)
+
+
 @action("ThrowObject")
 def throw(
     sim: Simulation,
