@@ -250,10 +250,9 @@ class World:
     def _held_pose(self, item: SimObject) -> tuple[Array, Array]:
         agent = self.agent
         camera = agent.camera_matrix()
-        if agent.grip is None:  # upright, turned with the agent, the middle of its box at the hand
-            turn = np.array([item.rotation[0], agent.yaw, item.rotation[2]])
+        if agent.grip is None:  # upright, turned with the agent, its origin at the hand
             hand = agent.camera_position() + camera @ HAND_AT_REST.offset
-            return hand - euler_matrix(turn) @ item.box_center, turn
+            return hand, np.array([0.0, agent.yaw, 0.0])
         return agent.camera_position() + camera @ agent.grip.offset, matrix_euler(
             camera @ agent.grip.turn
         )
