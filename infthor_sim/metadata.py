@@ -107,10 +107,10 @@ def object_metadata(item: SimObject) -> dict[str, Any]:
 
 
 def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
-    """Return fields of agent, scene and last action: all but `objects` and `colors`."""
+    """Return fields of the active agent, scene and last action: all but `objects` and `colors`."""
     world = sim.world
-    agent = sim.world.agent
-    held = None if world.held is None else world.objects[world.held]
+    agent = world.agent
+    held = None if agent.held is None else world.objects[agent.held]
     low, high = world.scene_bounds()
     pose = _hand_pose(world)
     return {
@@ -143,7 +143,7 @@ def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
         "sceneName": f"{world.scene}_physics" if _ITHOR.fullmatch(world.scene) else world.scene,
         "screenWidth": sim.display.width,
         "screenHeight": sim.display.height,
-        "agentId": 0,
+        "agentId": world.active,
         "depthFormat": "Meters",
         "currentTime": round(sim.time, 6),
         "sceneBounds": _box((low + high) / 2, high - low),
@@ -185,9 +185,9 @@ def _hand_pose(world: World) -> dict[str, Any]:
             ("position", "rotation", "localPosition", "localRotation"), round_xyz(np.zeros(3))
         )
     agent = world.agent
-    hand = world.hand
+    hand = agent.hand
     camera = agent.camera_matrix()
-    turn = hand.turn if world.held is not None else euler_matrix((-agent.horizon, 0.0, 0.0))
+    turn = hand.turn if agent.held is not None else euler_matrix((-agent.horizon, 0.0, 0.0))
     return {
         "position": round_xyz(agent.camera_position() + camera @ hand.offset),
         "rotation": round_xyz(matrix_euler(camera @ turn)),

@@ -26,6 +26,8 @@ class SimulatorSettings:
 
     Attributes:
         agent_mode: one of `AGENT_MODES`.
+        agent_count: number of agents.
+        bodies_drawn: agents see one another.
         mass_threshold: mass above which a loose object stops an arm; None: none does.
         grid_size: length of a step without `moveMagnitude`.
         snap_to_grid: keep positions free of rounding noise after whole steps.
@@ -40,6 +42,8 @@ class SimulatorSettings:
     """
 
     agent_mode: str = "default"
+    agent_count: int = 1
+    bodies_drawn: bool = True
     mass_threshold: float | None = None
     grid_size: float = 0.25
     snap_to_grid: bool = True

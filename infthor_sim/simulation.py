@@ -1,12 +1,14 @@
 """A running simulator's state: scene, settings, cameras, random numbers, saved states."""
 
 import copy
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from infthor_sim.arm.equipment import equip
 from infthor_sim.objects import SimObject
+from infthor_sim.physics.crowd import set_agent_count
 from infthor_sim.pictures.cameras import ThirdPartyCamera
 from infthor_sim.pictures.views import Display, Views
 from infthor_sim.pictures.vision import AgentVision
@@ -32,8 +34,6 @@ class Simulation:
         failed_reset: why the last Reset loaded no scene. Initialize repeats it, as the client reads
             only its reply.
         world: the scene.
-        views: pictures of the scene.
-        vision: queries about what the agent sees.
     """
 
     catalogue: Catalogue
@@ -45,8 +45,6 @@ class Simulation:
     time: float = 0.0
     failed_reset: str = ""
     world: World = field(init=False)
-    views: Views = field(init=False)
-    vision: AgentVision = field(init=False)
 
     def __post_init__(self) -> None:
         self.load(self.catalogue.empty())
@@ -62,9 +60,19 @@ class Simulation:
         self._show(world)
 
     def configure(self, settings: SimulatorSettings) -> None:
-        """Give the agent other settings and the arm of their agent mode."""
-        self.settings = self.views.settings = self.vision.settings = settings
+        """Give the agents other settings and the arm of their agent mode.
+
+        Raises:
+            ActionError: there is no room for so many agents.
+        """
+        self.settings = settings
         equip(self.world, settings.agent_mode)
+        self.world.agent.drawn = settings.bodies_drawn
+        set_agent_count(self.world, settings.agent_count, settings.grid_size)
+        if len(self.world.agents) != len(self._views):
+            self._show(self.world)
+        for views, vision in zip(self._views, self._visions, strict=True):
+            views.settings = vision.settings = settings
 
     def save(self, slot: int) -> None:
         """Keep a copy of the scene's state and random numbers, in place of what the slot held."""
@@ -89,8 +97,28 @@ class Simulation:
 
     def _show(self, world: World) -> None:
         self.world = world
-        self.views = Views(world, self.display, self.settings)
-        self.vision = AgentVision(world, self.views, self.display, self.settings)
+        self._views = [Views(world, self.display, self.settings) for _ in world.agents]
+        self._visions = [
+            AgentVision(world, views, self.display, self.settings) for views in self._views
+        ]
+
+    @property
+    def views(self) -> Views:
+        """Pictures of the scene by the active agent."""
+        return self._views[self.world.active]
+
+    @property
+    def vision(self) -> AgentVision:
+        """Queries about what the active agent sees."""
+        return self._visions[self.world.active]
+
+    def each_agent(self) -> Iterator[int]:
+        """Make every agent the active one in turn and yield its id; end with the one of before."""
+        active = self.world.active
+        for number in range(len(self.world.agents)):
+            self.world.active = number
+            yield number
+        self.world.active = active
 
     def reported_objects(self) -> list[SimObject]:
         """Return the objects that replies list, in the order of the metadata."""

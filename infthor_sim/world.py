@@ -1,11 +1,11 @@
-"""The state of one scene: its objects, its agent, and which object contains which."""
+"""The state of one scene: its objects, its agents, and which object contains which."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from infthor_sim.agent import Agent, Grip
+from infthor_sim.agent import HAND_AT_REST, Agent, Grip
 from infthor_sim.arm.arm import Arm
 from infthor_sim.errors import ActionError
 from infthor_sim.geometry import Array, aabb_gap, euler_matrix, matrix_euler
@@ -16,8 +16,6 @@ from infthor_sim.pictures.appearance import Appearance
 __all__ = ["FLOOR_STYLES", "RoomShell", "Wall", "World"]
 
 FLOOR_STYLES = ("wood", "tiles", "carpet")
-# where AI2-THOR has its agent's hand, in the camera's frame
-_HAND = Grip(np.array([0.0, -0.16, 0.38]), np.eye(3))
 
 
 @dataclass(frozen=True)
@@ -67,18 +65,17 @@ class World:
     Attributes:
         scene: name of the scene.
         objects: objects by id, in the order of the metadata.
-        nav: cells where the agent can stand.
+        nav: cells where an agent can stand.
+        agents: its agents, in the order of their ids.
+        active: id of the agent that acts, or whose part of a reply is made.
         seed: seed of the scene's random numbers.
-        held: id of the object in the agent's hand; None for an empty hand.
         version: number that grows with every change; cached views compare it.
         coarse: the shapes of its furniture are only known as boxes, as in recordings.
         walls: walls of rooms that are not `walled`.
         open_at_start: ids of the objects that are open in the recording; its cells already go
             around them.
         templates: copies of the loose objects as the scene first had them, by type.
-        grip: pose of the held object in the camera's frame; None for the usual one after a pick-up.
-        hand: pose of the hand in the camera's frame; the held object keeps its place in it.
-        arm: the agent's arm; None for an agent that holds things in front of its camera.
+        arm: the arm of the only agent; None for agents that hold things in front of their camera.
         disabled: objects that are out of the scene until they are enabled again, by id.
         appearance: randomized looks.
         standing_height: height in metres of the agent's position on the floor.
@@ -88,16 +85,14 @@ class World:
     objects: dict[str, SimObject]
     rooms: tuple[RoomShell, ...]
     nav: NavGrid
-    agent: Agent
+    agents: list[Agent]
+    active: int = 0
     seed: int = 0
-    held: str | None = None
     version: int = 0
     coarse: bool = False
     walls: tuple[Wall, ...] = ()
     open_at_start: frozenset[str] = frozenset()
     templates: dict[str, list[SimObject]] = field(default_factory=dict)
-    grip: Grip | None = None
-    hand: Grip = _HAND
     arm: Arm | None = None
     disabled: dict[str, SimObject] = field(default_factory=dict)
     appearance: Appearance = field(default_factory=Appearance)
@@ -105,6 +100,15 @@ class World:
 
     def __post_init__(self) -> None:
         self.standing_height = float(self.agent.position[1])
+
+    @property
+    def agent(self) -> Agent:
+        """The active agent."""
+        return self.agents[self.active]
+
+    def others(self) -> list[tuple[int, Agent]]:
+        """Return the ids of the agents that are not active, and the agents."""
+        return [(index, a) for index, a in enumerate(self.agents) if index != self.active]
 
     def get(self, object_id: str) -> SimObject:
         """Return the object with this id.
@@ -139,8 +143,7 @@ class World:
         for content in self.children(item):
             content.parent = None
             self.mark_changed(content)
-        if self.held == item.object_id:
-            self._empty_hand()
+        self._take_out_of_hands(item)
         if self.arm is not None:
             self.arm.let_go(item.object_id)
             for content_id in item.contents:
@@ -177,7 +180,8 @@ class World:
             item.contents = [new(content) for content in item.contents]
             item.controls = tuple(new(controlled) for controlled in item.controls)
         self.objects = {item.object_id: item for item in self.objects.values()}
-        self.held = None if self.held is None else new(self.held)
+        for agent in self.agents:
+            agent.held = None if agent.held is None else new(agent.held)
         if self.arm is not None:
             self.arm.held = {new(old): grip for old, grip in self.arm.held.items()}
             inside = self.arm.held_contents
@@ -213,19 +217,21 @@ class World:
                 self.mark_changed(part)
 
     def carry(self, keep_grip: bool = False) -> None:
-        """Move what the agent holds, and all it contains, along with the agent.
+        """Move what the active agent holds, and all it contains, along with it.
 
         Args:
             keep_grip: leave the object as it was moved in the hand; else the hand returns to its
                 usual place.
         """
+        agent = self.agent
         if not keep_grip:
-            self.grip = None
-            self.hand = _HAND
-        if self.held is not None:
-            self.set_pose(self.objects[self.held], *self._held_pose(self.objects[self.held]))
+            agent.grip = None
+            agent.hand = HAND_AT_REST
+        if agent.held is not None:
+            item = self.objects[agent.held]
+            self.set_pose(item, *self._held_pose(item))
         if self.arm is not None:
-            wrist = self.arm.wrist(self.agent)
+            wrist = self.arm.wrist(agent)
             # Contents have grips of their own: an arm tilts what it holds, which `set_pose` would
             # not do to contents.
             for object_id, grip in self.arm.grips():
@@ -237,29 +243,31 @@ class World:
                 self.mark_changed(item)
 
     def held_ids(self) -> list[str]:
-        """Return the ids of what the agent holds in its hand or with its arm, without contents."""
-        by_arm = [] if self.arm is None else list(self.arm.held)
-        return by_arm if self.held is None else [self.held, *by_arm]
+        """Return the ids of what agents hold in their hands or with an arm, without contents."""
+        in_hands = [agent.held for agent in self.agents if agent.held is not None]
+        return in_hands if self.arm is None else [*in_hands, *self.arm.held]
 
     def _held_pose(self, item: SimObject) -> tuple[Array, Array]:
-        if self.grip is None:  # upright, turned with the agent, the middle of its box at the hand
-            turn = np.array([item.rotation[0], self.agent.yaw, item.rotation[2]])
-            hand = self.agent.camera_position() + self.agent.camera_matrix() @ _HAND.offset
-            return hand - euler_matrix(turn) @ item.box_center, turn
-        camera = self.agent.camera_matrix()
-        return self.agent.camera_position() + camera @ self.grip.offset, matrix_euler(
-            camera @ self.grip.turn
+        agent = self.agent
+        camera = agent.camera_matrix()
+        if agent.grip is None:  # upright, turned with the agent, its origin at the hand
+            hand = agent.camera_position() + camera @ HAND_AT_REST.offset
+            return hand, np.array([0.0, agent.yaw, 0.0])
+        return agent.camera_position() + camera @ agent.grip.offset, matrix_euler(
+            camera @ agent.grip.turn
         )
 
     def release(self) -> None:
-        """Let go of everything that the agent holds; it stays where it is."""
-        for object_id in self.held_ids():
+        """Let go of everything that the active agent holds; it stays where it is."""
+        held = [] if self.arm is None else list(self.arm.held)
+        if self.agent.held is not None:
+            held.append(self.agent.held)
+        for object_id in held:
             self.let_go(self.objects[object_id])
 
     def let_go(self, item: SimObject) -> None:
         """Let go of one object, if it is held, with its contents; it stays where it is."""
-        if item.object_id == self.held:
-            self._empty_hand()
+        self._take_out_of_hands(item)
         if self.arm is not None:
             for part in (item, *self.descendants(item)):
                 part.state.picked_up = part.state.picked_up and part.object_id not in self.arm.held
@@ -267,22 +275,22 @@ class World:
         item.state.picked_up = False
         self.mark_changed(item)
 
-    def _empty_hand(self) -> None:
-        self.held = self.grip = None
-        self.hand = _HAND
+    def _take_out_of_hands(self, item: SimObject) -> None:
+        for agent in self.agents:
+            if agent.held == item.object_id:
+                agent.empty_hand()
 
     def move_hand(self, hand: Grip) -> None:
-        """Move the hand to a pose in the camera's frame, with what it holds."""
-        assert self.held is not None
-        item = self.objects[self.held]
-        camera = self.agent.camera_matrix()
+        """Move the active agent's hand to a pose in the camera's frame, with what it holds."""
+        agent = self.agent
+        assert agent.held is not None
+        item = self.objects[agent.held]
+        camera = agent.camera_matrix()
         offset = (
-            camera.T @ (item.position - self.agent.camera_position())
-            + hand.offset
-            - self.hand.offset
+            camera.T @ (item.position - agent.camera_position()) + hand.offset - agent.hand.offset
         )
-        self.grip = Grip(offset, hand.turn @ self.hand.turn.T @ camera.T @ item.matrix)
-        self.hand = hand
+        agent.grip = Grip(offset, hand.turn @ agent.hand.turn.T @ camera.T @ item.matrix)
+        agent.hand = hand
         self.carry(keep_grip=True)
 
     def set_pose(self, item: SimObject, position: Array, rotation: Array) -> None:
@@ -319,11 +327,11 @@ class World:
                    for outer in self.ancestors(item))  # fmt: skip
 
     def distance(self, item: SimObject) -> float:
-        """Return metres from the agent to the object's origin, as the metadata reports it."""
+        """Return metres from the active agent to an object's origin, as the metadata has it."""
         return float(np.linalg.norm(item.position - self.agent.position))
 
     def reach(self, item: SimObject) -> float:
-        """Return horizontal metres from the agent to the nearest point of the object's box."""
+        """Return level metres from the active agent to the nearest point of an object's box."""
         low, high = item.bounds()
         return aabb_gap(self.agent.position[[0, 2]], low[[0, 2]], high[[0, 2]])
 

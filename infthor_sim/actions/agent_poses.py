@@ -13,6 +13,7 @@ from infthor_sim.agent import MAX_DOWN, MAX_UP, Agent
 from infthor_sim.errors import ActionError
 from infthor_sim.geometry import Array, euler_matrix, level_gaps, to_array
 from infthor_sim.objects import SimObject
+from infthor_sim.physics.crowd import free_cells
 from infthor_sim.render.probe import VisibilityProbe
 from infthor_sim.simulation import Simulation
 
@@ -38,7 +39,8 @@ def get_reachable_positions(
         raise ActionError(f"gridSize must be at least {_FINEST}, not {step}")
     agent = sim.world.agent
     yaw = agent.yaw if directionsRelativeAgent else 0.0
-    points = sim.world.nav.reachable_points(agent.position[0], agent.position[2], step, yaw)
+    cells = free_cells(sim.world)
+    points = cells.reachable_points(agent.position[0], agent.position[2], step, yaw)
     if len(points) > maxStepCount / step**2:
         raise ActionError("Too many steps taken in GetReachablePositions.")
     return [{"x": x, "y": float(agent.position[1]), "z": z} for x, z in points]

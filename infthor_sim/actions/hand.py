@@ -27,6 +27,18 @@ def drop(sim: Simulation, forceAction: bool = False, autoSimulation: bool = True
     _let_go(sim, 0.0)
 
 
+@action("DropHeldObjectAhead")
+def drop_ahead(
+    sim: Simulation,
+    forceAction: bool = False,
+    autoSimulation: bool = True,
+    randomMagnitude: float = 0.0,
+    actionSimulationSeconds: float | None = None,
+) -> None:
+    """Drop the held object in front of the agent, farther than its arms hold it."""
+    _let_go(sim, _THROW_REACH)
+
+
 @action("ThrowObject")
 def throw(
     sim: Simulation,
@@ -80,7 +92,7 @@ def rotate_held_object(
     The axes are the hand's and not the object's: an object that lies in the hand stays lying in it.
     """
     held_object(sim, "Need to be holding something to rotate it!")
-    hand = sim.world.hand
+    hand = sim.world.agent.hand
     # Unity's roll is positive to the right, the reverse of its rotation about z.
     relative = hand.turn @ euler_matrix((pitch, yaw, -roll))
     turned = relative if rotation is None else euler_matrix(to_array(rotation))
@@ -106,5 +118,6 @@ def _move_held(sim: Simulation, step: Array, force_visible: bool) -> None:
     obstacle = obstacle_at(world, held, offset)
     if obstacle is not None:
         raise ActionError(f"{obstacle} is blocking the held object from moving there.")
-    world.move_hand(Grip(world.hand.offset + step, world.hand.turn))
+    hand = world.agent.hand
+    world.move_hand(Grip(hand.offset + step, hand.turn))
     world.mark_changed()

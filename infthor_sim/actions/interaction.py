@@ -35,15 +35,17 @@ def pick_up(
             f"{target.object_id} must have the property CanPickup to be picked up.",
             ErrorCode.NOT_PICKUPABLE,
         )
-    if sim.world.held is not None:
+    world = sim.world
+    if world.agent.held is not None:
         raise ActionError(
             "Agent hand has something in it already! Can't pick up anything else. Holding "
-            f"{sim.world.held}.",
+            f"{world.agent.held}.",
             ErrorCode.INVENTORY_FULL,
         )
-    world = sim.world
+    if target.object_id in world.held_ids():
+        raise ActionError(f"{target.object_id} is in the hand of another agent")
     world.detach(target)
-    world.held = target.object_id
+    world.agent.held = target.object_id
     target.state.picked_up = True
     world.carry()
 

@@ -10,6 +10,7 @@ from infthor_sim.actions.registry import Vector3, action
 from infthor_sim.agent import MAX_DOWN, MAX_UP
 from infthor_sim.errors import ActionError, ErrorCode
 from infthor_sim.geometry import Array
+from infthor_sim.physics.crowd import agent_on_way
 from infthor_sim.physics.obstacles import blocking_object, held_object_blocks, nearest_name
 from infthor_sim.simulation import Simulation
 
@@ -54,6 +55,9 @@ def _move(
                 f"Agent movement would bring it beyond the max distance of {objectId}: {away:.4f}"
             )
     _check_path(sim, target, offset, forceAction)
+    other = None if allowAgentsToIntersect else agent_on_way(sim.world, target)
+    if other is not None:
+        raise _blocked(sim, other, offset)
     agent.position = target
     sim.world.carry(manualInteract)
 
@@ -63,17 +67,21 @@ for _name, _angle in _DIRECTIONS.items():
 
 
 def _check_path(sim: Simulation, target: Array, offset: Array, force: bool) -> None:
-    start = sim.world.agent.position
-    by = f"({offset[0]:.4f}, {offset[1]:.4f}, {offset[2]:.4f})"
-    obstacle = blocking_object(sim.world, target)
+    world = sim.world
+    start = world.agent.position
+    obstacle = blocking_object(world, target)
     if obstacle is not None:
-        raise ActionError(f"{obstacle} is blocking Agent 0 from moving by {by}.")
-    if not sim.world.nav.can_walk((start[0], start[2]), (target[0], target[2])):
-        raise ActionError(
-            f"{nearest_name(sim.world, target)} is blocking Agent 0 from moving by {by}."
-        )
-    if not force and sim.world.held is not None and held_object_blocks(sim.world, target):
-        raise ActionError(f"{sim.world.held} is blocking Agent 0 from moving by {by}.")
+        raise _blocked(sim, obstacle, offset)
+    if not world.nav.can_walk((start[0], start[2]), (target[0], target[2])):
+        raise _blocked(sim, nearest_name(world, target), offset)
+    held = world.agent.held
+    if not force and held is not None and held_object_blocks(world, target):
+        raise _blocked(sim, held, offset)
+
+
+def _blocked(sim: Simulation, obstacle: str, offset: Array) -> ActionError:
+    by = ", ".join(f"{component:.4f}" for component in offset)
+    return ActionError(f"{obstacle} is blocking Agent {sim.world.active} from moving by ({by}).")
 
 
 def _rotate(

@@ -4,8 +4,9 @@ from typing import Any
 
 from infthor_sim.actions.registry import action
 from infthor_sim.errors import ActionError, DataError, ErrorCode
+from infthor_sim.physics.crowd import MOST_AGENTS
 from infthor_sim.render.camera import FAR, NEAR
-from infthor_sim.settings import AGENT_MODES, SimulatorSettings
+from infthor_sim.settings import AGENT_MODES, ARM_MODES, SimulatorSettings
 from infthor_sim.simulation import Simulation
 
 
@@ -40,9 +41,10 @@ def initialize(
     renderClassImage: bool = False,
     fastActionEmit: bool = True,
     agentCount: int = 1,
+    makeAgentsVisible: bool = True,
     massThreshold: float | None = None,
 ) -> dict[str, float]:
-    """Set up the agent; arguments that only Unity knows are ignored, as Unity does here."""
+    """Set up the agents; arguments that only Unity knows are ignored, as Unity does here."""
     # The client does not look at the reply to Reset, but raises on the reply to Initialize that it
     # sends next.
     if sim.failed_reset:
@@ -52,7 +54,14 @@ def initialize(
             f"agentMode {agentMode!r} is not offered by the embedded simulator; use one of "
             f"{', '.join(AGENT_MODES)}"
         )
-    _check(agentCount == 1, f"agentCount must be 1, not {agentCount}")
+    _check(
+        1 <= agentCount <= MOST_AGENTS,
+        f"agentCount must be 1 to {MOST_AGENTS}, not {agentCount}",
+    )
+    _check(
+        agentCount == 1 or agentMode.lower() not in ARM_MODES,
+        f"agentCount must be 1 with agentMode {agentMode!r}, not {agentCount}",
+    )
     _check(gridSize > 0, f"gridSize must be positive, not {gridSize}")
     _check(rotateStepDegrees > 0, f"rotateStepDegrees must be positive, not {rotateStepDegrees}")
     _check(
@@ -65,6 +74,8 @@ def initialize(
         raise ActionError(f"massThreshold must have nonzero value - invalid value: {massThreshold}")
     settings = SimulatorSettings(
         agent_mode=agentMode.lower(),
+        agent_count=int(agentCount),
+        bodies_drawn=makeAgentsVisible,
         mass_threshold=massThreshold,
         grid_size=float(gridSize),
         snap_to_grid=snapToGrid,

@@ -73,9 +73,9 @@ def held_object(sim: Simulation, message: str) -> SimObject:
     Raises:
         ActionError: nothing, with this message.
     """
-    if sim.world.held is None:
+    if sim.world.agent.held is None:
         raise ActionError(message, ErrorCode.NOT_IN_INVENTORY)
-    return sim.world.objects[sim.world.held]
+    return sim.world.objects[sim.world.agent.held]
 
 
 def check_in_frame(x: float, y: float) -> None:

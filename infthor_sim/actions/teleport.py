@@ -6,6 +6,7 @@ from infthor_sim.actions.registry import Vector3, action
 from infthor_sim.agent import MAX_DOWN, MAX_UP
 from infthor_sim.errors import ActionError
 from infthor_sim.geometry import Array
+from infthor_sim.physics.crowd import agent_at
 from infthor_sim.physics.obstacles import blocking_object, nearest_name
 from infthor_sim.simulation import Simulation
 from infthor_sim.world import World
@@ -81,7 +82,7 @@ def _place_on_floor(world: World, target: Array, horizon: float) -> Array:
             f"({off:.4f} > {_STEP_HEIGHT}) in the y component."
             " Consider using `forceAction=true` if you'd like to teleport anyway."
         )
-    obstacle = blocking_object(world, placed)
+    obstacle = blocking_object(world, placed) or agent_at(world, placed)
     if obstacle is not None or not world.nav.can_stand(target[0], target[2]):
         raise ActionError(
             f"Cannot teleport due to hitting object '{obstacle or nearest_name(world, placed)}'."

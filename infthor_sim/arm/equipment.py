@@ -21,8 +21,8 @@ def equip(world: World, agent_mode: str) -> None:
     if world.arm is not None:
         drop_all(world, world.arm)
     rig: Rig | None = _RIGS[agent_mode]() if agent_mode in _RIGS else None
-    if rig is not None and world.held is not None:
-        held = world.objects[world.held]
+    if rig is not None and world.agent.held is not None:
+        held = world.objects[world.agent.held]
         world.let_go(held)
         let_fall(world, held, held.center)
     world.arm = None if rig is None else Arm(rig, rig.rest())

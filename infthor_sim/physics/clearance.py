@@ -80,6 +80,6 @@ def _has_room(other: SimObject) -> bool:
 def _solid_box(other: SimObject) -> tuple[Array, Array]:
     """Return the corners of an object's box; of a seat or desk the part below its surface."""
     low, high = other.bounds()
-    if other.type.receptacle and other.support is not None:
+    if other.type.receptacle and other.support is not None and not other.type.encloses:
         high = np.array([high[0], other.surface_height(), high[2]])
     return low, high

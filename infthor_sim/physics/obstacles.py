@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from infthor_sim.agent import AGENT_RADIUS
 from infthor_sim.geometry import Array, aabb_overlap, level_gaps, yaw_matrix
 from infthor_sim.objects import DOOR_SWING, DRAWER_SLIDE, SimObject
 from infthor_sim.world import World
 
 __all__ = ["blocking_object", "door_leaf", "held_object_blocks", "nearest_name"]
 
-_RADIUS = 0.2  # of the agent's capsule, metres
 # heights in metres between which a door stops the agent
 _KNEE = 0.15
 _HEAD = 1.5
@@ -54,9 +54,9 @@ def door_leaf(item: SimObject) -> tuple[Array, Array] | None:
 
 def held_object_blocks(world: World, target: Array) -> bool:
     """Return whether the held object would be outside the outer walls with the agent there."""
-    if world.held is None:
+    if world.agent.held is None:
         return False
-    held = world.objects[world.held]
+    held = world.objects[world.agent.held]
     offset = target - world.agent.position
     low, high = held.bounds()
     inside_low, inside_high = world.scene_bounds()
@@ -78,4 +78,4 @@ def nearest_name(world: World, point: Array) -> str:
 
 
 def _touches(box: tuple[Array, Array], position: Array) -> bool:
-    return bool(level_gaps(position[[0, 2]], *box) < _RADIUS)
+    return bool(level_gaps(position[[0, 2]], *box) < AGENT_RADIUS)

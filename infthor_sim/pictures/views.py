@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from infthor_sim.geometry import Array
 from infthor_sim.pictures.cameras import ThirdPartyCamera, agent_camera, map_camera, pinhole_camera
 from infthor_sim.render.arm import ARM, arm_rows
+from infthor_sim.render.body import BODY, bodies_state, body_rows
 from infthor_sim.render.camera import PinholeCamera
 from infthor_sim.render.hand import HAND, held_rows
 from infthor_sim.render.picture import (
@@ -46,6 +47,9 @@ class Display:
 class Views:
     """Draws one world; keeps the agent's pictures until the world, the agent or the camera changes.
 
+    The agent is the world's active one. Several agents have views of their own, which are asked
+    only while their agent is active.
+
     Args:
         world: the world.
         display: size and quality of the pictures; may change at any time.
@@ -77,7 +81,8 @@ class Views:
         # Walking changes the agent without a new version of the world, so its pose is part of the
         # key.
         key = (self._world.version, tuple(agent.position), agent.yaw, agent.horizon, agent.standing,
-               display.width, display.height, self.settings.field_of_view)  # fmt: skip
+               display.width, display.height, self.settings.field_of_view,
+               bodies_state(self._world))  # fmt: skip
         if self._view is None or key != self._view_key:
             rows, _, _ = self.primitives()
             camera = agent_camera(agent, self.settings.field_of_view, display.width, display.height)
@@ -103,10 +108,9 @@ class Views:
             rows, names = self._list_held()
             if not len(rows):
                 return view
-            if self._world.held is not None:
-                rows = held_rows(
-                    rows, self._world.objects[self._world.held], view.camera, len(names) - 1
-                )
+            held = self._world.agent.held
+            if held is not None:
+                rows = held_rows(rows, self._world.objects[held], view.camera, len(names) - 1)
             self._frame = cast_picture(rows, names, view.camera, self._display.rasterizer, view)
             self._frame_arm_version = arm_version
         return self._frame
@@ -121,6 +125,9 @@ class Views:
     def third_party(self, camera: ThirdPartyCamera) -> Picture:
         """Return what a third-party camera sees."""
         held, names = self._list_held()
+        if BODY in names and self._world.agent.drawn:
+            own = body_rows(self._world.agent, self._world.active, names.index(BODY))
+            held = np.concatenate([held, own])
         pinhole = pinhole_camera(camera, self._display.width, self._display.height)
         rows = self.primitives()[0]
         # Unity's ceilings have no upper side, so that a camera above them sees into the rooms.

@@ -59,8 +59,8 @@ class AgentVision:
             item = self._world.objects.get(picture.names[index])
             if item is not None and self._world.reach(item) <= self.settings.visibility_distance:
                 visible.add(item.object_id)
-        if self._world.held is not None:
-            held = self._world.objects[self._world.held]
+        if self._world.agent.held is not None:
+            held = self._world.objects[self._world.agent.held]
             visible.add(held.object_id)
             visible.update(
                 o.object_id for o in self._world.descendants(held) if not self._world.is_hidden(o)

@@ -5,6 +5,7 @@ bytes of those fields are kept, and the few other fields are appended to the sam
 """
 
 import struct
+from collections.abc import Sequence
 from typing import Any
 
 import msgpack
@@ -14,6 +15,7 @@ from infthor_sim.geometry import Array
 from infthor_sim.metadata import Outcome, agent_metadata, object_metadata
 from infthor_sim.pictures.instances import class_color, instance_color
 from infthor_sim.render.arm import ARM
+from infthor_sim.render.body import BODY
 from infthor_sim.render.hand import HAND
 from infthor_sim.render.shell import SHELL_NAMES
 from infthor_sim.simulation import Simulation
@@ -50,23 +52,27 @@ class MetadataPacker:
         # can get its address and be taken for it.
         self._world: World | None = None
 
-    def message(self, sim: Simulation, outcome: Outcome, sequence: int, with_colors: bool) -> bytes:
-        """Return the METADATA body of one reply."""
-        agent = agent_metadata(sim, outcome)
-        parts = [_map_head(4), msgpack.packb("agents"), _array_head(1), _map_head(len(agent) + 2)]
-        parts += [_entries(agent), msgpack.packb("objects"), *self._objects(sim)]
-        parts += [msgpack.packb("colors"), self._color_list(sim) if with_colors else b"\xc0"]
+    def message(
+        self, sim: Simulation, outcomes: Sequence[Outcome], sequence: int, with_colors: bool
+    ) -> bytes:
+        """Return the METADATA body of one reply, with the outcome of each agent's last action."""
+        parts = [_map_head(4), msgpack.packb("agents"), _array_head(len(outcomes))]
+        for number in sim.each_agent():
+            agent = agent_metadata(sim, outcomes[number])
+            parts += [_map_head(len(agent) + 2), _entries(agent)]
+            parts += [msgpack.packb("objects"), *self._objects(sim)]
+            parts += [msgpack.packb("colors"), self._color_list(sim) if with_colors else b"\xc0"]
         top = {
             "sequenceId": sequence,
-            "activeAgentId": 0,
+            "activeAgentId": sim.world.active,
             "thirdPartyCameras": agent["thirdPartyCameras"],
         }
         parts.append(_entries(top))
         return b"".join(parts)
 
-    def patch(self, outcome: Outcome) -> bytes:
+    def patch(self, outcome: Outcome, agent_id: int) -> bytes:
         """Return the METADATA_PATCH body of one reply, for an action that changed nothing."""
-        packed: bytes = msgpack.packb({**outcome.fields(), "agentId": 0})
+        packed: bytes = msgpack.packb({**outcome.fields(), "agentId": agent_id})
         return packed
 
     def _objects(self, sim: Simulation) -> list[bytes]:
@@ -95,7 +101,9 @@ class MetadataPacker:
 
     def _color_list(self, sim: Simulation) -> bytes:
         ids = tuple(sim.world.objects)
-        agent = (HAND,) if sim.world.arm is None else (ARM,)
+        agent: tuple[str, ...] = (HAND,) if sim.world.arm is None else (ARM,)
+        if len(sim.world.agents) > 1:
+            agent = (*agent, BODY)
         if self._colors is None or self._colors[0] != (*ids, *agent):
             types = sorted(
                 {o.object_type for o in sim.world.objects.values()} | {*SHELL_NAMES, *agent}

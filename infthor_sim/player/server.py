@@ -21,6 +21,7 @@ __all__ = ["SimulatorServer"]
 
 Frames = Iterator[tuple[FieldType, bytes | memoryview]]
 _AGENT = (FieldType.RGB, FieldType.DEPTH, FieldType.NORMALS, FieldType.IDS, FieldType.CLASSES)
+_STARTS = ("Reset", "Initialize")
 _THIRD = (
     FieldType.THIRD_PARTY_RGB,
     FieldType.THIRD_PARTY_DEPTH,
@@ -36,12 +37,14 @@ class SimulatorServer:
     def __init__(self, sim: Simulation) -> None:
         self._sim = sim
         self._packer = MetadataPacker()
+        # of each agent's last action, by its id: a reply tells them all
+        self._outcomes: dict[int, Outcome] = {}
 
     def serve(self, pipes: FifoPipes) -> None:
         """Send the first state, then one reply to each action."""
         # The client waits for a state before it sends its first action, as Unity sends one when it
         # has started.
-        pipes.send(self._reply(Outcome("Initialize"), 0, {}))
+        pipes.send(self._reply(0, {}))
         while (message := pipes.receive()) is not None:
             pipes.send(self.answer(message))
 
@@ -52,11 +55,24 @@ class SimulatorServer:
         """
         sequence = int(message.get("sequenceId", 0))
         outcome, query = self.run(message)
+        if message.get("action") in _STARTS:
+            self._outcomes.clear()
+        sim = self._sim
+        # The agent may be gone with the scene that it was in.
+        sim.world.active = self._agent_of(message) or 0
+        self._outcomes[sim.world.active] = outcome
         # Unity's fast emit: after a query the client keeps its last frame and gets only what the
         # action returned.
-        if query and self._sim.settings.fast_emit:
-            return iter([(FieldType.METADATA_PATCH, self._packer.patch(outcome))])
-        return self._reply(outcome, sequence, message)
+        if query and sim.settings.fast_emit:
+            patch = self._packer.patch(outcome, sim.world.active)
+            return iter([(FieldType.METADATA_PATCH, patch)])
+        return self._reply(sequence, message)
+
+    def _agent_of(self, message: Mapping[str, Any]) -> int | None:
+        """Return the id of the agent that a message is for; None if the scene has no such agent."""
+        number = message.get("agentId") or 0
+        known = type(number) is int and 0 <= number < len(self._sim.world.agents)
+        return number if known else None
 
     def run(self, message: Mapping[str, Any]) -> tuple[Outcome, bool]:
         """Run one action; return its outcome, and whether it succeeded as a query."""
@@ -67,6 +83,14 @@ class SimulatorServer:
                     "renderFlowImage is not offered by the embedded simulator",
                     ErrorCode.INVALID_ARGUMENT,
                 )
+            agent_id = self._agent_of(message)
+            if agent_id is None:
+                raise ActionError(
+                    f"there is no agent with agentId {message['agentId']}; the scene has "
+                    f"{len(self._sim.world.agents)} (agentCount of Initialize)",
+                    ErrorCode.INVALID_ARGUMENT,
+                )
+            self._sim.world.active = agent_id
             action, arguments = bind(message, self._sim.settings.agent_mode)
             value = action.run(self._sim, **arguments)
             if not action.query:
@@ -77,8 +101,12 @@ class SimulatorServer:
             self._sim.time += PHYSICS_STEP
             return Outcome(name, error.message, str(error.code)), False
 
-    def _reply(self, outcome: Outcome, sequence: int, message: Mapping[str, Any]) -> Frames:
+    def _reply(self, sequence: int, message: Mapping[str, Any]) -> Frames:
         sim = self._sim
+        outcomes = [
+            self._outcomes.get(number, Outcome("Initialize"))
+            for number in range(len(sim.world.agents))
+        ]
         # An argument of the action decides about its own reply, else what Initialize set.
         requested = {
             "rgb": message.get("renderImage", True),
@@ -88,8 +116,9 @@ class SimulatorServer:
             "classes": message.get("renderSemanticSegmentation", sim.settings.classes),
         }
         segmented = bool(requested["ids"] or requested["classes"])
-        yield FieldType.METADATA, self._packer.message(sim, outcome, sequence, segmented)
-        yield from self._pictures(sim.views.agent_frame(), requested, _AGENT)
+        yield FieldType.METADATA, self._packer.message(sim, outcomes, sequence, segmented)
+        for _ in sim.each_agent():
+            yield from self._pictures(sim.views.agent_frame(), requested, _AGENT)
         for camera in sim.cameras:
             yield from self._pictures(sim.views.third_party(camera), requested, _THIRD)
 

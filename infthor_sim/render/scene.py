@@ -5,6 +5,7 @@ import numpy as np
 from infthor_sim.geometry import Array
 from infthor_sim.objects import SimObject
 from infthor_sim.pictures.appearance import apply_finishes
+from infthor_sim.render.body import BODY, bodies_state, body_rows
 from infthor_sim.render.lighting import Lights
 from infthor_sim.render.primitives import COLUMNS, rows
 from infthor_sim.render.shapes import shape
@@ -23,15 +24,20 @@ class SceneModel:
         self._world = world
         self._rows: dict[str, tuple[int, int, Array]] = {}
         self._shell = shell_rows(world)
-        self._version = -1
+        self._state: tuple[object, ...] = ()
         self._all: Array = np.zeros((0, COLUMNS))
         self._names: tuple[str, ...] = ()
         self._held: Array = np.zeros((0, COLUMNS))
 
     def primitives(self) -> tuple[Array, Array, tuple[str, ...]]:
-        """Return all primitives but the held object's (n, COLUMNS), its own, instances' names."""
-        if self._version != self._world.version:
+        """Return all primitives but the held object's (n, COLUMNS), its own, instances' names.
+
+        The held object is the active agent's.
+        """
+        state = (self._world.version, bodies_state(self._world))
+        if self._state != state:
             self._rebuild()
+            self._state = state
         return self._all, self._held, self._names
 
     def lights(self) -> Lights:
@@ -62,20 +68,23 @@ class SceneModel:
         held = [np.zeros((0, COLUMNS))]
         # What the hand holds is drawn apart: it hides nothing from the agent's sight, and the frame
         # shows it smaller.
-        in_hand = set() if world.held is None else {world.held}
-        if world.held is not None:
-            in_hand |= {o.object_id for o in world.descendants(world.objects[world.held])}
+        in_hand = set()
+        if world.agent.held is not None:
+            item = world.objects[world.agent.held]
+            in_hand = {o.object_id for o in (item, *world.descendants(item))}
         for index, item in enumerate(world.objects.values(), start=len(SHELL_NAMES)):
             # nobody sees into a closed fridge, so its contents need not be drawn
             if world.is_hidden(item):
                 continue
             (held if item.object_id in in_hand else parts).append(self._object_rows(item, index))
+        if len(world.agents) > 1:
+            names.append(BODY)
+            parts += [body_rows(a, i, len(names) - 1) for i, a in world.others() if a.drawn]
         self._rows = {key: value for key, value in self._rows.items() if key in world.objects}
         look = world.appearance
         self._all = apply_finishes(np.concatenate(parts), names, look)
         self._held = apply_finishes(np.concatenate(held), names, look)
         self._names = tuple(names)
-        self._version = world.version
 
     def _object_rows(self, item: SimObject, index: int) -> Array:
         entry = self._rows.get(item.object_id)

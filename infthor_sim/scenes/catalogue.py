@@ -76,7 +76,7 @@ class Catalogue:
         room = RoomShell(-1.5, 1.5, -1.5, 1.5)
         cells = [(x * 0.25, z * 0.25) for x in range(-4, 5) for z in range(-4, 5)]
         return World(
-            "Procedural", {}, (room,), NavGrid(cells), Agent(np.array([0.0, AGENT_HEIGHT, 0.0]))
+            "Procedural", {}, (room,), NavGrid(cells), [Agent(np.array([0.0, AGENT_HEIGHT, 0.0]))]
         )
 
     def house(self, house: Mapping[str, Any]) -> World:

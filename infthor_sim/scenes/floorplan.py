@@ -58,7 +58,7 @@ def build_floor_plan(
     room = _room(name, list(objects.values()), cells, floor)
     height = floor + AGENT_HEIGHT if extra.floor_y is None else extra.floor_y
     agent = _agent_at_start(name, nav, room, height)
-    world = World(name, objects, (room,), nav, agent, seed=_number(name), coarse=True)
+    world = World(name, objects, (room,), nav, [agent], seed=_number(name), coarse=True)
     world.open_at_start = frozenset(o.object_id for o in objects.values() if o.state.openness > 0)
     infer_layout(world)
     for item in objects.values():

@@ -224,7 +224,7 @@ def build_world(
     start = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
     yaw = nav.freest_yaw(*start, reach=3.0)
     agent = Agent(np.array([start[0], AGENT_HEIGHT, start[1]]), yaw)
-    world = World(name, objects, tuple(p.room for p in plans), nav, agent, seed=seed)
+    world = World(name, objects, tuple(p.room for p in plans), nav, [agent], seed=seed)
     for plan in plans:
         _scatter(world, plan)
     world.keep_templates()

@@ -130,3 +130,20 @@ def test_an_empty_hand(bench, action):
     bench.ok("DropHandObject")
     bench.refused(action)
     assert bench.metadata["errorCode"] == "ObjectNotInInventory"
+
+
+def test_a_held_object_stands_upright_with_its_origin_at_the_hand(bench):
+    # as AI2-THOR 5.0.0 reported it of 30 objects, however they had lain (horizon 0)
+    bench.ok("DropHandObject")
+    knife = bench.first("Knife")
+    bench.ok("Teleport", horizon=0, rotation={"y": 90})
+    item = bench.sim.world.objects[knife]
+    item.rotation = np.array([10.0, 33.0, 90.0])
+    bench.ok("PickupObject", objectId=knife, forceAction=True)
+    metadata = bench.ok("Teleport", horizon=0, rotation={"y": 90})
+    pose = metadata["heldObjectPose"]
+    assert pose["localPosition"] == pytest.approx({"x": 0.0, "y": -0.16, "z": 0.38})
+    assert pose["localRotation"] == pytest.approx({"x": 0.0, "y": 0.0, "z": 0.0})
+    held = bench.object(knife)
+    assert held["position"] == pytest.approx(pose["position"], abs=1e-5)
+    assert held["rotation"] == pytest.approx({"x": 0.0, "y": 90.0, "z": 0.0})

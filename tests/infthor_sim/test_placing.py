@@ -320,3 +320,23 @@ def test_a_push_takes_what_is_in_its_way_along_and_nothing_through_it(scene):
     assert gap > 0.02
     assert second.position[2] > low[2] + 0.41, "it was pushed along"
     assert second.bounds()[0][2] > first.bounds()[1][2] - 0.006, "and not gone through"
+
+
+@pytest.mark.parametrize("kind", ["Cabinet", "Drawer", "Fridge", "Microwave"])
+def test_nothing_is_put_into_closed_furniture_unless_forced(bench, kind):
+    furniture, apple = bench.first(kind, isOpen=False), bench.first("Apple")
+    inside = bench.object(furniture)["axisAlignedBoundingBox"]["center"]
+    pose = {"objectId": apple, "position": inside}
+    name = bench.object(furniture)["name"]
+    assert bench.refused("TeleportObject", **pose, rotation={}).startswith(name)
+    assert f"({name} is in the way)" in bench.refused("PlaceObjectAtPoint", **pose)
+    bench.ok("TeleportObject", **pose, rotation={}, forceAction=True)
+
+
+def test_what_is_dropped_ahead_lands_in_front_of_the_agent(bench):
+    potato = bench.first("Potato")
+    assert "Nothing in agent's hand" in bench.refused("DropHeldObjectAhead")
+    bench.ok("PickupObject", objectId=potato, forceAction=True)
+    bench.ok("DropHeldObjectAhead", forceAction=True, autoSimulation=False, randomMagnitude=0.0)
+    away = np.array(list(bench.object(potato)["position"].values())) - bench.sim.world.agent.position
+    assert float(np.hypot(away[0], away[2])) > 1.0

@@ -89,7 +89,7 @@ def test_interactable_poses_are_those_whose_inner_picture_shows_the_object(
             places, (-30.0, 0.0, 30.0, 60.0), (0.0, 90.0, 180.0, 270.0), (True, False)
         ):
             place, tilt, turn, standing = pose
-            inner.sim.world.agent = Agent(to_array(place), turn, tilt, standing)
+            inner.sim.world.agents[0] = Agent(to_array(place), turn, tilt, standing)
             if target in inner.sim.vision.visible_ids():
                 slow.append({**place, "rotation": turn, "standing": standing, "horizon": tilt})
         assert poses == slow

@@ -32,7 +32,7 @@ def state(bench: Bench) -> tuple[str, bytes, bytes]:
     }
     agent = bench.sim.world.agent
     text = json.dumps(
-        [objects, agent.position.tolist(), agent.yaw, agent.horizon, bench.sim.world.held],
+        [objects, agent.position.tolist(), agent.yaw, agent.horizon, agent.held],
         sort_keys=True,
     )
     return text, bench.sim.views.colours(picture).tobytes(), picture.instances.tobytes()

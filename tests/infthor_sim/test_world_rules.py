@@ -299,7 +299,7 @@ def test_random_placement_gives_ids_by_the_new_positions(bench):
             assert item["objectId"] == old[item["name"]]
         assert looks.finishes[item["objectId"]] is finishes[item["name"]]
     assert sum(o["objectId"] != old[o["name"]] for o in metadata["objects"]) > 10
-    assert metadata["inventoryObjects"][0]["objectId"] == bench.sim.world.held
+    assert metadata["inventoryObjects"][0]["objectId"] == bench.sim.world.agent.held
     bench.ok("DropHeldObject")
 
 
