@@ -1,10 +1,9 @@
 """Facts of frames, for the independent check of questions, and how to read them.
 
 They share no code with the rules, so they do not share their errors; they share the table of sizes.
-Facts of the whole log have
-the logged actions. Facts of clue frames have only what pictures show: an object in the hand was
-picked up, slices were cut, a light is on; only two successive frames show that something was put
-(in the hand in the first, elsewhere in the second) or opened.
+Facts of the whole log have the logged actions. Facts of clue frames have only what pictures show:
+an object in the hand was picked up, slices were cut, a light is on; only two successive frames show
+that something was put (in the hand in the first, elsewhere in the second) or opened.
 """
 
 import re
