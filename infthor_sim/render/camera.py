@@ -7,6 +7,7 @@ bottom, as in the protocol.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,11 +45,20 @@ class PinholeCamera:
     far: float = FAR
 
     def rays(self) -> tuple[Array, Array]:
-        """Return horizontal (width,) and vertical (height,) components of rays, bottom first."""
-        focal = self.height / 2 / math.tan(math.radians(self.field_of_view) / 2)
-        us: Array = (np.arange(self.width, dtype=np.float64) + 0.5 - self.width / 2) / focal
-        vs: Array = (np.arange(self.height, dtype=np.float64) + 0.5 - self.height / 2) / focal
-        return us, vs
+        """Return horizontal (width,) and vertical (height,) components of rays, bottom first.
+
+        They are read-only, as all cameras of one lens share them.
+        """
+        return _rays(self.field_of_view, self.width, self.height)
+
+
+@lru_cache(maxsize=8)
+def _rays(field_of_view: float, width: int, height: int) -> tuple[Array, Array]:
+    focal = height / 2 / math.tan(math.radians(field_of_view) / 2)
+    us: Array = (np.arange(width, dtype=np.float64) + 0.5 - width / 2) / focal
+    vs: Array = (np.arange(height, dtype=np.float64) + 0.5 - height / 2) / focal
+    us.flags.writeable = vs.flags.writeable = False
+    return us, vs
 
 
 @dataclass(frozen=True)

@@ -74,8 +74,11 @@ def test_both_renderers_draw_the_same_picture():
     for rasterizer in (COMPILED, NUMPY):
         picture = cast_picture(prims, names, camera(120), rasterizer)
         pictures.append(
-            (picture.depth, picture.instances, colour_picture(picture, lights, rasterizer))
-        )
+            (
+                picture.depth, picture.instances, colour_picture(picture, lights, rasterizer),
+                rasterizer.count(picture.nearest, len(picture.projection.index)),
+            )
+        )  # fmt: skip
     for first, second in zip(*pictures, strict=True):
         assert np.array_equal(first, second)
 
