@@ -55,14 +55,19 @@ class Views:
 
     def __init__(self, world: World, display: Display, settings: SimulatorSettings) -> None:
         self.settings = settings
-        self._world = world
         self._display = display
         self._model = SceneModel(world)
+        self._coloured: _Coloured | None = None
+        self.show(world)
+
+    def show(self, world: World) -> None:
+        """Draw another state of the same scene from now on."""
+        self._world = world
+        self._model.show(world)
         self._view: Picture | None = None
         self._view_key: tuple[object, ...] | None = None
         self._frame: Picture | None = None
         self._frame_arm_version = -1
-        self._coloured: _Coloured | None = None
 
     def primitives(self) -> tuple[Array, Array, tuple[str, ...]]:
         """Return the scene's primitives, those of what the hand holds, and the instances' names."""
