@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infthor_sim.geometry import Array
-from infthor_sim.render.camera import PinholeCamera, Projection, project
+from infthor_sim.render.camera import PinholeCamera, Projection
 from infthor_sim.render.kernel_cache import drop_stale_kernels
 from infthor_sim.render.lighting import Lights
 from infthor_sim.render.primitives import INSTANCE
 
 __all__ = ["Picture", "Rasterizer", "cast_picture", "colour_picture", "compiled_rasterizer"]
 
+Project = Callable[[Array, PinholeCamera], Projection]
 Cast = Callable[[Array, Projection, PinholeCamera], tuple[Array, NDArray[np.int32]]]
 Count = Callable[[NDArray[np.int32], int], NDArray[np.int64]]
 Pixels = NDArray[np.uint8]
@@ -33,6 +34,7 @@ class Rasterizer:
     """The renderer's functions: compiled ones, or those in numpy that tests hold them to.
 
     Attributes:
+        project: function that culls, sorts and transforms primitives for a camera.
         cast: function that returns depth and nearest primitive of each pixel.
         count: function that returns how many pixels show each of so many primitives.
         creases: function that returns factors of brightness from the depth.
@@ -42,6 +44,7 @@ class Rasterizer:
             primitives.
     """
 
+    project: Project
     cast: Cast
     count: Count
     creases: Creases
@@ -83,11 +86,12 @@ def compiled_rasterizer() -> Rasterizer:
     drop_stale_kernels()  # before the imports, which load cached kernels
     from infthor_sim.render.creases_numba import crease_factors
     from infthor_sim.render.probe_numba import sees
+    from infthor_sim.render.projection_numba import project
     from infthor_sim.render.raster_numba import cast, count_pixels
     from infthor_sim.render.shading_numba import shade
     from infthor_sim.render.smoothing_numba import smooth
 
-    return Rasterizer(cast, count_pixels, crease_factors, shade, smooth, sees)
+    return Rasterizer(project, cast, count_pixels, crease_factors, shade, smooth, sees)
 
 
 def cast_picture(
@@ -105,7 +109,7 @@ def cast_picture(
         base: picture of the same camera to draw over; its pixels that are nearer stay. None for an
             empty one.
     """
-    projection = project(prims, camera)
+    projection = rasterizer.project(prims, camera)
     depth, nearest = rasterizer.cast(prims, projection, camera)
     if base is None:
         return Picture(camera, prims, projection, nearest, depth, names)
