@@ -27,7 +27,7 @@ class SavedState:
 
     def copy(self) -> tuple[World, np.random.Generator]:
         """Return the state anew; it shares nothing with earlier copies."""
-        world, random = pickle.loads(self._content)  # noqa: S301 - bytes of this process
+        world, random = pickle.loads(self._content)
         return world, random
 
 

@@ -15,7 +15,7 @@ from infthor_sim.geometry import Array
 from infthor_sim.render.camera import PinholeCamera, Projection
 from infthor_sim.render.primitives import BOTTOM, FORM, TOP, Form
 
-__all__ = ["cast", "count_pixels", "hit"]
+__all__ = ["cast", "count_pixels", "hit", "hits"]
 
 _TINY = 1e-12  # takes the place of smaller components of directions, which are divided by
 _BOX = int(Form.BOX)
@@ -180,6 +180,37 @@ def hit(
     if form == _BOWL:
         return _hit_bowl(ox, oy, oz, dx, dy, dz, clip)
     return _hit_cylinder(ox, oy, oz, dx, dy, dz, bottom, top, form == _CUP, clip)
+
+
+@njit(cache=True, error_model="numpy")
+def hits(
+    form: float,
+    bottom: float,
+    top: float,
+    origin: Array,
+    steps: Array,
+    us: Array,
+    vs: Array,
+    clip: float,
+    ts: Array,
+) -> None:
+    """Write the depths at which rays (us, vs) meet one primitive to `ts`, see `hit`."""
+    ox, oy, oz = origin[0], origin[1], origin[2]
+    ahead_x, ahead_y, ahead_z = steps[0], steps[1], steps[2]
+    right_x, right_y, right_z = steps[3], steps[4], steps[5]
+    up_x, up_y, up_z = steps[6], steps[7], steps[8]
+    if form == _BOX:  # a loop of its own, which the compiler turns into one over several rays
+        for i in range(len(us)):
+            dx = (ahead_x + us[i] * right_x) + vs[i] * up_x
+            dy = (ahead_y + us[i] * right_y) + vs[i] * up_y
+            dz = (ahead_z + us[i] * right_z) + vs[i] * up_z
+            ts[i] = _hit_box(ox, oy, oz, dx, dy, dz)
+        return
+    for i in range(len(us)):
+        dx = (ahead_x + us[i] * right_x) + vs[i] * up_x
+        dy = (ahead_y + us[i] * right_y) + vs[i] * up_y
+        dz = (ahead_z + us[i] * right_z) + vs[i] * up_z
+        ts[i] = hit(form, bottom, top, ox, oy, oz, dx, dy, dz, clip)
 
 
 @njit(cache=True, error_model="numpy")

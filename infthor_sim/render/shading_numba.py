@@ -250,7 +250,7 @@ def _light_round(
     ny: Array,
     nz: Array,
 ) -> None:
-    """Write daylight, surface coordinates (a, b) and normals where rays hit the round primitive `k`."""
+    """Write daylight, surface coordinates (a, b) and normals where rays hit round `k`."""
     form, bottom, top = table[k, FORM], table[k, BOTTOM], table[k, TOP]
     hx, hy, hz = table[k, HALF], table[k, HALF + 1], table[k, HALF + 2]
     for i in range(len(us)):
@@ -280,7 +280,9 @@ def _light_round(
 
 
 @njit(cache=True, error_model="numpy")
-def _apply_pattern(material: float, a: Array, b: Array, light: Array) -> None:
+def _apply_pattern(  # noqa: PLR0912 - one branch per material
+    material: float, a: Array, b: Array, light: Array
+) -> None:
     """Multiply the light on points of one material by its pattern."""
     if material == _WOOD:
         for i in range(len(light)):
