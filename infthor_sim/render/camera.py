@@ -51,6 +51,13 @@ class PinholeCamera:
         """
         return _rays(self.field_of_view, self.width, self.height)
 
+    def ray_grid(self) -> tuple[Array, Array]:
+        """Return both components of each pixel's ray (height * width,), row by row.
+
+        All cameras of one lens share the arrays: they must stay as they are.
+        """
+        return _ray_grid(self.field_of_view, self.width, self.height)
+
 
 @lru_cache(maxsize=8)
 def _rays(field_of_view: float, width: int, height: int) -> tuple[Array, Array]:
@@ -59,6 +66,13 @@ def _rays(field_of_view: float, width: int, height: int) -> tuple[Array, Array]:
     vs: Array = (np.arange(height, dtype=np.float64) + 0.5 - height / 2) / focal
     us.flags.writeable = vs.flags.writeable = False
     return us, vs
+
+
+@lru_cache(maxsize=2)
+def _ray_grid(field_of_view: float, width: int, height: int) -> tuple[Array, Array]:
+    us, vs = _rays(field_of_view, width, height)
+    # Not marked read-only, as kernels would be compiled anew for such arrays.
+    return np.tile(us, height), np.repeat(vs, width)
 
 
 @dataclass(frozen=True)

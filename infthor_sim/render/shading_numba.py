@@ -29,8 +29,6 @@ from infthor_sim.render.table import INVERSE, ORIGIN, STEPS, SUNWARD, shading_ta
 __all__ = ["brightness", "eye_of", "shade"]
 
 _RIM = 1.0 - 1e-6  # |y| of hits that count as on a cylinder's flat end, with a margin for rounding
-# rows shaded together: enough pixels of each primitive, and few enough for the processor's cache
-_BAND = 16
 _BOX, _ELLIPSOID, _CUP, _BOWL = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP), int(Form.BOWL)
 _WOOD, _PLANKS, _TILES = int(Material.WOOD), int(Material.PLANKS), int(Material.TILES)
 _FABRIC, _STONE, _METAL = int(Material.FABRIC), int(Material.STONE), int(Material.METAL)
@@ -58,21 +56,15 @@ def shade(
     lights: Lights,
 ) -> NDArray[np.uint8]:
     """Return RGB (h, w, 3), bottom row first, of cast pixels, each brightness times its factor."""
-    us, vs = camera.rays()
+    us, vs = camera.ray_grid()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
     table = shading_table(prims, projection, lights)
-    _shade(
-        table,
-        len(projection.index),
-        eye_of(camera),
-        us,
-        vs,
-        depth,
-        nearest,
-        factors,
-        lights.daylight,
-        rgb,
-    )
+    levels = np.empty(nearest.size)
+    brightness(
+        table, len(projection.index), eye_of(camera), lights.daylight, nearest.ravel(), us, vs,
+        depth.ravel(), levels,
+    )  # fmt: skip
+    _colour(table, nearest, levels.reshape(nearest.shape), factors, rgb)
     return rgb
 
 
@@ -314,34 +306,17 @@ def _apply_pattern(  # noqa: PLR0912 - one branch per material
 
 
 @njit(cache=True, error_model="numpy")
-def _shade(
+def _colour(
     table: Array,
-    first: int,
-    eye: Any,
-    us: Array,
-    vs: Array,
-    depth: Array,
     nearest: NDArray[np.int32],
+    levels: Array,
     factors: Array,
-    daylight: float,
     rgb: NDArray[np.uint8],
 ) -> None:
-    width = len(us)
-    column, row, levels = np.empty(_BAND * width), np.empty(_BAND * width), np.empty(_BAND * width)
-    for y in range(_BAND):
-        column[y * width : (y + 1) * width] = us
-    for top in range(0, len(vs), _BAND):
-        end = min(top + _BAND, len(vs))
-        n = (end - top) * width
-        for y in range(top, end):
-            row[(y - top) * width : (y - top + 1) * width] = vs[y]
-        orders = nearest[top:end].reshape(n)
-        depths = depth[top:end].reshape(n)
-        brightness(table, first, eye, daylight, orders, column[:n], row[:n], depths, levels)
-        for y in range(top, end):
-            for x in range(width):
-                order = nearest[y, x]
-                if order >= 0:
-                    level = levels[(y - top) * width + x] * factors[y, x]
-                    for i in range(3):
-                        rgb[y, x, i] = np.uint8(min(table[order, COLOR + i] * level * 255.0, 255.0))
+    for y in range(nearest.shape[0]):
+        for x in range(nearest.shape[1]):
+            order = nearest[y, x]
+            if order >= 0:
+                level = levels[y, x] * factors[y, x]
+                for i in range(3):
+                    rgb[y, x, i] = np.uint8(min(table[order, COLOR + i] * level * 255.0, 255.0))

@@ -44,13 +44,22 @@ def smooth(
     rgb: NDArray[np.uint8],
 ) -> None:
     """Give the jagged pixels of `rgb` the mean colour of their rays, in place."""
+    jagged = _find_jagged(rgb)
     us, vs = camera.rays()
+    # All rays of a pixel follow each other.
+    shift = SUBPIXELS * (vs[1] - vs[0] if len(vs) > 1 else 0.0)
+    ray_u = (us[jagged[:, 1], None] + shift[:, 0]).ravel()
+    ray_v = (vs[jagged[:, 0], None] + shift[:, 1]).ravel()
     table = shading_table(prims, projection, lights)
-    _smooth(
-        table, len(projection.index), eye_of(camera), us, vs, camera.near, camera.far, nearest,
-        factors,
-        lights.daylight, _find_jagged(rgb), rgb,
-    )  # fmt: skip
+    first = len(projection.index)
+    lists, orders, crease = _list_candidates(nearest, factors, jagged)
+    found = _candidate_depths(table, first, camera.near, ray_u, ray_v, lists, orders)
+    hit_orders, depths, shadow = _nearest_hits(lists, orders, crease, found, camera.near, camera.far)
+    levels = np.empty(len(depths))
+    brightness(
+        table, first, eye_of(camera), lights.daylight, hit_orders, ray_u, ray_v, depths, levels
+    )
+    _blend(table, jagged, hit_orders, levels, shadow, rgb)
 
 
 @njit(cache=True, error_model="numpy")
@@ -81,70 +90,6 @@ def _find_jagged(rgb: NDArray[np.uint8]) -> NDArray[np.int64]:
                 positions[count, 1] = x
                 count += 1
     return positions[:count]
-
-
-@njit(cache=True, error_model="numpy")
-def _smooth(
-    table: Array,
-    first: int,
-    eye: Any,
-    us: Array,
-    vs: Array,
-    clip: float,
-    far: float,
-    nearest: NDArray[np.int32],
-    factors: Array,
-    daylight: float,
-    jagged: NDArray[np.int64],
-    rgb: NDArray[np.uint8],
-) -> None:
-    parts = len(SUBPIXELS)
-    pixel = vs[1] - vs[0] if len(vs) > 1 else 0.0
-    ray_u, ray_v = np.empty(len(jagged) * parts), np.empty(len(jagged) * parts)
-    for index in range(len(jagged)):
-        y, x = jagged[index, 0], jagged[index, 1]
-        for part in range(parts):
-            ray_u[index * parts + part] = us[x] + SUBPIXELS[part, 0] * pixel
-            ray_v[index * parts + part] = vs[y] + SUBPIXELS[part, 1] * pixel
-    lists, orders, crease = _list_candidates(nearest, factors, jagged)
-    found = _candidate_depths(table, first, clip, ray_u, ray_v, lists, orders)
-    # the primitive that each ray hits, -1 for none; where; and the crease factor of the pixel that
-    # showed it, as there is no depth around the ray
-    hit = np.full(len(ray_u), -1, dtype=np.int32)
-    depths, shadow, levels = np.empty(len(hit)), np.empty(len(hit)), np.empty(len(hit))
-    for index in range(len(jagged)):
-        for part in range(parts):
-            i = index * parts + part
-            depths[i] = far
-            for candidate in range(lists[index], lists[index + 1]):
-                t = found[candidate, part]
-                if clip < t < depths[i]:
-                    depths[i] = t
-                    hit[i] = orders[candidate]
-                    shadow[i] = crease[candidate]
-    brightness(table, first, eye, daylight, hit, ray_u, ray_v, depths, levels)
-    # Each pixel reads and writes only its own colour: smoothing in place needs no copy.
-    for index in range(len(jagged)):
-        y, x = jagged[index, 0], jagged[index, 1]
-        red = 0.0
-        green = 0.0
-        blue = 0.0
-        for i in range(index * parts, (index + 1) * parts):
-            order = hit[i]
-            if order < 0:  # the ray misses all candidates: the pixel's own colour is taken
-                red = red + rgb[y, x, 0]
-                green = green + rgb[y, x, 1]
-                blue = blue + rgb[y, x, 2]
-                continue
-            level = levels[i] * shadow[i]
-            red += min(table[order, COLOR] * level * 255.0, 255.0)
-            green += min(table[order, COLOR + 1] * level * 255.0, 255.0)
-            blue += min(table[order, COLOR + 2] * level * 255.0, 255.0)
-        rgb[y, x, 0], rgb[y, x, 1], rgb[y, x, 2] = (
-            np.uint8(red / parts),
-            np.uint8(green / parts),
-            np.uint8(blue / parts),
-        )
 
 
 @njit(cache=True, error_model="numpy")
@@ -212,3 +157,66 @@ def _candidate_depths(
         for j in range(len(members)):
             found[members[j], part] = t[j]
     return found
+
+
+@njit(cache=True, error_model="numpy")
+def _nearest_hits(
+    lists: NDArray[np.int64],
+    orders: NDArray[np.int32],
+    crease: Array,
+    found: Array,
+    clip: float,
+    far: float,
+) -> tuple[NDArray[np.int32], Array, Array]:
+    """Return the primitive that each ray hits, -1 for none; at which depth; its crease factor.
+
+    That is the factor of the pixel that showed the primitive, as there is no depth around the ray.
+    """
+    parts = found.shape[1]
+    n = (len(lists) - 1) * parts
+    hit_orders = np.full(n, -1, dtype=np.int32)
+    depths, shadow = np.full(n, far), np.empty(n)
+    for index in range(len(lists) - 1):
+        for candidate in range(lists[index], lists[index + 1]):
+            for part in range(parts):
+                i = index * parts + part
+                if clip < found[candidate, part] < depths[i]:
+                    depths[i] = found[candidate, part]
+                    hit_orders[i] = orders[candidate]
+                    shadow[i] = crease[candidate]
+    return hit_orders, depths, shadow
+
+
+@njit(cache=True, error_model="numpy")
+def _blend(
+    table: Array,
+    jagged: NDArray[np.int64],
+    hit_orders: NDArray[np.int32],
+    levels: Array,
+    shadow: Array,
+    rgb: NDArray[np.uint8],
+) -> None:
+    """Give each jagged pixel the mean colour of its rays."""
+    # Each pixel reads and writes only its own colour: smoothing in place needs no copy.
+    parts = len(SUBPIXELS)
+    for index in range(len(jagged)):
+        y, x = jagged[index, 0], jagged[index, 1]
+        red = 0.0
+        green = 0.0
+        blue = 0.0
+        for i in range(index * parts, (index + 1) * parts):
+            order = hit_orders[i]
+            if order < 0:  # the ray misses all candidates: the pixel's own colour is taken
+                red = red + rgb[y, x, 0]
+                green = green + rgb[y, x, 1]
+                blue = blue + rgb[y, x, 2]
+                continue
+            level = levels[i] * shadow[i]
+            red += min(table[order, COLOR] * level * 255.0, 255.0)
+            green += min(table[order, COLOR + 1] * level * 255.0, 255.0)
+            blue += min(table[order, COLOR + 2] * level * 255.0, 255.0)
+        rgb[y, x, 0], rgb[y, x, 1], rgb[y, x, 2] = (
+            np.uint8(red / parts),
+            np.uint8(green / parts),
+            np.uint8(blue / parts),
+        )
