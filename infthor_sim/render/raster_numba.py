@@ -245,7 +245,7 @@ def _cast(
             nearest_there = nearest[y, first : last + 1]
             if profiles[order, 0] == _BOX:
                 _cast_box_row(
-                    origin[order], steps[order], us_there, vs[y], clip, order, depth_there,
+                    origin[order], steps[order], near[order], us_there, vs[y], clip, order, depth_there,
                     nearest_there,
                 )  # fmt: skip
             else:
@@ -259,6 +259,7 @@ def _cast(
 def _cast_box_row(
     origin: Array,
     step: Array,
+    closest: float,
     us: Array,
     v: float,
     clip: float,
@@ -267,7 +268,8 @@ def _cast_box_row(
     nearest: NDArray[np.int32],
 ) -> None:
     # No branch depends on a pixel, so that the compiler computes several pixels at once. The
-    # numbers of the primitive are taken out of their arrays first, for the same reason.
+    # numbers of the primitive are taken out of their arrays first, for the same reason. What is
+    # hidden for sure stays hidden, though rounding may bring a coinciding surface nearer.
     ox, oy, oz = origin[0], origin[1], origin[2]
     forward_x, forward_y, forward_z = step[0, 0], step[0, 1], step[0, 2]
     right_x, right_y, right_z = step[1, 0], step[1, 1], step[1, 2]
@@ -279,7 +281,7 @@ def _cast_box_row(
             dx = (forward_x + us[x] * right_x) + up_x
             dz = (forward_z + us[x] * right_z) + up_z
             t = _hit_box(ox, oy, oz, dx, dy, dz)
-            is_nearer = (clip < t) & (t < depth[x])
+            is_nearer = (clip < t) & (t < depth[x]) & (closest < depth[x])
             depth[x] = t if is_nearer else depth[x]
             nearest[x] = number if is_nearer else nearest[x]
         return
@@ -288,7 +290,7 @@ def _cast_box_row(
         dy = (forward_y + us[x] * right_y) + up_y
         dz = (forward_z + us[x] * right_z) + up_z
         t = _hit_box(ox, oy, oz, dx, dy, dz)
-        is_nearer = (clip < t) & (t < depth[x])
+        is_nearer = (clip < t) & (t < depth[x]) & (closest < depth[x])
         depth[x] = t if is_nearer else depth[x]
         nearest[x] = number if is_nearer else nearest[x]
 

@@ -5,8 +5,6 @@ the primitives that the pixel and its neighbours show, and no others. That misse
 shows, but costs little.
 """
 
-from typing import Any
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -54,7 +52,9 @@ def smooth(
     first = len(projection.index)
     lists, orders, crease = _list_candidates(nearest, factors, jagged)
     found = _candidate_depths(table, first, camera.near, ray_u, ray_v, lists, orders)
-    hit_orders, depths, shadow = _nearest_hits(lists, orders, crease, found, camera.near, camera.far)
+    hit_orders, depths, shadow = _nearest_hits(
+        lists, orders, crease, found, camera.near, camera.far
+    )
     levels = np.empty(len(depths))
     brightness(
         table, first, eye_of(camera), lights.daylight, hit_orders, ray_u, ray_v, depths, levels
