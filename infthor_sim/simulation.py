@@ -1,6 +1,5 @@
 """A running simulator's state: scene, settings, cameras, random numbers, saved states."""
 
-import copy
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -12,6 +11,7 @@ from infthor_sim.physics.crowd import set_agent_count
 from infthor_sim.pictures.cameras import ThirdPartyCamera
 from infthor_sim.pictures.views import Display, Views
 from infthor_sim.pictures.vision import AgentVision
+from infthor_sim.saved_state import SavedState
 from infthor_sim.scenes.catalogue import Catalogue
 from infthor_sim.settings import SimulatorSettings
 from infthor_sim.world import World
@@ -30,6 +30,7 @@ class Simulation:
         cameras: third-party cameras, by their ids.
         random: random numbers of the actions that draw some.
         object_filter: ids of the objects that replies list; None for all.
+        n_loaded: number of scenes loaded so far. What is kept by object id and version is of one.
         time: simulated seconds since the scene was loaded.
         failed_reset: why the last Reset loaded no scene. Initialize repeats it, as the client reads
             only its reply.
@@ -42,6 +43,7 @@ class Simulation:
     cameras: list[ThirdPartyCamera] = field(default_factory=list)
     random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
     object_filter: frozenset[str] | None = None
+    n_loaded: int = 0
     time: float = 0.0
     failed_reset: str = ""
     world: World = field(init=False)
@@ -51,12 +53,14 @@ class Simulation:
 
     def load(self, world: World) -> None:
         """Make `world` the present scene; settings stay until the next Initialize."""
+        self.n_loaded += 1
         self.time = 0.0
         self.cameras.clear()
         self.object_filter = None
         self.random = np.random.default_rng(world.seed)
-        self._saved: dict[int, tuple[World, np.random.Generator]] = {}
+        self._saved: dict[int, SavedState] = {}
         equip(world, self.settings.agent_mode)
+        self.world = world
         self._show(world)
 
     def configure(self, settings: SimulatorSettings) -> None:
@@ -76,30 +80,33 @@ class Simulation:
 
     def save(self, slot: int) -> None:
         """Keep a copy of the scene's state and random numbers, in place of what the slot held."""
-        self._saved[slot] = copy.deepcopy((self.world, self.random))
+        self._saved[slot] = SavedState(self.world, self.random)
 
     def restore(self, slot: int) -> bool:
         """Bring back a slot's state, which stays kept; return False if none is of this scene."""
         if slot not in self._saved:
             return False
-        world, self.random = copy.deepcopy(self._saved[slot])
-        # Caches (packed metadata, primitives) compare versions. Objects of the restored state get
-        # versions that neither state has used, so that nothing cached for the abandoned one is
-        # taken for theirs.
-        newest = max(
-            (item.version for w in (self.world, world) for item in w.objects.values()), default=0
-        )
-        for item in world.objects.values():
-            item.version = newest + 1
+        world, self.random = self._saved[slot].copy()
+        # Versions go on from the abandoned state's, so that none is ever given to two states of an
+        # object. So what is kept of objects (packed metadata, primitives) by their versions holds
+        # for those that the restored state has unchanged.
         world.version = self.world.version + 1
-        self._show(world)
+        self.world = world
+        if len(world.agents) == len(self._views):
+            for views in self._views:
+                views.show(world)
+            self._look()
+        else:
+            self._show(world)
         return True
 
     def _show(self, world: World) -> None:
-        self.world = world
         self._views = [Views(world, self.display, self.settings) for _ in world.agents]
+        self._look()
+
+    def _look(self) -> None:
         self._visions = [
-            AgentVision(world, views, self.display, self.settings) for views in self._views
+            AgentVision(self.world, views, self.display, self.settings) for views in self._views
         ]
 
     @property

@@ -3,10 +3,9 @@
 from pathlib import Path
 from typing import Protocol
 
-from PIL import Image
-
 from infthor_eval.errors import DataError, SimulatorError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.png import write_png
 from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["FrameFolder", "FrameKeeper", "NoFrames"]
@@ -46,8 +45,7 @@ class FrameFolder:
         path = self._folder / f"{self._n_frames:09d}.png"
         self._n_frames += 1
         try:
-            # Temporary: speed matters more than size.
-            Image.fromarray(view.frame).save(path, compress_level=1)
+            write_png(path, view.frame, level=1)  # temporary: speed matters more than size
         except OSError as error:
             raise DataError(
                 f"{path}: cannot be written ({error.strerror}); make room, or set TMPDIR"

@@ -278,8 +278,12 @@ def _instances(event: Any) -> dict[str, Instance] | None:
     frame = event.instance_segmentation_frame
     if frame is None:
         return None
-    pixels = frame.astype(np.uint32)
-    instances = instances_of(pixels[..., 0] << 16 | pixels[..., 1] << 8 | pixels[..., 2])
+    # In place, channel by channel: copies of the whole frame take four times as long.
+    codes = frame[..., 0].astype(np.uint32)
+    for channel in (1, 2):
+        codes <<= 8
+        codes |= frame[..., channel]
+    instances = instances_of(codes)
     names = {r << 16 | g << 8 | b: name for (r, g, b), name in event.color_to_object_id.items()}
     # A name without "|" is a class of the structure (walls, floor), not an object.
     return {

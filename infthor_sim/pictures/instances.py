@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infthor_sim.render.picture import Picture
+from infthor_sim.render.primitives import INSTANCE
 from infthor_sim.world import World
 
 __all__ = ["class_color", "class_image", "instance_color", "instance_image"]
@@ -40,11 +41,14 @@ def class_image(picture: Picture, world: World) -> NDArray[np.uint8]:
 
 
 def _paint(picture: Picture, colors: list[tuple[int, int, int]]) -> NDArray[np.uint8]:
-    # The void, instance -1, takes the last entry: black. One lookup of 32-bit words is faster than
-    # one of four bytes.
+    # The void, -1, takes the last entry: black. One lookup of 32-bit words, from primitives to
+    # colours, is faster than two or than one of four bytes.
     table = np.array([(*color, 255) for color in [*colors, (0, 0, 0)]], dtype=np.uint8)
-    packed = table.view(np.uint32).ravel()
-    return packed[picture.instances].view(np.uint8).reshape(*picture.instances.shape, 4)
+    by_instance = table.view(np.uint32).ravel()
+    shown = picture.prims[picture.projection.index, INSTANCE].astype(int)
+    by_primitive = by_instance[np.append(shown, -1)]
+    pixels: NDArray[np.uint32] = by_primitive[picture.nearest]
+    return pixels.view(np.uint8).reshape(*pixels.shape, 4)
 
 
 def _color(namespace: str, name: str) -> tuple[int, int, int]:

@@ -11,6 +11,7 @@ from infthor_sim.render.arm import ARM, arm_rows
 from infthor_sim.render.body import BODY, bodies_state, body_rows
 from infthor_sim.render.camera import PinholeCamera
 from infthor_sim.render.hand import HAND, held_rows
+from infthor_sim.render.lighting import Lights
 from infthor_sim.render.picture import (
     Picture,
     Rasterizer,
@@ -58,9 +59,15 @@ class Views:
 
     def __init__(self, world: World, display: Display, settings: SimulatorSettings) -> None:
         self.settings = settings
-        self._world = world
         self._display = display
         self._model = SceneModel(world)
+        self._coloured: _Coloured | None = None
+        self.show(world)
+
+    def show(self, world: World) -> None:
+        """Draw another state of the same scene from now on."""
+        self._world = world
+        self._model.show(world)
         self._view: Picture | None = None
         self._view_key: tuple[object, ...] | None = None
         self._frame: Picture | None = None
@@ -138,7 +145,30 @@ class Views:
         )
 
     def colours(self, picture: Picture) -> NDArray[np.uint8]:
-        """Return a picture's RGB (h, w, 3), bottom row first."""
-        return colour_picture(
-            picture, self._model.lights(), self._display.rasterizer, self._display.antialias
+        """Return a picture's RGB (h, w, 3), bottom row first; the last picture's is kept."""
+        lights = self._model.lights()
+        antialias = self._display.antialias
+        kept = self._coloured
+        if kept is None or not kept.is_of(picture, lights, antialias):
+            rgb = colour_picture(picture, lights, self._display.rasterizer, antialias)
+            self._coloured = kept = _Coloured(picture, lights, antialias, rgb)
+        return kept.rgb
+
+
+@dataclass(frozen=True)
+class _Coloured:
+    """A picture's colours, and all that they were made of."""
+
+    picture: Picture
+    lights: Lights
+    antialias: bool
+    rgb: NDArray[np.uint8]
+
+    def is_of(self, picture: Picture, lights: Lights, antialias: bool) -> bool:
+        # The picture itself is compared, not its content: an unchanged view is the same object.
+        return (
+            self.picture is picture
+            and self.antialias == antialias
+            and self.lights.daylight == lights.daylight
+            and np.array_equal(self.lights.lamps, lights.lamps)
         )

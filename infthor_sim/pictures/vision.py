@@ -53,7 +53,9 @@ class AgentVision:
         return self._visible[2]
 
     def _visible_in(self, picture: Picture) -> frozenset[str]:
-        counts = np.bincount(picture.instances.ravel() + 1, minlength=len(picture.names) + 1)[1:]
+        prims = picture.prims[picture.projection.index]
+        pixels = self._display.rasterizer.count(picture.nearest, len(prims))
+        counts = np.bincount(prims[:, INSTANCE].astype(int), pixels, len(picture.names))
         visible = set()
         for index in np.nonzero(counts >= _least_pixels(picture.camera))[0]:
             item = self._world.objects.get(picture.names[index])

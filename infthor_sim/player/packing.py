@@ -19,7 +19,6 @@ from infthor_sim.render.body import BODY
 from infthor_sim.render.hand import HAND
 from infthor_sim.render.shell import SHELL_NAMES
 from infthor_sim.simulation import Simulation
-from infthor_sim.world import World
 
 __all__ = ["MetadataPacker"]
 
@@ -48,9 +47,7 @@ class MetadataPacker:
         # version, number of fields, their bytes, by object id
         self._packed: dict[str, tuple[int, int, bytes]] = {}
         self._colors: tuple[tuple[str, ...], bytes] | None = None
-        # The world whose objects are packed. The reference keeps it alive, so that no other world
-        # can get its address and be taken for it.
-        self._world: World | None = None
+        self._scene = -1  # the number of the scene whose objects are packed
 
     def message(
         self, sim: Simulation, outcomes: Sequence[Outcome], sequence: int, with_colors: bool
@@ -76,14 +73,13 @@ class MetadataPacker:
         return packed
 
     def _objects(self, sim: Simulation) -> list[bytes]:
-        world = sim.world
-        if self._world is not world:
+        if self._scene != sim.n_loaded:
             self._packed.clear()
-            self._world = world
+            self._scene = sim.n_loaded
         visible = sim.vision.visible_ids()
         reported = sim.reported_objects()
         positions: Array = np.array([o.position for o in reported]).reshape(-1, 3)
-        distances = np.linalg.norm(positions - world.agent.position, axis=1)
+        distances = np.linalg.norm(positions - sim.world.agent.position, axis=1)
         parts = [_array_head(len(reported))]
         for item, distance in zip(reported, distances, strict=True):
             entry = self._packed.get(item.object_id)

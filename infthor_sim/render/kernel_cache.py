@@ -11,8 +11,9 @@ from pathlib import Path
 __all__ = ["drop_stale_kernels"]
 
 _SOURCES = (  # every file that compiled code comes from
-    "camera.py", "creases_numba.py", "lighting.py", "patterns.py", "primitives.py",
-    "probe_numba.py", "raster_numba.py", "shading_numba.py", "smoothing_numba.py", "table.py",
+    "camera.py", "creases_numba.py", "grouping_numba.py", "lighting.py", "patterns.py",
+    "primitives.py", "probe_numba.py", "projection_numba.py", "raster_numba.py",
+    "shading_numba.py", "smoothing_numba.py", "table.py",
 )  # fmt: skip
 _HERE = Path(__file__).parent
 

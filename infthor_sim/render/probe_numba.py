@@ -1,6 +1,6 @@
 """Whether an object is visible in many directions, compiled by numba: it stops at enough pixels.
 
-The sums are those of `camera.project`, but of one primitive at a time: what cannot be in front of
+The sums are those of `projection_numba`, but of one primitive at a time: what cannot be in front of
 the object is left out before it is transformed.
 """
 

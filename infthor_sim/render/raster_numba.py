@@ -15,7 +15,7 @@ from infthor_sim.geometry import Array
 from infthor_sim.render.camera import PinholeCamera, Projection
 from infthor_sim.render.primitives import BOTTOM, FORM, TOP, Form
 
-__all__ = ["cast", "hit"]
+__all__ = ["cast", "count_pixels", "hit", "hits"]
 
 _TINY = 1e-12  # takes the place of smaller components of directions, which are divided by
 _BOX = int(Form.BOX)
@@ -38,6 +38,25 @@ def cast(
         depth, nearest,
     )  # fmt: skip
     return depth, nearest
+
+
+def count_pixels(nearest: NDArray[np.int32], n_primitives: int) -> NDArray[np.int64]:
+    """Return how many pixels show each primitive in `projection` (n_primitives,)."""
+    counts = np.zeros(n_primitives + 1, dtype=np.int64)
+    _count(nearest.ravel(), counts)
+    return counts[1:]
+
+
+@njit(cache=True, error_model="numpy")
+def _count(nearest: NDArray[np.int32], counts: NDArray[np.int64]) -> None:
+    """Add the pixels of each primitive to `counts`, those of none, -1, to its first entry."""
+    # Neighbours mostly show the same, so that runs are counted and not pixels.
+    first = 0
+    for i in range(1, len(nearest)):
+        if nearest[i] != nearest[first]:
+            counts[nearest[first] + 1] += i - first
+            first = i
+    counts[nearest[first] + 1] += len(nearest) - first
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -164,6 +183,37 @@ def hit(
 
 
 @njit(cache=True, error_model="numpy")
+def hits(
+    form: float,
+    bottom: float,
+    top: float,
+    origin: Array,
+    steps: Array,
+    us: Array,
+    vs: Array,
+    clip: float,
+    ts: Array,
+) -> None:
+    """Write the depths at which rays (us, vs) meet one primitive to `ts`, see `hit`."""
+    ox, oy, oz = origin[0], origin[1], origin[2]
+    ahead_x, ahead_y, ahead_z = steps[0], steps[1], steps[2]
+    right_x, right_y, right_z = steps[3], steps[4], steps[5]
+    up_x, up_y, up_z = steps[6], steps[7], steps[8]
+    if form == _BOX:  # a loop of its own, which the compiler turns into one over several rays
+        for i in range(len(us)):
+            dx = (ahead_x + us[i] * right_x) + vs[i] * up_x
+            dy = (ahead_y + us[i] * right_y) + vs[i] * up_y
+            dz = (ahead_z + us[i] * right_z) + vs[i] * up_z
+            ts[i] = _hit_box(ox, oy, oz, dx, dy, dz)
+        return
+    for i in range(len(us)):
+        dx = (ahead_x + us[i] * right_x) + vs[i] * up_x
+        dy = (ahead_y + us[i] * right_y) + vs[i] * up_y
+        dz = (ahead_z + us[i] * right_z) + vs[i] * up_z
+        ts[i] = hit(form, bottom, top, ox, oy, oz, dx, dy, dz, clip)
+
+
+@njit(cache=True, error_model="numpy")
 def _cast(
     profiles: Array,
     origin: Array,
@@ -180,26 +230,94 @@ def _cast(
     depth[:] = far
     nearest[:] = -1
     for order in range(len(profiles)):
-        form = profiles[order, 0]
-        bottom = profiles[order, 1]
-        top = profiles[order, 2]
-        ox = origin[order, 0]
-        oy = origin[order, 1]
-        oz = origin[order, 2]
-        step = steps[order]
-        closest = near[order]
         for y in range(box[order, 2], box[order, 3] + 1):
-            v = vs[y]
-            for x in range(box[order, 0], box[order, 1] + 1):
-                limit = depth[y, x]
-                if limit <= closest:  # hidden for sure, as most pixels of far primitives are
-                    continue
-                u = us[x]
-                dx = (step[0, 0] + u * step[1, 0]) + v * step[2, 0]
-                dy = (step[0, 1] + u * step[1, 1]) + v * step[2, 1]
-                dz = (step[0, 2] + u * step[1, 2]) + v * step[2, 2]
-                t = hit(form, bottom, top, ox, oy, oz, dx, dy, dz, clip)
-                # Strictly nearer: where surfaces coincide the earlier primitive stays.
-                if clip < t < limit:
-                    depth[y, x] = t
-                    nearest[y, x] = order
+            first = box[order, 0]
+            last = box[order, 1]
+            # The ends of the row that are hidden for sure, as those of most far primitives are.
+            while first <= last and depth[y, first] <= near[order]:
+                first += 1
+            while first < last and depth[y, last] <= near[order]:
+                last -= 1
+            if first > last:
+                continue
+            us_there = us[first : last + 1]
+            depth_there = depth[y, first : last + 1]
+            nearest_there = nearest[y, first : last + 1]
+            if profiles[order, 0] == _BOX:
+                _cast_box_row(
+                    origin[order], steps[order], near[order], us_there, vs[y], clip, order, depth_there,
+                    nearest_there,
+                )  # fmt: skip
+            else:
+                _cast_round_row(
+                    profiles[order], origin[order], steps[order], near[order], us_there, vs[y],
+                    clip, order, depth_there, nearest_there,
+                )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _cast_box_row(
+    origin: Array,
+    step: Array,
+    closest: float,
+    us: Array,
+    v: float,
+    clip: float,
+    order: int,
+    depth: Array,
+    nearest: NDArray[np.int32],
+) -> None:
+    # No branch depends on a pixel, so that the compiler computes several pixels at once. The
+    # numbers of the primitive are taken out of their arrays first, for the same reason. What is
+    # hidden for sure stays hidden, though rounding may bring a coinciding surface nearer.
+    ox, oy, oz = origin[0], origin[1], origin[2]
+    forward_x, forward_y, forward_z = step[0, 0], step[0, 1], step[0, 2]
+    right_x, right_y, right_z = step[1, 0], step[1, 1], step[1, 2]
+    up_x, up_y, up_z = v * step[2, 0], v * step[2, 1], v * step[2, 2]
+    number = np.int32(order)
+    if right_y == 0.0:  # an upright box before a level camera: all rays of the row rise alike
+        dy = forward_y + up_y
+        for x in range(len(us)):
+            dx = (forward_x + us[x] * right_x) + up_x
+            dz = (forward_z + us[x] * right_z) + up_z
+            t = _hit_box(ox, oy, oz, dx, dy, dz)
+            is_nearer = (clip < t) & (t < depth[x]) & (closest < depth[x])
+            depth[x] = t if is_nearer else depth[x]
+            nearest[x] = number if is_nearer else nearest[x]
+        return
+    for x in range(len(us)):
+        dx = (forward_x + us[x] * right_x) + up_x
+        dy = (forward_y + us[x] * right_y) + up_y
+        dz = (forward_z + us[x] * right_z) + up_z
+        t = _hit_box(ox, oy, oz, dx, dy, dz)
+        is_nearer = (clip < t) & (t < depth[x]) & (closest < depth[x])
+        depth[x] = t if is_nearer else depth[x]
+        nearest[x] = number if is_nearer else nearest[x]
+
+
+@njit(cache=True, error_model="numpy")
+def _cast_round_row(
+    profile: Array,
+    origin: Array,
+    step: Array,
+    closest: float,
+    us: Array,
+    v: float,
+    clip: float,
+    order: int,
+    depth: Array,
+    nearest: NDArray[np.int32],
+) -> None:
+    form, bottom, top = profile[0], profile[1], profile[2]
+    ox, oy, oz = origin[0], origin[1], origin[2]
+    for x in range(len(us)):
+        if depth[x] <= closest:  # hidden for sure
+            continue
+        dx = (step[0, 0] + us[x] * step[1, 0]) + v * step[2, 0]
+        dy = (step[0, 1] + us[x] * step[1, 1]) + v * step[2, 1]
+        dz = (step[0, 2] + us[x] * step[1, 2]) + v * step[2, 2]
+        t = hit(form, bottom, top, ox, oy, oz, dx, dy, dz, clip)
+        # Strictly nearer: where surfaces coincide the earlier primitive stays.
+        if clip < t < depth[x]:
+            depth[x] = t
+            nearest[x] = order

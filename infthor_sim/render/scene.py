@@ -29,6 +29,11 @@ class SceneModel:
         self._names: tuple[str, ...] = ()
         self._held: Array = np.zeros((0, COLUMNS))
 
+    def show(self, world: World) -> None:
+        """Take another state of the same scene; no two have objects of one id and version."""
+        self._world = world
+        self._version = -1
+
     def primitives(self) -> tuple[Array, Array, tuple[str, ...]]:
         """Return all primitives but the held object's (n, COLUMNS), its own, instances' names.
 

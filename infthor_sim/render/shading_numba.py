@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from infthor_sim.geometry import Array
 from infthor_sim.render import patterns
 from infthor_sim.render.camera import PinholeCamera, Projection
+from infthor_sim.render.grouping_numba import group
 from infthor_sim.render.lighting import AMBIENT, HEADLIGHT, LAMP_REACH, SKY, SUN, Lights
 from infthor_sim.render.primitives import (
     AXES,
@@ -55,50 +56,21 @@ def shade(
     lights: Lights,
 ) -> NDArray[np.uint8]:
     """Return RGB (h, w, 3), bottom row first, of cast pixels, each brightness times its factor."""
-    us, vs = camera.rays()
+    us, vs = camera.ray_grid()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
     table = shading_table(prims, projection, lights)
-    _shade(
-        table,
-        len(projection.index),
-        eye_of(camera),
-        us,
-        vs,
-        depth,
-        nearest,
-        factors,
-        lights.daylight,
-        rgb,
-    )
+    levels = np.empty(nearest.size)
+    brightness(
+        table, len(projection.index), eye_of(camera), lights.daylight, nearest.ravel(), us, vs,
+        depth.ravel(), levels,
+    )  # fmt: skip
+    _colour(table, nearest, levels.reshape(nearest.shape), factors, rgb)
     return rgb
 
 
 def eye_of(camera: PinholeCamera) -> tuple[float, ...]:
     """Return a camera's position, and its forward, right and up vectors, as plain numbers (12,)."""
     return tuple(np.concatenate([camera.position, camera.matrix[:, [2, 0, 1]].T.ravel()]).tolist())
-
-
-@njit(cache=True, error_model="numpy")
-def _pattern(material: float, a: float, b: float) -> float:  # noqa: PLR0911 - one line per material
-    if material == _WOOD:
-        return _wood(a, b)
-    if material == _PLANKS:
-        return _planks(a, b)
-    if material == _TILES:
-        return _tiles(a, b)
-    if material == _FABRIC:
-        return _fabric(a, b)
-    if material == _STONE:
-        return _stone(a, b)
-    if material == _METAL:
-        return _metal(a, b)
-    if material == _GLASS:
-        return _glass(a, b)
-    if material == _PAPER:
-        return _paper(a, b)
-    if material == _CARPET:
-        return _carpet(a, b)
-    return 1.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -166,14 +138,115 @@ def brightness(
         orders: the primitives (n,); -1 for none, whose level stays as it is.
         us, vs, depths: the rays, and the depth at which they hit (n,).
     """
-    # What can be told in the primitive's own frame is: the ray's direction d and the normal n have
-    # the product sum(d * n) there whatever the primitive's size, as d is scaled by the inverse of
-    # what n is scaled by.
-    for i in range(len(orders)):
-        k = orders[i]
-        if k < 0:
+    starts, members = group(orders, first)
+    work = np.empty((9, len(orders)))
+    # taken one by one, as numba does not know of unpacked rows that they are contiguous
+    u, v, t = work[0], work[1], work[2]
+    light, a, b = work[3], work[4], work[5]
+    nx, ny, nz = work[6], work[7], work[8]
+    for j in range(len(members)):
+        i = members[j]
+        u[j], v[j], t[j] = us[i], vs[i], depths[i]
+    for k in range(first):
+        start, end = starts[k], starts[k + 1]
+        if start == end:
             continue
-        u, v, t = us[i], vs[i], depths[i]
+        if table[k, FORM] == _BOX:
+            _light_box(
+                table, k, daylight, u[start:end], v[start:end], t[start:end], light[start:end],
+                a[start:end], b[start:end], nx[start:end], ny[start:end], nz[start:end],
+            )  # fmt: skip
+        else:
+            _light_round(
+                table, k, daylight, u[start:end], v[start:end], t[start:end], light[start:end],
+                a[start:end], b[start:end], nx[start:end], ny[start:end], nz[start:end],
+            )  # fmt: skip
+        if first < len(table):
+            for j in range(start, end):
+                light[j] = light[j] + _lamp_light(
+                    table, first, k, nx[j], ny[j], nz[j], u[j], v[j], t[j], eye
+                )
+        _apply_pattern(table[k, MATERIAL], a[start:end], b[start:end], light[start:end])
+        glow = table[k, EMISSION]
+        for j in range(start, end):
+            light[j] = glow * 1.15 + (1.0 - glow) * light[j]
+    for j in range(starts[0], len(members)):
+        levels[members[j]] = light[j]
+
+
+# What can be told in the primitive's own frame is: the ray's direction d and the normal n have the
+# product sum(d * n) there whatever the primitive's size, as d is scaled by the inverse of what n is
+# scaled by.
+
+
+@njit(cache=True, error_model="numpy")
+def _light_box(
+    table: Array,
+    k: int,
+    daylight: float,
+    us: Array,
+    vs: Array,
+    ts: Array,
+    light: Array,
+    a: Array,
+    b: Array,
+    nx: Array,
+    ny: Array,
+    nz: Array,
+) -> None:
+    """Write daylight, surface coordinates (a, b) and normals where rays hit box `k`."""
+    # No branch depends on a ray, so that the compiler computes several at once. The numbers of the
+    # box are taken out of the table first, for the same reason.
+    ox, oy, oz = table[k, ORIGIN], table[k, ORIGIN + 1], table[k, ORIGIN + 2]
+    ahead_x, ahead_y, ahead_z = table[k, STEPS], table[k, STEPS + 1], table[k, STEPS + 2]
+    right_x, right_y, right_z = table[k, STEPS + 3], table[k, STEPS + 4], table[k, STEPS + 5]
+    up_x, up_y, up_z = table[k, STEPS + 6], table[k, STEPS + 7], table[k, STEPS + 8]
+    hx, hy, hz = table[k, HALF], table[k, HALF + 1], table[k, HALF + 2]
+    sun_x, sun_y, sun_z = table[k, SUNWARD], table[k, SUNWARD + 1], table[k, SUNWARD + 2]
+    rise_x, rise_y, rise_z = table[k, AXES + 1], table[k, AXES + 4], table[k, AXES + 7]
+    for i in range(len(us)):
+        u, v, t = us[i], vs[i], ts[i]
+        dx = (ahead_x + u * right_x) + v * up_x
+        dy = (ahead_y + u * right_y) + v * up_y
+        dz = (ahead_z + u * right_z) + v * up_z
+        x, y, z = ox + t * dx, oy + t * dy, oz + t * dz
+        # The hit is on the face whose coordinate is nearest to 1. At an edge x wins over y over z,
+        # as in numpy. The normal is one of the axes, of the sign that faces the camera.
+        on_x = (abs(x) >= abs(y)) & (abs(x) >= abs(z))
+        on_y = abs(y) >= abs(z)
+        facing = dx * hx if on_x else dy * hy if on_y else dz * hz
+        sign = -1.0 if facing > 0.0 else 1.0
+        sun = sign * (sun_x if on_x else sun_y if on_y else sun_z)
+        rise = sign * (rise_x if on_x else rise_y if on_y else rise_z)
+        a[i] = z * hz if on_x else x * hx
+        b[i] = y * hy if on_x else z * hz if on_y else y * hy
+        nx[i] = sign if on_x else 0.0
+        ny[i] = 0.0 if on_x else sign if on_y else 0.0
+        nz[i] = 0.0 if on_x | on_y else sign
+        headlight = HEADLIGHT * abs(facing) / math.sqrt(1.0 + u * u + v * v)
+        light[i] = (AMBIENT + SKY * rise + SUN * max(sun, 0.0) + headlight) * daylight
+
+
+@njit(cache=True, error_model="numpy")
+def _light_round(
+    table: Array,
+    k: int,
+    daylight: float,
+    us: Array,
+    vs: Array,
+    ts: Array,
+    light: Array,
+    a: Array,
+    b: Array,
+    nx: Array,
+    ny: Array,
+    nz: Array,
+) -> None:
+    """Write daylight, surface coordinates (a, b) and normals where rays hit round `k`."""
+    form, bottom, top = table[k, FORM], table[k, BOTTOM], table[k, TOP]
+    hx, hy, hz = table[k, HALF], table[k, HALF + 1], table[k, HALF + 2]
+    for i in range(len(us)):
+        u, v, t = us[i], vs[i], ts[i]
         dx = (table[k, STEPS] + u * table[k, STEPS + 3]) + v * table[k, STEPS + 6]
         dy = (table[k, STEPS + 1] + u * table[k, STEPS + 4]) + v * table[k, STEPS + 7]
         dz = (table[k, STEPS + 2] + u * table[k, STEPS + 5]) + v * table[k, STEPS + 8]
@@ -182,84 +255,68 @@ def brightness(
             table[k, ORIGIN + 1] + t * dy,
             table[k, ORIGIN + 2] + t * dz,
         )
-        hx, hy, hz = table[k, HALF], table[k, HALF + 1], table[k, HALF + 2]
-        nx, ny, nz = 0.0, 0.0, 0.0
-        if table[k, FORM] == _BOX:
-            # The hit is on the face whose coordinate is nearest to 1. At an edge x wins over y over
-            # z, as in numpy. The normal is one of the axes, of the sign that faces the camera.
-            ax, ay, az = abs(x), abs(y), abs(z)
-            if ax >= ay and ax >= az:
-                nx, facing, sun, up, a, b = (
-                    1.0,
-                    dx * hx,
-                    table[k, SUNWARD],
-                    table[k, AXES + 1],
-                    z * hz,
-                    y * hy,
-                )
-            elif ay >= az:
-                ny, facing, sun, up, a, b = (
-                    1.0,
-                    dy * hy,
-                    table[k, SUNWARD + 1],
-                    table[k, AXES + 4],
-                    x * hx,
-                    z * hz,
-                )
-            else:
-                nz, facing, sun, up, a, b = (
-                    1.0,
-                    dz * hz,
-                    table[k, SUNWARD + 2],
-                    table[k, AXES + 7],
-                    x * hx,
-                    y * hy,
-                )
-        else:
-            a, b = x * hx + z * hz, y * hy
-            nx, ny, nz = _round_normal(table[k, FORM], table[k, BOTTOM], table[k, TOP], x, y, z)
-            facing = nx * dx + ny * dy + nz * dz
-            # Normals scale by the inverse of the half extents, unlike points.
-            nx, ny, nz = (
-                nx * table[k, INVERSE],
-                ny * table[k, INVERSE + 1],
-                nz * table[k, INVERSE + 2],
-            )
-            shrink = 1.0 / (math.sqrt(nx * nx + ny * ny + nz * nz) + 1e-12)
-            nx, ny, nz, facing = nx * shrink, ny * shrink, nz * shrink, facing * shrink
-            sun = nx * table[k, SUNWARD] + ny * table[k, SUNWARD + 1] + nz * table[k, SUNWARD + 2]
-            up = nx * table[k, AXES + 1] + ny * table[k, AXES + 4] + nz * table[k, AXES + 7]
-        # the normal points away from the camera: another face, or the inside of a cup
-        if facing > 0.0:
-            nx, ny, nz, sun, up = -nx, -ny, -nz, -sun, -up
-        headlight = HEADLIGHT * abs(facing) / math.sqrt(1.0 + u * u + v * v)
-        light = (AMBIENT + SKY * up + SUN * max(sun, 0.0) + headlight) * daylight
-        if first < len(table):
-            light = light + _lamp_light(table, first, k, nx, ny, nz, u, v, t, eye)
-        glow = table[k, EMISSION]
-        levels[i] = glow * 1.15 + (1.0 - glow) * (light * _pattern(table[k, MATERIAL], a, b))
+        mx, my, mz = _round_normal(form, bottom, top, x, y, z)
+        facing = mx * dx + my * dy + mz * dz
+        # Normals scale by the inverse of the half extents, unlike points.
+        mx, my, mz = mx * table[k, INVERSE], my * table[k, INVERSE + 1], mz * table[k, INVERSE + 2]
+        shrink = 1.0 / (math.sqrt(mx * mx + my * my + mz * mz) + 1e-12)
+        # turned around if it points away from the camera, as on the inside of a cup
+        turn = -shrink if facing > 0.0 else shrink
+        mx, my, mz = mx * turn, my * turn, mz * turn
+        sun = mx * table[k, SUNWARD] + my * table[k, SUNWARD + 1] + mz * table[k, SUNWARD + 2]
+        rise = mx * table[k, AXES + 1] + my * table[k, AXES + 4] + mz * table[k, AXES + 7]
+        a[i], b[i] = x * hx + z * hz, y * hy
+        nx[i], ny[i], nz[i] = mx, my, mz
+        headlight = HEADLIGHT * abs(facing * shrink) / math.sqrt(1.0 + u * u + v * v)
+        light[i] = (AMBIENT + SKY * rise + SUN * max(sun, 0.0) + headlight) * daylight
 
 
 @njit(cache=True, error_model="numpy")
-def _shade(
+def _apply_pattern(  # noqa: PLR0912 - one branch per material
+    material: float, a: Array, b: Array, light: Array
+) -> None:
+    """Multiply the light on points of one material by its pattern."""
+    if material == _WOOD:
+        for i in range(len(light)):
+            light[i] *= _wood(a[i], b[i])
+    elif material == _PLANKS:
+        for i in range(len(light)):
+            light[i] *= _planks(a[i], b[i])
+    elif material == _TILES:
+        for i in range(len(light)):
+            light[i] *= _tiles(a[i], b[i])
+    elif material == _FABRIC:
+        for i in range(len(light)):
+            light[i] *= _fabric(a[i], b[i])
+    elif material == _STONE:
+        for i in range(len(light)):
+            light[i] *= _stone(a[i], b[i])
+    elif material == _METAL:
+        for i in range(len(light)):
+            light[i] *= _metal(a[i], b[i])
+    elif material == _GLASS:
+        for i in range(len(light)):
+            light[i] *= _glass(a[i], b[i])
+    elif material == _PAPER:
+        for i in range(len(light)):
+            light[i] *= _paper(a[i], b[i])
+    elif material == _CARPET:
+        for i in range(len(light)):
+            light[i] *= _carpet(a[i], b[i])
+
+
+@njit(cache=True, error_model="numpy")
+def _colour(
     table: Array,
-    first: int,
-    eye: Any,
-    us: Array,
-    vs: Array,
-    depth: Array,
     nearest: NDArray[np.int32],
+    levels: Array,
     factors: Array,
-    daylight: float,
     rgb: NDArray[np.uint8],
 ) -> None:
-    row, levels = np.empty(len(us)), np.empty(len(us))
-    for y in range(len(vs)):
-        row[:] = vs[y]
-        brightness(table, first, eye, daylight, nearest[y], us, row, depth[y], levels)
-        for x in range(len(us)):
+    for y in range(nearest.shape[0]):
+        for x in range(nearest.shape[1]):
             order = nearest[y, x]
             if order >= 0:
-                level = levels[x] * factors[y, x]
+                level = levels[y, x] * factors[y, x]
                 for i in range(3):
                     rgb[y, x, i] = np.uint8(min(table[order, COLOR + i] * level * 255.0, 255.0))

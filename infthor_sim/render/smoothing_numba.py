@@ -5,18 +5,16 @@ the primitives that the pixel and its neighbours show, and no others. That misse
 shows, but costs little.
 """
 
-import math
-from typing import Any
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from infthor_sim.geometry import Array
 from infthor_sim.render.camera import PinholeCamera, Projection
+from infthor_sim.render.grouping_numba import group
 from infthor_sim.render.lighting import Lights
 from infthor_sim.render.primitives import BOTTOM, COLOR, FORM, TOP
-from infthor_sim.render.raster_numba import hit
+from infthor_sim.render.raster_numba import hits
 from infthor_sim.render.shading_numba import brightness, eye_of
 from infthor_sim.render.table import ORIGIN, STEPS, shading_table
 
@@ -44,13 +42,24 @@ def smooth(
     rgb: NDArray[np.uint8],
 ) -> None:
     """Give the jagged pixels of `rgb` the mean colour of their rays, in place."""
+    jagged = _find_jagged(rgb)
     us, vs = camera.rays()
+    # All rays of a pixel follow each other.
+    shift = SUBPIXELS * (vs[1] - vs[0] if len(vs) > 1 else 0.0)
+    ray_u = (us[jagged[:, 1], None] + shift[:, 0]).ravel()
+    ray_v = (vs[jagged[:, 0], None] + shift[:, 1]).ravel()
     table = shading_table(prims, projection, lights)
-    _smooth(
-        table, len(projection.index), eye_of(camera), us, vs, camera.near, camera.far, nearest,
-        factors,
-        lights.daylight, _find_jagged(rgb), rgb,
-    )  # fmt: skip
+    first = len(projection.index)
+    lists, orders, crease = _list_candidates(nearest, factors, jagged)
+    found = _candidate_depths(table, first, camera.near, ray_u, ray_v, lists, orders)
+    hit_orders, depths, shadow = _nearest_hits(
+        lists, orders, crease, found, camera.near, camera.far
+    )
+    levels = np.empty(len(depths))
+    brightness(
+        table, first, eye_of(camera), lights.daylight, hit_orders, ray_u, ray_v, depths, levels
+    )
+    _blend(table, jagged, hit_orders, levels, shadow, rgb)
 
 
 @njit(cache=True, error_model="numpy")
@@ -84,120 +93,125 @@ def _find_jagged(rgb: NDArray[np.uint8]) -> NDArray[np.int64]:
 
 
 @njit(cache=True, error_model="numpy")
-def _candidates(
-    nearest: NDArray[np.int32], y: int, x: int, orders: NDArray[np.int32], at: NDArray[np.int64]
-) -> int:
-    """Write what a pixel and its neighbours show to `orders`, where to `at`; return how many."""
-    count = 0
-    for j in range(len(NEIGHBOURS)):
-        yy = y + NEIGHBOURS[j, 0]
-        xx = x + NEIGHBOURS[j, 1]
-        if (
-            yy < 0
-            or xx < 0
-            or yy >= nearest.shape[0]
-            or xx >= nearest.shape[1]
-            or nearest[yy, xx] < 0
-        ):
-            continue
-        order = nearest[yy, xx]
-        listed = False
-        for k in range(count):
-            listed = listed or orders[k] == order
-        if not listed:
-            orders[count] = order
-            at[count, 0] = yy
-            at[count, 1] = xx
-            count += 1
-    return count
+def _list_candidates(
+    nearest: NDArray[np.int32], factors: Array, jagged: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int32], Array]:
+    """Return the primitives that jagged pixels and their neighbours show, each once a pixel.
+
+    Returns:
+        Where each pixel's list starts, and where the last one ends (n + 1,); the primitives of all
+        lists; and the crease factors of the pixels that show them.
+    """
+    lists = np.zeros(len(jagged) + 1, dtype=np.int64)
+    orders = np.empty(len(jagged) * len(NEIGHBOURS), dtype=np.int32)
+    crease = np.empty(len(orders))
+    end = 0
+    for index in range(len(jagged)):
+        start = end
+        for j in range(len(NEIGHBOURS)):
+            y = jagged[index, 0] + NEIGHBOURS[j, 0]
+            x = jagged[index, 1] + NEIGHBOURS[j, 1]
+            if y < 0 or x < 0 or y >= nearest.shape[0] or x >= nearest.shape[1]:
+                continue
+            order = nearest[y, x]
+            is_new = order >= 0
+            for k in range(start, end):
+                is_new &= orders[k] != order
+            if is_new:
+                orders[end] = order
+                crease[end] = factors[y, x]
+                end += 1
+        lists[index + 1] = end
+    return lists, orders[:end], crease[:end]
 
 
 @njit(cache=True, error_model="numpy")
-def _smooth(
+def _candidate_depths(
     table: Array,
     first: int,
-    eye: Any,
-    us: Array,
-    vs: Array,
+    clip: float,
+    ray_u: Array,
+    ray_v: Array,
+    lists: NDArray[np.int64],
+    orders: NDArray[np.int32],
+) -> Array:
+    """Return the depths at which the rays of each list's pixel meet its primitives (n, parts)."""
+    parts = len(SUBPIXELS)
+    ray = np.empty(len(orders), dtype=np.int64)  # the first ray of each candidate's pixel
+    for index in range(len(lists) - 1):
+        ray[lists[index] : lists[index + 1]] = index * parts
+    starts, members = group(orders, first)
+    found = np.empty((len(orders), parts))
+    u, v, t = np.empty(len(orders)), np.empty(len(orders)), np.empty(len(orders))
+    for part in range(parts):
+        for j in range(len(members)):
+            i = ray[members[j]] + part
+            u[j], v[j] = ray_u[i], ray_v[i]
+        for k in range(first):
+            start, end = starts[k], starts[k + 1]
+            if start < end:
+                hits(
+                    table[k, FORM], table[k, BOTTOM], table[k, TOP], table[k, ORIGIN:STEPS],
+                    table[k, STEPS : STEPS + 9], u[start:end], v[start:end], clip, t[start:end],
+                )  # fmt: skip
+        for j in range(len(members)):
+            found[members[j], part] = t[j]
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _nearest_hits(
+    lists: NDArray[np.int64],
+    orders: NDArray[np.int32],
+    crease: Array,
+    found: Array,
     clip: float,
     far: float,
-    nearest: NDArray[np.int32],
-    factors: Array,
-    daylight: float,
+) -> tuple[NDArray[np.int32], Array, Array]:
+    """Return the primitive that each ray hits, -1 for none; at which depth; its crease factor.
+
+    That is the factor of the pixel that showed the primitive, as there is no depth around the ray.
+    """
+    parts = found.shape[1]
+    n = (len(lists) - 1) * parts
+    hit_orders = np.full(n, -1, dtype=np.int32)
+    depths, shadow = np.full(n, far), np.empty(n)
+    for index in range(len(lists) - 1):
+        for candidate in range(lists[index], lists[index + 1]):
+            for part in range(parts):
+                i = index * parts + part
+                if clip < found[candidate, part] < depths[i]:
+                    depths[i] = found[candidate, part]
+                    hit_orders[i] = orders[candidate]
+                    shadow[i] = crease[candidate]
+    return hit_orders, depths, shadow
+
+
+@njit(cache=True, error_model="numpy")
+def _blend(
+    table: Array,
     jagged: NDArray[np.int64],
+    hit_orders: NDArray[np.int32],
+    levels: Array,
+    shadow: Array,
     rgb: NDArray[np.uint8],
 ) -> None:
-    pixel = vs[1] - vs[0] if len(vs) > 1 else 0.0
+    """Give each jagged pixel the mean colour of its rays."""
     # Each pixel reads and writes only its own colour: smoothing in place needs no copy.
     parts = len(SUBPIXELS)
-    # the primitive that each ray hits; -1 for none
-    hits = np.full(len(jagged) * parts, -1, dtype=np.int32)
-    ray_u = np.empty(len(hits))
-    ray_v = np.empty(len(hits))
-    depths = np.empty(len(hits))
-    crease = np.empty(len(hits))
-    levels = np.empty(len(hits))
-    orders = np.empty(len(NEIGHBOURS), dtype=np.int32)
-    at = np.empty((len(NEIGHBOURS), 2), dtype=np.int64)
-    for index in range(len(jagged)):
-        y, x = jagged[index, 0], jagged[index, 1]
-        count = _candidates(nearest, y, x, orders, at)
-        for part in range(parts):
-            u, v = us[x] + SUBPIXELS[part, 0] * pixel, vs[y] + SUBPIXELS[part, 1] * pixel
-            best = math.inf
-            chosen = -1
-            for k in range(count):
-                order = orders[k]
-                dx = (table[order, STEPS] + u * table[order, STEPS + 3]) + v * table[
-                    order, STEPS + 6
-                ]
-                dy = (table[order, STEPS + 1] + u * table[order, STEPS + 4]) + v * table[
-                    order, STEPS + 7
-                ]
-                dz = (table[order, STEPS + 2] + u * table[order, STEPS + 5]) + v * table[
-                    order, STEPS + 8
-                ]
-                ox = table[order, ORIGIN]
-                oy = table[order, ORIGIN + 1]
-                oz = table[order, ORIGIN + 2]
-                t = hit(
-                    table[order, FORM],
-                    table[order, BOTTOM],
-                    table[order, TOP],
-                    ox,
-                    oy,
-                    oz,
-                    dx,
-                    dy,
-                    dz,
-                    clip,
-                )
-                if clip < t < far and t < best:
-                    best = t
-                    chosen = k
-            if chosen >= 0:
-                i = index * parts + part
-                hits[i] = orders[chosen]
-                ray_u[i] = u
-                ray_v[i] = v
-                depths[i] = best
-                # The crease factor is that of the pixel that showed it, as there is no depth around
-                # the ray.
-                crease[i] = factors[at[chosen, 0], at[chosen, 1]]
-    brightness(table, first, eye, daylight, hits, ray_u, ray_v, depths, levels)
     for index in range(len(jagged)):
         y, x = jagged[index, 0], jagged[index, 1]
         red = 0.0
         green = 0.0
         blue = 0.0
         for i in range(index * parts, (index + 1) * parts):
-            order = hits[i]
+            order = hit_orders[i]
             if order < 0:  # the ray misses all candidates: the pixel's own colour is taken
                 red = red + rgb[y, x, 0]
                 green = green + rgb[y, x, 1]
                 blue = blue + rgb[y, x, 2]
                 continue
-            level = levels[i] * crease[i]
+            level = levels[i] * shadow[i]
             red += min(table[order, COLOR] * level * 255.0, 255.0)
             green += min(table[order, COLOR + 1] * level * 255.0, 255.0)
             blue += min(table[order, COLOR + 2] * level * 255.0, 255.0)

@@ -8,7 +8,7 @@ from infthor_sim.object_types import OBJECT_TYPES, type_named
 from infthor_sim.objects import default_object
 from infthor_sim.pictures.instances import class_color, instance_color
 from infthor_sim.player.fifo import FieldType
-from infthor_sim.render.camera import PinholeCamera, project
+from infthor_sim.render.camera import PinholeCamera
 from infthor_sim.render.hand import HAND
 from infthor_sim.render.lighting import Lights
 from infthor_sim.render.picture import cast_picture, colour_picture, compiled_rasterizer
@@ -74,14 +74,17 @@ def test_both_renderers_draw_the_same_picture():
     for rasterizer in (COMPILED, NUMPY):
         picture = cast_picture(prims, names, camera(120), rasterizer)
         pictures.append(
-            (picture.depth, picture.instances, colour_picture(picture, lights, rasterizer))
-        )
+            (
+                picture.depth, picture.instances, colour_picture(picture, lights, rasterizer),
+                rasterizer.count(picture.nearest, len(picture.projection.index)),
+            )
+        )  # fmt: skip
     for first, second in zip(*pictures, strict=True):
         assert np.array_equal(first, second)
 
 
 def test_near_plane_and_things_behind_are_cut():
-    assert not len(project(one(Form.BOX, -3.0), camera()).index)
+    assert not len(COMPILED.project(one(Form.BOX, -3.0), camera()).index)
     assert cast_picture(one(Form.BOX, 0.0, 0.05), ("a",), camera(), COMPILED).instances.max() == -1
 
 

@@ -6,10 +6,11 @@ Every formula has the order of operations of its counterpart in `infthor_sim.ren
 from infthor_sim.render.picture import Rasterizer
 
 from .probe import sees
-from .raster import cast
+from .projection import project
+from .raster import cast, count_pixels
 from .shading import crease_factors, shade
 from .smoothing import smooth
 
 __all__ = ["NUMPY"]
 
-NUMPY = Rasterizer(cast, crease_factors, shade, smooth, sees)
+NUMPY = Rasterizer(project, cast, count_pixels, crease_factors, shade, smooth, sees)

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infthor_sim.geometry import Array
-from infthor_sim.render.camera import PinholeCamera, Projection, project
+from infthor_sim.render.camera import PinholeCamera, Projection
 
+from .projection import project
 from .raster import cast, hit
 
 __all__ = ["sees"]

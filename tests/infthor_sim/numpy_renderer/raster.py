@@ -7,7 +7,7 @@ from infthor_sim.geometry import Array
 from infthor_sim.render.camera import PinholeCamera, Projection
 from infthor_sim.render.primitives import BOTTOM, FORM, TOP, Form
 
-__all__ = ["cast", "hit"]
+__all__ = ["cast", "count_pixels", "hit"]
 
 _TINY = 1e-12
 
@@ -31,6 +31,11 @@ def cast(
         window[closer] = t[closer]
         nearest[y0:y1, x0:x1][closer] = order
     return depth, nearest
+
+
+def count_pixels(nearest: NDArray[np.int32], n_primitives: int) -> NDArray[np.int64]:
+    """Return how many pixels show each primitive (n_primitives,)."""
+    return np.bincount(nearest.ravel() + 1, minlength=n_primitives + 1)[1:]
 
 
 def hit(
