@@ -37,7 +37,9 @@ _SHAPES = ("Bowl", "AppleSliced", "BreadSliced", "TomatoSliced", "PotatoSliced",
            "Apple", "Tomato",
            "TennisRacket", "AlarmClock", "Watch", "Ladle", "Statue", "CreditCard", "CellPhone",
            "SaltShaker",
-           "PepperShaker", "Microwave", "Safe", "DogBed", "Lettuce")  # fmt: skip
+           "PepperShaker", "Microwave", "Safe", "DogBed", "Lettuce",
+           "Egg", "ScrubBrush", "Plunger", "Newspaper", "Fork", "Spoon", "CD",
+           "SoapBar")  # fmt: skip
 _HELD = (
     ("kitchen-1", "Pan"),
     ("kitchen-2", "Bread"),

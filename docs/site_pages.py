@@ -21,6 +21,7 @@ _OUTSIDE = {  # where a file lies in the repository: where its page stands in th
     "benchmarks/README.md": "benchmarks/README.md",
     "benchmarks/cost.md": "benchmarks/cost.md",
     "benchmarks/engines.md": "benchmarks/engines.md",
+    "benchmarks/drawings.md": "benchmarks/drawings.md",
     "benchmarks/generation.md": "benchmarks/generation.md",
     "benchmarks/gpu.md": "benchmarks/gpu.md",
     "benchmarks/manipulation.md": "benchmarks/manipulation.md",

@@ -171,3 +171,16 @@ def test_a_drawer_holds_what_may_lie_in_it() -> None:
     ]
     assert len(sides) == 2
     assert all(float(np.asarray(p.center)[1] + reach(p)[1]) > 0.9 * tallest for p in sides)
+
+
+@pytest.mark.parametrize("object_type", ["CD", "KeyChain", "SoapBar"])
+def test_things_of_one_model_are_drawn_apart(object_type: str) -> None:
+    """Ten objects of one style have at least four looks, always the same by their ids."""
+    looks_by_id = []
+    for _ in range(2):
+        items = [default_object(object_type, np.array([0.1 * n, 1.0, 0.0])) for n in range(10)]
+        for item in items:
+            item.style = 0
+        looks_by_id.append([tuple(part.color for part in shape(item)) for item in items])
+    assert len(set(looks_by_id[0])) >= 4
+    assert looks_by_id[0] == looks_by_id[1]

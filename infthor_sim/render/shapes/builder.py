@@ -1,12 +1,13 @@
 """Building an object's shape: coordinates from -1 to 1 across its box, front towards +z."""
 
+import zlib
 from collections.abc import Sequence
 from functools import partialmethod
 
 import numpy as np
 
 from infthor_sim.geometry import Array, euler_matrix, yaw_matrix
-from infthor_sim.objects import WALL, SimObject, SimObjectState, style_of
+from infthor_sim.objects import WALL, SimObject, SimObjectState
 from infthor_sim.render.primitives import Color, Form, Material, ShapePart
 
 __all__ = ["Builder", "Vector", "shade_of"]
@@ -39,7 +40,7 @@ class Builder:
         self.state: SimObjectState = item.state
         self.parts: list[ShapePart] = []
         self.style = item.style
-        self.mark = style_of(item.object_id)
+        self.mark = zlib.crc32(item.object_id.encode())
         self._turn = yaw_matrix(item.front)
         self.half: Array = item.front_size / 2
 

@@ -32,6 +32,7 @@ _SOAPS: tuple[Color, ...] = (
     (0.95, 0.86, 0.74), (0.92, 0.66, 0.68), (0.68, 0.83, 0.66), (0.66, 0.78, 0.9),
     (0.8, 0.72, 0.9),
 )  # fmt: skip
+_SOAP_MARKS = (1.1, 0.72, 0.88)  # shades of the mark, relative to the soap
 
 
 @draws
@@ -202,7 +203,7 @@ def soap_bar(b: Builder) -> None:
     for x in (-0.76, 0.76):
         for z in (-0.84, 0.84):
             b.tube((x, -0.1, z), (0.24, 0.9, 0.16), color)
-    mark = pick((1.1, 0.72, 0.88), b.mark // len(_SOAPS))
+    mark = _SOAP_MARKS[b.mark // len(_SOAPS) % len(_SOAP_MARKS)]
     b.tube((0, 0.8, 0), (0.55, 0.1, 0.62), shade_of(color, mark))
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.step_log import ObjectInFrame
 from infthor_eval.generation.questions import (
     contents,
     counting,
@@ -16,6 +17,7 @@ from infthor_eval.generation.questions import (
     put_action,
 )
 from infthor_eval.generation.questions.checker import Checker
+from infthor_eval.generation.questions.facts import frame_facts
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
 from infthor_eval.generation.questions.rooms import rooms_of
 from infthor_eval.thor.launch import embedded_launch
@@ -297,3 +299,14 @@ def test_a_view_well_inside_the_frame_is_preferred():
     )
     (candidate,) = open_state.open_states(opened)
     assert (candidate.answers, candidate.clues) == (("yes",), (1,))
+
+
+def test_a_fork_must_fill_more_of_a_frame_than_a_knife_to_count_as_shown():
+    log = history({key: state(key, "Desk|1") for key in ("Desk|1", "Fork|1", "Knife|1")})
+    for pixels, shown in ((89, set()), (90, {"Knife|1"}), (179, {"Knife|1"}),
+                          (180, {"Fork|1", "Knife|1"})):  # fmt: skip
+        for key in ("Fork|1", "Knife|1"):
+            log.steps[0].seen[key] = ObjectInFrame(pixels, (100, 100, 120, 120), True)
+        (facts,) = frame_facts(log.steps, DEFAULT_SHARE, [0])
+        assert {key for key in ("Fork|1", "Knife|1") if log.shows(0, key)} == shown
+        assert set(facts.objects) - {"Desk|1"} == shown
