@@ -1,12 +1,16 @@
-"""What `gen_info` says of where a trajectory was made: no clock, no checkout, unless told."""
+"""What `gen_info` says of how a trajectory was made: settings; no clock and no checkout, unless
+told."""
 
 import importlib.metadata
+import json
 
 import pytest
 
 from infthor_eval.errors import UsageError
 from infthor_eval.generation import provenance as module
 from infthor_eval.generation.provenance import provenance
+
+from ..helpers.command_line import option_words
 
 
 def test_the_clock_is_read_from_the_environment_alone(monkeypatch):
@@ -37,3 +41,13 @@ def test_the_commit_is_the_installed_one(monkeypatch, written, commit):
     monkeypatch.setattr(module, "distribution", lambda name: Installed)
     assert provenance()["git"] == commit
     assert provenance()["ai2thor"] == importlib.metadata.version("ai2thor")
+
+
+def test_the_filter_of_goals_is_a_setting_by_which_a_run_is_resumed(run_cli, tmp_path):
+    words = option_words(scene="bathroom-1", min_steps="1", min_subgoals="1", out=tmp_path)
+    assert run_cli("generate", *words, "--no-scene-goal-filter")[0] == 0
+    info = json.loads((tmp_path / "bathroom-1-seed0.json").read_text())["gen_info"]
+    assert info["scene_goal_filter"] is False and "banked_on_giveup" not in info
+    code, _, err = run_cli("generate", *words)
+    assert code == 1 and "generated with other settings" in err
+    assert run_cli("generate", *words, "--no-scene-goal-filter")[0] == 0
