@@ -89,6 +89,8 @@ class SimulatorServer:
         }
         segmented = bool(requested["ids"] or requested["classes"])
         yield FieldType.METADATA, self._packer.message(sim, outcome, sequence, segmented)
+        if not any(requested.values()):
+            return
         yield from self._pictures(sim.views.agent_frame(), requested, _AGENT)
         for camera in sim.cameras:
             yield from self._pictures(sim.views.third_party(camera), requested, _THIRD)
