@@ -7,7 +7,6 @@ import copyreg
 import io
 import pickle
 from collections.abc import Callable
-from typing import ClassVar
 
 import numpy as np
 
@@ -22,7 +21,9 @@ class SavedState:
 
     def __init__(self, world: World, random: np.random.Generator) -> None:
         buffer = io.BytesIO()
-        _Pickler(buffer, protocol=pickle.HIGHEST_PROTOCOL).dump((world, random))
+        pickler = pickle.Pickler(buffer, protocol=pickle.HIGHEST_PROTOCOL)
+        pickler.dispatch_table = {**copyreg.dispatch_table, ObjectType: _reduce_type}
+        pickler.dump((world, random))
         self._content = buffer.getvalue()
 
     def copy(self) -> tuple[World, np.random.Generator]:
@@ -34,7 +35,3 @@ class SavedState:
 def _reduce_type(record: ObjectType) -> tuple[Callable[[str], ObjectType], tuple[str]]:
     """Have a type's record looked up again: it is never changed, so states can share it."""
     return type_named, (record.name,)
-
-
-class _Pickler(pickle.Pickler):
-    dispatch_table: ClassVar = {**copyreg.dispatch_table, ObjectType: _reduce_type}

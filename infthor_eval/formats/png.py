@@ -28,7 +28,7 @@ def write_png(path: Path, frame: NDArray[np.uint8], level: int) -> None:
     rows[:, 1:] = frame.reshape(height, 3 * width)
     parts = (
         _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, *_RGB)),
-        _chunk(b"IDAT", zlib.compress(rows, level)),
+        _chunk(b"IDAT", zlib.compress(rows.tobytes(), level)),
         _chunk(b"IEND", b""),
     )
     path.write_bytes(_SIGNATURE + b"".join(parts))

@@ -117,6 +117,8 @@ class SimulatorServer:
         }
         segmented = bool(requested["ids"] or requested["classes"])
         yield FieldType.METADATA, self._packer.message(sim, outcomes, sequence, segmented)
+        if not any(requested.values()):
+            return
         for _ in sim.each_agent():
             yield from self._pictures(sim.views.agent_frame(), requested, _AGENT)
         for camera in sim.cameras:

@@ -62,8 +62,8 @@ def _measure(center: Array, extents: Array, limit: float, bounds: Array) -> None
     """Write the bounds of boxes by their middle and half edges, cut off at the depth `limit`."""
     points = np.empty((len(CORNERS), 3))
     for n in range(len(center)):
-        u0, v0, near = math.inf, math.inf, math.inf
-        u1, v1, farthest = -math.inf, -math.inf, -math.inf
+        u0 = v0 = near = math.inf
+        u1 = v1 = farthest = -math.inf
         n_in_front = 0
         for k in range(len(CORNERS)):
             for i in range(3):
@@ -72,10 +72,12 @@ def _measure(center: Array, extents: Array, limit: float, bounds: Array) -> None
                     + CORNERS[k, 2] * extents[n, 2, i]
                 )
             depth = points[k, 2]
-            near, farthest = min(near, depth), max(farthest, depth)
+            near = min(near, depth)
+            farthest = max(farthest, depth)
             if depth >= limit:
                 n_in_front += 1
-                u, v = points[k, 0] / depth, points[k, 1] / depth
+                u = points[k, 0] / depth
+                v = points[k, 1] / depth
                 u0, u1, v0, v1 = min(u0, u), max(u1, u), min(v0, v), max(v1, v)
         if 0 < n_in_front < len(CORNERS):
             # Corners behind the camera project to the wrong side. The points where edges cross the
@@ -86,8 +88,12 @@ def _measure(center: Array, extents: Array, limit: float, bounds: Array) -> None
                     u = (points[a, 0] + share * (points[b, 0] - points[a, 0])) / limit
                     v = (points[a, 1] + share * (points[b, 1] - points[a, 1])) / limit
                     u0, u1, v0, v1 = min(u0, u), max(u1, u), min(v0, v), max(v1, v)
-        bounds[n, _U0], bounds[n, _V0], bounds[n, _NEAR] = u0, v0, near
-        bounds[n, _U1], bounds[n, _V1], bounds[n, _FAR] = u1, v1, farthest
+        bounds[n, _U0] = u0
+        bounds[n, _V0] = v0
+        bounds[n, _U1] = u1
+        bounds[n, _V1] = v1
+        bounds[n, _NEAR] = near
+        bounds[n, _FAR] = farthest
 
 
 @njit(cache=True, error_model="numpy")

@@ -245,8 +245,8 @@ def _cast(
             nearest_there = nearest[y, first : last + 1]
             if profiles[order, 0] == _BOX:
                 _cast_box_row(
-                    origin[order], steps[order], near[order], us_there, vs[y], clip, order, depth_there,
-                    nearest_there,
+                    origin[order], steps[order], near[order], us_there, vs[y], clip, order,
+                    depth_there, nearest_there,
                 )  # fmt: skip
             else:
                 _cast_round_row(

@@ -141,14 +141,23 @@ def brightness(
     starts, members = group(orders, first)
     work = np.empty((9, len(orders)))
     # taken one by one, as numba does not know of unpacked rows that they are contiguous
-    u, v, t = work[0], work[1], work[2]
-    light, a, b = work[3], work[4], work[5]
-    nx, ny, nz = work[6], work[7], work[8]
+    u = work[0]
+    v = work[1]
+    t = work[2]
+    light = work[3]
+    a = work[4]
+    b = work[5]
+    nx = work[6]
+    ny = work[7]
+    nz = work[8]
     for j in range(len(members)):
         i = members[j]
-        u[j], v[j], t[j] = us[i], vs[i], depths[i]
+        u[j] = us[i]
+        v[j] = vs[i]
+        t[j] = depths[i]
     for k in range(first):
-        start, end = starts[k], starts[k + 1]
+        start = starts[k]
+        end = starts[k + 1]
         if start == end:
             continue
         if table[k, FORM] == _BOX:

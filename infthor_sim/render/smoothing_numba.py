@@ -146,9 +146,11 @@ def _candidate_depths(
     for part in range(parts):
         for j in range(len(members)):
             i = ray[members[j]] + part
-            u[j], v[j] = ray_u[i], ray_v[i]
+            u[j] = ray_u[i]
+            v[j] = ray_v[i]
         for k in range(first):
-            start, end = starts[k], starts[k + 1]
+            start = starts[k]
+            end = starts[k + 1]
             if start < end:
                 hits(
                     table[k, FORM], table[k, BOTTOM], table[k, TOP], table[k, ORIGIN:STEPS],
