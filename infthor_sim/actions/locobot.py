@@ -4,7 +4,8 @@
 from functools import partial
 
 from infthor_sim.actions.movement import turn, walk
-from infthor_sim.actions.registry import action
+from infthor_sim.actions.registry import Vector3, action
+from infthor_sim.actions.teleport import teleport
 from infthor_sim.errors import ActionError
 from infthor_sim.settings import LOCOBOT
 from infthor_sim.simulation import Simulation
@@ -71,3 +72,19 @@ def _turn(
 
 for _name, _sign in (("RotateRight", 1.0), ("RotateLeft", -1.0)):
     action(_name, modes=(LOCOBOT,))(partial(_turn, _sign))
+
+
+@action("TeleportFull", overloads=(("position",), ("x", "y", "z")), modes=(LOCOBOT,))
+def teleport_full(
+    sim: Simulation,
+    rotation: Vector3,
+    horizon: float,
+    position: Vector3 | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    z: float | None = None,
+    standing: bool | None = None,
+    forceAction: bool = False,
+) -> None:
+    """Put the robot elsewhere; it cannot crouch, so that `standing` need not be given."""
+    teleport(sim, position, x, y, z, rotation, horizon, None, forceAction)

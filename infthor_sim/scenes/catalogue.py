@@ -102,7 +102,8 @@ class Catalogue:
             raise DataError(
                 f"Scene {name} needs recorded data: give the folder that has "
                 "thor_scenes/objects.jsonl.gz and"
-                " alfred/layouts/ (run and watch: --scenes DIR; other commands: --data DIR)"
+                " alfred/layouts/ (run and watch: --scenes DIR; other commands: --data DIR); "
+                "`infthor-eval scenes fetch --out DIR` makes one"
             )
         if self._supplement is None:
             assert self._supplement_path is not None

@@ -62,6 +62,12 @@ def test_its_steps_and_turns_are_noisy_and_the_same_in_every_run():
     assert float(np.hypot(*way)) != 0.5
 
 
+def test_a_full_teleport_needs_no_standing(robot):
+    here = robot.metadata["agent"]["position"]
+    assert "horizon" in robot.refused("TeleportFull", position=here, rotation={"y": 90})
+    robot.ok("TeleportFull", **here, rotation={"y": 90}, horizon=0)
+
+
 def test_noise_of_an_action_is_added(robot):
     robot.ok("RotateRight", noise=5.0)
     assert robot.metadata["agent"]["rotation"]["y"] % 90 == 5.0
