@@ -21,7 +21,7 @@ __all__ = [
 AGENT_HEIGHT = 0.9009992  # agent.y of AI2-THOR's default agent on a floor at 0
 AGENT_RADIUS = 0.2  # of the agent's capsule, metres
 CAMERA_HEIGHT = 0.675  # camera above agent.y, fitted to the boxes recorded in ALFRED
-# degrees that the camera tilts below and above the horizon
+# degrees that the default agent's camera tilts below the horizon, and all agents' above it
 MAX_DOWN = 60.0
 MAX_UP = 30.0
 CROUCH = 0.35  # metres that crouching lowers the camera
@@ -56,6 +56,7 @@ class Agent:
         eye: camera relative to the agent's position (right, up, ahead), metres; the stretch robot's
             is off centre.
         crouch: metres that crouching lowers the camera; 0 for a robot that cannot crouch.
+        max_down: degrees that the camera tilts below the horizon at most.
         held: id of the object in its hand; None for an empty hand.
         grip: pose of the held object in the camera's frame; None for the usual one after a pick-up.
         hand: pose of the hand in the camera's frame; the held object keeps its place in it.
@@ -68,6 +69,7 @@ class Agent:
     standing: bool = True
     eye: tuple[float, float, float] = (0.0, CAMERA_HEIGHT, 0.0)
     crouch: float = CROUCH
+    max_down: float = MAX_DOWN
     held: str | None = None
     grip: Grip | None = None
     hand: Grip = HAND_AT_REST

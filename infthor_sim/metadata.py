@@ -154,13 +154,13 @@ def _orthographic_size(sim: Simulation, outcome: Outcome) -> float:
     """Return the agent camera's orthographic size, metres, as AI2-THOR reports it.
 
     It is told once, in the reply to the action that switches to the map; other replies have -1, and
-    that to Reset 0.
+    those to Reset and Initialize 0.
     """
     if outcome.action == "ToggleMapView" and sim.display.map_view and not outcome.error:
         size = map_camera(sim.world).orthographic_size
         assert size is not None
         return size
-    return 0.0 if outcome.action == "Reset" else -1.0
+    return 0.0 if outcome.action in ("Reset", "Initialize") else -1.0
 
 
 def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infthor_sim.actions.registry import Vector3, action
-from infthor_sim.agent import MAX_DOWN, MAX_UP, Agent
+from infthor_sim.agent import MAX_UP, Agent
 from infthor_sim.errors import ActionError
 from infthor_sim.geometry import Array, euler_matrix, level_gaps, to_array
 from infthor_sim.objects import SimObject
@@ -18,7 +18,7 @@ from infthor_sim.render.probe import VisibilityProbe
 from infthor_sim.simulation import Simulation
 
 _FINEST = 0.01  # metres; finer grids have millions of points
-_TILT = 30.0  # degrees between the horizons that are tried
+TILT = 30.0  # degrees between the horizons that are tried
 
 
 @action("GetReachablePositions", query=True)
@@ -63,7 +63,7 @@ def get_interactable_poses(
     item = sim.world.get(objectId)
     reach = sim.settings.visibility_distance if maxDistance is None else maxDistance
     turns = _range(0.0, 360.0 - 1e-6, sim.settings.rotate_step) if rotations is None else rotations
-    tilts = _range(-MAX_UP, MAX_DOWN, _TILT) if horizons is None else horizons
+    tilts = _range(-MAX_UP, sim.world.agent.max_down, TILT) if horizons is None else horizons
     heights = [True, False] if standings is None else standings
     places = get_reachable_positions(sim) if positions is None else positions
     near = [p for p in places if level_gaps(to_array(p)[[0, 2]], *item.bounds()) <= reach]

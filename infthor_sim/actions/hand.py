@@ -12,6 +12,7 @@ from infthor_sim.errors import ActionError
 from infthor_sim.geometry import Array, euler_matrix, to_array
 from infthor_sim.physics.clearance import obstacle_at
 from infthor_sim.physics.falling import let_fall
+from infthor_sim.settings import HAND_MODES
 from infthor_sim.simulation import Simulation
 
 _THROW_REACH = 0.9  # metres in front of the agent at which a thrown thing lands
@@ -21,13 +22,13 @@ _DIRECTIONS = {
 }  # fmt: skip
 
 
-@action("DropHandObject", "DropHeldObject")
+@action("DropHandObject", "DropHeldObject", modes=HAND_MODES)
 def drop(sim: Simulation, forceAction: bool = False, autoSimulation: bool = True) -> None:
     """Let the held object fall to whatever is below it."""
     _let_go(sim, 0.0)
 
 
-@action("DropHeldObjectAhead")
+@action("DropHeldObjectAhead", modes=HAND_MODES)
 def drop_ahead(
     sim: Simulation,
     forceAction: bool = False,
@@ -39,7 +40,7 @@ def drop_ahead(
     _let_go(sim, _THROW_REACH)
 
 
-@action("ThrowObject")
+@action("ThrowObject", modes=HAND_MODES)
 def throw(
     sim: Simulation,
     moveMagnitude: float = 0.0,
@@ -57,7 +58,7 @@ def _let_go(sim: Simulation, ahead: float) -> None:
     let_fall(sim.world, held, held.center + forward * ahead)
 
 
-@action("MoveHeldObject")
+@action("MoveHeldObject", modes=HAND_MODES)
 def move_held_object(
     sim: Simulation,
     ahead: float = 0.0,
@@ -76,10 +77,12 @@ def _move_along(
 
 
 for _name, _direction in _DIRECTIONS.items():
-    action(f"MoveHeldObject{_name}", f"MoveHand{_name}")(partial(_move_along, np.array(_direction)))
+    action(f"MoveHeldObject{_name}", f"MoveHand{_name}", modes=HAND_MODES)(
+        partial(_move_along, np.array(_direction))
+    )
 
 
-@action("RotateHeldObject", overloads=((), ("rotation",)))
+@action("RotateHeldObject", overloads=((), ("rotation",)), modes=HAND_MODES)
 def rotate_held_object(
     sim: Simulation,
     pitch: float = 0.0,

@@ -12,6 +12,7 @@ from infthor_sim.objects import SimObject
 from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.receptacles import drawer_offset
 from infthor_sim.physics.solids import unfold
+from infthor_sim.settings import HAND_MODES
 from infthor_sim.simulation import Simulation
 
 # Overlaps of boxes that `forceAction` tolerates in a full receptacle of a recording, smallest
@@ -19,7 +20,7 @@ from infthor_sim.simulation import Simulation
 _CROWDED = (0.12, 0.24, 0.35)
 
 
-@action("PickupObject", overloads=BY_ID_OR_PIXEL)
+@action("PickupObject", overloads=BY_ID_OR_PIXEL, modes=HAND_MODES)
 def pick_up(
     sim: Simulation,
     objectId: str | None = None,
@@ -50,7 +51,7 @@ def pick_up(
     world.carry()
 
 
-@action("PutObject", overloads=BY_ID_OR_PIXEL)
+@action("PutObject", overloads=BY_ID_OR_PIXEL, modes=HAND_MODES)
 def put(
     sim: Simulation,
     objectId: str | None = None,
@@ -110,7 +111,7 @@ def _check_receptacle(held: SimObject, target: SimObject) -> None:
         )
 
 
-@action("OpenObject", overloads=BY_ID_OR_PIXEL)
+@action("OpenObject", overloads=BY_ID_OR_PIXEL, modes=HAND_MODES)
 def open_object(
     sim: Simulation,
     objectId: str | None = None,

@@ -7,19 +7,20 @@ from functools import partial
 import numpy as np
 
 from infthor_sim.actions.registry import Vector3, action
-from infthor_sim.agent import MAX_DOWN, MAX_UP
+from infthor_sim.agent import MAX_UP
 from infthor_sim.errors import ActionError, ErrorCode
 from infthor_sim.geometry import Array
 from infthor_sim.physics.crowd import agent_on_way
 from infthor_sim.physics.obstacles import blocking_object, held_object_blocks, nearest_name
+from infthor_sim.settings import HAND_MODES
 from infthor_sim.simulation import Simulation
 
 # degrees from the agent's own
 _DIRECTIONS = {"Ahead": 0.0, "Back": 180.0, "Left": -90.0, "Right": 90.0}
 
 
-def _move(
-    turn: float,
+def walk(
+    direction: float,
     sim: Simulation,
     moveMagnitude: float | None = None,
     objectId: str | None = None,
@@ -36,7 +37,7 @@ def _move(
     if size <= 0:
         raise ActionError("moveMagnitude must be > 0")
     agent = sim.world.agent
-    angle = math.radians(agent.yaw + turn)
+    angle = math.radians(agent.yaw + direction)
     offset = np.array([math.sin(angle), 0.0, math.cos(angle)]) * size
     target = agent.position + offset
     if (
@@ -63,7 +64,7 @@ def _move(
 
 
 for _name, _angle in _DIRECTIONS.items():
-    action(f"Move{_name}")(partial(_move, _angle))
+    action(f"Move{_name}")(partial(walk, _angle))
 
 
 def _check_path(sim: Simulation, target: Array, offset: Array, force: bool) -> None:
@@ -84,7 +85,7 @@ def _blocked(sim: Simulation, obstacle: str, offset: Array) -> ActionError:
     return ActionError(f"{obstacle} is blocking Agent {sim.world.active} from moving by ({by}).")
 
 
-def _rotate(
+def turn(
     sign: float,
     sim: Simulation,
     degrees: float | None = None,
@@ -95,6 +96,7 @@ def _rotate(
     manualInteract: bool = False,
     forceAction: bool = False,
 ) -> None:
+    """Turn by some degrees to the right, or with `sign` -1 to the left."""
     # Unity takes 0 degrees, its default, for `rotateStepDegrees`.
     amount = sim.settings.rotate_step if degrees is None or degrees == 0 else degrees
     agent = sim.world.agent
@@ -104,7 +106,7 @@ def _rotate(
 
 
 for _name, _sign in (("RotateRight", 1.0), ("RotateLeft", -1.0)):
-    action(_name)(partial(_rotate, _sign))
+    action(_name)(partial(turn, _sign))
 
 
 def _look(
@@ -121,8 +123,8 @@ def _look(
         )
     agent = sim.world.agent
     target = round(agent.horizon + sign * degrees, 4)
-    if target > MAX_DOWN:
-        text = f"can't look down beyond {MAX_DOWN:g} degrees below the forward horizon"
+    if target > agent.max_down:
+        text = f"can't look down beyond {agent.max_down:g} degrees below the forward horizon"
         raise ActionError(text, ErrorCode.LOOK_DOWN_LIMIT)
     if target < -MAX_UP:
         raise ActionError(
@@ -146,7 +148,7 @@ def rotate_look(sim: Simulation, rotation: Vector3 | None = None, horizon: float
     sim.world.carry()
 
 
-@action("Crouch")
+@action("Crouch", modes=HAND_MODES)
 def crouch(sim: Simulation) -> None:
     """Lower the camera."""
     if not sim.world.agent.standing:
@@ -154,7 +156,7 @@ def crouch(sim: Simulation) -> None:
     sim.world.agent.standing = False
 
 
-@action("Stand")
+@action("Stand", modes=HAND_MODES)
 def stand(sim: Simulation) -> None:
     """Raise the camera again."""
     if sim.world.agent.standing:

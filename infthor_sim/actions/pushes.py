@@ -9,6 +9,7 @@ from infthor_sim.actions.targets import BY_ID_OR_PIXEL, interactable
 from infthor_sim.errors import ActionError
 from infthor_sim.geometry import Array, yaw_matrix
 from infthor_sim.physics.sliding import LIGHTEST, slide
+from infthor_sim.settings import HAND_MODES
 from infthor_sim.simulation import Simulation
 
 _FRAME = 0.02  # seconds that Unity applies the force
@@ -30,10 +31,10 @@ def _push(
 
 
 for _name, _angle in (("PushObject", 0.0), ("PullObject", 180.0)):
-    action(_name, overloads=BY_ID_OR_PIXEL)(partial(_push, _angle))
+    action(_name, overloads=BY_ID_OR_PIXEL, modes=HAND_MODES)(partial(_push, _angle))
 
 
-@action("DirectionalPush", overloads=BY_ID_OR_PIXEL)
+@action("DirectionalPush", overloads=BY_ID_OR_PIXEL, modes=HAND_MODES)
 def directional_push(
     sim: Simulation,
     moveMagnitude: float,

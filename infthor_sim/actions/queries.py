@@ -62,10 +62,19 @@ def _goal(
         return to_array(target)
     if object_id is not None:
         return sim.world.get(object_id).center
+    return nearest_of_type(sim, object_type).center
+
+
+def nearest_of_type(sim: Simulation, object_type: str | None) -> SimObject:
+    """Return the object of a type that is nearest to the agent.
+
+    Raises:
+        ActionError: there is none.
+    """
     candidates = [o for o in sim.world.objects.values() if o.object_type == object_type]
     if not candidates:
         raise ActionError(f"No object of type {object_type!r} is in the scene")
-    return min(candidates, key=lambda o: (sim.world.distance(o), o.object_id)).center
+    return min(candidates, key=lambda o: (sim.world.distance(o), o.object_id))
 
 
 @action("GetObjectInFrame", query=True)

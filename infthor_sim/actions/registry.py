@@ -39,6 +39,7 @@ class Action:
         run: function that takes the simulation and the wire's arguments by name.
         parameters: parameters of `run` without the simulation; their annotations are the accepted
             types.
+        modes: agent modes that it was registered for.
         query: it changes nothing that is seen, so the client keeps its last frame.
         lenient: unknown arguments are ignored, as in the actions that take Unity's whole
             ServerAction.
@@ -48,6 +49,7 @@ class Action:
     name: str
     run: ActionFunction
     parameters: Mapping[str, inspect.Parameter]
+    modes: tuple[str, ...]
     query: bool
     lenient: bool
     overloads: tuple[Overload, ...] = ()
@@ -68,14 +70,13 @@ def action(
     def register(run: ActionFunction) -> ActionFunction:
         parameters = dict(list(inspect.signature(run).parameters.items())[1:])
         for name in names:
-            new = Action(name, run, parameters, query, lenient, overloads)
+            new = Action(name, run, parameters, modes, query, lenient, overloads)
             for mode in modes:
-                # Unity's arm agents descend from the default one and override some of its actions.
-                # An action of some modes wins over one of all modes, whichever module is imported
-                # first.
-                if modes == AGENT_MODES:
-                    _ACTIONS[mode].setdefault(name, new)
-                else:
+                # Unity's other agents descend from the default one and override some of its
+                # actions. An action of fewer modes wins over one of more, whichever module is
+                # imported first.
+                known = _ACTIONS[mode].get(name)
+                if known is None or len(modes) < len(known.modes):
                     _ACTIONS[mode][name] = new
         return run
 

@@ -8,6 +8,7 @@ from infthor_sim.actions.targets import BY_ID_OR_PIXEL, interactable, object_act
 from infthor_sim.effects import break_object
 from infthor_sim.errors import ActionError
 from infthor_sim.objects import SimObject
+from infthor_sim.settings import HAND_MODES
 from infthor_sim.simulation import Simulation
 
 _LIQUIDS = ("coffee", "wine", "water")
@@ -62,7 +63,7 @@ for _spec in _ACTIONS:
     object_action(_spec.name)(partial(_set_state, spec=_spec))
 
 
-@action("FillObjectWithLiquid", overloads=BY_ID_OR_PIXEL)
+@action("FillObjectWithLiquid", overloads=BY_ID_OR_PIXEL, modes=HAND_MODES)
 def fill(
     sim: Simulation,
     fillLiquid: str,

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from infthor_sim.actions.registry import action
 from infthor_sim.errors import ActionError, ErrorCode
 from infthor_sim.objects import SimObject
+from infthor_sim.settings import HAND_MODES
 from infthor_sim.simulation import Simulation
 
 __all__ = [
@@ -35,7 +36,7 @@ def object_action(*names: str) -> Callable[[ObjectFunction], ObjectFunction]:
         ) -> None:
             function(sim, interactable(sim, objectId, forceAction, x, y))
 
-        action(*names, overloads=BY_ID_OR_PIXEL)(run)
+        action(*names, overloads=BY_ID_OR_PIXEL, modes=HAND_MODES)(run)
         return function
 
     return register

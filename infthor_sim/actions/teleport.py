@@ -3,7 +3,7 @@
 import numpy as np
 
 from infthor_sim.actions.registry import Vector3, action
-from infthor_sim.agent import MAX_DOWN, MAX_UP
+from infthor_sim.agent import MAX_UP
 from infthor_sim.errors import ActionError
 from infthor_sim.geometry import Array
 from infthor_sim.physics.crowd import agent_at
@@ -67,10 +67,9 @@ def _place_on_floor(world: World, target: Array, horizon: float) -> Array:
     Raises:
         ActionError: the agent cannot be there.
     """
-    if not -MAX_UP <= horizon <= MAX_DOWN:
-        raise ActionError(
-            f"Each horizon must be in [{-MAX_UP:g}:{MAX_DOWN:g}]. You gave {horizon}."
-        )
+    lowest = world.agent.max_down
+    if not -MAX_UP <= horizon <= lowest:
+        raise ActionError(f"Each horizon must be in [{-MAX_UP:g}:{lowest:g}]. You gave {horizon}.")
     low, high = world.scene_bounds()
     if np.any(target[[0, 2]] < low[[0, 2]]) or np.any(target[[0, 2]] > high[[0, 2]]):
         raise ActionError("Teleport target out of bounds: ({:.4f}, {:.4f}, {:.4f})".format(*target))

@@ -20,6 +20,7 @@ __all__ = ["Catalogue"]
 
 _LISTED = 1000  # procedural scenes of each kind that `names` has; there is no last one
 _PROCEDURAL = re.compile(r"([a-z-]+)-(\d+)")
+_ROBOTHOR = re.compile(r"FloorPlan_(Train|Val|Test|RVal|test-dev|test-challenge)\d+_\d+")
 _ITHOR = re.compile(r"FloorPlan\d+")
 _FLOOR_PLAN = re.compile(r"FloorPlan(_[A-Za-z0-9_]+|\d+)")
 # What a floor plan whose fields are missing or of other types raises.
@@ -92,11 +93,17 @@ class Catalogue:
         return build_house(house, self._assets)
 
     def _floor_plan(self, name: str) -> World:
+        if _ROBOTHOR.fullmatch(name) and (self._data is None or name not in self._data.scenes()):
+            raise DataError(
+                f"{name} is an apartment of RoboTHOR, of which there is no recording; use "
+                "house-<seed>, a procedural one, with agentMode='locobot'"
+            )
         if self._data is None:
             raise DataError(
                 f"Scene {name} needs recorded data: give the folder that has "
                 "thor_scenes/objects.jsonl.gz and"
-                " alfred/layouts/ (run and watch: --scenes DIR; other commands: --data DIR)"
+                " alfred/layouts/ (run and watch: --scenes DIR; other commands: --data DIR); "
+                "`infthor-eval scenes fetch --out DIR` makes one"
             )
         if self._supplement is None:
             assert self._supplement_path is not None

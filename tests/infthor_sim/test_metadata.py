@@ -125,7 +125,7 @@ def test_time_passes_with_actions():
 def test_the_size_of_the_map_is_told_once():
     bench = Bench(size=20)
     assert bench.ok("Reset", sceneName="kitchen-1")["cameraOrthSize"] == 0
-    assert bench.ok("Initialize", fastActionEmit=False)["cameraOrthSize"] == -1
+    assert bench.ok("Initialize", fastActionEmit=False)["cameraOrthSize"] == 0
     size = bench.ok("GetMapViewCameraProperties")["actionReturn"]["orthographicSize"]
     assert bench.metadata["cameraOrthSize"] == -1
     assert bench.ok("ToggleMapView")["cameraOrthSize"] == size

@@ -338,5 +338,7 @@ def test_what_is_dropped_ahead_lands_in_front_of_the_agent(bench):
     assert "Nothing in agent's hand" in bench.refused("DropHeldObjectAhead")
     bench.ok("PickupObject", objectId=potato, forceAction=True)
     bench.ok("DropHeldObjectAhead", forceAction=True, autoSimulation=False, randomMagnitude=0.0)
-    away = np.array(list(bench.object(potato)["position"].values())) - bench.sim.world.agent.position
+    away = (
+        np.array(list(bench.object(potato)["position"].values())) - bench.sim.world.agent.position
+    )
     assert float(np.hypot(away[0], away[2])) > 1.0

@@ -1,4 +1,4 @@
-"""`infthor-eval scenes`: draw a scene, or export it for machines without Unity."""
+"""`infthor-eval scenes`: draw a scene, export it for machines without Unity, or fetch it."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ _PICTURES = (".png", ".jpg", ".jpeg")
 
 @click.group("scenes", cls=ExampleGroup, example="infthor-eval scenes show kitchen-3")
 def command() -> None:
-    """Draw a scene (show), or export scenes for machines without Unity (dump)."""
+    """Draw a scene (show); get scenes for machines without Unity (dump from Unity, or fetch)."""
 
 
 @command.command(
@@ -107,3 +107,34 @@ def dump(
     with Simulator(start) as simulator:
         for name in names:
             print_line(f"{name}: {dump_scene(simulator, name, out, overwrite)} objects in {out}")
+
+
+@command.command(
+    "fetch",
+    cls=ExampleCommand,
+    example="infthor-eval scenes fetch FloorPlan1 FloorPlan201 --out scenes",
+)
+@click.argument("names", nargs=-1)
+@click.option("--out", type=PATH, required=True, help="Folder of floor plans, new or existing.")
+@click.option("--overwrite", is_flag=True, help="Replace other recordings of these scenes.")
+@click.option("--endpoint", hidden=True, help="Another host of the repositories' files.")
+def fetch(names: tuple[str, ...], out: Path, overwrite: bool, endpoint: str | None) -> None:
+    """Download AI2-THOR's floor plans NAMES, or all 120, from public repositories (MIT license).
+
+    Other commands take that folder as --data, to run these scenes in the embedded simulator.
+    """
+    from infthor_eval.storage.files import prepare_folder
+    from infthor_eval.terminal import print_line
+    from infthor_eval.thor.published_scenes import HOST, PUBLISHED_SCENES, fetch_scene
+
+    unknown = [name for name in names if name not in PUBLISHED_SCENES]
+    if unknown:
+        raise click.UsageError(
+            f"{unknown[0]}: not published; there are FloorPlan1 to 30, 201 to 230, 301 to 330 and "
+            "401 to 430"
+        )
+    prepare_folder(out)
+    for name in names or PUBLISHED_SCENES:
+        print_line(
+            f"{name}: {fetch_scene(name, out, endpoint or HOST, overwrite)} objects in {out}"
+        )
