@@ -30,7 +30,7 @@ def counts(history: TrajectoryHistory) -> Iterator[Candidate]:
     for object_type, items in sorted(history.picked_up_by_type.items()):
         item = min(items)
         moves = history.moves_of(item)
-        is_shown = all(history.shows(move.after, move.item, move.target) for move in moves)
+        is_shown = all(history.shows_put(move) for move in moves)
         if len(items) == 1 and is_shown and len(moves) == history.pickups[item] > 1:
             form = "How many times did you move {}?"
             frames = [move.after for move in moves]
