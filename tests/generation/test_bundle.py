@@ -20,7 +20,7 @@ def test_the_bundled_set_is_small_and_has_every_type_and_number_of_clues():
     assert len({question.question_type for question in data.questions}) == 13
     assert {min(len(question.clues), 3) for question in data.questions} == {1, 2, 3}
     assert len({question.traj_id for question in data.questions}) == 6
-    assert 130 <= len(data.questions) <= 170
+    assert 120 <= len(data.questions) <= 170
     assert sum(path.stat().st_size for path in BUNDLED.rglob("*") if path.is_file()) < 12e6
 
 

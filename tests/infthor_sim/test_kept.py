@@ -6,8 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_sim.metadata import Outcome
-from infthor_sim.pictures.views import Views
-from infthor_sim.pictures.vision import AgentVision
 from infthor_sim.player.packing import MetadataPacker
 
 from .harness import Bench
@@ -40,8 +38,7 @@ def forget(bench: Bench) -> None:
     """Drop all that is kept between replies."""
     sim = bench.sim
     bench.server._packer = MetadataPacker()
-    sim.views = Views(sim.world, sim.display, sim.settings)
-    sim.vision = AgentVision(sim.world, sim.views, sim.display, sim.settings)
+    sim._show(sim.world)
 
 
 def reply_anew(bench: Bench) -> list[tuple[Any, bytes]]:
@@ -51,7 +48,8 @@ def reply_anew(bench: Bench) -> list[tuple[Any, bytes]]:
 
 
 def shown(bench: Bench) -> list[tuple[Any, bytes]]:
-    reply = bench.server._reply(Outcome("Pass"), 1, {})
+    bench.server._outcomes = {0: Outcome("Pass")}
+    reply = bench.server._reply(1, {})
     return [(field_type, bytes(body)) for field_type, body in reply]
 
 
