@@ -1,6 +1,7 @@
 """Restoring the recorded initial state of a trajectory.
 
-The order is ALFRED's: toggles, dirt and liquids, object poses, then the agent. Recorded poses have
+The order is ALFRED's: toggles, dirt and liquids, object poses, states of single objects (ours), then
+the agent. Recorded poses have
 names of Unity objects, which differ between AI2-THOR versions. An unknown name is replaced by that
 of an object of the same type.
 """
@@ -10,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from infthor_eval.formats.object_ids import modern_type
-from infthor_eval.formats.trajectory import ObjectPose, Scene
+from infthor_eval.formats.trajectory import ObjectPose, Scene, StartState
 from infthor_eval.thor.axes import modern_rotation
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView, Vector, teleport_call
@@ -44,13 +45,35 @@ def restore(simulator: Simulator, scene: Scene) -> RestoreReport:
         poses, report.dropped = _poses(scene.object_poses, view)
         calls.append({"action": "SetObjectPoses", "objectPoses": poses, "placeStationary": True})
     start = scene.init_action
-    pose = AgentPose(Vector(start.x, start.y, start.z), start.yaw, start.horizon)
-    calls.append(teleport_call(pose))
     for call in calls:
-        view = simulator.step(**call)
-        if not view.success:
-            report.refused.append(f"{call['action']}: {view.error}")
+        view = _step(simulator, call, report)
+    for state in scene.object_states or ():
+        _set_state(simulator, view, state, report)
+    pose = AgentPose(Vector(start.x, start.y, start.z), start.yaw, start.horizon)
+    _step(simulator, teleport_call(pose), report)
     return report
+
+
+def _step(simulator: Simulator, call: dict[str, Any], report: RestoreReport) -> SimulatorView:
+    view = simulator.step(**call)
+    if not view.success:
+        report.refused.append(f"{call['action']}: {view.error}")
+    return view
+
+
+def _set_state(
+    simulator: Simulator, view: SimulatorView, state: StartState, report: RestoreReport
+) -> None:
+    """Give one object its state of the start; ids are those after the poses were set."""
+    key = next((obj.object_id for obj in view.objects.values() if obj.name == state.name), None)
+    if key is None:
+        report.dropped.append(state.name)
+        return
+    if state.is_open is not None:
+        action = "OpenObject" if state.is_open else "CloseObject"
+        _step(simulator, {"action": action, "objectId": key, "forceAction": True}, report)
+    if state.is_disabled:
+        _step(simulator, {"action": "DisableObject", "objectId": key}, report)
 
 
 def _state_calls(scene: Scene) -> list[dict[str, Any]]:
