@@ -45,8 +45,16 @@ __all__ = [
 ]
 
 _SUFFIXES = (".json", ".jsonl", ".jsonl.gz")
-# Other JSON files of a replayed set.
-_NOT_TRAJECTORIES = {"metadata.json", "expert_log.json", "state_summary.json"}
+# Other JSON files of what is replayed, and of a folder of the published generator.
+_NOT_TRAJECTORIES = {
+    "expert_log.json",
+    "metadata.json",
+    "replay.json",
+    "set.json",
+    "state_summary.json",
+    "status.json",
+    "timeline.json",
+}
 _HINT = "restore the file or leave it out"
 _ALWAYS: dict[str, Callable[[], Any]] = {
     "long_horizon_task": dict,
@@ -248,6 +256,11 @@ class TrajectorySource:
     def place(self) -> str:
         """File and line, for messages."""
         return str(self.path) if self.line is None else f"{self.path}:{self.line}"
+
+    @property
+    def digest(self) -> str:
+        """Hash of the trajectory's JSON, by which replays are recognised."""
+        return digest(self.raw.strip())
 
     def read(self) -> Trajectory:
         """Decode and check the trajectory; a missing `traj_id` becomes the task's id or the file's.

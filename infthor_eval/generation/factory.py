@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import InitAction, Trajectory
 from infthor_eval.generation.draft import Draft, initial_scene
 from infthor_eval.generation.final_task import end_types
@@ -302,8 +303,14 @@ class _Factory:
         self._known_failures.task_done()
         self._problems.append(problem(task, room, f"task-{len(self._problems):03d}"))
         self._marks.append(mark)
-        self._draft.add_task(sub_task(task, self._settings.scene), start, end)
+        self._draft.add_task(sub_task(task, self._settings.scene, self._words()), start, end)
         return outcome
+
+    def _words(self) -> random.Random | None:
+        """Return what draws the next task's words, which depend on nothing but seed and number."""
+        if self._settings.words == Words.NATURAL:
+            return None
+        return random.Random(f"{self._settings.seed}/{self._draft.n_tasks}")
 
     def _objection(self, task: Task, operators: list[Operator]) -> RolloutError | None:
         """Return why a task is not worth walking for."""

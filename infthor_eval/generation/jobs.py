@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.generation.settings import MAX_FAIL, TrajectorySettings
 from infthor_eval.household.scene_types import BATHROOM, scene_type
 from infthor_eval.storage.limits import TRAJECTORIES
@@ -21,6 +22,7 @@ def trajectory_jobs(
     max_fail: int = MAX_FAIL,
     save_floor: int = 0,
     look_around: bool = False,
+    words: Words = Words.NATURAL,
 ) -> list[TrajectorySettings]:
     """Return the settings of all trajectories of a set, scene by scene.
 
@@ -35,6 +37,7 @@ def trajectory_jobs(
         save_floor: number of steps from which a trajectory that gives up is kept as far as it got;
             0: never.
         look_around: True to walk long stretches with a level camera.
+        words: the words of tasks, plain English or the published generator's.
 
     Raises:
         UsageError: the number of trajectories exceeds the limit.
@@ -55,6 +58,7 @@ def trajectory_jobs(
             max_fail=max_fail,
             save_floor=save_floor,
             look_around=look_around,
+            words=words,
         )
         for scene in scenes
         for k in seeds

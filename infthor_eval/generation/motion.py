@@ -5,19 +5,26 @@ from collections.abc import Iterator
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView, Vector, teleport_call
 
-__all__ = ["intermediate_views"]
+__all__ = ["intermediate_views", "smoothstep"]
+
+
+def smoothstep(share: float) -> float:
+    """Return the share of a motion that is done at a share of its time, if it starts and ends
+    slowly (3a² - 2a³, as in the published renderer)."""
+    return share * share * (3.0 - 2.0 * share)
 
 
 def intermediate_views(
-    simulator: Simulator, start: AgentPose, end: AgentPose, frames: int
+    simulator: Simulator, start: AgentPose, end: AgentPose, frames: int, *, eased: bool = False
 ) -> Iterator[SimulatorView]:
-    """Yield the states at evenly spaced poses between two; the agent returns to the second pose.
+    """Yield the states at poses between two; the agent returns to the second pose.
 
     Args:
         simulator: simulator with the agent at `end`.
         start: pose before the action.
         end: pose after the action.
         frames: number of frames of the action, including that at `end`.
+        eased: True for poses by `smoothstep`; else they are evenly spaced.
 
     Yields:
         `frames` - 1 states, or none if the agent did not move.
@@ -25,7 +32,8 @@ def intermediate_views(
     if start == end:
         return
     for number in range(1, frames):
-        yield simulator.query(**teleport_call(_interpolate(start, end, number / frames)))
+        share = smoothstep(number / frames) if eased else number / frames
+        yield simulator.query(**teleport_call(_interpolate(start, end, share)))
     if frames > 1:
         simulator.query(**teleport_call(end))
 

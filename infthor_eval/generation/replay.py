@@ -5,12 +5,16 @@ what really happened, so questions on it are still correct. The trajectory count
 its first refused action on.
 """
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
+from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import write_steps
-from infthor_eval.formats.trajectory import LowAction, Trajectory
+from infthor_eval.formats.trajectory import LowAction, Trajectory, TrajectorySource
 from infthor_eval.generation.motion import intermediate_views
 from infthor_eval.household.sequence_text import sequence_text
 from infthor_eval.household.state_summary import state_summaries
@@ -22,7 +26,15 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["Overlap", "Refusal", "ReplayReport", "box_iou", "replay"]
+__all__ = [
+    "ActionReplay",
+    "Overlap",
+    "Refusal",
+    "ReplayReport",
+    "SetForm",
+    "box_iou",
+    "replay",
+]
 
 
 class Refusal(msgspec.Struct):
@@ -93,10 +105,9 @@ def replay(
         SimulatorError: the simulator fails, or has no such scene.
     """
     report = ReplayReport(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames)
-    restored = restore(simulator, trajectory.scene)
-    report.restore = [f"no {name} here" for name in restored.dropped] + restored.refused
+    actions = ActionReplay(simulator, trajectory, report)
     (folder / "img").mkdir()
-    run = _Run(simulator, report, folder / "img")
+    run = _Run(simulator, actions, folder / "img", frames)
     for index, low in enumerate(trajectory.plan.low_actions):
         run.act(index, low)
     steps = run.recorder.steps
@@ -111,6 +122,36 @@ def replay(
     return report
 
 
+@dataclass(frozen=True)
+class SetForm:
+    """An NIEH set, as a form of what replays write (`replay_set.ReplayForm`).
+
+    Attributes:
+        frames: number of frames of each action that moves the agent or its camera.
+    """
+
+    frames: int = 1
+    folder: str = "metadata"
+    simulator_options: Mapping[str, Any] = field(default_factory=dict)
+    report_type: type[ReplayReport] = ReplayReport
+
+    def write(
+        self, source: TrajectorySource, trajectory: Trajectory, simulator: Simulator, folder: Path
+    ) -> ReplayReport:
+        """Write the frames and logs of a replay, and the trajectory as it came."""
+        report = replay(trajectory, simulator, folder, source.digest, self.frames)
+        (folder / "traj_data.json").write_bytes(source.raw.strip() + b"\n")
+        return report
+
+    def require_same(self, report: ReplayReport, folder: Path) -> None:
+        """Raise DataError if an earlier replay in a folder had other settings."""
+        if report.frames != self.frames:
+            raise DataError(
+                f"{folder}: replayed with {report.frames} frames per move; remove it or choose "
+                "another --out"
+            )
+
+
 def box_iou(one: tuple[int, int, int, int], other: tuple[int, int, int, int]) -> float:
     """Return the IoU of two boxes [xmin, ymin, xmax, ymax], both ends inclusive."""
     width = min(one[2], other[2]) - max(one[0], other[0]) + 1
@@ -123,46 +164,37 @@ def _area(box: tuple[int, int, int, int]) -> int:
     return (box[2] - box[0] + 1) * (box[3] - box[1] + 1)
 
 
-class _Run:
-    """One replay, from the restored scene on."""
+class ActionReplay:
+    """Executes the actions of a trajectory in a simulator, from its restored scene on.
 
-    def __init__(self, simulator: Simulator, report: ReplayReport, images: Path) -> None:
+    What is accepted, refused or not restored is added to the report.
+
+    Raises:
+        SimulatorError: the simulator fails, or has no such scene.
+    """
+
+    def __init__(self, simulator: Simulator, trajectory: Trajectory, report: ReplayReport) -> None:
+        report.restore = restore(simulator, trajectory.scene).lines()
         self._simulator = simulator
         self._report = report
-        self.recorder = Recorder(images)
-        self.recorder.record(simulator.view)
         self._grounding = Grounding(simulator.view)
 
-    def act(self, index: int, low: LowAction) -> None:
-        before = self._simulator.view
-        api = low.api_action
-        text = str(text_of(api.action, api.object_id, api.receptacle_id))
-        target, error = self._call(index, low, before)
-        if error is None:
-            self._report.accepted[api.action] = self._report.accepted.get(api.action, 0) + 1
-        else:
-            self._report.refusals.append(Refusal(index, text, error))
-        after = self._simulator.view.agent
-        views = intermediate_views(self._simulator, before.agent, after, self._report.frames)
-        for view in views:
-            self.recorder.record(view, step=index, high_idx=low.high_idx)
-        putting = api.action == "PutObject"
-        step = self.recorder.record(
-            self._simulator.view,
-            step=index,
-            action=text,
-            high_idx=low.high_idx,
-            target=next(iter(before.inventory), None) if putting else target,
-            receptacle=target if putting else None,
-        )
-        # Set here, as an action that could not be called at all has no reply of the simulator.
-        step.success = error is None
-        step.error = error
+    def execute(self, index: int, low: LowAction) -> tuple[str | None, str | None]:
+        """Execute the action of an index.
 
-    def _call(
-        self, index: int, low: LowAction, before: SimulatorView
-    ) -> tuple[str | None, str | None]:
-        """Execute an action; returns the acted-on object's id, and the reason if it is refused."""
+        Returns:
+            The acted-on object's id, and the reason if the action was refused.
+        """
+        target, error = self._call(index, low)
+        name = low.api_action.action
+        if error is None:
+            self._report.accepted[name] = self._report.accepted.get(name, 0) + 1
+        else:
+            self._report.refusals.append(Refusal(index, _text_of(low), error))
+        return target, error
+
+    def _call(self, index: int, low: LowAction) -> tuple[str | None, str | None]:
+        before = self._simulator.view
         try:
             call = translate(low, self._grounding, before)
         except MissingObjectError as missing:
@@ -185,3 +217,40 @@ class _Run:
         self._report.overlaps.append(
             Overlap(index, low.api_action.action, object_type, round(iou, 4))
         )
+
+
+class _Run:
+    """The recording of one replay."""
+
+    def __init__(
+        self, simulator: Simulator, actions: ActionReplay, images: Path, frames: int
+    ) -> None:
+        self._simulator = simulator
+        self._actions = actions
+        self._frames = frames
+        self.recorder = Recorder(images)
+        self.recorder.record(simulator.view)
+
+    def act(self, index: int, low: LowAction) -> None:
+        before = self._simulator.view
+        target, error = self._actions.execute(index, low)
+        after = self._simulator.view.agent
+        for view in intermediate_views(self._simulator, before.agent, after, self._frames):
+            self.recorder.record(view, step=index, high_idx=low.high_idx)
+        putting = low.api_action.action == "PutObject"
+        step = self.recorder.record(
+            self._simulator.view,
+            step=index,
+            action=_text_of(low),
+            high_idx=low.high_idx,
+            target=next(iter(before.inventory), None) if putting else target,
+            receptacle=target if putting else None,
+        )
+        # Set here, as an action that could not be called at all has no reply of the simulator.
+        step.success = error is None
+        step.error = error
+
+
+def _text_of(low: LowAction) -> str:
+    api = low.api_action
+    return str(text_of(api.action, api.object_id, api.receptacle_id))

@@ -7,11 +7,12 @@ replayed again.
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Any, Protocol
 
 import msgspec
 
@@ -25,13 +26,12 @@ from infthor_eval.formats.trajectory import (
     iter_sources,
     trajectory_files,
 )
-from infthor_eval.generation.replay import ReplayReport, replay
+from infthor_eval.generation.replay import ReplayReport, SetForm
 from infthor_eval.generation.simulator_jobs import (
     SimulatorWorker,
     collect_outcomes,
     freeze_existing_objects,
 )
-from infthor_eval.storage.digests import digest
 from infthor_eval.storage.files import write_atomically
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
@@ -40,6 +40,7 @@ from infthor_eval.workers import WorkerSettings, run_jobs
 
 __all__ = [
     "ReplayFailure",
+    "ReplayForm",
     "ReplayedSet",
     "Selection",
     "replay_set",
@@ -48,8 +49,37 @@ __all__ = [
 ]
 
 _REPORT = "replay.json"
-_TRAJECTORY = "traj_data.json"
+_SET = SetForm()
 Item = tuple[TrajectorySource, Trajectory]
+
+
+class ReplayForm(Protocol):
+    """What is written of a replay; it is pickled for workers."""
+
+    @property
+    def folder(self) -> str:
+        """Folder of the trajectories' folders, in that of the set."""
+        ...
+
+    @property
+    def simulator_options(self) -> Mapping[str, Any]:
+        """Options of the `Simulator` that renders it."""
+        ...
+
+    @property
+    def report_type(self) -> type[ReplayReport]:
+        """Type of its reports (`replay.json`)."""
+        ...
+
+    def write(
+        self, source: TrajectorySource, trajectory: Trajectory, simulator: Simulator, folder: Path
+    ) -> ReplayReport:
+        """Replay a trajectory into an existing, empty folder."""
+        ...
+
+    def require_same(self, report: Any, folder: Path) -> None:
+        """Raise DataError if the report in a folder, of `report_type`, has other settings."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -138,19 +168,21 @@ def replay_set(
     simulator: Simulator,
     out: Path,
     progress: Callable[[bool], None] = lambda _: None,
-    frames: int = 1,
+    form: ReplayForm = _SET,
 ) -> ReplayedSet:
-    """Replay trajectories into `out/metadata/<traj_id>`; a failure does not stop the others.
+    """Replay trajectories into folders, those of a set into `out/metadata/<traj_id>`.
+
+    A failure does not stop the others.
 
     Args:
         selection: the trajectories.
         simulator: simulator to replay them in.
         out: folder of the set; created if it does not exist.
         progress: called after each trajectory, with True if an earlier run replayed it.
-        frames: number of frames of each action that moves the agent or its camera.
+        form: what is written of each.
     """
-    metadata = _prepare_set(out, simulator.label)
-    outcomes = enumerate(_replay_one(item, simulator, metadata, frames) for item in selection.items)
+    folder = _prepare_set(out, simulator.label, form)
+    outcomes = enumerate(_replay_one(item, simulator, folder, form) for item in selection.items)
     return _collect(outcomes, selection, progress)
 
 
@@ -159,7 +191,7 @@ def replay_with_workers(
     launch: Launch,
     out: Path,
     worker_settings: WorkerSettings,
-    frames: int = 1,
+    form: ReplayForm = _SET,
     progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> ReplayedSet:
@@ -170,22 +202,22 @@ def replay_with_workers(
         launch: simulator that each worker starts.
         out: see `replay_set`.
         worker_settings: number and place of the workers.
-        frames: see `replay_set`.
+        form: see `replay_set`.
         progress: see `replay_set`.
         say: called with messages about the workers.
     """
-    metadata = _prepare_set(out, launch.label)
-    replay_one = partial(_replay_one, metadata=metadata, frames=frames)
-    start = partial(SimulatorWorker, partial(Simulator, launch), replay_one)
+    replay_one = partial(_replay_one, out=_prepare_set(out, launch.label, form), form=form)
+    open_simulator = partial(Simulator, launch, **form.simulator_options)
+    start = partial(SimulatorWorker, open_simulator, replay_one)
     return _collect(run_jobs(start, selection.items, worker_settings, say), selection, progress)
 
 
-def _prepare_set(out: Path, label: str) -> Path:
-    """Create the folder of a set's trajectories."""
-    metadata = out / "metadata"
-    metadata.mkdir(parents=True, exist_ok=True)
+def _prepare_set(out: Path, label: str, form: ReplayForm) -> Path:
+    """Create the folder of the trajectories' folders."""
+    folder = out / form.folder
+    folder.mkdir(parents=True, exist_ok=True)
     claim_for_simulator(out, label)
-    return metadata
+    return folder
 
 
 def _collect(
@@ -210,11 +242,11 @@ def _collect(
     return result
 
 
-def _replay_one(item: Item, simulator: Simulator, metadata: Path, frames: int) -> _ReplayOutcome:
+def _replay_one(item: Item, simulator: Simulator, out: Path, form: ReplayForm) -> _ReplayOutcome:
     source, trajectory = item
     try:
         with freeze_existing_objects(), _wrap_malformed():
-            return _replay_or_check(source, trajectory, simulator, metadata, frames)
+            return _replay_or_check(source, trajectory, simulator, out, form)
     except InfthorError as error:
         return _failure_outcome(item, error)
 
@@ -256,20 +288,18 @@ def _replay_or_check(
     source: TrajectorySource,
     trajectory: Trajectory,
     simulator: Simulator,
-    metadata: Path,
-    frames: int,
+    out: Path,
+    form: ReplayForm,
 ) -> _ReplayOutcome:
-    content = source.raw.strip()
-    final = metadata / folder_name(trajectory.traj_id)
+    final = out / folder_name(trajectory.traj_id)
     if final.exists():
-        return _ReplayOutcome(_check_earlier(final, digest(content), frames), is_resumed=True)
+        return _ReplayOutcome(_check_earlier(final, source.digest, form), is_resumed=True)
     started = time.monotonic()
     try:
         with write_atomically(final) as folder:
             folder.mkdir()
-            report = replay(trajectory, simulator, folder, digest(content), frames)
+            report = form.write(source, trajectory, simulator, folder)
             report.seconds = round(time.monotonic() - started, 3)
-            (folder / _TRAJECTORY).write_bytes(content + b"\n")
             (folder / _REPORT).write_bytes(msgspec.json.encode(report) + b"\n")
     except OSError as error:
         message = (
@@ -279,17 +309,14 @@ def _replay_or_check(
     return _ReplayOutcome(report)
 
 
-def _check_earlier(folder: Path, digest: str, frames: int) -> ReplayReport:
+def _check_earlier(folder: Path, digest: str, form: ReplayForm) -> ReplayReport:
     """Return the report of an earlier run, if it is of the same trajectory and settings."""
-    report = read_json(folder / _REPORT, "remove the folder to replay it again", ReplayReport)
+    hint = "remove the folder to replay it again"
+    report = read_json(folder / _REPORT, hint, form.report_type)
     if report.digest != digest:
         raise DataError(
             f"{folder}: replayed from another trajectory of this name; remove it or choose another "
             "--out"
         )
-    if report.frames != frames:
-        raise DataError(
-            f"{folder}: replayed with {report.frames} frames per move; remove it or choose another "
-            "--out"
-        )
+    form.require_same(report, folder)
     return report

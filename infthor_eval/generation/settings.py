@@ -5,6 +5,7 @@ from typing import Any
 
 import msgspec
 
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.household.tasks import SAMPLED, TaskType
 
 __all__ = ["MAX_FAIL", "MIN_STEPS", "MIN_SUBGOALS", "TrajectorySettings"]
@@ -31,6 +32,7 @@ class TrajectorySettings:
         save_floor: number of steps from which a trajectory that gives up is kept as far as it got;
             0: never.
         look_around: True to walk long stretches with a level camera (see the module `look_around`).
+        words: the words of tasks, plain English or drawn among the published generator's.
     """
 
     scene: str
@@ -42,6 +44,7 @@ class TrajectorySettings:
     max_fail: int = MAX_FAIL
     save_floor: int = 0
     look_around: bool = False
+    words: Words = Words.NATURAL
 
     @property
     def traj_id(self) -> str:
@@ -51,9 +54,12 @@ class TrajectorySettings:
     def document(self) -> dict[str, Any]:
         """Return the settings as JSON values, as they are stored in trajectories.
 
-        `look_around` is among them only where it is used: older trajectories have no such setting.
+        `look_around` and `words` are among them only where they are used: older trajectories have
+        no such settings.
         """
         document = msgspec.json.decode(msgspec.json.encode(self), type=dict[str, Any])
         if not self.look_around:
             del document["look_around"]
+        if self.words == Words.NATURAL:
+            del document["words"]
         return document

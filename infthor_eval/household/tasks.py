@@ -4,6 +4,7 @@ To add a household task type: here, its goal in `goals.py` and `pddl.py`.
 """
 
 from enum import StrEnum
+from random import Random
 from typing import Any
 
 import msgspec
@@ -12,7 +13,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.object_ids import modern_type
 from infthor_eval.formats.trajectory import SubTask, TaskInfo
 from infthor_eval.household.affordances import preposition
-from infthor_eval.household.wording import noun, plural, with_article
+from infthor_eval.household.wording import compact_name, noun, plural, with_article
 
 __all__ = ["SAMPLED", "Task", "TaskType", "sub_task", "task_of"]
 
@@ -81,10 +82,55 @@ _TEMPLATES = {
     TaskType.PUT_AWAY: "put the {pickup} on the {receptacle}",
 }
 _ONTO = {"Plate"}  # objects are on these, not in them
+# Of the published generator (`gen/goal_library.py`), for whole objects and for slices.
+_PUBLISHED = {
+    TaskType.PLACE: (
+        ("put a {obj} in {recep}", "put some {obj} on {recep}"),
+        ("slice {obj} and put in {recep}", "put sliced {obj} in {recep}"),
+    ),
+    TaskType.PLACE_TWO: (
+        ("put two {obj} in {recep}", "find two {obj} and put them in {recep}"),
+        ("put two sliced {obj} in {recep}", "find two sliced {obj} and put them in {recep}"),
+    ),
+    TaskType.EXAMINE: (
+        ("look at {obj} under the {toggle}", "examine the {obj} with the {toggle}"),
+        ("look at sliced {obj} under the {toggle}", "examine the sliced {obj} with the {toggle}"),
+    ),
+    TaskType.CLEAN: (
+        ("put a clean {obj} in {recep}", "clean some {obj} and put it in {recep}"),
+        ("put a clean slice of {obj} in {recep}", "clean some sliced {obj} and put it in {recep}"),
+    ),
+    TaskType.HEAT: (
+        ("put a hot {obj} in {recep}", "heat some {obj} and put it in {recep}"),
+        ("put a hot slice of {obj} in {recep}", "heat some sliced {obj} and put it in {recep}"),
+    ),
+    TaskType.COOL: (
+        ("put a cool {obj} in {recep}", "cool some {obj} and put it in {recep}"),
+        ("put a cool slice of {obj} in {recep}", "cool some sliced {obj} and put it in {recep}"),
+    ),
+    TaskType.STACK: (
+        (
+            "put {obj} in a {mrecep} and then put them in {recep}",
+            "put a {mrecep} of {obj} in {recep}",
+            "put {obj} {mrecep} in {recep}",
+        ),
+        (
+            "put sliced {obj} in a {mrecep} and then put them in {recep}",
+            "put a {mrecep} of sliced {obj} in {recep}",
+            "put sliced {obj} {mrecep} in {recep}",
+        ),
+    ),
+}
 
 
-def sub_task(task: Task, scene: str) -> SubTask:
-    """Return a task in a scene in the form of trajectories, with a description in words."""
+def sub_task(task: Task, scene: str, draw: Random | None = None) -> SubTask:
+    """Return a task in a scene in the form of trajectories, with a description in words.
+
+    Args:
+        task: the task.
+        scene: name of the scene.
+        draw: draws a description among the published generator's; None for plain English.
+    """
     if task.task_type == TaskType.PUT_AWAY:  # as the published generator writes it
         return SubTask(
             TaskInfo(str(task.task_type), None, task.pickup, task.receptacle, scene),
@@ -98,7 +144,8 @@ def sub_task(task: Task, scene: str) -> SubTask:
         "parent_target": task.receptacle or "",
         "toggle_target": task.light or "",
     }
-    return SubTask(info, _describe(task), params)
+    description = _describe(task) if draw is None else _describe_as_published(task, draw)
+    return SubTask(info, description, params)
 
 
 def task_of(recorded: SubTask) -> Task:
@@ -190,3 +237,14 @@ def _describe(task: Task) -> str:
         movable=with_article(noun(task.movable)) if task.movable else "",
     )
     return text.replace(" in it ", " on it ") if task.movable in _ONTO else text
+
+
+def _describe_as_published(task: Task, draw: Random) -> str:
+    names = {
+        "obj": task.pickup,
+        "recep": task.receptacle or "",
+        "toggle": task.light or "",
+        "mrecep": task.movable or "",
+    }
+    template = draw.choice(_PUBLISHED[task.task_type][task.sliced])
+    return template.format(**{name: compact_name(value) for name, value in names.items()})

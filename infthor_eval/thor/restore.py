@@ -1,9 +1,10 @@
 """Restoring the recorded initial state of a trajectory.
 
-The order is ALFRED's: toggles, dirt and liquids, object poses, states of single objects (ours), then
-the agent. Recorded poses have
-names of Unity objects, which differ between AI2-THOR versions. An unknown name is replaced by that
-of an object of the same type.
+The order is ALFRED's: toggles, dirt and liquids, object poses, then the agent. In Unity, the agent
+comes before the poses, which are set in rounds (`settling.py`), as in the published generator. At
+the end come states of single objects, which are ours. Recorded poses have names of Unity objects,
+which differ between AI2-THOR versions. An unknown name is replaced by that of an object of the same
+type.
 """
 
 from collections import defaultdict
@@ -13,6 +14,7 @@ from typing import Any
 from infthor_eval.formats.object_ids import modern_type
 from infthor_eval.formats.trajectory import ObjectPose, Scene, StartState
 from infthor_eval.thor.axes import modern_rotation
+from infthor_eval.thor.settling import Deviation, poses_call, settle
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView, Vector, teleport_call
 
@@ -26,10 +28,20 @@ class RestoreReport:
     Attributes:
         dropped: names of recorded objects for which the scene has no object.
         refused: calls that the simulator refused, with its messages.
+        deviation: in Unity, the object farthest from its recorded pose, if it is off by more than
+            2 cm.
     """
 
     dropped: list[str] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
+    deviation: Deviation | None = None
+
+    def lines(self) -> list[str]:
+        """Return what could not be restored, in words."""
+        lines = [f"no {name} here" for name in self.dropped] + self.refused
+        if self.deviation is not None:
+            lines.append(f"{self.deviation.name} is off by {self.deviation.metres:.3f} m")
+        return lines
 
 
 def restore(simulator: Simulator, scene: Scene) -> RestoreReport:
@@ -38,38 +50,43 @@ def restore(simulator: Simulator, scene: Scene) -> RestoreReport:
     Raises:
         SimulatorError: the simulator has no such scene, or fails.
     """
-    view = simulator.reset(scene.floor_plan)
+    loaded = simulator.reset(scene.floor_plan)
     report = RestoreReport()
     calls = _state_calls(scene)
-    if scene.object_poses:
-        poses, report.dropped = _poses(scene.object_poses, view)
-        calls.append({"action": "SetObjectPoses", "objectPoses": poses, "placeStationary": True})
     start = scene.init_action
-    for call in calls:
-        view = _step(simulator, call, report)
-    for state in scene.object_states or ():
-        _set_state(simulator, view, state, report)
     pose = AgentPose(Vector(start.x, start.y, start.z), start.yaw, start.horizon)
-    _step(simulator, teleport_call(pose), report)
+    poses, report.dropped = _poses(scene.object_poses, loaded)
+    settles = simulator.label == "unity" and bool(scene.object_poses)
+    if scene.object_poses and not settles:
+        calls.append(poses_call(poses))
+    calls.append(teleport_call(pose))
+    for call in calls:
+        _step(simulator, call, report)
+    if settles:
+        refused, report.deviation = settle(simulator, poses, loaded)
+        report.refused += refused
+    # Ids are those after the poses were set.
+    by_name = {obj.name: obj.object_id for obj in simulator.view.objects.values()}
+    for state in scene.object_states or ():
+        _set_state(simulator, by_name.get(state.name), state, report)
     return report
 
 
-def _step(simulator: Simulator, call: dict[str, Any], report: RestoreReport) -> SimulatorView:
+def _step(simulator: Simulator, call: dict[str, Any], report: RestoreReport) -> None:
     view = simulator.step(**call)
     if not view.success:
         report.refused.append(f"{call['action']}: {view.error}")
-    return view
 
 
 def _set_state(
-    simulator: Simulator, view: SimulatorView, state: StartState, report: RestoreReport
+    simulator: Simulator, key: str | None, state: StartState, report: RestoreReport
 ) -> None:
-    """Give one object its state of the start; ids are those after the poses were set."""
-    key = next((obj.object_id for obj in view.objects.values() if obj.name == state.name), None)
+    """Give one object its state of the start."""
     if key is None:
         report.dropped.append(state.name)
         return
-    if state.is_open is not None:
+    obj = simulator.view.objects[key]
+    if state.is_open is not None and state.is_open != obj.is_open:
         action = "OpenObject" if state.is_open else "CloseObject"
         _step(simulator, {"action": action, "objectId": key, "forceAction": True}, report)
     if state.is_disabled:

@@ -2,8 +2,14 @@
 
 Of the published code, branch `dev` alone exports them, and Qwen2.5-VL alone. Here their weights are
 put into the model that training started from, which is then written like any other checkpoint.
+
+The published trainer writes `step-N/` with `.metadata` and `*.distcp`, under keys `model.*`,
+`optimizer.*`, `train_state.*` and so on, or the weights alone under their own names. Its READMEs
+name folders `checkpoints/NAME` of the hub's `PEARLS-Lab/infini-thor`, which hold those files.
 """
 
+import pickle
+import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,15 +18,36 @@ from typing import Any
 
 import torch
 import torch.distributed.checkpoint as dcp
-from torch.distributed.checkpoint.metadata import TensorStorageMetadata
+from torch.distributed.checkpoint.metadata import Metadata, StorageMeta, TensorStorageMetadata
 from transformers.core_model_loading import revert_weight_conversion
 
 from infthor_eval.errors import DataError, wrap_errors
+from model_adapters.hf.loading.hub import fetch
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.loading.tower_names import published_name
 
-__all__ = ["ImportedWeights", "import_weights"]
+__all__ = ["ImportedWeights", "find_weights", "import_weights"]
 
+_DTYPES = {name for name in dir(torch) if isinstance(getattr(torch, name), torch.dtype)}
+# What the pickle `.metadata` may name, by module: it may come from the hub, and a pickle that may
+# name anything runs code.
+_HARMLESS = {
+    "collections": {"OrderedDict"},
+    "pathlib": {"PosixPath"},
+    "torch": {"Size", *_DTYPES},
+    "torch.distributed.checkpoint.filesystem": {"_StorageInfo"},
+    "torch.distributed.checkpoint.metadata": {
+        "BytesStorageMetadata",
+        "ChunkStorageMetadata",
+        "Metadata",
+        "MetadataIndex",
+        "StorageMeta",
+        "TensorProperties",
+        "TensorStorageMetadata",
+        "_MEM_FORMAT_ENCODING",
+    },
+    "torch.serialization": {"_get_layout"},
+}
 _HINT = "give a folder with .metadata and *.distcp files of the model that --model names"
 
 
@@ -40,6 +67,28 @@ class ImportedWeights:
     n_ignored: int
 
 
+def find_weights(place: str, revision: str | None = None) -> Path:
+    """Return the folder of a distributed checkpoint, downloading it unless it is there.
+
+    Args:
+        place: its folder, a folder of `step-N` of which the last is taken as in the published
+            trainer, or such a folder of a hub's repository (`owner/name/folder`).
+        revision: branch, tag or commit on the hub; the default branch where None.
+
+    Raises:
+        ModelError: there is no such folder, here or on the hub.
+    """
+    folder, _ = fetch(place, revision, option="", extra_patterns=("*.distcp",))
+    if (folder / ".metadata").is_file():
+        return folder
+    steps = {
+        int(match[1]): path
+        for path in folder.iterdir()
+        if (match := re.fullmatch(r"step-(\d+)", path.name)) and (path / ".metadata").is_file()
+    }
+    return steps[max(steps)] if steps else folder
+
+
 def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
     """Load the weights of a distributed checkpoint into a model.
 
@@ -54,7 +103,7 @@ def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
         DataError: the folder is not such a checkpoint, or has another model's weights.
     """
     with wrap_errors(f"{folder}: not a distributed checkpoint", _HINT, catch=Exception):
-        reader = dcp.FileSystemReader(folder)
+        reader = _Reader(folder)
         stored: Mapping[str, Any] = reader.read_metadata().state_dict_metadata
         sizes = {
             name: entry.size
@@ -78,6 +127,26 @@ def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
     )
     n_imported = len(stored_names)
     return ImportedWeights(n_imported, len(weights) - n_imported, len(sizes) - n_imported)
+
+
+class _MetadataUnpickler(pickle.Unpickler):
+    def find_class(self, module: str, name: str) -> Any:
+        if name not in _HARMLESS.get(module, ()):
+            raise pickle.UnpicklingError(f".metadata names {module}.{name}, which may run code")
+        return super().find_class(module, name)
+
+
+class _Reader(dcp.FileSystemReader):
+    """A reader that unpickles nothing which could run code; torch reads the tensors so, too."""
+
+    def read_metadata(self, *args: Any, **kwargs: Any) -> Metadata:
+        """See `dcp.FileSystemReader`."""
+        with (Path(self.path) / ".metadata").open("rb") as file:
+            metadata: Metadata = _MetadataUnpickler(file).load()
+        if metadata.storage_meta is None:
+            metadata.storage_meta = StorageMeta()
+        metadata.storage_meta.load_id = self.load_id
+        return metadata
 
 
 def _stored_names(sizes: Mapping[str, Any], model: Any, folder: Path) -> Mapping[str, str]:

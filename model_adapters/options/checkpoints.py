@@ -110,7 +110,7 @@ class CheckpointSource:
     """Source of a checkpoint, on any engine.
 
     Attributes:
-        pretrained: hub id or folder.
+        pretrained: folder, hub id, or a folder of a hub's repository (`owner/name/folder`).
         revision: branch, tag or commit on the hub; the default branch where None.
     """
 

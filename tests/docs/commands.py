@@ -11,6 +11,7 @@ FLOOR_PLANS = "needs recorded floor plans"
 # fails a test.
 CANNOT_RUN = {
     r"--models? (qwen2\.5-vl|llava-onevision|openvla|deepseek-vl)[ ,]": "downloads weights",
+    r"import-checkpoint PEARLS-Lab/": "downloads weights",
     r" fetch nieh": "downloads the published set",
     r"--model openai ": "needs a server, and a key",
     r"check-parity ": "needs a server",

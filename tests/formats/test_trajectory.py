@@ -57,6 +57,14 @@ def test_directory_in_order_without_the_sets_own_files(tmp_path):
     ]
 
 
+@pytest.mark.parametrize("name", ["replay.json", "set.json", "status.json", "timeline.json"])
+def test_reports_of_replays_and_of_the_published_generator_are_no_trajectories(tmp_path, name):
+    write(tmp_path / "floorplan1_3_40_1.json", MINIMAL)
+    write(tmp_path / name, {"scene": 1, "phase": "sampling"})
+    (trajectory,) = iter_trajectories(tmp_path)
+    assert trajectory.traj_id == "floorplan1_3_40_1"
+
+
 def test_a_malformed_line_is_named_and_hides_no_other(tmp_path):
     path = write(tmp_path / "a.jsonl", MINIMAL, {"scene": 1}, MINIMAL)
     sources = list(iter_sources(path))

@@ -1,5 +1,6 @@
 """Algorithm 1 on the embedded simulator: what holds between tasks and at the end."""
 
+import dataclasses
 import subprocess
 import sys
 import time
@@ -9,6 +10,7 @@ import msgspec
 import pytest
 
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.generation import factory
@@ -73,6 +75,25 @@ def test_sub_goals_and_actions_are_numbered_through(simulator):
             part.high_pddl_idx[0] <= owner < part.high_pddl_idx[1] for owner in owners[first:end]
         )
         ends.append(end)
+
+
+def test_published_words_change_nothing_else(simulator):
+    plain = TrajectorySettings("living-room-2", 5, 60, 4)
+    settings = dataclasses.replace(plain, words=Words.PUBLISHED)
+    natural, published = (generate(each, simulator).trajectory for each in (plain, settings))
+    assert (natural.plan, natural.scene) == (published.plan, published.scene)
+    assert [task.task_info for task in natural.sub_tasks] == [
+        task.task_info for task in published.sub_tasks
+    ]
+    assert "words" not in natural.gen_info["settings"]
+    assert published.gen_info["settings"]["words"] == "published"
+    names = {task.task_info.pickup.lower() for task in published.sub_tasks}
+    for task, part in zip(published.sub_tasks, published.sub_trajs, strict=True):
+        assert part.subgoal == task.task_desc
+        assert names & set(task.task_desc.split())
+    assert natural.sub_tasks != published.sub_tasks
+    again = generate(settings, simulator).trajectory
+    assert again.sub_tasks == published.sub_tasks
 
 
 def test_the_final_task_is_about_both_ends_and_comes_last(simulator):

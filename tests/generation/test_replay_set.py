@@ -10,7 +10,7 @@ from infthor_eval.formats.step_log import iter_object_states, read_steps
 from infthor_eval.formats.trajectory import iter_sources, iter_trajectories
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.generate import generate_questions
-from infthor_eval.generation.replay import box_iou
+from infthor_eval.generation.replay import SetForm, box_iou
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.replay_summary import summarise
 from infthor_eval.generation.settings import TrajectorySettings
@@ -67,7 +67,7 @@ def test_a_generated_trajectory_replays_whole(generated, tmp_path):
 
 def test_several_frames_per_move(generated, tmp_path):
     with Simulator(embedded_launch()) as simulator:
-        replayed = replay_set(select([generated]), simulator, tmp_path, frames=3)
+        replayed = replay_set(select([generated]), simulator, tmp_path, form=SetForm(3))
         again = replay_set(select([generated]), simulator, tmp_path)
     assert summarise(replayed).complete == 1
     assert "3 frames per move" in again.failures[0].message

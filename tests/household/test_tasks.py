@@ -1,3 +1,7 @@
+import json
+import random
+from pathlib import Path
+
 import msgspec
 import pytest
 
@@ -28,6 +32,33 @@ def test_descriptions():
     )
     stack = Task(TaskType.STACK, "Apple", "CounterTop", movable="Plate")
     assert words(stack) == "put a plate with an apple on it on the counter top"
+
+
+GOAL_WORDS = json.loads((Path(__file__).parents[1] / "goldens" / "goal_words.json").read_text())
+
+
+@pytest.mark.parametrize("row", GOAL_WORDS)
+def test_published_words_are_those_of_the_published_generator(row):
+    task = Task(
+        TaskType(row["goal"]),
+        row["pickup"],
+        row["receptacle"],
+        row["movable"],
+        row["light"],
+        row["sliced"],
+    )
+    drawn = {sub_task(task, "kitchen-1", random.Random(seed)).task_desc for seed in range(40)}
+    assert drawn == set(row["words"])
+    published = sub_task(task, "kitchen-1", random.Random(0))
+    natural = sub_task(task, "kitchen-1")
+    assert (published.task_info, published.pddl_params) == (natural.task_info, natural.pddl_params)
+
+
+def test_putting_away_has_one_description():
+    put_away = Task(TaskType.PUT_AWAY, "Knife", "CounterTop")
+    for draw in (None, random.Random(0)):
+        words = sub_task(put_away, "kitchen-1", draw).task_desc
+        assert words == "put the Knife on the CounterTop"
 
 
 TASKS = [

@@ -90,6 +90,13 @@ __all__ = ["command"]
     is_flag=True,
     help="Walk long stretches with a level camera, as an option of the published generator does.",
 )
+@click.option(
+    "--words",
+    type=click.Choice(("natural", "published")),
+    default="natural",
+    show_default=True,
+    help="Tasks in plain English, or in the words of the published generator, drawn by the seed.",
+)
 @click.option("--out", required=True, type=PATH, help="Folder for the trajectory files.")
 @floor_plans_option
 @worker_options
@@ -107,6 +114,7 @@ def command(
     final_task: bool,
     test_set: bool,
     look_around: bool,
+    words: str,
     out: Path,
     data: Path | None,
     as_json: bool,
@@ -117,6 +125,7 @@ def command(
     Trajectories in the folder are not generated again. Exit code 1 if one cannot be generated.
     """
     from infthor_eval.cli.progress.bar import PacedBar
+    from infthor_eval.formats.object_ids import Words
     from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
     from infthor_eval.storage.files import prepare_folder
@@ -138,6 +147,7 @@ def command(
         max_fail=max_fail,
         save_floor=save_floor,
         look_around=look_around,
+        words=Words(words),
     )
     prepare_folder(out)
     with progress_bar(notes) as progress:

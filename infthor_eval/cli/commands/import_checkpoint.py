@@ -15,7 +15,7 @@ __all__ = ["command"]
     cls=ExampleCommand,
     example="infthor-eval import-checkpoint global_step_1000 --out checkpoint",
 )
-@click.argument("folder", type=PATH)
+@click.argument("checkpoint")
 @click.option(
     "--model",
     default="llava-onevision",
@@ -33,21 +33,27 @@ __all__ = ["command"]
     help="Its prompts: the bare sequence, or for the Qwen2.5-VL of branch dev the base model's "
     "chat template.",
 )
+@click.option("--revision", help="Branch, tag or commit on the hub.  [default: its main branch]")
 @click.option("--out", required=True, type=PATH, help="Folder of the new checkpoint.")
-def command(folder: Path, model: str, model_args: str, prompt: str, out: Path) -> int:
-    """Convert FOLDER, a distributed checkpoint of the published trainer, into one that models load.
+def command(
+    checkpoint: str, model: str, model_args: str, prompt: str, revision: str | None, out: Path
+) -> int:
+    """Convert CHECKPOINT, a distributed one of the published trainer, into one that models load.
 
-    The new checkpoint has safetensors, tokenizer and processor. Weights that FOLDER lacks, because
-    they were frozen, come from the model that the training started from.
+    CHECKPOINT is its folder, a folder of step-N of which the last is taken, or a folder of a hub's
+    repository (PEARLS-Lab/infini-thor/checkpoints/NAME). The new checkpoint has safetensors,
+    tokenizer and processor. Weights that CHECKPOINT lacks, because they were frozen, come from the
+    model that the training started from.
     """
     from infthor_eval.formats.object_ids import Words
     from infthor_eval.storage.files import prepare_folder
     from infthor_eval.terminal import print_line
     from infthor_eval.training.export import export
-    from infthor_eval.training.published import import_weights
+    from infthor_eval.training.published import find_weights, import_weights
     from infthor_eval.training.starting_model import load_starting_model
 
     prepare_folder(out)
+    folder = find_weights(checkpoint, revision)
     loaded = load_starting_model(model, parse_model_args(model_args), prompt, seed=0)
     weights = import_weights(loaded, folder)
     export(loaded, out, title=f"{model}, weights of {folder.name}", words=Words.PUBLISHED)

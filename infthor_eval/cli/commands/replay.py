@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.options.rendering import parse_form, rendering_options
 from infthor_eval.cli.options.values import PATH, floor_plans_option
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
@@ -39,6 +40,7 @@ _MAX_SHOWN = 20  # failures and divergences printed one by one; all are in the J
 @click.option(
     "--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator."
 )
+@rendering_options
 @worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
 @click.pass_context
@@ -52,7 +54,10 @@ def command(
     frames: int,
     unity: bool,
     as_json: bool,
-    **workers: Any,
+    workers: int,
+    ray_address: str | None,
+    gpus_per_worker: float | None,
+    **rendering: Any,
 ) -> None:
     """Replay trajectories (.json, .jsonl, .jsonl.gz, directories) into an NIEH set.
 
@@ -68,7 +73,8 @@ def command(
     from infthor_eval.thor import launch
     from infthor_eval.thor.supplement import supplement_file
 
-    worker_settings = parse_worker_settings(**workers)
+    worker_settings = parse_worker_settings(workers, ray_address, gpus_per_worker)
+    form = parse_form(frames=frames, unity=unity, **rendering)
     notes = error_console()
     prepare_folder(out)
     selection = select(trajectories, limit, per_floor_plan)
@@ -77,7 +83,7 @@ def command(
         with progress_bar(notes) as progress:
             bar = PacedBar(progress, "replay", len(selection.items))
             replayed = replay_with_workers(
-                selection, start, out, worker_settings, frames, bar.advance, notes.print
+                selection, start, out, worker_settings, form, bar.advance, notes.print
             )
     if as_json:
         import msgspec

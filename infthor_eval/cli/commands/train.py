@@ -272,7 +272,12 @@ def _generate_data(
         bar = PacedBar(progress, "frames", len(jobs))
         selection = select([trajectories])
         replayed = replay_with_workers(
-            selection, embedded_launch(), replayed_set, worker_settings, 1, bar.advance, print_note
+            selection,
+            embedded_launch(),
+            replayed_set,
+            worker_settings,
+            progress=bar.advance,
+            say=print_note,
         )
     failures = list(generated.failures)
     failures += [f"{failure.place}: {failure.message}" for failure in replayed.failures]

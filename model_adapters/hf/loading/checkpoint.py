@@ -74,10 +74,16 @@ def locate(options: R) -> LocatedCheckpoint[R]:
     """Find or download a checkpoint and read its config.
 
     Raises:
-        ModelError: the checkpoint does not exist, or cannot be downloaded.
+        ModelError: the checkpoint does not exist, cannot be downloaded, or is a trainer's.
     """
     folder, commit = fetch(options.pretrained, options.revision)
     require_plain_files(folder, "restore the checkpoint")
+    if (folder / ".metadata").is_file():
+        raise ModelError(
+            f"{options.pretrained} is a distributed checkpoint of a trainer; convert it with "
+            f"`infthor-eval import-checkpoint {options.pretrained} --out DIR` and give "
+            "pretrained=DIR"
+        )
     with wrap_loading_errors(options.pretrained):
         config = transformers.AutoConfig.from_pretrained(
             folder, trust_remote_code=options.trust_remote_code

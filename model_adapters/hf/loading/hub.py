@@ -15,8 +15,10 @@ from infthor_eval.errors import ModelError
 
 __all__ = ["fetch"]
 
-_FILES = ["*.json", "*.jinja", "*.model", "*.py", "*.safetensors", "*.txt"]
+# `.metadata` is that of a distributed checkpoint, by which it is told from one that models load.
+_FILES = ["*.json", "*.jinja", "*.model", "*.py", "*.safetensors", "*.txt", ".metadata"]
 _TIMEOUT_S = 10.0
+_NO_PARTS = ("", ".", "..")  # of a hub id
 
 
 def fetch(
@@ -33,7 +35,8 @@ def fetch(
     at once.
 
     Args:
-        pretrained: a folder, or a hub id.
+        pretrained: a folder, a hub id (`owner/name`), or a folder of a hub's repository
+            (`owner/name/folder`).
         revision: branch, tag or commit on the hub; the default branch where None.
         option: the option that names the checkpoint, as users type it, for the message.
         extra_patterns: patterns of files to download in addition to the usual ones.
@@ -48,38 +51,47 @@ def fetch(
     path = Path(pretrained).expanduser()
     if path.is_dir():
         return path, None
-    if pretrained.startswith((".", "/", "~")) or pretrained.count("/") != 1:
+    parts = pretrained.split("/")
+    if pretrained.startswith("~") or len(parts) < 2 or any(part in _NO_PARTS for part in parts):
         raise ModelError(
-            f"{option}{pretrained}: there is no such folder, and hub ids have the form owner/name"
+            f"{option}{pretrained}: there is no such folder, and hub ids have the form owner/name "
+            "or owner/name/folder"
         )
+    repository = "/".join(parts[:2])
+    inside = "".join(f"{part}/" for part in parts[2:])
     at = f"{pretrained} at revision {revision}" if revision else pretrained
     try:
-        commit = HfApi().model_info(pretrained, revision=revision, timeout=_TIMEOUT_S).sha
-        folder = Path(
-            snapshot_download(
-                pretrained, revision=commit, allow_patterns=[*_FILES, *extra_patterns]
-            )
-        )
+        commit = HfApi().model_info(repository, revision=revision, timeout=_TIMEOUT_S).sha
+        patterns = [f"{inside}{pattern}" for pattern in (*_FILES, *extra_patterns)]
+        root = Path(snapshot_download(repository, revision=commit, allow_patterns=patterns))
     except (HfHubHTTPError, HFValidationError) as error:
         raise ModelError(
             f"the hub refuses {at} ({_first_line(error)}); check the name, or log in with `hf auth "
             "login`"
         ) from error
     except (HTTPError, OSError) as error:
-        folder = _cached_folder(pretrained, revision, at, option, error)
-    return folder, folder.name
+        root = _cached_folder(repository, inside, revision, at, option, error)
+    folder = root / inside
+    if not folder.is_dir():
+        raise ModelError(
+            f"{option}{pretrained}: {repository} has no checkpoint there at {root.name[:12]}; "
+            "check the folder's name"
+        )
+    return folder, root.name
 
 
 def _cached_folder(
-    pretrained: str, revision: str | None, at: str, option: str, reason: Exception
+    repository: str, inside: str, revision: str | None, at: str, option: str, reason: Exception
 ) -> Path:
     try:
-        return Path(snapshot_download(pretrained, revision=revision, local_files_only=True))
+        return Path(snapshot_download(repository, revision=revision, local_files_only=True))
     except LocalEntryNotFoundError as error:
+        files = f" --include '{inside}*'" if inside else ""
+        folder = "/".join(("DIR", *filter(None, inside.split("/"))))
         raise ModelError(
             f"{at} is not in the local cache and the hub cannot be reached "
             f"({_first_line(reason)}); download it where there is network with `hf download "
-            f"{pretrained} --local-dir DIR` and give {option}DIR"
+            f"{repository}{files} --local-dir DIR` and give {option}{folder}"
         ) from error
 
 

@@ -7,8 +7,10 @@ import json
 import shutil
 
 import pytest
+from ai2thor._quality_settings import QUALITY_SETTINGS
 
 from infthor_eval.cli import main
+from infthor_eval.cli.options.rendering import QUALITIES, parse_form
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import read_questions
 
@@ -71,6 +73,46 @@ def test_what_they_print_for_people(made_folder, tmp_path, run_cli):
     )
     assert code == 0
     assert "1 trajectories (0 generated earlier)" in out
+
+
+def test_replay_writes_what_the_published_renderer_writes(made_folder, tmp_path, run_cli):
+    size = ("--width", 64, "--height", 48)
+    arguments = ("replay", made_folder / "trajectories", "--out", tmp_path, "--timeline", *size)
+    assert run_cli(*arguments, "--smooth", 2)[0] == 0
+    (folder,) = (path for path in tmp_path.iterdir() if path.is_dir())
+    timeline = json.loads((folder / "timeline.json").read_text())
+    assert (timeline["width"], timeline["height"], timeline["smooth"]) == (64, 48, 2)
+    assert len(list((folder / "frames").iterdir())) == timeline["n_frames"] > timeline["n_steps"]
+    (source,) = (made_folder / "trajectories").glob("*.json")
+    assert timeline["source_json"] == source.name
+    again = run_cli(*arguments)
+    assert again[0] == 1 and "rendered with other settings" in " ".join(again[2].split())
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--smooth", 2), "--smooth: is for --timeline"),
+        (("--jpeg-quality", 90), "--jpeg-quality: is for --timeline"),
+        (("--keep-going",), "--keep-going: is for --timeline"),
+        (("--timeline", "--frames", 2), "--frames: is for sets"),
+        (("--timeline", "--quality", "Ultra"), "--quality: is Unity's"),
+    ],
+)
+def test_options_of_the_two_forms_are_not_mixed(options, words, tmp_path, run_cli):
+    code, _, err = run_cli("replay", "file.json", "--out", tmp_path, *options)
+    assert code == 2
+    assert words in err
+
+
+def test_unitys_rendering_qualities_are_those_of_ai2thor():
+    qualities = {name for name, number in QUALITY_SETTINGS.items() if number}
+    assert set(QUALITIES) == qualities
+    assert list(QUALITIES[:5]) == sorted(QUALITIES[:5], key=QUALITY_SETTINGS.get)
+    settings = parse_form(
+        timeline=True, frames=1, unity=True, keep_going=False, quality=None, smooth=None
+    )
+    assert settings.simulator_options["quality"] == "MediumCloseFitShadows"
 
 
 def test_a_truncated_trajectory_is_named_and_nothing_half_written(made_folder, tmp_path, run_cli):

@@ -1,66 +1,13 @@
 """`fetch` against a local server that speaks the hub's protocol for one data set."""
 
-import hashlib
-import json
 import tarfile
-import threading
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
 from infthor_eval.nieh.published.hub_data import NIEH_REPOSITORY
 
 from ...helpers.command_line import assert_refused
-
-COMMIT = "0" * 40
-
-
-class Hub(BaseHTTPRequestHandler):
-    files: dict[str, bytes]
-    status = 200
-
-    def do_HEAD(self):
-        self.do_GET()
-
-    def do_GET(self):
-        name = self.path.rpartition("/")[2]
-        if self.status != 200:
-            self.answer(self.status, b"{}", {"X-Error-Code": "GatedRepo"})
-        elif "/tree/" in self.path:
-            entries = [
-                {
-                    "type": "file",
-                    "path": file,
-                    "size": len(content),
-                    "oid": hashlib.sha1(content).hexdigest(),
-                }
-                for file, content in self.files.items()
-            ]
-            self.answer(200, json.dumps(entries).encode(), {"Content-Type": "application/json"})
-        elif self.path.startswith(f"/api/datasets/{NIEH_REPOSITORY}"):
-            siblings = [{"rfilename": file} for file in self.files]
-            self.answer(
-                200,
-                json.dumps({"id": NIEH_REPOSITORY, "sha": COMMIT, "siblings": siblings}).encode(),
-            )
-        elif name in self.files:
-            content = self.files[name]
-            etag = hashlib.sha256(content).hexdigest()
-            self.answer(200, content, {"ETag": f'"{etag}"', "X-Repo-Commit": COMMIT})
-        else:
-            self.answer(404, b"{}", {"X-Error-Code": "EntryNotFound"})
-
-    def answer(self, status, content, headers=()):
-        self.send_response(status)
-        for key, value in dict(headers).items():
-            self.send_header(key, value)
-        self.send_header("Content-Length", str(len(content)))
-        self.end_headers()
-        if self.command == "GET":
-            self.wfile.write(content)
-
-    def log_message(self, *_):
-        pass
+from ...helpers.hub import serve_hub
 
 
 @pytest.fixture
@@ -74,13 +21,9 @@ def hub(make_nieh_set, tmp_path, monkeypatch):
         "qa_set_nieh_multi_clue.csv": "".join([csv[0], *csv[2:]]).encode(),
         "metadata.tar": (tmp_path / "metadata.tar").read_bytes(),
     }
-    handler = type("ThisHub", (Hub,), {"files": files})
-    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    yield f"http://127.0.0.1:{server.server_port}", handler
-    server.shutdown()
-    server.server_close()
+    with serve_hub(f"datasets/{NIEH_REPOSITORY}", files) as served:
+        yield served
 
 
 def test_fetched_data_are_found_by_the_task_and_not_fetched_again(hub, tmp_path, run_cli):
