@@ -9,12 +9,16 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from msgspec.structs import replace
+
 from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
 from infthor_eval.formats.twins import ComparedFrame
 from infthor_eval.generation.twins.kinds import Worlds
 from infthor_eval.generation.twins.rewriting import exchange_ids
 
 __all__ = ["Difference", "World", "compare"]
+
+_Frame = tuple[Step, dict[str, ObjectState]]
 
 
 class Difference(Exception):
@@ -43,7 +47,7 @@ def compare(worlds: Worlds, first: World, second: World) -> tuple[ComparedFrame,
     """
     if len(first.steps) != len(second.steps):
         raise Difference("another number of frames")
-    new_id = exchange_ids(worlds.ids)
+    comparison = _Comparison(worlds)
     states = zip(iter_object_states(first.steps), iter_object_states(second.steps), strict=True)
     compared = []
     for number, (of_first, of_second) in enumerate(states):
@@ -51,11 +55,9 @@ def compare(worlds: Worlds, first: World, second: World) -> tuple[ComparedFrame,
         other = second.steps[number]
         if one.pose != other.pose:
             raise Difference("the agent is elsewhere")
-        changed = _changed(worlds, _existing(of_first), _existing(of_second))
-        in_second = {new_id(key) for key in changed}
-        in_view = (changed & (one.seen or {}).keys()) | {
-            key for key in changed if new_id(key) in (other.seen or {}) and new_id(key) in in_second
-        }
+        in_view = comparison.changed_in_view(
+            (one, _existing(of_first)), (other, _existing(of_second))
+        )
         same = first.pictures[number] == second.pictures[number]
         if not same and not in_view:
             raise Difference("a picture differs though nothing that differs is in view")
@@ -67,25 +69,43 @@ def _existing(states: dict[str, ObjectState]) -> dict[str, ObjectState]:
     return {key: state for key, state in states.items() if state.exists}
 
 
-def _changed(
-    worlds: Worlds, first: dict[str, ObjectState], second: dict[str, ObjectState]
-) -> set[str]:
-    """Return the ids, in the first world, of the objects that differ at a frame."""
-    new_id = exchange_ids(worlds.ids)
-    old_id = exchange_ids({new: old for old, new in worlds.ids.items()})
-    changed = {key for key, state in first.items() if not _is_equal(state, second.get(new_id(key)), new_id)}
-    changed |= {old_id(key) for key in second if old_id(key) not in first}
-    for key in changed:
-        if "|".join(key.split("|")[:4]) not in worlds.changed:
+class _Comparison:
+    """Compares states, with the ids of the first world."""
+
+    def __init__(self, worlds: Worlds) -> None:
+        self._changed = worlds.changed
+        self._new_id = exchange_ids(worlds.ids)
+        self._old_id = exchange_ids({new: old for old, new in worlds.ids.items()})
+
+    def changed_in_view(self, first: _Frame, second: _Frame) -> set[str]:
+        """Return the ids of what differs and is in view, or in the hand, in either world.
+
+        Raises:
+            Difference: an object differs that was not to be changed.
+        """
+        step, states = first
+        other_step, other_states = second
+        translated = {self._old_id(key): state for key, state in other_states.items()}
+        differing = {
+            key
+            for key in states.keys() | translated.keys()
+            if not self._are_equal(states.get(key), translated.get(key))
+        }
+        if any("|".join(key.split("|")[:4]) not in self._changed for key in differing):
             raise Difference("an object differs that was not to be changed")
-    return changed
+        shown = {*(step.seen or {}), *map(self._old_id, other_step.seen or {})}
+        held = {
+            key
+            for key in differing
+            if any(key in world and world[key].held for world in (states, translated))
+        }
+        return differing & shown | held
 
-
-def _is_equal(state: ObjectState, other: ObjectState | None, new_id) -> bool:
-    if other is None:
-        return False
-    if state == other:
-        return True
-    import msgspec
-    mapped = msgspec.structs.replace(state, parents=tuple(map(new_id, state.parents)))
-    return Counter(mapped.parents) == Counter(other.parents) and msgspec.structs.replace(mapped, parents=()) == msgspec.structs.replace(other, parents=())
+    def _are_equal(self, state: ObjectState | None, other: ObjectState | None) -> bool:
+        """Return True if states are equal, whatever the order of the parents."""
+        if state is None or other is None:
+            return False
+        parents = Counter(map(self._new_id, state.parents))
+        return parents == Counter(other.parents) and replace(state, parents=()) == replace(
+            other, parents=()
+        )

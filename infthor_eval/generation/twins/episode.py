@@ -49,6 +49,22 @@ class Episode:
             if obj.pickupable and key not in holders and self.holder(key) is not None
         )
 
+    @cached_property
+    def seen(self) -> frozenset[str]:
+        """Ids of the objects that a frame shows large enough."""
+        history = self.history
+        return frozenset(
+            key
+            for frame in range(len(history))
+            for key in history.objects_in_frame(frame)
+            if history.shows(frame, key)
+        )
+
+    @cached_property
+    def put_targets(self) -> frozenset[str]:
+        """Ids of what the agent puts things into or onto."""
+        return frozenset(event.receptacle for event in self.history.events if event.receptacle)
+
     def holder(self, key: str) -> ThorObject | None:
         """Return what an object is directly in or on at the start; None for the floor."""
         states = self.history.states(0)

@@ -1,18 +1,14 @@
 """Kinds in which two objects exchange places at the start, and roles in the episode."""
 
-import math
 import random
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations
 from typing import ClassVar
 
-import msgspec
-from msgspec.structs import asdict
-
-from infthor_eval.formats.trajectory import ObjectPose, Scene
 from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.generation.twins.kinds import EditRefused, Worlds
+from infthor_eval.generation.twins.placing import moved_scene, scene_of, size_ratio
 from infthor_eval.generation.twins.rewriting import exchange_ids, in_world
 from infthor_eval.household.affordances import SLICEABLE, goes_into
 from infthor_eval.household.wording import canonical_type
@@ -20,14 +16,11 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["Exchange", "Move", "Swap", "SwapSliced", "SwapTask"]
+__all__ = ["Exchange", "ExchangeKind", "Move", "Swap", "SwapSliced", "SwapTask", "Untouched"]
 
 _CARRYING = {"PickupObject", "PutObject"}
 _SLICING = {"SliceObject"}
-# Places beside the other's that are tried, nearest first, metres.
-_STEPS = [step / 20 for step in range(-6, 7)]
-_OFFSETS = sorted(product(_STEPS, _STEPS), key=lambda offset: math.hypot(*offset))
-_FAR = 50.0  # metres above the room, where an object waits for its new place
+_Pair = tuple[ThorObject, ThorObject]
 
 
 @dataclass(frozen=True)
@@ -44,19 +37,20 @@ class Exchange:
 
     def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
         """See `Proposal`: the first world is the episode's, the second has the places exchanged."""
-        scene = _exchanged_scene(episode, self.one, self.other, simulator)
-        restored = restore(simulator, scene)
-        if restored.dropped or restored.refused:
+        one = self.one
+        other = self.other
+        moves = [(one, other), (other, one)]
+        scene = moved_scene(episode.trajectory.scene, simulator, moves)
+        if restore(simulator, scene).lines():
             raise EditRefused("the exchanged start cannot be restored")
         after = _ids_by_name(simulator.view)
-        one, other = self.one, self.other
         roles = {one.object_id: after[other.name], other.object_id: after[one.name]}
         types = {one.object_type: other.object_type, other.object_type: one.object_type}
         handled = episode.actions_on(one.object_id) or episode.actions_on(other.object_id)
         trajectory = episode.trajectory
         return Worlds(
             pair=(
-                in_world(trajectory, trajectory.scene),
+                in_world(trajectory, scene_of(trajectory.scene, episode.start)),
                 in_world(trajectory, scene, exchange_ids(roles), types if handled else {}),
             ),
             changed=frozenset(roles),
@@ -69,74 +63,65 @@ def _ids_by_name(view: SimulatorView) -> dict[str, str]:
     return {obj.name: obj.object_id for obj in view.objects.values()}
 
 
-def _exchanged_scene(
-    episode: Episode, one: ThorObject, other: ThorObject, simulator: Simulator
-) -> Scene:
-    """Exchange two objects in the restored scene, and return it in the form of trajectories."""
-    scene = episode.trajectory.scene
-    restore(simulator, scene)
-    before = simulator.view.objects
-    simulator.step(
-        "TeleportObject",
-        objectId=other.object_id,
-        position={"x": 0.0, "y": _FAR, "z": 0.0},
-        rotation=asdict(other.rotation),
-        forceAction=True,
-        forceKinematic=True,
-    )
-    _place(simulator, one, other, other.parent_receptacles or [])
-    _place(simulator, other, one, one.parent_receptacles or [])
-    after = simulator.view.objects
-    moved = {one.object_id, other.object_id}
-    for key, obj in before.items():
-        if key not in moved and obj.parent_receptacles != after[key].parent_receptacles:
-            raise EditRefused("the exchange changed where a third object is")
-        if key not in moved and obj.position != after[key].position:
-            raise EditRefused("the exchange moved a third object")
-    for key, partner in ((one.object_id, other), (other.object_id, one)):
-        if after[key].parent_receptacles != before[partner.object_id].parent_receptacles:
-            raise EditRefused("an object is not where the other was")
-    poses = [
-        ObjectPose(obj.name, asdict(obj.position), asdict(obj.rotation))
-        for obj in after.values()
-        if obj.pickupable
-    ]
-    return msgspec.structs.replace(scene, object_poses=poses)
+class ExchangeKind:
+    """Base of the kinds of exchange: all pairs of objects of which both allow it.
 
+    Those of which frames show both come first, then those of like sizes: at another's place there
+    is seldom room for more.
 
-def _place(simulator: Simulator, item: ThorObject, where: ThorObject, target: list[str]) -> None:
-    """Stand an object where another one stood, or as near to it as there is room.
-
-    Args:
-        simulator: simulator with the restored scene.
-        item: the object.
-        where: the other one, before it was moved.
-        target: ids of the receptacles that the other one was in or on.
+    Attributes:
+        needs_other_place: True if an exchange within one type of place changes no answer.
     """
-    box = where.axis_aligned_bounding_box
-    if box is None:
-        raise EditRefused("the simulator does not report boxes")
-    bottom = box.center.y - box.size.y / 2
-    for x, z in _OFFSETS:
-        point = {"x": where.position.x + x, "y": bottom, "z": where.position.z + z}
-        view = simulator.step("PlaceObjectAtPoint", objectId=item.object_id, position=point)
-        if view.success and view.objects[item.object_id].parent_receptacles == target:
-            return
-    raise EditRefused("no room at the other's place")
+
+    needs_other_place: ClassVar[bool] = False
+
+    def propose(self, episode: Episode, rng: random.Random) -> Iterator[Exchange]:
+        """See `EditKind`."""
+        for one, other in self.pairs(episode, rng):
+            yield Exchange(one, other)
+
+    def pairs(self, episode: Episode, rng: random.Random) -> list[_Pair]:
+        """Return the pairs of objects that may exchange places, the likeliest first."""
+        loose = [obj for obj in episode.loose if _is_alone(episode, obj)]
+        pairs = [
+            (one, other)
+            for one, other in combinations(loose, 2)
+            if self.allows(*(set(episode.actions_on(obj.object_id)) for obj in (one, other)))
+            and self._may_exchange(episode, one, other)
+        ]
+        rng.shuffle(pairs)
+        pairs.sort(key=lambda pair: (_n_unseen(episode, pair), round(size_ratio(*pair))))
+        return _spread(pairs)
+
+    def allows(self, first: set[str], second: set[str]) -> bool:
+        """Return True for two objects with these names of actions on them."""
+        raise NotImplementedError
+
+    def _may_exchange(self, episode: Episode, one: ThorObject, other: ThorObject) -> bool:
+        """Return True if each could as well be where the other is, and is put."""
+        if canonical_type(one.object_type) == canonical_type(other.object_type):
+            return False
+        places = [episode.holder(obj.object_id) for obj in (one, other)]
+        at_one, at_other = (place.object_type if place is not None else "" for place in places)
+        if self.needs_other_place and canonical_type(at_one) == canonical_type(at_other):
+            return False
+        return _fits(episode, one, other, at_other) and _fits(episode, other, one, at_one)
 
 
-def _may_exchange(episode: Episode, one: ThorObject, other: ThorObject) -> bool:
-    """Return True if each could as well be where the other is, and is put.
+def _n_unseen(episode: Episode, pair: _Pair) -> int:
+    return sum(obj.object_id not in episode.seen for obj in pair)
 
-    Places are of different types, or no answer would change.
-    """
-    if canonical_type(one.object_type) == canonical_type(other.object_type):
-        return False
-    places = [episode.holder(obj.object_id) for obj in (one, other)]
-    at_one, at_other = (place.object_type if place is not None else "" for place in places)
-    if canonical_type(at_one) == canonical_type(at_other):
-        return False
-    return _fits(episode, one, other, at_other) and _fits(episode, other, one, at_one)
+
+def _spread(pairs: Iterable[_Pair]) -> list[_Pair]:
+    """Return pairs with those first of which no object is in an earlier one, so that facts vary."""
+    first: list[_Pair] = []
+    later: list[_Pair] = []
+    used: set[str] = set()
+    for pair in pairs:
+        keys = {obj.object_id for obj in pair}
+        (later if keys & used else first).append(pair)
+        used |= keys
+    return [*first, *later]
 
 
 def _fits(episode: Episode, item: ThorObject, partner: ThorObject, place: str) -> bool:
@@ -147,29 +132,12 @@ def _fits(episode: Episode, item: ThorObject, partner: ThorObject, place: str) -
 
 
 def _is_alone(episode: Episode, obj: ThorObject) -> bool:
-    """Return True if the agent acts on no other object of the type, so that words are clear."""
-    return episode.n_handled(obj.object_type) <= bool(episode.actions_on(obj.object_id))
+    """Return True if words are clear: the agent acts on no other of the type, nor puts into it."""
+    is_clear = episode.n_handled(obj.object_type) <= bool(episode.actions_on(obj.object_id))
+    return is_clear and obj.object_id not in episode.put_targets
 
 
-class _Exchanges:
-    """Base of the kinds of exchange: all pairs of objects of which both allow it."""
-
-    def propose(self, episode: Episode, rng: random.Random) -> Iterator[Exchange]:
-        """See `EditKind`."""
-        loose = [obj for obj in episode.loose if _is_alone(episode, obj)]
-        pairs = list(combinations(loose, 2))
-        rng.shuffle(pairs)
-        for one, other in pairs:
-            roles = [set(episode.actions_on(obj.object_id)) for obj in (one, other)]
-            if self.allows(*roles) and _may_exchange(episode, one, other):
-                yield Exchange(one, other)
-
-    def allows(self, first: set[str], second: set[str]) -> bool:
-        """Return True for two objects with these names of actions on them."""
-        raise NotImplementedError
-
-
-class Swap(_Exchanges):
+class Swap(ExchangeKind):
     """One that is carried exchanges places with one that is not touched."""
 
     name: ClassVar[str] = "swap"
@@ -179,7 +147,7 @@ class Swap(_Exchanges):
         return bool(first) != bool(second) and first | second <= _CARRYING
 
 
-class SwapTask(_Exchanges):
+class SwapTask(ExchangeKind):
     """Two that are carried exchange places and tasks, and so their order."""
 
     name: ClassVar[str] = "swap-task"
@@ -189,7 +157,7 @@ class SwapTask(_Exchanges):
         return bool(first and second) and first | second <= _CARRYING
 
 
-class SwapSliced(_Exchanges):
+class SwapSliced(ExchangeKind):
     """Two foods exchange places, of which at least one is cut."""
 
     name: ClassVar[str] = "swap-sliced"
@@ -206,11 +174,16 @@ class SwapSliced(_Exchanges):
         return bool(both & _SLICING) and both <= _CARRYING | _SLICING
 
 
-class Move(_Exchanges):
-    """Two that are not touched exchange places."""
-
-    name: ClassVar[str] = "move"
+class Untouched(ExchangeKind):
+    """Base of the kinds of two objects that are not touched."""
 
     def allows(self, first: set[str], second: set[str]) -> bool:
         """See the base."""
         return not first and not second
+
+
+class Move(Untouched):
+    """Two that are not touched exchange places."""
+
+    name: ClassVar[str] = "move"
+    needs_other_place: ClassVar[bool] = True

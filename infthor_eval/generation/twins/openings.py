@@ -32,7 +32,7 @@ class _OneMore:
     one: ThorObject
     other: ThorObject
 
-    def apply(self, episode: Episode, simulator: Simulator) -> Worlds:  # noqa: ARG002
+    def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
         """See `Proposal`."""
         first, second = (
             with_inserted(

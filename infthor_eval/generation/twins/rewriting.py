@@ -67,15 +67,11 @@ def without_traces(trajectory: Trajectory, traj_id: str) -> Trajectory:
     )
 
 
-def with_inserted(
-    trajectory: Trajectory, index: int, actions: Sequence[ApiAction]
-) -> Trajectory:
+def with_inserted(trajectory: Trajectory, index: int, actions: Sequence[ApiAction]) -> Trajectory:
     """Return a copy with more low-level actions before the one of an index, within its sub-goal."""
     plan = trajectory.plan
     high_idx = plan.low_actions[index].high_idx
-    inserted = [
-        LowAction(api, high_idx, DiscreteAction(api.action, {}), None) for api in actions
-    ]
+    inserted = [LowAction(api, high_idx, DiscreteAction(api.action, {}), None) for api in actions]
     low_actions = [*plan.low_actions[:index], *inserted, *plan.low_actions[index:]]
     numbered = [
         msgspec.structs.replace(low, low_idx=number) for number, low in enumerate(low_actions)

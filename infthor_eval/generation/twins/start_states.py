@@ -1,19 +1,22 @@
 """Kinds that differ in states of single objects at the start: what is open, what is there."""
 
 import random
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from itertools import combinations, permutations
+from dataclasses import dataclass
+from itertools import permutations, product
 from typing import ClassVar
 
 import msgspec
 
-from infthor_eval.formats.trajectory import Scene, StartState, Trajectory
+from infthor_eval.formats.trajectory import StartState, Trajectory
 from infthor_eval.generation.twins.episode import Episode
-from infthor_eval.generation.twins.exchanges import Exchange, Move
-from infthor_eval.generation.twins.kinds import Worlds
+from infthor_eval.generation.twins.exchanges import Untouched
+from infthor_eval.generation.twins.kinds import EditRefused, Worlds
+from infthor_eval.generation.twins.placing import moved_scene, scene_of
 from infthor_eval.generation.twins.rewriting import in_world
 from infthor_eval.household.wording import canonical_type
+from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import ThorObject
 
@@ -26,82 +29,120 @@ _ASKED = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Laptop", "Microwave",
 def _with_states(trajectory: Trajectory, *states: StartState) -> Trajectory:
     scene = trajectory.scene
     earlier = scene.object_states or []
-    return in_world(
-        trajectory, msgspec.structs.replace(scene, object_states=[*earlier, *states])
-    )
+    return in_world(trajectory, msgspec.structs.replace(scene, object_states=[*earlier, *states]))
 
 
 @dataclass(frozen=True)
 class _Opening:
-    """One of two objects is open at the start, the other closed; and the other way round."""
+    """One of two objects is open at the start, the other closed; and the other way round.
+
+    Attributes:
+        one: the object that is asked about.
+        other: another one, so that in neither world all is closed, as generated rooms begin.
+    """
 
     one: ThorObject
     other: ThorObject
 
-    def apply(self, episode: Episode, simulator: Simulator) -> Worlds:  # noqa: ARG002
+    def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
         """See `Proposal`."""
         worlds = []
         for open_one, closed in permutations((self.one, self.other)):
-            states = StartState(open_one.name, is_open=True), StartState(closed.name, is_open=False)
-            worlds.append(_with_states(episode.trajectory, *states))
+            states = {open_one.name: True, closed.name: False}
+            worlds.append(
+                _with_states(
+                    episode.trajectory,
+                    *(StartState(name, is_open=state) for name, state in sorted(states.items())),
+                )
+            )
         both = {self.one.object_id, self.other.object_id}
-        inside = (key for key in both for key in episode.inside(key))
+        inside = {key for holder in both for key in episode.inside(holder)}
         return Worlds(
             pair=(worlds[0], worlds[1]),
-            changed=frozenset(both.union(inside)),
+            changed=frozenset(both | inside),
             types=frozenset({self.one.object_type, self.other.object_type}),
         )
 
 
 class Opened:
-    """Of two containers, each the only one of its type, one is open at the start."""
+    """A container that is the only one of its type is open at the start, or another one is."""
 
     name: ClassVar[str] = "state"
 
     def propose(self, episode: Episode, rng: random.Random) -> Iterator[_Opening]:
-        """See `EditKind`: only what the agent never opens or closes."""
+        """See `EditKind`: only what the agent never opens, closes, or takes from."""
         acted = {event.target for event in episode.history.events}
-        acted |= {event.receptacle for event in episode.history.events if event.receptacle}
-        single = [
+        acted |= episode.put_targets | {
+            move.origin for move in episode.history.moves if move.origin
+        }
+        untouched = [
             obj
             for key, obj in sorted(episode.start.objects.items())
-            if obj.openable
-            and obj.object_type in _ASKED
-            and key not in acted
-            and episode.history.is_only_one(0, key)
+            if obj.openable and obj.object_type in _ASKED and key not in acted
         ]
-        pairs = list(combinations(single, 2))
+        single = [obj for obj in untouched if episode.is_only_one(obj)]
+        pairs = [
+            (one, other)
+            for one, other in product(single, untouched)
+            if canonical_type(one.object_type) != canonical_type(other.object_type)
+        ]
         rng.shuffle(pairs)
-        for one, other in pairs:
-            yield _Opening(one, other)
+        # Of those that frames show first, each object once before any a second time.
+        used = Counter[str]()
+        while pairs:
+            best = min(pairs, key=lambda pair: (used[pair[0].name], not _is_seen(episode, pair[0])))
+            pairs.remove(best)
+            used[best[0].name] += 1
+            yield _Opening(*best)
+
+
+def _is_seen(episode: Episode, obj: ThorObject) -> bool:
+    return obj.object_id in episode.seen
 
 
 @dataclass(frozen=True)
 class _Replacement:
-    """At one place stands one of two objects; the other one is not in the scene at all."""
+    """At one place stands one of two objects; the other one is not in the scene at all.
 
-    exchange: Exchange
+    Attributes:
+        one: an object at its place in the episode.
+        other: the object that stands there in the second world.
+    """
+
+    one: ThorObject
+    other: ThorObject
 
     def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
         """See `Proposal`: the place where the second object was is empty in both worlds."""
-        exchange = self.exchange
-        worlds = exchange.apply(episode, simulator)
-        first, second = worlds.pair
-        gone = [
-            StartState(obj.name, is_disabled=True) for obj in (exchange.other, exchange.one)
-        ]
-        return replace(
-            worlds, pair=(_with_states(first, gone[0]), _with_states(second, gone[1]))
+        trajectory = episode.trajectory
+        moved = moved_scene(trajectory.scene, simulator, [(self.other, self.one)], aside=[self.one])
+        first = in_world(trajectory, scene_of(trajectory.scene, episode.start))
+        second = in_world(trajectory, moved)
+        if restore(simulator, moved).lines():
+            raise EditRefused("the exchanged start cannot be restored")
+        after = {obj.name: obj.object_id for obj in simulator.view.objects.values()}
+        keys = {obj.object_id: after[obj.name] for obj in (self.one, self.other)}
+        return Worlds(
+            pair=(
+                _with_states(first, StartState(self.other.name, is_disabled=True)),
+                _with_states(second, StartState(self.one.name, is_disabled=True)),
+            ),
+            changed=frozenset(keys),
+            types=frozenset({self.one.object_type, self.other.object_type}),
+            ids=keys,
         )
 
 
-class Replace(Move):
+class Replace:
     """One object that is not touched stands where another one could."""
 
     name: ClassVar[str] = "replace"
 
-    def propose(self, episode: Episode, rng: random.Random) -> Iterator[_Replacement]:  # type: ignore[override]
-        """See `EditKind`: only what is seen, and each the only one of its type."""
-        for exchange in super().propose(episode, rng):
-            if all(episode.is_only_one(obj) for obj in (exchange.one, exchange.other)):
-                yield _Replacement(exchange)
+    def propose(self, episode: Episode, rng: random.Random) -> Iterator[_Replacement]:
+        """See `EditKind`: each is the only one of its type, and the first is seen."""
+        for pair in Untouched().pairs(episode, rng):
+            one, other = rng.sample(pair, 2)
+            if one.object_id not in episode.seen:
+                one, other = other, one
+            if all(map(episode.is_only_one, pair)):
+                yield _Replacement(one, other)

@@ -8,7 +8,7 @@ from typing import ClassVar
 from infthor_eval.generation.questions.history import ObjectMove
 from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.generation.twins.kinds import Worlds
-from infthor_eval.generation.twins.rewriting import put_elsewhere
+from infthor_eval.generation.twins.rewriting import in_world, put_elsewhere
 from infthor_eval.household.affordances import goes_into
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.thor.simulator import Simulator
@@ -29,9 +29,9 @@ class _OtherTarget:
     move: ObjectMove
     other: ThorObject
 
-    def apply(self, episode: Episode, simulator: Simulator) -> Worlds:  # noqa: ARG002
+    def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
         """See `Proposal`: the first world is the episode's."""
-        trajectory = episode.trajectory
+        trajectory = in_world(episode.trajectory, episode.trajectory.scene)
         target = episode.start.objects[self.move.target]
         second = put_elsewhere(trajectory, self.move.after - 1, self.other)
         types = {self.move.object_type, target.object_type, self.other.object_type}
@@ -43,7 +43,7 @@ class _OtherTarget:
 
 
 class PutTarget:
-    """Where an object was put last: two receptacles, both in reach, that need not be opened."""
+    """Where an object was put last: another receptacle, in reach, that need not be opened."""
 
     name: ClassVar[str] = "put-target"
 
@@ -58,11 +58,11 @@ class PutTarget:
 
 
 def _is_last(episode: Episode, move: ObjectMove) -> bool:
-    """Return True if the object stays where the move leaves it, on something always open."""
+    """Return True if the object stays where the move leaves it, in or on a fixture."""
     target = episode.start.objects.get(move.target)
     events = episode.history.events
     later = [event for event in events if event.frame > move.after and event.target == move.item]
-    return target is not None and not target.openable and not target.pickupable and not later
+    return target is not None and not target.pickupable and not later
 
 
 def _receptacles_in_reach(episode: Episode, move: ObjectMove) -> list[ThorObject]:
