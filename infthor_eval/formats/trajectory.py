@@ -53,6 +53,7 @@ _NOT_TRAJECTORIES = {
     "set.json",
     "state_summary.json",
     "status.json",
+    "twins.jsonl",
     "timeline.json",
 }
 _HINT = "restore the file or leave it out"

@@ -1,8 +1,6 @@
 """Pairs of twins: `twins.jsonl` of a set, a line a pair of worlds.
 
-Both worlds are trajectories of the set like any other. Their pictures are in `frames/`, each once,
-named by its digest; `metadata/<traj_id>/frames.txt` has the name of each frame's picture, a line a
-frame.
+Both worlds are trajectories of the set like any other; their pictures are `shared_frames`.
 """
 
 from collections.abc import Iterable
@@ -18,9 +16,6 @@ from infthor_eval.formats.reading import read_bytes
 from infthor_eval.storage.files import write_atomically
 
 __all__ = [
-    "FRAMES_FILE",
-    "PICTURES",
-    "TWINS",
     "ComparedFrame",
     "PairedQuestion",
     "TwinPair",
@@ -28,9 +23,7 @@ __all__ = [
     "write_pairs",
 ]
 
-TWINS = "twins.jsonl"
-PICTURES = "frames"
-FRAMES_FILE = "frames.txt"
+_TWINS = "twins.jsonl"
 _HINT = "make the twins again"
 
 
@@ -56,7 +49,8 @@ class PairedQuestion(msgspec.Struct, frozen=True, omit_defaults=True):
         fact: what it is about; questions on one fact of a pair are not independent.
         answers: gold answers in each world.
         clues: frames with the evidence in either world, which are shown on both sides.
-        own_clues: frames that each world's question has by itself.
+        own_clues: frames that each world's question has by itself; none where the rules do not ask
+            it in that world.
         absence: True where the answer is that something is nowhere, for each world.
         overlap: strict score of each world's answer as a reply in the other.
     """
@@ -79,11 +73,13 @@ class TwinPair(msgspec.Struct, frozen=True):
         id: id of the pair.
         kind: kind of the edit.
         seed: seed of all that was drawn.
-        base: hash of the trajectory that the worlds were made of; it stands in no frame or text.
+        base: hash of the trajectory that the worlds were made of, which nobody is shown.
         traj_ids: names of the two trajectories, in drawn order.
         floor_plan: scene.
         ids: ids in the second world by those in the first, where they differ.
         changed: ids in the first world of what may differ.
+        displaced: ids in the first world of third objects that lie a little beside, on the same
+            receptacle, as what was changed was in the way.
         types: object types that the changed fact is about.
         frames: how each frame compares.
         questions: the paired questions.
@@ -97,6 +93,7 @@ class TwinPair(msgspec.Struct, frozen=True):
     floor_plan: str
     ids: dict[str, str]
     changed: tuple[str, ...]
+    displaced: tuple[str, ...]
     types: tuple[str, ...]
     frames: tuple[ComparedFrame, ...]
     questions: tuple[PairedQuestion, ...]
@@ -108,7 +105,7 @@ def read_pairs(folder: Path) -> list[TwinPair]:
     Raises:
         DataError: the file cannot be read, or a line is no pair.
     """
-    path = folder / TWINS
+    path = folder / _TWINS
     pairs = []
     for number, line in enumerate(read_bytes(path, _HINT).splitlines(), 1):
         try:
@@ -120,5 +117,5 @@ def read_pairs(folder: Path) -> list[TwinPair]:
 
 def write_pairs(folder: Path, pairs: Iterable[TwinPair]) -> None:
     """Write the pairs of a set, atomically."""
-    with write_atomically(folder / TWINS) as partial:
+    with write_atomically(folder / _TWINS) as partial:
         partial.write_bytes(b"".join(msgspec.json.encode(pair) + b"\n" for pair in pairs))

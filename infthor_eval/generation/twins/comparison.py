@@ -5,6 +5,7 @@ view. What differs is found by comparing logged states, not taken from the edit,
 effect shows.
 """
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,10 +15,11 @@ from msgspec.structs import replace
 from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
 from infthor_eval.formats.twins import ComparedFrame
 from infthor_eval.generation.twins.kinds import Worlds
-from infthor_eval.generation.twins.rewriting import exchange_ids
+from infthor_eval.generation.twins.rewriting import exchange_ids, whole_of
 
 __all__ = ["Difference", "World", "compare"]
 
+_NEAR = 0.5  # how far a third object may be displaced on its receptacle, metres
 _Frame = tuple[Step, dict[str, ObjectState]]
 
 
@@ -38,8 +40,10 @@ class World:
     pictures: Sequence[str]
 
 
-def compare(worlds: Worlds, first: World, second: World) -> tuple[ComparedFrame, ...]:
-    """Return how each frame compares.
+def compare(
+    worlds: Worlds, first: World, second: World
+) -> tuple[tuple[ComparedFrame, ...], frozenset[str]]:
+    """Return how each frame compares, and the ids of the third objects that are displaced.
 
     Raises:
         Difference: the agent is not in the same place throughout, an object differs that was not to
@@ -62,7 +66,7 @@ def compare(worlds: Worlds, first: World, second: World) -> tuple[ComparedFrame,
         if not same and not in_view:
             raise Difference("a picture differs though nothing that differs is in view")
         compared.append(ComparedFrame(same, tuple(sorted(in_view))))
-    return tuple(compared)
+    return tuple(compared), frozenset(comparison.displaced)
 
 
 def _existing(states: dict[str, ObjectState]) -> dict[str, ObjectState]:
@@ -70,9 +74,15 @@ def _existing(states: dict[str, ObjectState]) -> dict[str, ObjectState]:
 
 
 class _Comparison:
-    """Compares states, with the ids of the first world."""
+    """Compares states, with the ids of the first world.
+
+    Attributes:
+        displaced: ids of the objects that were put down elsewhere on the same receptacle, as the
+            changed one was in the way.
+    """
 
     def __init__(self, worlds: Worlds) -> None:
+        self.displaced: set[str] = set()
         self._changed = worlds.changed
         self._new_id = exchange_ids(worlds.ids)
         self._old_id = exchange_ids({new: old for old, new in worlds.ids.items()})
@@ -91,8 +101,12 @@ class _Comparison:
             for key in states.keys() | translated.keys()
             if not self._are_equal(states.get(key), translated.get(key))
         }
-        if any("|".join(key.split("|")[:4]) not in self._changed for key in differing):
-            raise Difference("an object differs that was not to be changed")
+        for key in differing:
+            if whole_of(key) in self._changed:
+                continue
+            if not self._are_near(states.get(key), translated.get(key)):
+                raise Difference("an object differs that was not to be changed")
+            self.displaced.add(key)
         shown = {*(step.seen or {}), *map(self._old_id, other_step.seen or {})}
         held = {
             key
@@ -100,6 +114,13 @@ class _Comparison:
             if any(key in world and world[key].held for world in (states, translated))
         }
         return differing & shown | held
+
+    def _are_near(self, state: ObjectState | None, other: ObjectState | None) -> bool:
+        """Return True if only the position differs, and little."""
+        if state is None or other is None:
+            return False
+        is_near = math.dist(state.position, other.position) <= _NEAR
+        return is_near and self._are_equal(state, replace(other, position=state.position))
 
     def _are_equal(self, state: ObjectState | None, other: ObjectState | None) -> bool:
         """Return True if states are equal, whatever the order of the parents."""

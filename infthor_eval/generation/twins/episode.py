@@ -9,6 +9,7 @@ from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import ApiAction, Trajectory
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.replay import replay
+from infthor_eval.generation.twins.rewriting import whole_of
 from infthor_eval.household.containment import logged_parent
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.storage.scratch import ScratchFolder
@@ -93,7 +94,7 @@ class Episode:
         """Return how many objects of a type the agent acts on."""
         name = canonical_type(object_type)
         events = self.history.events
-        heads = {"|".join(event.target.split("|")[:4]) for event in events}
+        heads = {whole_of(event.target) for event in events}
         return sum(canonical_type(head.partition("|")[0]) == name for head in heads)
 
 

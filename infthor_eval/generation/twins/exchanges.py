@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.generation.twins.kinds import EditRefused, Worlds
-from infthor_eval.generation.twins.placing import moved_scene, scene_of, size_ratio
+from infthor_eval.generation.twins.placing import may_fit, moved_scene, scene_of
 from infthor_eval.generation.twins.rewriting import exchange_ids, in_world
 from infthor_eval.household.affordances import SLICEABLE, goes_into
 from infthor_eval.household.wording import canonical_type
@@ -66,8 +66,8 @@ def _ids_by_name(view: SimulatorView) -> dict[str, str]:
 class ExchangeKind:
     """Base of the kinds of exchange: all pairs of objects of which both allow it.
 
-    Those of which frames show both come first, then those of like sizes: at another's place there
-    is seldom room for more.
+    Those of which frames show both come first. Objects whose sizes differ much are left out: there
+    is seldom room for the larger one.
 
     Attributes:
         needs_other_place: True if an exchange within one type of place changes no answer.
@@ -90,7 +90,7 @@ class ExchangeKind:
             and self._may_exchange(episode, one, other)
         ]
         rng.shuffle(pairs)
-        pairs.sort(key=lambda pair: (_n_unseen(episode, pair), round(size_ratio(*pair))))
+        pairs.sort(key=lambda pair: _n_unseen(episode, pair))
         return _spread(pairs)
 
     def allows(self, first: set[str], second: set[str]) -> bool:
@@ -127,6 +127,8 @@ def _spread(pairs: Iterable[_Pair]) -> list[_Pair]:
 def _fits(episode: Episode, item: ThorObject, partner: ThorObject, place: str) -> bool:
     """Return True if an object goes where its partner is at the start, and is put."""
     objects = episode.start.objects
+    if not may_fit(item, partner, objects):
+        return False
     targets = [objects[key].object_type for key in episode.targets_of(partner.object_id)]
     return all(goes_into(item.object_type, target) for target in (place, *targets))
 

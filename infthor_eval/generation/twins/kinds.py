@@ -54,6 +54,17 @@ class Worlds:
     types: frozenset[str]
     ids: dict[str, str] = field(default_factory=dict)
 
+    @property
+    def changed_in_second(self) -> frozenset[str]:
+        """The ids of the changed objects in the second world."""
+        return frozenset(self.ids.get(key, key) for key in self.changed)
+
+    def flipped(self) -> "Worlds":
+        """Return the same worlds in the other order."""
+        first, second = self.pair
+        back = {new: old for old, new in self.ids.items()}
+        return Worlds((second, first), self.changed_in_second, self.types, back)
+
 
 class Proposal(Protocol):
     """An edit of an episode that may be possible."""

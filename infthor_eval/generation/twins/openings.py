@@ -57,7 +57,7 @@ class CountOpen:
     name: ClassVar[str] = "count-open"
 
     def propose(self, episode: Episode, rng: random.Random) -> Iterator[_OneMore]:
-        """See `EditKind`: where both are seen closed, within reach, between two actions of a task."""
+        """See `EditKind`: where both are seen closed, in reach, between two actions of a task."""
         ends = {end for part in episode.trajectory.sub_trajs for end in part.low_pddl_idx}
         indices = [index for index in range(1, len(episode.history) - 1) if index not in ends]
         rng.shuffle(indices)

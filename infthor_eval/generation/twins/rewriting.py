@@ -18,7 +18,14 @@ from infthor_eval.formats.trajectory import (
 from infthor_eval.household.tasks import sub_task, task_of
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["exchange_ids", "in_world", "put_elsewhere", "with_inserted", "without_traces"]
+__all__ = [
+    "exchange_ids",
+    "in_world",
+    "put_elsewhere",
+    "whole_of",
+    "with_inserted",
+    "without_traces",
+]
 
 _ID_FIELDS = ("object_id", "receptacle_id", "clean_id")
 
@@ -126,7 +133,7 @@ def exchange_ids(ids: Mapping[str, str]) -> Callable[[str], str]:
     """Return a function from ids to new ones; a slice or a part goes with its whole."""
 
     def new_id(old: str) -> str:
-        head = "|".join(old.split("|")[:4])
+        head = whole_of(old)
         other = ids.get(head, head)
         rest = old[len(head) :]
         before, after = object_type_of(head), object_type_of(other)
@@ -134,6 +141,11 @@ def exchange_ids(ids: Mapping[str, str]) -> Callable[[str], str]:
         return other + rest.replace(f"|{before}Sliced", f"|{after}Sliced")
 
     return new_id
+
+
+def whole_of(key: str) -> str:
+    """Return the id of the object that a slice or a part is of."""
+    return "|".join(key.split("|")[:4])
 
 
 def _with_words(trajectory: Trajectory, types: Mapping[str, str]) -> list[Any]:
