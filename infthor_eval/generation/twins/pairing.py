@@ -13,7 +13,7 @@ from functools import cached_property
 from infthor_eval.formats.question import Answer
 from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.twins import PairedQuestion
-from infthor_eval.generation.questions import presence
+from infthor_eval.generation.questions import order, presence
 from infthor_eval.generation.questions.candidates import (
     MANY,
     Candidate,
@@ -59,7 +59,7 @@ class AskedWorld:
         """Return the questions that the rules ask, by their text."""
         rng = random.Random(self.seed)
         asked = candidates_of(self.history, vocabulary, rng)
-        asked += further_candidates_of(self.history, rng)
+        asked += [*further_candidates_of(self.history, rng), *order.orders(self.history)]
         return {candidate.text: candidate for candidate in asked}
 
     def sightings(self) -> Iterator[int]:

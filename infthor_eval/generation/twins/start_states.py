@@ -10,6 +10,7 @@ from typing import ClassVar
 import msgspec
 
 from infthor_eval.formats.trajectory import StartState, Trajectory
+from infthor_eval.generation.questions import presence
 from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.generation.twins.exchanges import Untouched
 from infthor_eval.generation.twins.kinds import EditRefused, Worlds
@@ -139,10 +140,24 @@ class Replace:
     name: ClassVar[str] = "replace"
 
     def propose(self, episode: Episode, rng: random.Random) -> Iterator[_Replacement]:
-        """See `EditKind`: each is the only one of its type, and the first is seen."""
-        for pair in Untouched().pairs(episode, rng):
+        """See `EditKind`: each is the only one of its type, and can be asked for where it is not.
+
+        Those whose places frames show, and of which both can be asked for, come first.
+        """
+        pairs = [
+            pair
+            for pair in Untouched().pairs(episode, rng)
+            if all(map(episode.is_only_one, pair)) and any(_can_be_missed(episode, pair))
+        ]
+        for pair in sorted(pairs, key=lambda pair: -sum(_can_be_missed(episode, pair))):
             one, other = rng.sample(pair, 2)
             if one.object_id not in episode.seen:
                 one, other = other, one
-            if all(map(episode.is_only_one, pair)):
-                yield _Replacement(one, other)
+            yield _Replacement(one, other)
+
+
+def _can_be_missed(episode: Episode, pair: tuple[ThorObject, ThorObject]) -> list[bool]:
+    """Return for each of two objects whether one can ask for it where it is not."""
+    there = episode.history.all_object_types
+    names = [canonical_type(obj.object_type) for obj in pair]
+    return [presence.is_clear_absence(name, there - {name}) for name in names]
