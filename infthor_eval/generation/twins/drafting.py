@@ -27,7 +27,7 @@ from infthor_eval.storage.files import write_atomically
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["TwinDraft", "TwinSettings", "draft_twins", "tell_twins"]
+__all__ = ["TwinDraft", "TwinSettings", "draft_twins", "is_flipped", "name_worlds"]
 
 _WORLD = "twin"  # what a world is called while it is replayed
 _COPIED = ("metadata.json", "traj.txt", "state_summary.json")
@@ -188,8 +188,7 @@ class _Maker:
             Difference: the two worlds are no twins.
         """
         worlds = proposal.apply(self._episode, self._replays.simulator)
-        # Which of the two is the original is drawn here, so nothing later can tell.
-        if random.Random(pair_id).random() < 0.5:
+        if is_flipped(pair_id):
             worlds = worlds.flipped()
         replays = [self._replays.replayed(without_traces(one, _WORLD)) for one in worlds.pair]
         frames, displaced = compare(worlds, replays[0].world, replays[1].world)
@@ -198,7 +197,7 @@ class _Maker:
             AskedWorld(replays[0].world.steps, worlds.changed, seed),
             AskedWorld(replays[1].world.steps, worlds.changed_in_second, seed),
         )
-        names = tell_twins(self._draft.rooms, pair_id)
+        names = name_worlds(self._draft.rooms, pair_id)
         pair = TwinPair(
             id=pair_id,
             kind=kind,
@@ -236,7 +235,12 @@ class _Maker:
                 )
 
 
-def tell_twins(rooms: str, pair_id: str) -> tuple[str, str]:
+def is_flipped(pair_id: str) -> bool:
+    """Return whether a pair's worlds change places, so that the first is not always the episode."""
+    return random.Random(pair_id).random() < 0.5
+
+
+def name_worlds(rooms: str, pair_id: str) -> tuple[str, str]:
     """Return the names of a pair's trajectories, which tell nothing but the rooms."""
     first, second = (f"{folder_name(rooms)}-{digest(f'{pair_id}/{side}', 4)}" for side in (0, 1))
     return first, second
