@@ -1,7 +1,7 @@
 """Giving objects each other's places in a restored scene, and the scene that results."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 
 import msgspec
@@ -18,8 +18,8 @@ __all__ = ["may_fit", "moved_scene", "scene_of"]
 # Places beside the other's that are tried, nearest first, metres.
 _STEPS = [step / 20 for step in range(-5, 6)]
 _OFFSETS = sorted(product(_STEPS, _STEPS), key=lambda offset: math.hypot(*offset))
-_SLACK = 0.05  # how much larger the new object may be in a container, metres
-_WIDER = 2.5  # how many times as wide it may be elsewhere
+_SLACK = 0.01  # how far the new object may reach beyond a container, metres
+_WIDER = 0.15  # how much wider it may be elsewhere, metres
 _FAR = 50.0  # metres above the room, where objects wait for their new places
 
 
@@ -71,26 +71,59 @@ def scene_of(scene: Scene, view: SimulatorView) -> Scene:
 
 
 def may_fit(item: ThorObject, where: ThorObject, objects: Mapping[str, ThorObject]) -> bool:
-    """Return True if an object is so large that there may be room for it where another one is."""
-    own = _size(item)
-    other = _size(where)
+    """Return True if an object is not too large for the place of another one."""
+    own = item.axis_aligned_bounding_box
+    other = where.axis_aligned_bounding_box
     if own is None or other is None:
         return False
-    if _is_enclosed(where, objects):
-        more = own.x - other.x, own.y - other.y, own.z - other.z
-        return max(more) <= _SLACK
-    return max(own.x / other.x, own.z / other.z) <= _WIDER
+    container = _container(where, objects)
+    if container is None:
+        return max(own.size.x - other.size.x, own.size.z - other.size.z) <= _WIDER
+    return any(_is_within(box, container) for box in _boxes_beside(own, other))
 
 
-def _size(obj: ThorObject) -> Vector | None:
-    box = obj.axis_aligned_bounding_box
-    return None if box is None else box.size
+def _container(where: ThorObject, objects: Mapping[str, ThorObject]) -> Box | None:
+    """Return the box of the container or basin that an object is in.
+
+    All of its inside is its body to the simulator, which places nothing there by itself.
+    """
+    parents = [objects[key] for key in where.parent_receptacles or () if key in objects]
+    boxes = [
+        parent.axis_aligned_bounding_box
+        for parent in parents
+        if (parent.openable and parent.object_type != "Toilet")
+        or parent.object_type.endswith("Basin")
+    ]
+    known = [box for box in boxes if box is not None]
+    return min(known, key=lambda box: box.size.x * box.size.y * box.size.z, default=None)
 
 
-def _is_enclosed(obj: ThorObject, objects: Mapping[str, ThorObject]) -> bool:
-    """Return True if an object is in a container or a basin, all of whose inside is its body."""
-    parents = [objects[key] for key in obj.parent_receptacles or () if key in objects]
-    return any(parent.openable or parent.object_type.endswith("Basin") for parent in parents)
+def _boxes_beside(own: Box, other: Box) -> Iterator[Box]:
+    """Yield the box of an object that stands where another one stands, then beside it."""
+    bottom = other.center.y - other.size.y / 2
+    for x, z in _OFFSETS:
+        center = Vector(other.center.x + x, bottom + own.size.y / 2, other.center.z + z)
+        yield msgspec.structs.replace(own, center=center)
+
+
+def _is_within(inner: Box, outer: Box) -> bool:
+    away = _distances(inner, outer)
+    return all(
+        away[axis] + getattr(inner.size, axis) / 2 <= getattr(outer.size, axis) / 2 + _SLACK
+        for axis in away
+    )
+
+
+def _meet(one: Box, other: Box) -> bool:
+    away = _distances(one, other)
+    return all(
+        away[axis] < (getattr(one.size, axis) + getattr(other.size, axis)) / 2 for axis in away
+    )
+
+
+def _distances(one: Box, other: Box) -> dict[str, float]:
+    """Return how far the middles of two boxes are from each other along each axis."""
+    return {axis: abs(getattr(one.center, axis) - getattr(other.center, axis)) for axis in "xyz"}
 
 
 def _place(
@@ -108,14 +141,12 @@ def _place(
     own = item.axis_aligned_bounding_box
     if box is None or own is None:
         raise EditRefused("the simulator does not report boxes")
+    container = _container(where, before)
+    if container is not None:
+        _put_inside(simulator, item, where, container)
+        return
     bottom = box.center.y - box.size.y / 2
     point = {"x": where.position.x, "y": bottom, "z": where.position.z}
-    if _is_enclosed(where, before):
-        height = item.position.y - (own.center.y - own.size.y / 2)
-        _lift(simulator, item, {**point, "y": bottom + height})
-        if _has_place(simulator.view, item, where) and not _overlaps(simulator.view, item):
-            return
-        raise EditRefused("no room at the other's place")
     for x, z in _OFFSETS:
         view = simulator.step(
             "PlaceObjectAtPoint",
@@ -123,6 +154,33 @@ def _place(
             position={**point, "x": point["x"] + x, "z": point["z"] + z},
         )
         if view.success and _has_place(view, item, where):
+            return
+    raise EditRefused("no room at the other's place")
+
+
+def _put_inside(simulator: Simulator, item: ThorObject, where: ThorObject, container: Box) -> None:
+    """Put an object into a container where another one was, or beside, clear of what is there."""
+    own = item.axis_aligned_bounding_box
+    other = where.axis_aligned_bounding_box
+    assert own is not None
+    assert other is not None
+    others = [
+        obj.axis_aligned_bounding_box
+        for obj in simulator.view.objects.values()
+        if obj.pickupable and obj.object_id != item.object_id
+    ]
+    for box in _boxes_beside(own, other):
+        is_clear = not any(taken is not None and _meet(box, taken) for taken in others)
+        if not is_clear or not _is_within(box, container):
+            continue
+        position = {
+            axis: getattr(item.position, axis)
+            - getattr(own.center, axis)
+            + getattr(box.center, axis)
+            for axis in "xyz"
+        }
+        _lift(simulator, item, position)
+        if _has_place(simulator.view, item, where):
             return
     raise EditRefused("no room at the other's place")
 
@@ -143,20 +201,3 @@ def _has_place(view: SimulatorView, item: ThorObject, where: ThorObject) -> bool
     """Return True if an object is in or on what another one was in or on."""
     parents = view.objects[item.object_id].parent_receptacles or []
     return set(parents) == set(where.parent_receptacles or [])
-
-
-def _overlaps(view: SimulatorView, item: ThorObject) -> bool:
-    """Return True if the box of an object meets that of another one that can be carried."""
-    others = (obj for obj in view.objects.values() if obj.pickupable)
-    placed = view.objects[item.object_id].axis_aligned_bounding_box
-    boxes = (obj.axis_aligned_bounding_box for obj in others if obj.object_id != item.object_id)
-    return placed is None or any(box is not None and _meet(placed, box) for box in boxes)
-
-
-def _meet(one: Box, other: Box) -> bool:
-    centers = asdict(one.center), asdict(other.center)
-    sizes = asdict(one.size), asdict(other.size)
-    return all(
-        2 * abs(centers[0][axis] - centers[1][axis]) < sizes[0][axis] + sizes[1][axis]
-        for axis in ("x", "y", "z")
-    )
