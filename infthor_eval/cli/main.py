@@ -66,6 +66,8 @@ _COMMANDS = {
 }
 # Commands that share a module of infthor_eval.cli.commands; the others are `command` of their own.
 _SHARED_MODULES = {
+    "questions": "questions:questions",
+    "twins": "questions:twins",
     "table4": "tables:table4",
     "table-final": "tables:table_final",
     "check-adapter": "checks:check_adapter",
