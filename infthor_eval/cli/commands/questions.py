@@ -1,4 +1,4 @@
-"""`infthor-eval questions` and `infthor-eval twins`: make questions, on a set or on pairs of worlds."""
+"""`infthor-eval questions` and `infthor-eval twins`: make questions, on a set or on twins."""
 
 from __future__ import annotations
 
