@@ -7,7 +7,7 @@ from pathlib import Path
 
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import ApiAction, Trajectory
-from infthor_eval.generation.questions.history import TrajectoryHistory
+from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
 from infthor_eval.generation.replay import replay
 from infthor_eval.generation.twins.rewriting import whole_of
 from infthor_eval.household.containment import logged_parent
@@ -86,9 +86,13 @@ class Episode:
         events = self.history.events
         return [event.action for event in events if _is_of(event.target, key)]
 
-    def targets_of(self, key: str) -> set[str]:
-        """Return the ids of the receptacles that an object is put into."""
-        return {move.target for move in self.history.moves_of(key)}
+    def moves_of(self, key: str) -> list[ObjectMove]:
+        """Return the moves of an object and of its slices."""
+        return [move for move in self.history.moves if _is_of(move.item, key)]
+
+    def suffix(self, move: ObjectMove) -> str:
+        """Return what the type of a moved object has after that of its whole."""
+        return "Sliced" if move.object_type.endswith("Sliced") else ""
 
     def n_handled(self, object_type: str) -> int:
         """Return how many objects of a type the agent acts on."""

@@ -105,7 +105,21 @@ class ExchangeKind:
         at_one, at_other = (place.object_type if place is not None else "" for place in places)
         if self.needs_other_place and canonical_type(at_one) == canonical_type(at_other):
             return False
-        return _fits(episode, one, other, at_other) and _fits(episode, other, one, at_one)
+        return self._fits(episode, one, other, at_other) and self._fits(episode, other, one, at_one)
+
+    def _fits(self, episode: Episode, item: ThorObject, partner: ThorObject, place: str) -> bool:
+        """Return True if an object goes where its partner is at the start, and is put."""
+        objects = episode.start.objects
+        if not may_fit(item, partner, objects) or not self.suits(item.object_type, place):
+            return False
+        return all(
+            goes_into(item.object_type + episode.suffix(move), objects[move.target].object_type)
+            for move in episode.moves_of(partner.object_id)
+        )
+
+    def suits(self, object_type: str, place: str) -> bool:
+        """Return True if a type of object may be at a type of place at the start."""
+        return goes_into(object_type, place)
 
 
 def _n_unseen(episode: Episode, pair: _Pair) -> int:
@@ -122,15 +136,6 @@ def _spread(pairs: Iterable[_Pair]) -> list[_Pair]:
         (later if keys & used else first).append(pair)
         used |= keys
     return [*first, *later]
-
-
-def _fits(episode: Episode, item: ThorObject, partner: ThorObject, place: str) -> bool:
-    """Return True if an object goes where its partner is at the start, and is put."""
-    objects = episode.start.objects
-    if not may_fit(item, partner, objects):
-        return False
-    targets = [objects[key].object_type for key in episode.targets_of(partner.object_id)]
-    return all(goes_into(item.object_type, target) for target in (place, *targets))
 
 
 def _is_alone(episode: Episode, obj: ThorObject) -> bool:
@@ -169,6 +174,10 @@ class SwapSliced(ExchangeKind):
         for exchange in super().propose(episode, rng):
             if {exchange.one.object_type, exchange.other.object_type} <= SLICEABLE:
                 yield exchange
+
+    def suits(self, object_type: str, place: str) -> bool:
+        """See the base: foods stand for each other, wherever rooms have one."""
+        return True
 
     def allows(self, first: set[str], second: set[str]) -> bool:
         """See the base."""

@@ -79,6 +79,7 @@ def _closed_in_reach(episode: Episode, frame: int) -> list[ThorObject]:
         if shown.visible
         and key in episode.start.objects
         and states[key].is_open is False
+        and not states[key].is_on  # a microwave that is on stays closed
         and states[key].type in _ASKED
         and history.shows(frame, key)
     ]
