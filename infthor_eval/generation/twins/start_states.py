@@ -23,6 +23,7 @@ from infthor_eval.thor.view import ThorObject
 
 __all__ = ["Opened", "Replace"]
 
+_WITH_DOORS = frozenset({"Cabinet", "Fridge", "Safe"})  # which stand in the way when open
 # What people would ask about as open or closed, and what can stand open without a hand on it.
 _ASKED = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Laptop", "Microwave", "Safe"})
 
@@ -88,17 +89,23 @@ class Opened:
             if canonical_type(one.object_type) != canonical_type(other.object_type)
         ]
         rng.shuffle(pairs)
-        # Of those that frames show first, each object once before any a second time.
+        # Of those that frames show first, each object once before any a second time, and those in
+        # nobody's way.
         used = Counter[str]()
+
+        def rank(pair: tuple[ThorObject, ThorObject]) -> tuple[int, bool, int]:
+            is_unseen = pair[0].object_id not in episode.seen
+            return (
+                used[pair[0].name],
+                is_unseen,
+                sum(obj.object_type in _WITH_DOORS for obj in pair),
+            )
+
         while pairs:
-            best = min(pairs, key=lambda pair: (used[pair[0].name], not _is_seen(episode, pair[0])))
+            best = min(pairs, key=rank)
             pairs.remove(best)
             used[best[0].name] += 1
             yield _Opening(*best)
-
-
-def _is_seen(episode: Episode, obj: ThorObject) -> bool:
-    return obj.object_id in episode.seen
 
 
 @dataclass(frozen=True)

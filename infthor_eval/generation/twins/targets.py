@@ -37,7 +37,7 @@ class _OtherTarget:
         types = {self.move.object_type, target.object_type, self.other.object_type}
         return Worlds(
             pair=(trajectory, second),
-            changed=frozenset({self.move.item}),
+            changed=frozenset({self.move.item, *episode.inside(self.move.item, self.move.after)}),
             types=frozenset(types),
         )
 
