@@ -29,6 +29,7 @@ _OUTSIDE = {  # where a file lies in the repository: where its page stands in th
     "benchmarks/plans.md": "benchmarks/plans.md",
     "benchmarks/simulator.md": "benchmarks/simulator.md",
     "benchmarks/speed.md": "benchmarks/speed.md",
+    "benchmarks/twins.md": "benchmarks/twins.md",
     "examples/sums/README.md": "examples/sums/README.md",
     "examples/thumbnails/README.md": "examples/thumbnails/README.md",
     "infthor_sim/README.md": "infthor_sim/README.md",

@@ -46,6 +46,7 @@ _COMMANDS = {
         "look-around": "Level the camera in the long walks of trajectories.",
         "replay": "Replay trajectories in the simulator into frames and metadata.",
         "questions": "Generate NIEH questions on replayed trajectories.",
+        "twins": "Make twins of trajectories: questions with another answer in another world.",
         "validate": "Keep the questions of a set that one of several models answers.",
         "bundle": "Build a question set from a manifest of scenes and seeds.",
         "scenes": "Draw a scene, or export it for machines without Unity.",
@@ -65,6 +66,8 @@ _COMMANDS = {
 }
 # Commands that share a module of infthor_eval.cli.commands; the others are `command` of their own.
 _SHARED_MODULES = {
+    "questions": "questions:questions",
+    "twins": "questions:twins",
     "table4": "tables:table4",
     "table-final": "tables:table_final",
     "check-adapter": "checks:check_adapter",

@@ -3,7 +3,7 @@
 The folder has the layout of the published data (hub dataset `PEARLS-Lab/infini-thor-nieh`):
 `qa_set*.csv` beside `metadata/<traj_id>/` with `img/` (or `img_768/`), `metadata.json`,
 `expert_log.json` and, in some sets, `<traj_id>_10fps.mp4`. The trajectory files are in a separate
-folder (published data) or inside the set (ours).
+folder (published data) or inside the set (ours). Twins share pictures (`shared_frames`).
 
 Question files alone, without `metadata/`, are a set too: for whatever needs no frame.
 """
@@ -24,6 +24,7 @@ from infthor_eval.formats.outline import Outline, find_outline, read_outline, re
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.set_info import simulator_of
+from infthor_eval.formats.shared_frames import read_shared_frames
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.video import Video, read_video
 
@@ -298,6 +299,9 @@ def _read_frames(folder: Path) -> dict[int, FrameRef]:
         if not folder.is_dir():
             raise DataError(f"trajectory {folder.name} is not in metadata/")
     steps = sorted(read_steps(folder), key=lambda step: step.img_idx)
+    shared = read_shared_frames(folder, [step.img_idx for step in steps])
+    if shared is not None:
+        return shared
     home = next((folder / name for name in _IMAGE_FOLDERS if (folder / name).is_dir()), None)
     if home is None:
         raise DataError(f"trajectory {folder.name}: neither img/ nor img_768/ in {folder}; {_HINT}")

@@ -4,7 +4,8 @@ Columns `traj_id`, `question`, `gt_img_idx`, `answer`; the last two are Python-l
 13]`, `['yes']`). `question_type` and `absence` are ours and optional. `absence` is `yes` for
 questions whose answer is that something is nowhere: no frame is evidence for that, and `gt_img_idx`
 is a sample. Without a `question_type` the tables take the type that the question's words have in
-Table 3 (`question_forms`).
+Table 3 (`question_forms`). `pair` and `fact` are there in sets of twins alone: both questions of a
+pair have the same `pair`, and all on one changed fact the same `fact`.
 
 The two published files (`qa_set_nieh_single_clue.csv`, `qa_set_nsieh_multi_clue.csv`) have `qid`,
 `num_evidence`, `gt_steps` and `match1` to `match4` too, which are kept; copies without some of them
@@ -29,6 +30,7 @@ __all__ = ["encode_questions", "read_questions", "write_questions"]
 _COLUMNS = ("traj_id", "question", "gt_img_idx", "answer")
 _TYPE = "question_type"
 _ABSENCE = "absence"
+_TWINS = ("pair", "fact")
 _MATCHES = ("match1", "match2", "match3", "match4")
 _PUBLISHED = ("qid", "num_evidence", "gt_steps", *_MATCHES)
 _CLUE_FILES = ("single", "multi")  # in the names of the published files, before "_clue"
@@ -63,7 +65,9 @@ def encode_questions(questions: Iterable[Question]) -> bytes:
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     are_published = any(question.published for question in questions)
-    writer.writerow([*_COLUMNS, _TYPE, _ABSENCE, *(_PUBLISHED if are_published else ())])
+    are_twins = any(question.pair for question in questions)
+    further = (*(_TWINS if are_twins else ()), *(_PUBLISHED if are_published else ()))
+    writer.writerow([*_COLUMNS, _TYPE, _ABSENCE, *further])
     for question in questions:
         absence = "yes" if question.absence else ""
         cells = [
@@ -74,8 +78,9 @@ def encode_questions(questions: Iterable[Question]) -> bytes:
             question.question_type or "",
             absence,
         ]
+        twins = (question.pair, question.fact) if are_twins else ()
         published = _published_cells(question.published) if question.published else ()
-        writer.writerow([*cells, *published])
+        writer.writerow([*cells, *twins, *published])
     return text.getvalue().encode()
 
 
@@ -112,6 +117,8 @@ def _question(row: dict[str, str], file: str | None) -> Question:
         question_type=row.get(_TYPE, "").strip() or None,
         absence=absence == "yes",
         published=_published(row, file),
+        pair=row.get("pair", "").strip(),
+        fact=row.get("fact", "").strip(),
     )
 
 

@@ -45,6 +45,8 @@ class Question:
         absence: True if the answer is that something is nowhere. No frame is evidence; the clues
             are a sample.
         published: further columns of a published file; None elsewhere.
+        pair: name of the pair of questions that it is one of, in twins; empty elsewhere.
+        fact: name of the changed fact that the pair is about; several pairs may be about one.
         file: name of its file without suffix, among several of a set; empty elsewhere. It is no
             part of what is asked.
     """
@@ -56,6 +58,8 @@ class Question:
     question_type: str | None = None
     absence: bool = False
     published: PublishedColumns | None = None
+    pair: str = field(default="", compare=False)
+    fact: str = field(default="", compare=False)
     file: str = field(default="", compare=False)
 
     @property

@@ -85,6 +85,7 @@ FURTHER_FORMS = (
     QuestionForm(_COUNT, "How many times did you open {}?"),
     QuestionForm(_COUNT, "How many times did you put something in/on {}?"),
     QuestionForm(_COUNT, "How many different objects did you pick up?"),
+    QuestionForm("order_further", "Did you pick up {} before {}?"),
 )
 
 

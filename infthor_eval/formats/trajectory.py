@@ -30,6 +30,7 @@ __all__ = [
     "ObjectPose",
     "PlannerAction",
     "Scene",
+    "StartState",
     "SubTask",
     "SubTrajectory",
     "TaskInfo",
@@ -53,6 +54,7 @@ _NOT_TRAJECTORIES = {
     "set.json",
     "state_summary.json",
     "status.json",
+    "twins.jsonl",
     "timeline.json",
 }
 _HINT = "restore the file or leave it out"
@@ -103,8 +105,25 @@ class Toggle(_Fields, omit_defaults=False):
     is_on: bool = msgspec.field(name="isOn")
 
 
+class StartState(_Fields):
+    """The state of one object in the initial scene, by Unity's name: our addition, for twins.
+
+    Attributes:
+        name: name of the object, as in `ObjectPose`.
+        is_open: True or False to open or close it; None to leave it as it is.
+        is_disabled: True to take it out of the scene.
+    """
+
+    name: str = msgspec.field(name="objectName")
+    is_open: bool | None = msgspec.field(name="isOpen", default=None)
+    is_disabled: bool = msgspec.field(name="isDisabled", default=False)
+
+
 class Scene(_Fields, omit_defaults=False):
-    """The initial state of a trajectory: scene, poses and states of objects, pose of the agent."""
+    """The initial state of a trajectory: scene, poses and states of objects, pose of the agent.
+
+    `object_states` is ours, and not written where it is empty, as in published files.
+    """
 
     floor_plan: str
     init_action: InitAction
@@ -113,6 +132,7 @@ class Scene(_Fields, omit_defaults=False):
     object_toggles: list[Toggle] = msgspec.field(default_factory=list)
     dirty_and_empty: bool = False
     random_seed: int = 0
+    object_states: list[StartState] | msgspec.UnsetType = msgspec.UNSET
 
 
 class ApiAction(_Fields):

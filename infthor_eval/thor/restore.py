@@ -1,9 +1,10 @@
 """Restoring the recorded initial state of a trajectory.
 
 The order is ALFRED's: toggles, dirt and liquids, object poses, then the agent. In Unity, the agent
-comes before the poses, which are set in rounds (`settling.py`), as in the published generator.
-Recorded poses have names of Unity objects, which differ between AI2-THOR versions. An unknown name
-is replaced by that of an object of the same type.
+comes before the poses, which are set in rounds (`settling.py`), as in the published generator. At
+the end come states of single objects, which are ours. Recorded poses have names of Unity objects,
+which differ between AI2-THOR versions. An unknown name is replaced by that of an object of the same
+type.
 """
 
 from collections import defaultdict
@@ -11,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from infthor_eval.formats.object_ids import modern_type
-from infthor_eval.formats.trajectory import ObjectPose, Scene
+from infthor_eval.formats.trajectory import ObjectPose, Scene, StartState
 from infthor_eval.thor.axes import modern_rotation
 from infthor_eval.thor.settling import Deviation, poses_call, settle
 from infthor_eval.thor.simulator import Simulator
@@ -60,13 +61,36 @@ def restore(simulator: Simulator, scene: Scene) -> RestoreReport:
         calls.append(poses_call(poses))
     calls.append(teleport_call(pose))
     for call in calls:
-        view = simulator.step(**call)
-        if not view.success:
-            report.refused.append(f"{call['action']}: {view.error}")
+        _step(simulator, call, report)
     if settles:
         refused, report.deviation = settle(simulator, poses, loaded)
         report.refused += refused
+    # Ids are those after the poses were set.
+    by_name = {obj.name: obj.object_id for obj in simulator.view.objects.values()}
+    for state in scene.object_states or ():
+        _set_state(simulator, by_name.get(state.name), state, report)
     return report
+
+
+def _step(simulator: Simulator, call: dict[str, Any], report: RestoreReport) -> None:
+    view = simulator.step(**call)
+    if not view.success:
+        report.refused.append(f"{call['action']}: {view.error}")
+
+
+def _set_state(
+    simulator: Simulator, key: str | None, state: StartState, report: RestoreReport
+) -> None:
+    """Give one object its state of the start."""
+    if key is None:
+        report.dropped.append(state.name)
+        return
+    obj = simulator.view.objects[key]
+    if state.is_open is not None and state.is_open != obj.is_open:
+        action = "OpenObject" if state.is_open else "CloseObject"
+        _step(simulator, {"action": action, "objectId": key, "forceAction": True}, report)
+    if state.is_disabled:
+        _step(simulator, {"action": "DisableObject", "objectId": key}, report)
 
 
 def _state_calls(scene: Scene) -> list[dict[str, Any]]:

@@ -71,6 +71,15 @@ class Checker:
             minimal = absence or n_necessary == len(clues)
         return Verdict(gives_gold(self._whole), gives_gold(shown), minimal)
 
+    def answers(self, text: str, clues: Sequence[int] | None = None) -> tuple[str, ...] | None:
+        """Return the answers to a question's text by the whole log, or by what some frames show.
+
+        It is None if they do not suffice.
+        """
+        facts = self._whole if clues is None else [self._single[clue] for clue in clues]
+        found = answer(text, facts)
+        return None if found is None else tuple(found)
+
     def _are_needed(self, question: Question, n_necessary: int) -> bool:
         """Return True if so many necessary clues fit a further count."""
         (count,) = map(int, question.answers)

@@ -20,7 +20,7 @@ from infthor_eval.generation.questions.rooms import COMMON_TYPES, rooms_of
 from infthor_eval.household.affordances import STOWABLE
 from infthor_eval.household.wording import noun, with_article
 
-__all__ = ["QUESTION_TYPE", "no_questions", "yes_questions"]
+__all__ = ["QUESTION_TYPE", "is_clear_absence", "no_questions", "yes_questions"]
 
 QUESTION_TYPE = "object_presence"
 _IN_ROOM = "Is there any {} in this room?"
@@ -125,15 +125,24 @@ def _other_types(
     history: TrajectoryHistory, vocabulary: frozenset[str], there: frozenset[str]
 ) -> set[str]:
     """Return the vocabulary's types that are not there, nor like one that is; more if few."""
-    similar = {name for group in _SIMILAR_TYPES if group & there for name in group}
     rooms = rooms_of(history.all_object_types).split(", ")
     common = (
         frozenset[str]().union(*map(COMMON_TYPES.__getitem__, rooms)) - history.all_object_types
     )
-    excluded = there | similar
+    excluded = there | _similar_types(there)
     own = set(filter(_is_nameable, vocabulary - excluded))
     others = set(filter(_is_nameable, common - excluded))
     return own if len(own) >= _FEW else own | others
+
+
+def _similar_types(there: frozenset[str]) -> set[str]:
+    """Return the types that people may take for one that is there."""
+    return {name for group in _SIMILAR_TYPES if group & there for name in group}
+
+
+def is_clear_absence(object_type: str, there: frozenset[str]) -> bool:
+    """Return True if a type can be asked for, and is neither there nor like one that is."""
+    return _is_nameable(object_type) and object_type not in there | _similar_types(there)
 
 
 def _is_nameable(object_type: str) -> bool:

@@ -296,6 +296,15 @@ def _n_picked_up(facts: Sequence[FrameFacts]) -> list[str]:
     return [str(count)] if count else []
 
 
+def _picked_before(facts: Sequence[FrameFacts], words: str, other: str) -> list[str]:
+    """Return whether one thing was picked up before another; frames show what the hand holds."""
+    first = [event.frame.number for event in events_of(facts, "PickupObject", words)]
+    second = [event.frame.number for event in events_of(facts, "PickupObject", other)]
+    if not first or not second or (facts[0].everything and len(first) + len(second) > 2):
+        return []
+    return ["yes" if first[0] < second[0] else "no"]
+
+
 _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"Is there any (.+) in this room\?", _presence),
     (r"Have you seen (.+)\?", _seen),
@@ -335,4 +344,5 @@ _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"How many times did you open (?:the|an?) (.+)\?", _openings),
     (r"How many times did you put something (in|on) the (.+)\?", _puts),
     (r"How many different objects did you pick up\?", _n_picked_up),
+    (r"Did you pick up the (.+) before the (.+)\?", _picked_before),
 )

@@ -1,0 +1,121 @@
+"""Pairs of twins: `twins.jsonl` of a set, a line a pair of worlds.
+
+Both worlds are trajectories of the set like any other; their pictures are `shared_frames`.
+"""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.question import Answer
+from infthor_eval.formats.reading import read_bytes
+from infthor_eval.storage.files import write_atomically
+
+__all__ = [
+    "ComparedFrame",
+    "PairedQuestion",
+    "TwinPair",
+    "read_pairs",
+    "write_pairs",
+]
+
+_TWINS = "twins.jsonl"
+_HINT = "make the twins again"
+
+
+class ComparedFrame(msgspec.Struct, array_like=True, frozen=True):
+    """One frame of a pair.
+
+    Attributes:
+        same: True if the pictures are equal.
+        changed: ids in the first world of what differs and is in view.
+    """
+
+    same: bool
+    changed: tuple[str, ...] = ()
+
+
+class PairedQuestion(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A question with another answer in each world.
+
+    Attributes:
+        text: the question.
+        form: its form, with {} for names.
+        question_type: its type.
+        fact: what it is about; questions on one fact of a pair are not independent.
+        answers: gold answers in each world.
+        clues: frames with the evidence in either world, which are shown on both sides.
+        own_clues: frames that each world's question has by itself; none where the rules do not ask
+            it in that world.
+        absence: True where the answer is that something is nowhere, for each world.
+        overlap: strict score of each world's answer as a reply in the other.
+    """
+
+    text: str
+    form: str
+    question_type: str
+    fact: str
+    answers: tuple[tuple[Answer, ...], tuple[Answer, ...]]
+    clues: tuple[int, ...]
+    own_clues: tuple[tuple[int, ...], tuple[int, ...]]
+    absence: tuple[bool, bool]
+    overlap: tuple[float, float]
+
+
+class TwinPair(msgspec.Struct, frozen=True):
+    """Two worlds and what differs between them.
+
+    Attributes:
+        id: id of the pair.
+        kind: kind of the edit.
+        seed: seed of all that was drawn.
+        base: hash of the trajectory that the worlds were made of, which nobody is shown.
+        traj_ids: names of the two trajectories, in drawn order.
+        floor_plan: scene.
+        ids: ids in the second world by those in the first, where they differ.
+        changed: ids in the first world of what may differ.
+        displaced: ids in the first world of third objects that lie a little beside, on the same
+            receptacle, as what was changed was in the way.
+        types: object types that the changed fact is about.
+        frames: how each frame compares.
+        questions: the paired questions.
+    """
+
+    id: Annotated[str, Meta(pattern=r"^[\w.-]+$")]
+    kind: str
+    seed: int
+    base: str
+    traj_ids: tuple[str, str]
+    floor_plan: str
+    ids: dict[str, str]
+    changed: tuple[str, ...]
+    displaced: tuple[str, ...]
+    types: tuple[str, ...]
+    frames: tuple[ComparedFrame, ...]
+    questions: tuple[PairedQuestion, ...]
+
+
+def read_pairs(folder: Path) -> list[TwinPair]:
+    """Read the pairs of a set.
+
+    Raises:
+        DataError: the file cannot be read, or a line is no pair.
+    """
+    path = folder / _TWINS
+    pairs = []
+    for number, line in enumerate(read_bytes(path, _HINT).splitlines(), 1):
+        try:
+            pairs.append(msgspec.json.decode(line, type=TwinPair))
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise DataError(f"{path}:{number}: not a pair of twins ({error}); {_HINT}") from error
+    return pairs
+
+
+def write_pairs(folder: Path, pairs: Iterable[TwinPair]) -> None:
+    """Write the pairs of a set, atomically."""
+    with write_atomically(folder / _TWINS) as partial:
+        partial.write_bytes(b"".join(msgspec.json.encode(pair) + b"\n" for pair in pairs))

@@ -1,0 +1,1 @@
+"""Twins: the same episode in two worlds that differ in one thing, so that answers differ."""

@@ -1,0 +1,246 @@
+"""Making the twins of one trajectory: edits are proposed, applied, replayed, compared and asked.
+
+What passes is a draft: all pairs of worlds with all their questions, of which a set has a choice.
+"""
+
+import random
+import shutil
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from infthor_eval.formats.shared_frames import store_picture, write_frame_names
+from infthor_eval.formats.step_log import read_steps
+from infthor_eval.formats.trajectory import Trajectory, encode_trajectory, folder_name
+from infthor_eval.formats.twins import TwinPair
+from infthor_eval.generation.replay import replay
+from infthor_eval.generation.twins.comparison import Difference, World, compare
+from infthor_eval.generation.twins.episode import Episode, read_episode
+from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Proposal, Worlds
+from infthor_eval.generation.twins.pairing import AskedWorld, ScoreReply, pair_questions
+from infthor_eval.generation.twins.rewriting import without_traces
+from infthor_eval.storage.digests import digest, digest_of_file
+from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.scratch import ScratchFolder
+from infthor_eval.thor.simulator import Simulator
+
+__all__ = ["TwinDraft", "TwinSettings", "draft_twins", "is_flipped", "name_worlds"]
+
+_WORLD = "twin"  # what a world is called while it is replayed
+_COPIED = ("metadata.json", "traj.txt", "state_summary.json")
+
+
+class TwinSettings(msgspec.Struct, frozen=True):
+    """How twins are made.
+
+    Attributes:
+        kinds: names of the kinds of edits.
+        seed: seed of all that is drawn.
+        per_kind: twins with questions of one kind and trajectory, at most; twice as many are
+            proposed.
+    """
+
+    kinds: tuple[str, ...]
+    seed: int = 0
+    per_kind: int = 2
+
+
+class TwinDraft(msgspec.Struct):
+    """The twins of one trajectory.
+
+    Attributes:
+        digest: hash of the trajectory's JSON.
+        settings: how they were made.
+        rooms: scene of the trajectory.
+        proposed: number of proposed edits by kind.
+        rejected: number of rejected edits by kind and reason.
+        pairs: what was kept and has questions.
+    """
+
+    digest: str
+    settings: TwinSettings
+    rooms: str
+    proposed: dict[str, int] = msgspec.field(default_factory=dict)
+    rejected: dict[str, dict[str, int]] = msgspec.field(default_factory=dict)
+    pairs: list[TwinPair] = msgspec.field(default_factory=list)
+
+
+def draft_twins(
+    trajectory: Trajectory,
+    base: str,
+    settings: TwinSettings,
+    score: ScoreReply,
+    simulator: Simulator,
+    out: Path,
+) -> TwinDraft:
+    """Make the twins of a trajectory, and write the worlds of those with questions into a set.
+
+    Args:
+        trajectory: the trajectory; its ids of objects are replaced by the simulator's.
+        base: hash of its JSON.
+        settings: how twins are made.
+        score: the strict score of a reply.
+        simulator: a simulator.
+        out: folder of the set.
+
+    Raises:
+        EpisodeError: it cannot be restored or replayed.
+        SimulatorError: the simulator fails.
+    """
+    draft = TwinDraft(base, settings, trajectory.scene.floor_plan)
+    episode = read_episode(trajectory, simulator)
+    with ExitStack() as stack:
+        maker = _Maker(draft, episode, score, _Replays(simulator, stack), out)
+        for name in settings.kinds:
+            maker.try_kind(name)
+    return draft
+
+
+@dataclass(frozen=True)
+class _Replayed:
+    """A replayed world and the folder of its files."""
+
+    world: World
+    folder: Path
+
+
+class _Replays:
+    """Replays worlds, each once, whatever edits it is of."""
+
+    def __init__(self, simulator: Simulator, stack: ExitStack) -> None:
+        self.simulator = simulator
+        self._stack = stack
+        self._replayed: dict[str, _Replayed | str] = {}
+
+    def replayed(self, world: Trajectory) -> _Replayed:
+        """Return the replay of a world.
+
+        Raises:
+            Difference: it cannot be restored, or an action is refused.
+        """
+        key = digest(msgspec.json.encode(world))
+        if key not in self._replayed:
+            self._replayed[key] = self._replay(world)
+        result = self._replayed[key]
+        if isinstance(result, str):
+            raise Difference(result)
+        return result
+
+    def _replay(self, world: Trajectory) -> _Replayed | str:
+        folder = self._stack.enter_context(ScratchFolder()) / _WORLD
+        folder.mkdir()
+        report = replay(world, self.simulator, folder, "")
+        if report.restore:
+            return "its start cannot be restored"
+        if report.refusals:
+            return f"{report.refusals[0].action.partition(' ')[0]} is refused"
+        steps = read_steps(folder)
+        pictures = [digest_of_file(folder / "img" / step.img_filename) for step in steps]
+        return _Replayed(World(steps, pictures), folder)
+
+
+class _Maker:
+    """Fills the draft of a trajectory."""
+
+    def __init__(
+        self, draft: TwinDraft, episode: Episode, score: ScoreReply, replays: _Replays, out: Path
+    ) -> None:
+        self._draft = draft
+        self._episode = episode
+        self._score = score
+        self._replays = replays
+        self._out = out
+
+    def try_kind(self, name: str) -> None:
+        """Try the edits of a kind until enough have questions, or have been proposed."""
+        settings = self._draft.settings
+        kind: EditKind = KINDS.load(name, EditKind)()
+        stream = f"{settings.seed}/{self._draft.digest}/{name}"
+        rng = random.Random(stream)
+        rejected: dict[str, int] = {}
+        pairs: list[TwinPair] = []
+        n_proposed = 0
+        for proposal in kind.propose(self._episode, rng):
+            if n_proposed == 2 * settings.per_kind or len(pairs) == settings.per_kind:
+                break
+            pair_id = f"{name}-{digest(f'{stream}/{n_proposed}', 4)}"
+            n_proposed += 1
+            try:
+                pair = self._try(proposal, name, pair_id)
+            except (EditRefused, Difference) as error:
+                rejected[str(error)] = rejected.get(str(error), 0) + 1
+            else:
+                pairs += [pair] if pair.questions else []
+        if n_proposed:
+            self._draft.proposed[name] = n_proposed
+        if rejected:
+            self._draft.rejected[name] = rejected
+        self._draft.pairs += pairs
+
+    def _try(self, proposal: Proposal, kind: str, pair_id: str) -> TwinPair:
+        """Make one pair, and write its worlds if it has questions.
+
+        Raises:
+            EditRefused: the edit is not possible.
+            Difference: the two worlds are no twins.
+        """
+        worlds = proposal.apply(self._episode, self._replays.simulator)
+        if is_flipped(pair_id):
+            worlds = worlds.flipped()
+        replays = [self._replays.replayed(without_traces(one, _WORLD)) for one in worlds.pair]
+        frames, displaced = compare(worlds, replays[0].world, replays[1].world)
+        seed = self._draft.settings.seed
+        asked = (
+            AskedWorld(replays[0].world.steps, worlds.changed, seed),
+            AskedWorld(replays[1].world.steps, worlds.changed_in_second, seed),
+        )
+        names = name_worlds(self._draft.rooms, pair_id)
+        pair = TwinPair(
+            id=pair_id,
+            kind=kind,
+            seed=seed,
+            base=self._draft.digest,
+            traj_ids=names,
+            floor_plan=self._draft.rooms,
+            ids=worlds.ids,
+            changed=tuple(sorted(worlds.changed)),
+            displaced=tuple(sorted(displaced)),
+            types=tuple(sorted(worlds.types)),
+            frames=frames,
+            questions=tuple(pair_questions(asked, worlds.types, self._score)),
+        )
+        if pair.questions:
+            self._write(worlds, names, replays)
+        return pair
+
+    def _write(self, worlds: Worlds, names: Sequence[str], replays: Sequence[_Replayed]) -> None:
+        for name, trajectory, replayed in zip(names, worlds.pair, replays, strict=True):
+            final = self._out / "metadata" / name
+            if final.exists():
+                shutil.rmtree(final)  # of a run that was interrupted before this draft was whole
+            with write_atomically(final) as folder:
+                folder.mkdir()
+                for file in _COPIED:
+                    shutil.copyfile(replayed.folder / file, folder / file)
+                document = encode_trajectory(without_traces(trajectory, name))
+                (folder / "traj_data.json").write_bytes(document)
+                images = (
+                    replayed.folder / "img" / step.img_filename for step in replayed.world.steps
+                )
+                write_frame_names(
+                    folder, [store_picture(self._out, image, name) for image in images]
+                )
+
+
+def is_flipped(pair_id: str) -> bool:
+    """Return whether a pair's worlds change places, so that the first is not always the episode."""
+    return random.Random(pair_id).random() < 0.5
+
+
+def name_worlds(rooms: str, pair_id: str) -> tuple[str, str]:
+    """Return the names of a pair's trajectories, which tell nothing but the rooms."""
+    first, second = (f"{folder_name(rooms)}-{digest(f'{pair_id}/{side}', 4)}" for side in (0, 1))
+    return first, second

@@ -1,0 +1,147 @@
+"""An episode that twins are made of: a trajectory, its restored start, and what happened in it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from infthor_eval.formats.step_log import read_steps
+from infthor_eval.formats.trajectory import ApiAction, Trajectory
+from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
+from infthor_eval.generation.replay import replay
+from infthor_eval.generation.twins.rewriting import whole_of
+from infthor_eval.household.containment import logged_parent
+from infthor_eval.household.wording import canonical_type
+from infthor_eval.storage.scratch import ScratchFolder
+from infthor_eval.thor.grounding import Grounding
+from infthor_eval.thor.restore import restore
+from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.view import SimulatorView, ThorObject
+
+__all__ = ["Episode", "EpisodeError", "read_episode"]
+
+
+class EpisodeError(Exception):
+    """A trajectory that twins cannot be made of; the message says why."""
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A trajectory with its restored start and the log of its replay.
+
+    Attributes:
+        trajectory: the trajectory; the ids in its actions are the simulator's.
+        start: the restored scene, before the agent's first action.
+        history: what happened, from the log.
+    """
+
+    trajectory: Trajectory
+    start: SimulatorView
+    history: TrajectoryHistory
+
+    @cached_property
+    def loose(self) -> tuple[ThorObject, ...]:
+        """Objects that can be picked up and stand somewhere alone and empty, by id."""
+        states = self.history.states(0)
+        holders = {parent for state in states.values() for parent in state.parents}
+        return tuple(
+            obj
+            for key, obj in sorted(self.start.objects.items())
+            if obj.pickupable and key not in holders and self.holder(key) is not None
+        )
+
+    @cached_property
+    def seen(self) -> frozenset[str]:
+        """Ids of the objects that a frame shows large enough."""
+        history = self.history
+        return frozenset(
+            key
+            for frame in range(len(history))
+            for key in history.objects_in_frame(frame)
+            if history.shows(frame, key)
+        )
+
+    @cached_property
+    def put_targets(self) -> frozenset[str]:
+        """Ids of what the agent puts things into or onto."""
+        return frozenset(event.receptacle for event in self.history.events if event.receptacle)
+
+    def holder(self, key: str) -> ThorObject | None:
+        """Return what an object is directly in or on at the start; None for the floor."""
+        states = self.history.states(0)
+        parent = logged_parent(states[key], states)
+        return None if parent is None else self.start.objects[parent]
+
+    def inside(self, key: str, frame: int = 0) -> frozenset[str]:
+        """Return the ids of all that is in or on an object at a frame, however deep."""
+        states = self.history.states(frame)
+        return frozenset(other for other, state in states.items() if key in state.parents)
+
+    def is_only_one(self, obj: ThorObject) -> bool:
+        """Return True if the scene has no other object of the name at the start."""
+        return self.history.is_only_one(0, obj.object_id)
+
+    def actions_on(self, key: str) -> list[str]:
+        """Return the names of the actions on an object, or on a slice of it, in order."""
+        events = self.history.events
+        return [event.action for event in events if _is_of(event.target, key)]
+
+    def moves_of(self, key: str) -> list[ObjectMove]:
+        """Return the moves of an object and of its slices."""
+        return [move for move in self.history.moves if _is_of(move.item, key)]
+
+    def suffix(self, move: ObjectMove) -> str:
+        """Return what the type of a moved object has after that of its whole."""
+        return "Sliced" if move.object_type.endswith("Sliced") else ""
+
+    def n_handled(self, object_type: str) -> int:
+        """Return how many objects of a type the agent acts on."""
+        name = canonical_type(object_type)
+        events = self.history.events
+        heads = {whole_of(event.target) for event in events}
+        return sum(canonical_type(head.partition("|")[0]) == name for head in heads)
+
+
+def read_episode(trajectory: Trajectory, simulator: Simulator) -> Episode:
+    """Restore and replay a trajectory.
+
+    Raises:
+        EpisodeError: the scene cannot be restored, or an action is refused.
+        SimulatorError: the simulator fails.
+    """
+    restored = restore(simulator, trajectory.scene)
+    if restored.dropped or restored.refused:
+        raise EpisodeError(f"not restored: {[*restored.dropped, *restored.refused][0]}")
+    start = simulator.view
+    grounding = Grounding(start)
+    for api in _api_actions(trajectory):
+        for name in ("object_id", "receptacle_id"):
+            _ground(api, name, grounding, start)
+    with ScratchFolder() as scratch:
+        folder = Path(scratch) / "replay"
+        folder.mkdir()
+        report = replay(trajectory, simulator, folder, "")
+        if report.refusals:
+            first = report.refusals[0]
+            raise EpisodeError(f"step {first.step}: {first.action}: {first.error}")
+        steps = read_steps(folder)
+    return Episode(trajectory, start, TrajectoryHistory(trajectory.traj_id, steps))
+
+
+def _api_actions(trajectory: Trajectory) -> Iterator[ApiAction]:
+    for low in trajectory.plan.low_actions:
+        yield low.api_action
+
+
+def _ground(api: ApiAction, name: str, grounding: Grounding, start: SimulatorView) -> None:
+    """Replace a recorded id of an object that is there at the start by the simulator's."""
+    recorded = getattr(api, name)
+    if recorded is None or recorded.count("|") > 3:  # a part or a slice keeps its whole's id
+        return
+    key = grounding.ground(recorded, start)
+    if key is not None:
+        setattr(api, name, key)
+
+
+def _is_of(target: str, key: str) -> bool:
+    return target == key or target.startswith(f"{key}|")

@@ -1,0 +1,200 @@
+"""Kinds in which two objects exchange places at the start, and roles in the episode."""
+
+import random
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import ClassVar
+
+from infthor_eval.generation.twins.episode import Episode
+from infthor_eval.generation.twins.kinds import EditRefused, Worlds
+from infthor_eval.generation.twins.placing import may_fit, moved_scene, scene_of
+from infthor_eval.generation.twins.rewriting import exchange_ids, in_world
+from infthor_eval.household.affordances import SLICEABLE, goes_into
+from infthor_eval.household.wording import canonical_type
+from infthor_eval.thor.restore import restore
+from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.view import SimulatorView, ThorObject
+
+__all__ = ["Exchange", "ExchangeKind", "Move", "Swap", "SwapSliced", "SwapTask", "Untouched"]
+
+_CARRYING = {"PickupObject", "PutObject"}
+_SLICING = {"SliceObject"}
+_Pair = tuple[ThorObject, ThorObject]
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """Two objects that exchange places; what the agent did with one it does with the other.
+
+    Attributes:
+        one: an object at the start.
+        other: another object, of another type.
+    """
+
+    one: ThorObject
+    other: ThorObject
+
+    def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
+        """See `Proposal`: the first world is the episode's, the second has the places exchanged."""
+        one = self.one
+        other = self.other
+        moves = [(one, other), (other, one)]
+        scene = moved_scene(episode.trajectory.scene, simulator, moves)
+        if restore(simulator, scene).lines():
+            raise EditRefused("the exchanged start cannot be restored")
+        after = _ids_by_name(simulator.view)
+        roles = {one.object_id: after[other.name], other.object_id: after[one.name]}
+        types = {one.object_type: other.object_type, other.object_type: one.object_type}
+        handled = episode.actions_on(one.object_id) or episode.actions_on(other.object_id)
+        trajectory = episode.trajectory
+        return Worlds(
+            pair=(
+                in_world(trajectory, scene_of(trajectory.scene, episode.start)),
+                in_world(trajectory, scene, exchange_ids(roles), types if handled else {}),
+            ),
+            changed=frozenset(roles),
+            types=frozenset(types),
+            ids={one.object_id: after[one.name], other.object_id: after[other.name]},
+        )
+
+
+def _ids_by_name(view: SimulatorView) -> dict[str, str]:
+    return {obj.name: obj.object_id for obj in view.objects.values()}
+
+
+class ExchangeKind:
+    """Base of the kinds of exchange: all pairs of objects of which both allow it.
+
+    Those of which frames show both come first. Objects whose sizes differ much are left out: there
+    is seldom room for the larger one.
+
+    Attributes:
+        needs_other_place: True if an exchange within one type of place changes no answer.
+    """
+
+    needs_other_place: ClassVar[bool] = False
+
+    def propose(self, episode: Episode, rng: random.Random) -> Iterator[Exchange]:
+        """See `EditKind`."""
+        for one, other in self.pairs(episode, rng):
+            yield Exchange(one, other)
+
+    def pairs(self, episode: Episode, rng: random.Random) -> list[_Pair]:
+        """Return the pairs of objects that may exchange places, the likeliest first."""
+        loose = [obj for obj in episode.loose if _is_alone(episode, obj)]
+        pairs = [
+            (one, other)
+            for one, other in combinations(loose, 2)
+            if self.allows(*(set(episode.actions_on(obj.object_id)) for obj in (one, other)))
+            and self._may_exchange(episode, one, other)
+        ]
+        rng.shuffle(pairs)
+        pairs.sort(key=lambda pair: _n_unseen(episode, pair))
+        return _spread(pairs)
+
+    def allows(self, first: set[str], second: set[str]) -> bool:
+        """Return True for two objects with these names of actions on them."""
+        raise NotImplementedError
+
+    def _may_exchange(self, episode: Episode, one: ThorObject, other: ThorObject) -> bool:
+        """Return True if each could as well be where the other is, and is put."""
+        if canonical_type(one.object_type) == canonical_type(other.object_type):
+            return False
+        places = [episode.holder(obj.object_id) for obj in (one, other)]
+        at_one, at_other = (place.object_type if place is not None else "" for place in places)
+        if self.needs_other_place and canonical_type(at_one) == canonical_type(at_other):
+            return False
+        return self._fits(episode, one, other, at_other) and self._fits(episode, other, one, at_one)
+
+    def _fits(self, episode: Episode, item: ThorObject, partner: ThorObject, place: str) -> bool:
+        """Return True if an object goes where its partner is at the start, and is put."""
+        objects = episode.start.objects
+        if not may_fit(item, partner, objects) or not self.suits(item.object_type, place):
+            return False
+        return all(
+            goes_into(item.object_type + episode.suffix(move), objects[move.target].object_type)
+            for move in episode.moves_of(partner.object_id)
+        )
+
+    def suits(self, object_type: str, place: str) -> bool:
+        """Return True if a type of object may be at a type of place at the start."""
+        return goes_into(object_type, place)
+
+
+def _n_unseen(episode: Episode, pair: _Pair) -> int:
+    return sum(obj.object_id not in episode.seen for obj in pair)
+
+
+def _spread(pairs: Iterable[_Pair]) -> list[_Pair]:
+    """Return pairs with those first of which no object is in an earlier one, so that facts vary."""
+    first: list[_Pair] = []
+    later: list[_Pair] = []
+    used: set[str] = set()
+    for pair in pairs:
+        keys = {obj.object_id for obj in pair}
+        (later if keys & used else first).append(pair)
+        used |= keys
+    return [*first, *later]
+
+
+def _is_alone(episode: Episode, obj: ThorObject) -> bool:
+    """Return True if words are clear: the agent acts on no other of the type, nor puts into it."""
+    is_clear = episode.n_handled(obj.object_type) <= bool(episode.actions_on(obj.object_id))
+    return is_clear and obj.object_id not in episode.put_targets
+
+
+class Swap(ExchangeKind):
+    """One that is carried exchanges places with one that is not touched."""
+
+    name: ClassVar[str] = "swap"
+
+    def allows(self, first: set[str], second: set[str]) -> bool:
+        """See the base."""
+        return bool(first) != bool(second) and first | second <= _CARRYING
+
+
+class SwapTask(ExchangeKind):
+    """Two that are carried exchange places and tasks, and so their order."""
+
+    name: ClassVar[str] = "swap-task"
+
+    def allows(self, first: set[str], second: set[str]) -> bool:
+        """See the base."""
+        return bool(first and second) and first | second <= _CARRYING
+
+
+class SwapSliced(ExchangeKind):
+    """Two foods exchange places, of which at least one is cut."""
+
+    name: ClassVar[str] = "swap-sliced"
+
+    def propose(self, episode: Episode, rng: random.Random) -> Iterator[Exchange]:
+        """See `EditKind`."""
+        for exchange in super().propose(episode, rng):
+            if {exchange.one.object_type, exchange.other.object_type} <= SLICEABLE:
+                yield exchange
+
+    def suits(self, object_type: str, place: str) -> bool:
+        """See the base: foods stand for each other, wherever rooms have one."""
+        return True
+
+    def allows(self, first: set[str], second: set[str]) -> bool:
+        """See the base."""
+        both = first | second
+        return bool(both & _SLICING) and both <= _CARRYING | _SLICING
+
+
+class Untouched(ExchangeKind):
+    """Base of the kinds of two objects that are not touched."""
+
+    def allows(self, first: set[str], second: set[str]) -> bool:
+        """See the base."""
+        return not first and not second
+
+
+class Move(Untouched):
+    """Two that are not touched exchange places."""
+
+    name: ClassVar[str] = "move"
+    needs_other_place: ClassVar[bool] = True

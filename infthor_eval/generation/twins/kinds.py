@@ -1,0 +1,91 @@
+"""The kinds of edits by name, and what a kind is.
+
+To add a kind of twins: a class with the members of `EditKind`, and its name in `KINDS` here; in
+another package, an entry point of the group `infthor_eval.twins`.
+"""
+
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import ClassVar, Protocol
+
+from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.generation.twins.episode import Episode
+from infthor_eval.plugins import PluginTable
+from infthor_eval.thor.simulator import Simulator
+
+__all__ = ["KINDS", "EditKind", "EditRefused", "Proposal", "Worlds"]
+
+_HERE = "infthor_eval.generation.twins"
+KINDS = PluginTable(
+    "kind of twins",
+    "infthor_eval.twins",
+    {
+        "swap": f"{_HERE}.exchanges:Swap",
+        "swap-task": f"{_HERE}.exchanges:SwapTask",
+        "swap-sliced": f"{_HERE}.exchanges:SwapSliced",
+        "move": f"{_HERE}.exchanges:Move",
+        "replace": f"{_HERE}.start_states:Replace",
+        "state": f"{_HERE}.start_states:Opened",
+        "count-open": f"{_HERE}.openings:CountOpen",
+        "put-target": f"{_HERE}.targets:PutTarget",
+    },
+    "docs/twins.md",
+)
+
+
+class EditRefused(Exception):
+    """An edit that the scene or the simulator does not allow; the message is the reason."""
+
+
+@dataclass(frozen=True)
+class Worlds:
+    """Two worlds of an episode that differ in one thing.
+
+    Attributes:
+        pair: the trajectories; scenes, ids and words are those of each world.
+        ids: ids in the second world by those in the first, for objects whose ids differ.
+        changed: ids in the first world of the objects that may differ, with their slices.
+        types: object types that the changed fact is about; only questions on them are paired.
+    """
+
+    pair: tuple[Trajectory, Trajectory]
+    changed: frozenset[str]
+    types: frozenset[str]
+    ids: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def changed_in_second(self) -> frozenset[str]:
+        """The ids of the changed objects in the second world."""
+        return frozenset(self.ids.get(key, key) for key in self.changed)
+
+    def flipped(self) -> "Worlds":
+        """Return the same worlds in the other order."""
+        first, second = self.pair
+        back = {new: old for old, new in self.ids.items()}
+        return Worlds((second, first), self.changed_in_second, self.types, back)
+
+
+class Proposal(Protocol):
+    """An edit of an episode that may be possible."""
+
+    def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
+        """Return the two worlds.
+
+        Raises:
+            EditRefused: the edit is not possible.
+            SimulatorError: the simulator fails.
+        """
+
+
+class EditKind(Protocol):
+    """A kind of edits.
+
+    Attributes:
+        name: its name in the table of kinds.
+    """
+
+    name: ClassVar[str]
+
+    def propose(self, episode: Episode, rng: random.Random) -> Iterator[Proposal]:
+        """Yield edits of an episode that may be possible, in random order."""

@@ -1,0 +1,170 @@
+"""Kinds that differ in states of single objects at the start: what is open, what is there."""
+
+import random
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import permutations, product
+from typing import ClassVar
+
+import msgspec
+
+from infthor_eval.formats.trajectory import StartState, Trajectory
+from infthor_eval.generation.questions import presence
+from infthor_eval.generation.twins.episode import Episode
+from infthor_eval.generation.twins.exchanges import Untouched
+from infthor_eval.generation.twins.kinds import EditRefused, Worlds
+from infthor_eval.generation.twins.placing import moved_scene, scene_of
+from infthor_eval.generation.twins.rewriting import in_world
+from infthor_eval.household.wording import canonical_type
+from infthor_eval.thor.restore import restore
+from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.view import ThorObject
+
+__all__ = ["Opened", "Replace"]
+
+_WITH_DOORS = frozenset({"Cabinet", "Fridge", "Safe"})  # which stand in the way when open
+# What people would ask about as open or closed, and what can stand open without a hand on it.
+_ASKED = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Laptop", "Microwave", "Safe"})
+
+
+def _with_states(trajectory: Trajectory, *states: StartState) -> Trajectory:
+    scene = trajectory.scene
+    earlier = scene.object_states or []
+    return in_world(trajectory, msgspec.structs.replace(scene, object_states=[*earlier, *states]))
+
+
+@dataclass(frozen=True)
+class _Opening:
+    """One of two objects is open at the start, the other closed; and the other way round.
+
+    Attributes:
+        one: the object that is asked about.
+        other: another one, so that in neither world all is closed, as generated rooms begin.
+    """
+
+    one: ThorObject
+    other: ThorObject
+
+    def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
+        """See `Proposal`."""
+        worlds = []
+        for open_one, closed in permutations((self.one, self.other)):
+            states = {open_one.name: True, closed.name: False}
+            worlds.append(
+                _with_states(
+                    episode.trajectory,
+                    *(StartState(name, is_open=state) for name, state in sorted(states.items())),
+                )
+            )
+        both = {self.one.object_id, self.other.object_id}
+        inside = {key for holder in both for key in episode.inside(holder)}
+        return Worlds(
+            pair=(worlds[0], worlds[1]),
+            changed=frozenset(both | inside),
+            types=frozenset({self.one.object_type, self.other.object_type}),
+        )
+
+
+class Opened:
+    """A container that is the only one of its type is open at the start, or another one is."""
+
+    name: ClassVar[str] = "state"
+
+    def propose(self, episode: Episode, rng: random.Random) -> Iterator[_Opening]:
+        """See `EditKind`: only what the agent never opens, closes, or takes from."""
+        acted = {event.target for event in episode.history.events}
+        acted |= episode.put_targets | {
+            move.origin for move in episode.history.moves if move.origin
+        }
+        untouched = [
+            obj
+            for key, obj in sorted(episode.start.objects.items())
+            if obj.openable and obj.object_type in _ASKED and key not in acted
+        ]
+        single = [obj for obj in untouched if episode.is_only_one(obj)]
+        pairs = [
+            (one, other)
+            for one, other in product(single, untouched)
+            if canonical_type(one.object_type) != canonical_type(other.object_type)
+        ]
+        rng.shuffle(pairs)
+        # Of those that frames show first, each object once before any a second time, and those in
+        # nobody's way.
+        used = Counter[str]()
+
+        def rank(pair: tuple[ThorObject, ThorObject]) -> tuple[int, bool, int]:
+            is_unseen = pair[0].object_id not in episode.seen
+            return (
+                used[pair[0].name],
+                is_unseen,
+                sum(obj.object_type in _WITH_DOORS for obj in pair),
+            )
+
+        while pairs:
+            best = min(pairs, key=rank)
+            pairs.remove(best)
+            used[best[0].name] += 1
+            yield _Opening(*best)
+
+
+@dataclass(frozen=True)
+class _Replacement:
+    """At one place stands one of two objects; the other one is not in the scene at all.
+
+    Attributes:
+        one: an object at its place in the episode.
+        other: the object that stands there in the second world.
+    """
+
+    one: ThorObject
+    other: ThorObject
+
+    def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
+        """See `Proposal`: the place where the second object was is empty in both worlds."""
+        trajectory = episode.trajectory
+        moved = moved_scene(trajectory.scene, simulator, [(self.other, self.one)], aside=[self.one])
+        first = in_world(trajectory, scene_of(trajectory.scene, episode.start))
+        second = in_world(trajectory, moved)
+        if restore(simulator, moved).lines():
+            raise EditRefused("the exchanged start cannot be restored")
+        after = {obj.name: obj.object_id for obj in simulator.view.objects.values()}
+        keys = {obj.object_id: after[obj.name] for obj in (self.one, self.other)}
+        return Worlds(
+            pair=(
+                _with_states(first, StartState(self.other.name, is_disabled=True)),
+                _with_states(second, StartState(self.one.name, is_disabled=True)),
+            ),
+            changed=frozenset(keys),
+            types=frozenset({self.one.object_type, self.other.object_type}),
+            ids=keys,
+        )
+
+
+class Replace:
+    """One object that is not touched stands where another one could."""
+
+    name: ClassVar[str] = "replace"
+
+    def propose(self, episode: Episode, rng: random.Random) -> Iterator[_Replacement]:
+        """See `EditKind`: each is the only one of its type, and can be asked for where it is not.
+
+        Those whose places frames show, and of which both can be asked for, come first.
+        """
+        pairs = [
+            pair
+            for pair in Untouched().pairs(episode, rng)
+            if all(map(episode.is_only_one, pair)) and any(_can_be_missed(episode, pair))
+        ]
+        for pair in sorted(pairs, key=lambda pair: -sum(_can_be_missed(episode, pair))):
+            one, other = rng.sample(pair, 2)
+            if one.object_id not in episode.seen:
+                one, other = other, one
+            yield _Replacement(one, other)
+
+
+def _can_be_missed(episode: Episode, pair: tuple[ThorObject, ThorObject]) -> list[bool]:
+    """Return for each of two objects whether one can ask for it where it is not."""
+    there = episode.history.all_object_types
+    names = [canonical_type(obj.object_type) for obj in pair]
+    return [presence.is_clear_absence(name, there - {name}) for name in names]

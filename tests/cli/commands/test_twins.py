@@ -1,0 +1,68 @@
+"""`twins`, as a user types it."""
+
+import json
+from collections import Counter
+
+import pytest
+
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.twins import read_pairs
+
+from ...helpers.command_line import assert_refused
+from ...helpers.trajectories import FORK, MUG, cut_trajectory, write_trajectories
+
+OPTIONS = ("--kinds", "state,replace", "--per-kind", 1, "--per-trajectory", 3)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    documents = [cut_trajectory(name, 4) for name in (FORK, MUG)]
+    return write_trajectories(tmp_path_factory.mktemp("twins") / "data", *documents)
+
+
+def content(folder):
+    """All files of a set by their names."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_a_set_of_twins(data, tmp_path, run_cli):
+    code, out, _ = run_cli("twins", data, "--out", tmp_path / "one", *OPTIONS, "--json")
+    summary = json.loads(out)
+    assert code == 0
+    assert summary["trajectories"] == 2
+    assert sum(summary["by_kind"].values()) == sum(summary["by_form"].values()) == summary["pairs"]
+    assert summary["pairs"] > 1
+
+    twins = NiehSet(tmp_path / "one")
+    assert not twins.skipped
+    assert len(twins.questions) == 2 * summary["pairs"]
+    assert set(Counter(question.pair for question in twins.questions).values()) == {2}
+    names = {name for pair in read_pairs(tmp_path / "one") for name in pair.traj_ids}
+    assert {question.traj_id for question in twins.questions} == names
+    per_side = Counter(question.traj_id for question in twins.questions)
+    assert max(per_side.values()) <= 3
+
+    # Again: the same files, of an earlier run; then with two workers, from the beginning.
+    before = content(tmp_path / "one")
+    code, out, _ = run_cli("twins", data, "--out", tmp_path / "one", *OPTIONS)
+    assert code == 0
+    assert "2 trajectories (2 of earlier runs)" in out
+    assert content(tmp_path / "one") == before
+    other = tmp_path / "two"
+    code, _, _ = run_cli("twins", data, "--out", other, *OPTIONS, "--workers", 2)
+    assert code == 0
+    assert content(other) == before
+
+    # With another seed the set is not continued.
+    code, _, err = run_cli("twins", data, "--out", other, *OPTIONS, "--seed", 1)
+    assert code == 1
+    assert "made with other kinds, seed or --per-kind" in err
+
+
+def test_an_unknown_kind_is_one_line(data, tmp_path, run_cli):
+    ended = run_cli("twins", data, "--out", tmp_path, "--kinds", "swop")
+    assert_refused(ended, "unknown kind of twins 'swop'", "swap")

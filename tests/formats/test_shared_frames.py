@@ -1,0 +1,63 @@
+"""Pictures that trajectories share."""
+
+import shutil
+
+import pytest
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.shared_frames import (
+    read_shared_frames,
+    store_picture,
+    write_frame_names,
+)
+
+
+@pytest.fixture
+def shared(make_nieh_set):
+    """A set whose trajectories share their pictures, and the folder it was made of."""
+    own = make_nieh_set()
+    root = own.with_name("shared")
+    shutil.copytree(own, root)
+    for folder in (root / "metadata").iterdir():
+        images = sorted((folder / "img").iterdir())
+        write_frame_names(folder, [store_picture(root, image, folder.name) for image in images])
+        shutil.rmtree(folder / "img")
+    return root, own
+
+
+def test_a_set_with_shared_pictures_has_the_same_frames(shared):
+    root, own = shared
+    for question in NiehSet(own).questions:
+        pairs = zip(
+            NiehSet(root).frames(question.traj_id),
+            NiehSet(own).frames(question.traj_id),
+            strict=True,
+        )
+        assert all(one.digest == other.digest for one, other in pairs)
+    assert NiehSet(root).questions == NiehSet(own).questions
+
+
+def test_a_picture_is_stored_once(shared, tmp_path):
+    root, own = shared
+    image = next((own / "metadata/traj_a/img").iterdir())
+    stored = set((root / "frames").iterdir())
+    store_picture(root, image, "again")
+    assert set((root / "frames").iterdir()) == stored
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (["../../secret"] * 6, "is not the name of a picture"),
+        (["0" * 32] * 5, "5 names but 6 entries"),
+    ],
+)
+def test_wrong_names_are_refused(names, words, tmp_path):
+    write_frame_names(tmp_path, names)
+    with pytest.raises(DataError, match=words):
+        read_shared_frames(tmp_path, range(6))
+
+
+def test_a_trajectory_with_its_own_pictures_has_no_shared_ones(tmp_path):
+    assert read_shared_frames(tmp_path, range(6)) is None

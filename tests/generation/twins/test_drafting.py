@@ -1,0 +1,209 @@
+"""Twins of a short trajectory in a kitchen, and broken edits, each of which is rejected."""
+
+import json
+import random
+from functools import partial
+
+import msgspec
+import pytest
+from msgspec.structs import replace
+
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.trajectory import StartState, encode_trajectory, iter_trajectories
+from infthor_eval.generation.twins.drafting import (
+    TwinSettings,
+    draft_twins,
+    is_flipped,
+    name_worlds,
+)
+from infthor_eval.generation.twins.episode import EpisodeError, read_episode
+from infthor_eval.generation.twins.exchanges import Exchange
+from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Worlds
+from infthor_eval.generation.twins.rewriting import in_world, without_traces
+from infthor_eval.nieh.scoring import score
+
+from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
+
+STRICT = partial(score, scorer="strict")
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    folder = write_trajectories(tmp_path_factory.mktemp("data") / "one", cut_trajectory(FORK, 8))
+    return next(folder.iterdir())
+
+
+@pytest.fixture(scope="module")
+def episode(file, simulator):
+    return read_episode(next(iter_trajectories(file)), simulator)
+
+
+def draft(file, simulator, out, *kinds, per_kind=1):
+    (out / "metadata").mkdir(parents=True)
+    settings = TwinSettings(kinds, 0, per_kind)
+    trajectory = next(iter_trajectories(file))
+    return draft_twins(trajectory, "base", settings, STRICT, simulator, out)
+
+
+def break_start(trajectory, scene):
+    states = [StartState("Nothing_1", is_open=True)]
+    return replace(trajectory, scene=replace(scene, object_states=states))
+
+
+def break_third(trajectory, scene):
+    states = [StartState("", is_open=True)]
+    return replace(trajectory, scene=replace(scene, object_states=states))
+
+
+def break_pose(trajectory, scene):
+    lowered = replace(scene.init_action, horizon=scene.init_action.horizon + 5.0)
+    return replace(trajectory, scene=replace(scene, init_action=lowered))
+
+
+def break_length(trajectory, scene):
+    plan = replace(trajectory.plan, low_actions=trajectory.plan.low_actions[:-1])
+    return replace(trajectory, plan=plan)
+
+
+def break_action(trajectory, scene):
+    low_actions = list(trajectory.plan.low_actions)
+    number = next(n for n, low in enumerate(low_actions) if low.api_action.action == "PutObject")
+    api = replace(low_actions[number].api_action, receptacle_id="Fridge|9|9|9")
+    low_actions[number] = replace(low_actions[number], api_action=api)
+    return replace(trajectory, plan=replace(trajectory.plan, low_actions=low_actions))
+
+
+class Broken:
+    """A kind whose only edit breaks something that it does not declare."""
+
+    name = "broken"
+    damage = None
+
+    def propose(self, episode, rng):
+        yield self
+
+    def apply(self, episode, simulator):
+        whole = in_world(episode.trajectory, episode.trajectory.scene)
+        broken = type(self).damage(whole, whole.scene)
+        states = broken.scene.object_states or []
+        # Any drawer, whose name the damage does not know.
+        drawer = next(o for o in episode.start.objects.values() if o.object_type == "Drawer")
+        for state in states:
+            state.name = state.name or drawer.name
+        return Worlds((whole, broken), frozenset(), frozenset({"Drawer"}))
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        (break_start, "its start cannot be restored"),
+        (break_third, "an object differs that was not to be changed"),
+        (break_pose, "the agent is elsewhere"),
+        (break_length, "another number of frames"),
+        (break_action, "PutObject is refused"),
+    ],
+)
+def test_a_broken_edit_is_rejected_and_counted(
+    damage, reason, file, simulator, tmp_path, monkeypatch
+):
+    monkeypatch.setitem(KINDS.built_in, "broken", f"{__name__}:Broken")
+    monkeypatch.setattr(Broken, "damage", staticmethod(damage))
+    made = draft(file, simulator, tmp_path, "broken")
+    assert made.proposed == {"broken": 1}
+    assert made.rejected == {"broken": {reason: 1}}
+    assert not made.pairs
+    assert not list((tmp_path / "metadata").iterdir())
+
+
+def test_an_exchange_without_room_is_refused(episode, simulator):
+    one, other = episode.loose[:2]
+    nowhere = replace(other, parent_receptacles=["Shelf|9|9|9"])  # which nothing comes to lie on
+    with pytest.raises(EditRefused, match="no room"):
+        Exchange(one, nowhere).apply(episode, simulator)
+
+
+def test_an_episode_with_a_refused_action_has_no_twins(file, simulator):
+    trajectory = next(iter_trajectories(file))
+    with pytest.raises(EpisodeError, match="PutObject"):
+        read_episode(break_action(trajectory, trajectory.scene), simulator)
+
+
+@pytest.fixture(scope="module")
+def made(file, simulator, tmp_path_factory):
+    """A draft of all kinds, and the folder of its set."""
+    out = tmp_path_factory.mktemp("twins") / "set"
+    return draft(file, simulator, out, *KINDS.names), out
+
+
+def test_kinds_give_pairs_whose_two_worlds_differ_where_declared(made):
+    drafted, _ = made
+    assert len({pair.kind for pair in drafted.pairs}) >= 3
+    for pair in drafted.pairs:
+        assert any(not frame.same for frame in pair.frames)
+        assert all(frame.same or frame.changed for frame in pair.frames)
+        for question in pair.questions:
+            assert question.answers[0] != question.answers[1]
+            assert max(question.overlap) < 1
+
+
+def test_frames_are_stored_once(made):
+    drafted, out = made
+    names = {
+        name for file in out.glob("metadata/*/frames.txt") for name in file.read_text().splitlines()
+    }
+    assert {path.stem for path in (out / "frames").iterdir()} == names
+    frames = NiehSet(out, needs_questions=False).frames(drafted.pairs[0].traj_ids[0])
+    assert len(frames) == len(drafted.pairs[0].frames)
+    assert all(frame.problem() is None for frame in frames)
+
+
+def test_no_file_of_a_world_names_the_episode(made):
+    _, out = made
+    for path in out.glob("metadata/*/*"):
+        assert FORK not in path.read_text()
+
+
+def shape(value):
+    """What a document is made of, without its words and numbers."""
+    if isinstance(value, dict):
+        return {key: shape(item) for key, item in value.items()}
+    return [shape(item) for item in value] if isinstance(value, list) else type(value).__name__
+
+
+@pytest.mark.parametrize("name", ["swap", "move", "replace", "state", "count-open", "put-target"])
+def test_both_worlds_are_written_alike(name, episode, simulator):
+    kind = KINDS.load(name, EditKind)()
+    for proposal in kind.propose(episode, random.Random(1)):
+        try:
+            worlds = proposal.apply(episode, simulator)
+        except EditRefused:
+            continue
+        documents = [
+            json.loads(encode_trajectory(without_traces(world, "same"))) for world in worlds.pair
+        ]
+        assert shape(documents[0]) == shape(documents[1])
+        assert documents[0] != documents[1]
+        flipped = worlds.flipped()
+        assert flipped.pair == (worlds.pair[1], worlds.pair[0])
+        assert flipped.flipped() == worlds
+        return
+    pytest.skip("no room for any")
+
+
+def test_labels_are_drawn_by_coin():
+    flipped = sum(is_flipped(f"swap-{number}") for number in range(400))
+    assert 160 < flipped < 240
+
+
+def test_names_tell_the_rooms_alone():
+    first, second = name_worlds("kitchen-1", "swap-1")
+    assert first != second
+    assert {name.rpartition("-")[0] for name in (first, second)} == {"kitchen-1"}
+
+
+def test_the_same_seed_gives_the_same_draft(made, file, simulator, tmp_path):
+    drafted, out = made
+    again = draft(file, simulator, tmp_path / "again", *KINDS.names)
+    assert msgspec.json.encode(again) == msgspec.json.encode(drafted)
+    for path in out.glob("metadata/*/*"):
+        assert (tmp_path / "again" / path.relative_to(out)).read_bytes() == path.read_bytes()

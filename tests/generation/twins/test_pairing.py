@@ -1,0 +1,83 @@
+"""Which questions pair, on logs made by hand."""
+
+from functools import partial
+
+import pytest
+
+from infthor_eval.generation.twins.pairing import AskedWorld, pair_questions
+from infthor_eval.nieh.scoring import score
+
+from ..questions.logs import history, moved, state
+
+TABLE, DESK, FRIDGE = "DiningTable|1|0|0", "Desk|1|0|0", "Fridge|1|0|0"
+MUG, APPLE, BOOK = "Mug|1|0|0", "Apple|1|0|0", "Book|1|0|0"
+PLACES = {key: state(key) for key in (TABLE, DESK, FRIDGE)}
+STRICT = partial(score, scorer="strict")
+
+
+def paired(first, second, *types, scorer=STRICT):
+    """The paired questions by their text."""
+    changed = frozenset(key for key in (MUG, APPLE, BOOK) if key.partition("|")[0] in types)
+    worlds = (AskedWorld(first.steps, changed, 0), AskedWorld(second.steps, changed, 0))
+    return {pair.text: pair for pair in pair_questions(worlds, frozenset(types), scorer)}
+
+
+def put(item, target, other=APPLE):
+    """A log in which one of two things is put somewhere."""
+    start = {**PLACES, item: state(item, TABLE), other: state(other, TABLE)}
+    return history(start, *moved(item, TABLE, target))
+
+
+def test_what_is_asked_in_both_worlds_has_both_answers_and_the_union_of_the_clues():
+    pairs = paired(put(MUG, DESK), put(MUG, FRIDGE), "Mug", "Desk", "Fridge")
+    where = pairs["Where did you move the mug to?"]
+    assert where.answers == (("desk",), ("fridge",))
+    assert set(where.clues) == {*where.own_clues[0], *where.own_clues[1]}
+    assert where.overlap == (0, 0)
+    assert where.fact == "location_tracing: Mug"
+
+
+def test_what_the_rules_ask_in_one_world_is_answered_in_the_other():
+    pairs = paired(put(MUG, DESK), put(APPLE, DESK, MUG), "Mug", "Apple")
+    there = pairs["Is the mug on the desk?"]
+    assert there.answers == (("yes",), ("no",))
+    assert there.own_clues[1] == ()
+
+
+def test_the_order_of_two_things():
+    start = {**PLACES, MUG: state(MUG, TABLE), APPLE: state(APPLE, TABLE)}
+    one = moved(MUG, TABLE, DESK)
+    other = moved(APPLE, TABLE, DESK)
+    pairs = paired(history(start, *one, *other), history(start, *other, *one), "Mug", "Apple")
+    assert pairs["Did you pick up the mug before the apple?"].answers == (("yes",), ("no",))
+    assert pairs["Did you pick up the apple before the mug?"].answers == (("no",), ("yes",))
+
+
+def test_equal_answers_are_no_pair():
+    assert not paired(put(MUG, DESK), put(MUG, DESK), "Mug")
+
+
+def test_answers_that_the_scorer_takes_for_each_other_are_no_pair():
+    worlds = put(MUG, DESK), put(MUG, FRIDGE)
+    assert not paired(*worlds, "Mug", scorer=lambda reply, answers: 1.0)
+
+
+def test_answers_without_full_marks_are_no_pair():
+    worlds = put(MUG, DESK), put(MUG, FRIDGE)
+    assert not paired(*worlds, "Mug", scorer=lambda reply, answers: 0.5)
+
+
+def test_a_side_effect_is_not_asked_for():
+    start = {**PLACES, MUG: state(MUG, TABLE), BOOK: state(BOOK, TABLE)}
+    first = history(start, *moved(MUG, TABLE, DESK))
+    second = history({**start, BOOK: state(BOOK, DESK)}, *moved(MUG, TABLE, FRIDGE))
+    assert not any("book" in text for text in paired(first, second, "Mug"))
+
+
+@pytest.mark.parametrize("shown", [True, False])
+def test_both_answers_must_follow_from_the_clues(shown):
+    second = put(MUG, FRIDGE)
+    if not shown:
+        for step in second.steps:
+            step.seen = {}
+    assert ("Where did you move the mug to?" in paired(put(MUG, DESK), second, "Mug")) == shown
