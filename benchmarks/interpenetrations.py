@@ -320,7 +320,7 @@ def faults_of_puts(scene: str, n_puts: int, random: np.random.Generator) -> set[
                 "placeStationary": True,
             }
         )
-        if world.held is not None:  # there was no room
+        if world.agent.held is not None:  # there was no room
             server.run({"action": "DropHandObject", "forceAction": True})
             continue
         found |= {(a, b) for a, b, _ in room.pairs({item.object_id})} - before
