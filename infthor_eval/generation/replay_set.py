@@ -46,6 +46,7 @@ __all__ = [
     "replay_set",
     "replay_with_workers",
     "select",
+    "wrap_malformed",
 ]
 
 _REPORT = "replay.json"
@@ -135,7 +136,7 @@ def select(
             break
         try:
             trajectory = source.read()
-            with _wrap_malformed(f"{source.place}: "):
+            with wrap_malformed(f"{source.place}: "):
                 # Read for all scenes before the first replay, so an error must show here.
                 agent_path(trajectory)
         except DataError as error:
@@ -245,7 +246,7 @@ def _collect(
 def _replay_one(item: Item, simulator: Simulator, out: Path, form: ReplayForm) -> _ReplayOutcome:
     source, trajectory = item
     try:
-        with freeze_existing_objects(), _wrap_malformed():
+        with freeze_existing_objects(), wrap_malformed():
             return _replay_or_check(source, trajectory, simulator, out, form)
     except InfthorError as error:
         return _failure_outcome(item, error)
@@ -276,7 +277,7 @@ def _all_sources(
                 failures.append(ReplayFailure(str(file), str(error)))
 
 
-def _wrap_malformed(place: str = "") -> AbstractContextManager[None]:
+def wrap_malformed(place: str = "") -> AbstractContextManager[None]:
     """Convert the errors of a trajectory that has the documented form but inconsistent content."""
     wrong = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
     return wrap_errors(

@@ -45,7 +45,8 @@ class Checker:
     def __init__(self, steps: Sequence[Step], share: float) -> None:
         """Read the log; objects that fill this share of the frame's pixels count as seen."""
         self._whole = frame_facts(steps)
-        self._single = {frame.number: frame for frame in facts_shown(steps, share)}
+        shown = facts_shown(steps, self._whole, share)
+        self._single = {frame.number: frame for frame in shown}
 
     def verdict(self, question: Question) -> Verdict:
         """Check one question.

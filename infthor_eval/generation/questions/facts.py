@@ -93,11 +93,13 @@ def frame_facts(steps: Sequence[Step]) -> list[FrameFacts]:
     return facts
 
 
-def facts_shown(steps: Sequence[Step], share: float) -> list[FrameFacts]:
-    """Return what each frame shows: the objects that fill this share of its pixels."""
+def facts_shown(
+    steps: Sequence[Step], facts: Sequence[FrameFacts], share: float
+) -> list[FrameFacts]:
+    """Return what each frame shows of the log's facts: objects that fill this share of it."""
     return [
         replace(whole, objects=_large_objects(step, whole, share), logged=None, everything=False)
-        for step, whole in zip(steps, frame_facts(steps), strict=True)
+        for step, whole in zip(steps, facts, strict=True)
     ]
 
 

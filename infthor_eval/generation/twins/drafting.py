@@ -87,7 +87,7 @@ def draft_twins(
         out: folder of the set.
 
     Raises:
-        EpisodeError: it cannot be restored or replayed.
+        DataError: it cannot be restored or replayed.
         SimulatorError: the simulator fails.
     """
     draft = TwinDraft(base, settings, trajectory.scene.floor_plan)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import ApiAction, Trajectory
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
@@ -18,11 +19,9 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["Episode", "EpisodeError", "read_episode"]
+__all__ = ["Episode", "read_episode"]
 
-
-class EpisodeError(Exception):
-    """A trajectory that twins cannot be made of; the message says why."""
+_HINT = "give a trajectory that replays here"
 
 
 @dataclass(frozen=True)
@@ -106,12 +105,13 @@ def read_episode(trajectory: Trajectory, simulator: Simulator) -> Episode:
     """Restore and replay a trajectory.
 
     Raises:
-        EpisodeError: the scene cannot be restored, or an action is refused.
+        DataError: the scene cannot be restored, or an action is refused.
         SimulatorError: the simulator fails.
     """
     restored = restore(simulator, trajectory.scene)
     if restored.dropped or restored.refused:
-        raise EpisodeError(f"not restored: {[*restored.dropped, *restored.refused][0]}")
+        reason = [*restored.dropped, *restored.refused][0]
+        raise DataError(f"its start cannot be restored ({reason}); {_HINT}")
     start = simulator.view
     grounding = Grounding(start)
     for api in _api_actions(trajectory):
@@ -123,7 +123,7 @@ def read_episode(trajectory: Trajectory, simulator: Simulator) -> Episode:
         report = replay(trajectory, simulator, folder, "")
         if report.refusals:
             first = report.refusals[0]
-            raise EpisodeError(f"step {first.step}: {first.action}: {first.error}")
+            raise DataError(f"step {first.step}: {first.action}: {first.error}; {_HINT}")
         steps = read_steps(folder)
     return Episode(trajectory, start, TrajectoryHistory(trajectory.traj_id, steps))
 

@@ -21,7 +21,7 @@ from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.set_info import claim_for_simulator
 from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, folder_name
 from infthor_eval.formats.twins import TwinPair, write_pairs
-from infthor_eval.generation.replay_set import Selection
+from infthor_eval.generation.replay_set import Selection, wrap_malformed
 from infthor_eval.generation.simulator_jobs import (
     SimulatorWorker,
     collect_outcomes,
@@ -144,7 +144,7 @@ def _draft_one(
     try:
         if file.exists():
             return _DraftOutcome(_read_draft(file, source.digest, settings), is_resumed=True)
-        with freeze_existing_objects():
+        with freeze_existing_objects(), wrap_malformed():
             draft = draft_twins(trajectory, source.digest, settings, score, simulator, out)
         with write_atomically(file) as partial_file:
             partial_file.write_bytes(msgspec.json.encode(draft) + b"\n")

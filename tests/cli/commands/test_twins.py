@@ -66,3 +66,18 @@ def test_a_set_of_twins(data, tmp_path, run_cli):
 def test_an_unknown_kind_is_one_line(data, tmp_path, run_cli):
     ended = run_cli("twins", data, "--out", tmp_path, "--kinds", "swop")
     assert_refused(ended, "unknown kind of twins 'swop'", "swap")
+
+
+def test_a_trajectory_that_does_not_replay_is_named_and_the_others_are_made(tmp_path, run_cli):
+    good = cut_trajectory(MUG, 4)
+    bad = cut_trajectory(FORK, 4)
+    calls = [low["api_action"] for low in bad["plan"]["low_actions"]]
+    call = next(call for call in calls if call["action"] == "PickupObject")
+    call["objectId"] = "Statue|+09.00|+09.00|+09.00"  # which the kitchen lacks
+    data = write_trajectories(tmp_path / "data", bad, good)
+    options = ("--kinds", "move", "--per-kind", 1, "--json")
+    code, out, err = run_cli("twins", data, "--out", tmp_path / "out", *options)
+    summary = json.loads(out)
+    assert (code, summary["trajectories"], len(summary["failures"])) == (1, 1, 1)
+    assert FORK in summary["failures"][0] and "PickupObject" in summary["failures"][0]
+    assert "Traceback" not in err

@@ -17,7 +17,7 @@ from infthor_eval.generation.questions import (
     put_action,
 )
 from infthor_eval.generation.questions.checker import Checker
-from infthor_eval.generation.questions.facts import facts_shown
+from infthor_eval.generation.questions.facts import facts_shown, frame_facts
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
 from infthor_eval.generation.questions.rooms import rooms_of
 from infthor_eval.thor.launch import embedded_launch
@@ -307,6 +307,6 @@ def test_a_fork_must_fill_more_of_a_frame_than_a_knife_to_count_as_shown():
                           (180, {"Fork|1", "Knife|1"})):  # fmt: skip
         for key in ("Fork|1", "Knife|1"):
             log.steps[0].seen[key] = ObjectInFrame(pixels, (100, 100, 120, 120), True)
-        (facts,) = facts_shown(log.steps, DEFAULT_SHARE)
+        (facts,) = facts_shown(log.steps, frame_facts(log.steps), DEFAULT_SHARE)
         assert {key for key in ("Fork|1", "Knife|1") if log.shows(0, key)} == shown
         assert set(facts.objects) - {"Desk|1"} == shown

@@ -8,6 +8,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.trajectory import StartState, encode_trajectory, iter_trajectories
 from infthor_eval.generation.twins.drafting import (
@@ -16,7 +17,7 @@ from infthor_eval.generation.twins.drafting import (
     is_flipped,
     name_worlds,
 )
-from infthor_eval.generation.twins.episode import EpisodeError, read_episode
+from infthor_eval.generation.twins.episode import read_episode
 from infthor_eval.generation.twins.exchanges import Exchange
 from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Worlds
 from infthor_eval.generation.twins.rewriting import in_world, without_traces
@@ -124,7 +125,7 @@ def test_an_exchange_without_room_is_refused(episode, simulator):
 
 def test_an_episode_with_a_refused_action_has_no_twins(file, simulator):
     trajectory = next(iter_trajectories(file))
-    with pytest.raises(EpisodeError, match="PutObject"):
+    with pytest.raises(DataError, match="PutObject"):
         read_episode(break_action(trajectory, trajectory.scene), simulator)
 
 
