@@ -194,6 +194,18 @@ class TrajectoryHistory:
         return frozenset(canonical_type(states[key].type) for states, key in shown if key in states)
 
     @cached_property
+    def best_frames(self) -> dict[str, int]:
+        """By type, in order, the frame that shows an object of it best, the earliest of equals."""
+        best: dict[str, tuple[tuple[bool, int], int]] = {}
+        for frame in range(len(self)):
+            states = self.states(frame)
+            for key in self.objects_in_frame(frame):
+                if key in states and self.shows(frame, key):
+                    sighting = self.clarity(frame, key), -frame
+                    best[states[key].type] = max(sighting, best.get(states[key].type, sighting))
+        return {object_type: -negated for object_type, (_, negated) in sorted(best.items())}
+
+    @cached_property
     def has_rooms(self) -> bool:
         """True if the scene has several rooms; each has a floor object."""
         return sum(state.type == "Floor" for state in self.states(0).values()) > 1

@@ -12,11 +12,11 @@ from infthor_eval.generation.questions.candidates import (
 )
 from infthor_eval.generation.questions.history import Event, TrajectoryHistory
 
-__all__ = ["FURTHER", "QUESTION_TYPE", "further_open_states", "open_states"]
+__all__ = ["CONTAINERS", "FURTHER", "QUESTION_TYPE", "further_open_states", "open_states"]
 
 QUESTION_TYPE = "open_state"
 FURTHER = further_type(QUESTION_TYPE)
-_CONTAINERS = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Microwave", "Safe"})
+CONTAINERS = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Microwave", "Safe"})
 _UNASKED = frozenset(
     {"Blinds", "Curtains", "Book", "Kettle", "ShowerCurtain", "ShowerDoor", "Window"}
 )
@@ -34,7 +34,7 @@ def open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
         ]
         object_type = history.states(len(history) - 1)[key].type
         frame = history.clearest(open_at or frames, key)
-        if object_type in _CONTAINERS and frame is not None:
+        if object_type in CONTAINERS and frame is not None:
             names = (with_the(object_type),)
             answer = "yes" if open_at else "no"
             yield Candidate(

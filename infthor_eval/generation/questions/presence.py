@@ -88,15 +88,9 @@ def no_questions(
 
 
 def _best_frames(history: TrajectoryHistory) -> dict[str, int]:
-    """Return by nameable type, in order, the frame that shows one best, the earliest of equals."""
-    best: dict[str, tuple[tuple[bool, int], int]] = {}
-    for frame in range(len(history)):
-        states = history.states(frame)
-        for key in history.objects_in_frame(frame):
-            if key in states and _is_nameable(states[key].type) and history.shows(frame, key):
-                sighting = history.clarity(frame, key), -frame
-                best[states[key].type] = max(sighting, best.get(states[key].type, sighting))
-    return {object_type: -negated for object_type, (_, negated) in sorted(best.items())}
+    """Return by nameable type, in order, the frame that shows one best."""
+    best = history.best_frames.items()
+    return {object_type: frame for object_type, frame in best if _is_nameable(object_type)}
 
 
 def _forms(history: TrajectoryHistory) -> tuple[str, ...]:

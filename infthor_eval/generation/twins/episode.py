@@ -8,6 +8,7 @@ from pathlib import Path
 from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import ApiAction, Trajectory
+from infthor_eval.generation.questions import open_state
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
 from infthor_eval.generation.replay import replay
 from infthor_eval.generation.twins.rewriting import whole_of
@@ -19,8 +20,10 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["Episode", "read_episode"]
+__all__ = ["ASKED_OPEN", "Episode", "read_episode"]
 
+# What people would ask about as open or closed, and what can stand open without a hand on it.
+ASKED_OPEN = open_state.CONTAINERS | {"Laptop"}
 _HINT = "give a trajectory that replays here"
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from infthor_eval.formats.trajectory import ApiAction
-from infthor_eval.generation.twins.episode import Episode
+from infthor_eval.generation.twins.episode import ASKED_OPEN, Episode
 from infthor_eval.generation.twins.kinds import Worlds
 from infthor_eval.generation.twins.rewriting import with_inserted
 from infthor_eval.household.wording import canonical_type
@@ -14,8 +14,6 @@ from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import ThorObject
 
 __all__ = ["CountOpen"]
-
-_ASKED = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Microwave", "Safe", "Laptop"})
 
 
 @dataclass(frozen=True)
@@ -80,6 +78,6 @@ def _closed_in_reach(episode: Episode, frame: int) -> list[ThorObject]:
         and key in episode.start.objects
         and states[key].is_open is False
         and not states[key].is_on  # a microwave that is on stays closed
-        and states[key].type in _ASKED
+        and states[key].type in ASKED_OPEN
         and history.shows(frame, key)
     ]

@@ -11,7 +11,7 @@ import msgspec
 
 from infthor_eval.formats.trajectory import StartState, Trajectory
 from infthor_eval.generation.questions import presence
-from infthor_eval.generation.twins.episode import Episode
+from infthor_eval.generation.twins.episode import ASKED_OPEN, Episode
 from infthor_eval.generation.twins.exchanges import Untouched
 from infthor_eval.generation.twins.kinds import EditRefused, Worlds
 from infthor_eval.generation.twins.placing import moved_scene, scene_of
@@ -24,8 +24,6 @@ from infthor_eval.thor.view import ThorObject
 __all__ = ["Opened", "Replace"]
 
 _WITH_DOORS = frozenset({"Cabinet", "Fridge", "Safe"})  # which stand in the way when open
-# What people would ask about as open or closed, and what can stand open without a hand on it.
-_ASKED = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Laptop", "Microwave", "Safe"})
 
 
 def _with_states(trajectory: Trajectory, *states: StartState) -> Trajectory:
@@ -80,7 +78,7 @@ class Opened:
         untouched = [
             obj
             for key, obj in sorted(episode.start.objects.items())
-            if obj.openable and obj.object_type in _ASKED and key not in acted
+            if obj.openable and obj.object_type in ASKED_OPEN and key not in acted
         ]
         single = [obj for obj in untouched if episode.is_only_one(obj)]
         pairs = [
