@@ -10,7 +10,7 @@ Question files alone, without `metadata/`, are a set too: for whatever needs no 
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import chain
@@ -26,6 +26,7 @@ from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.shared_frames import read_shared_frames
 from infthor_eval.formats.step_log import read_steps
+from infthor_eval.formats.twins import TwinPair, read_pairs
 from infthor_eval.formats.video import Video, read_video
 
 __all__ = ["NiehSet"]
@@ -127,6 +128,16 @@ class NiehSet:
         return tuple(row for row in self.rows if isinstance(row, Question))
 
     @cached_property
+    def twins(self) -> Mapping[str, TwinPair]:
+        """Pairs of worlds by the names of both trajectories.
+
+        Raises:
+            DataError: `twins.jsonl` is missing or malformed.
+        """
+        pairs = read_pairs(self._folder)
+        return {name: pair for pair in pairs for name in pair.traj_ids}
+
+    @cached_property
     def fingerprint(self) -> str:
         """Hash of questions, step logs, and names and sizes of the frames (hex, 32 characters)."""
         # Not the content of frames, which would mean reading all of it: a record has the digests of
@@ -142,10 +153,19 @@ class NiehSet:
 
     def _read_file(self, file: Path) -> tuple[Question | SkippedQuestion, ...]:
         name = file.stem if len(self._files) > 1 else ""
+        rows = read_questions(file)
+        are_twins = any(isinstance(row, Question) and row.pair for row in rows)
+        bases = self._bases if are_twins else {}
         return tuple(
-            row if isinstance(row, SkippedQuestion) else replace(row, file=name)
-            for row in read_questions(file)
+            row
+            if isinstance(row, SkippedQuestion)
+            else replace(row, file=name, base=bases.get(row.traj_id, ""))
+            for row in rows
         )
+
+    @cached_property
+    def _bases(self) -> Mapping[str, str]:
+        return {name: pair.base for name, pair in self.twins.items()}
 
     def reasons(self) -> Counter[str]:
         """Return the number of skipped questions by reason."""
@@ -169,6 +189,14 @@ class NiehSet:
         """Return the frames with a question's evidence, in the order of its clues."""
         frames = self._trajectory(question.traj_id)
         return tuple(frames[index] for index in question.clues)
+
+    def clue_positions(self, question: Question) -> tuple[int, ...]:
+        """Return where in the trajectory's time order a question's clues are, in their own order.
+
+        Not by the frames themselves: several steps may share a picture.
+        """
+        position_of = {number: at for at, number in enumerate(self._trajectory(question.traj_id))}
+        return tuple(position_of[number] for number in question.clues)
 
     def outline_file(self, traj_id: str) -> Path | None:
         """Return the file of the trajectory itself, or None if there is none."""

@@ -47,6 +47,7 @@ class Question:
         published: further columns of a published file; None elsewhere.
         pair: name of the pair of questions that it is one of, in twins; empty elsewhere.
         fact: name of the changed fact that the pair is about; several pairs may be about one.
+        base: name of the trajectory that both worlds of a pair were made of; empty elsewhere.
         file: name of its file without suffix, among several of a set; empty elsewhere. It is no
             part of what is asked.
     """
@@ -60,6 +61,7 @@ class Question:
     published: PublishedColumns | None = None
     pair: str = field(default="", compare=False)
     fact: str = field(default="", compare=False)
+    base: str = field(default="", compare=False)
     file: str = field(default="", compare=False)
 
     @property
@@ -81,6 +83,21 @@ class Question:
         if file == "single" or self.n_clues == 1:
             return "" if file == "multi" else "1"
         return "2" if self.n_clues == 2 else ">=3"
+
+    @property
+    def has_evidence(self) -> bool:
+        """True if its clues are shown as evidence: not of an absence, but of both of twins."""
+        return bool(self.pair) or not self.absence
+
+    @property
+    def draw_name(self) -> str:
+        """Name by which frames are drawn for it: the same in both worlds of twins."""
+        return self.pair or self.id
+
+    @property
+    def cluster(self) -> str:
+        """Name of what intervals cluster by: its trajectory, or the base of twins."""
+        return self.base or self.traj_id
 
     @cached_property
     def id(self) -> str:

@@ -58,7 +58,7 @@ class TrajectoryFacts:
     """What is known of a trajectory before its first step.
 
     Attributes:
-        name: name of the trajectory.
+        name: name of the trajectory; of twins, that of their base.
         tokens_per_frame: tokens of a frame for the model under test; None if it is not known, then
             there is no budget.
         seed: seed of whatever the memory draws.

@@ -47,6 +47,9 @@ def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> D
         "published": question.published
         and {"file": question.published.file, "qid": question.published.qid},
         "file": question.file,
+        "pair": question.pair,
+        "fact": question.fact,
+        "base": question.base,
         "clues": list(question.clues),
         "answers": json.dumps(question.answers),
         "context": task_samples.context_name,
@@ -74,6 +77,9 @@ def sample_of(doc: Doc) -> Sample:
         absence=doc["absence"],
         published=PublishedColumns(**doc["published"]) if doc["published"] else None,
         file=doc["file"],
+        pair=doc["pair"],
+        fact=doc["fact"],
+        base=doc["base"],
     )
     return Sample(
         question,

@@ -121,6 +121,13 @@ class NiehEvaluation:
                     f"--{name.replace('_', '-')} {value}: no context of {names} has a size in "
                     "tokens; leave it out, or ask nieh_haystack or nieh_truncate_head"
                 )
+        for name in ("context", "ctx_size"):
+            value = getattr(self._options, name)
+            if value is not None and not any(task.takes_context for task in self._tasks):
+                raise UsageError(
+                    f"--{name.replace('_', '-')} {value}: no task of {names} leaves its context "
+                    "open; leave it out, or ask nieh_twins"
+                )
         for name, value in self._memory().items():
             if not any(task.takes_memory for task in self._tasks):
                 raise UsageError(
@@ -213,13 +220,17 @@ class BoundNieh:
 
 
 def _groups(prepared: Mapping[str, PreparedTask], repeats: int = 1) -> list[Group[NiehUnit]]:
-    """Return a group per task and trajectory: its samples share what is encoded of that."""
+    """Return a group per task and trajectory: its samples share what is encoded of that.
+
+    Twins of one trajectory are one group: they have the frames before their first difference in
+    common.
+    """
     groups = []
     for task, ready in prepared.items():
-        ordered = sorted(ready.task_samples.samples, key=lambda sample: sample.question.traj_id)
-        for _, samples in groupby(ordered, key=lambda sample: sample.question.traj_id):
-            same = list(samples)
-            frames = len({frame for sample in same for frame in sample.frames})
+        ordered = sorted(ready.task_samples.samples, key=lambda sample: sample.question.cluster)
+        for _, samples in groupby(ordered, key=lambda sample: sample.question.cluster):
+            same = sorted(samples, key=lambda sample: sample.question.traj_id)
+            frames = len({(it.question.traj_id, frame) for it in same for frame in it.frames})
             units = [
                 NiehUnit.of(task, ready.task_samples, sample, repeat)
                 for sample in same

@@ -16,6 +16,22 @@ FRAMES = (SHOWN, "blank", "shuffled", "other")  # see `infthor_eval.nieh.frame_a
 class NiehOptions(MemoryOptions):
     """Options of the suite, with their help texts; None is the task's or the model's own."""
 
+    context: str | None = field(
+        default=None,
+        metadata={
+            "help": "Contexts of tasks that leave it open (nieh_twins), a run with each: clues, "
+            "trajectory, haystack, truncate_head, memory, video; default: clues.",
+            "metavar": "NAME,...",
+            "each": True,
+        },
+    )
+    ctx_size: float | None = field(
+        default=None,
+        metadata={
+            "help": "Size of such a context in kilo-tokens, for haystack and truncate_head.",
+            "metavar": "K",
+        },
+    )
     k_tokens: int | None = field(
         default=None,
         metadata={

@@ -11,7 +11,16 @@ from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.runs.journals.records import RecordTypes
 from infthor_eval.runs.usage import Count
 
-__all__ = ["RECORDS", "Guess", "NiehAnswer", "NiehNote", "NiehRecall", "NiehVerdict", "ShownClues"]
+__all__ = [
+    "RECORDS",
+    "Guess",
+    "NiehAnswer",
+    "NiehNote",
+    "NiehRecall",
+    "NiehVerdict",
+    "ShownClues",
+    "TwinSide",
+]
 
 
 class Guess(msgspec.Struct, frozen=True, kw_only=True):
@@ -47,6 +56,31 @@ class ShownClues(msgspec.Struct, frozen=True, kw_only=True):
     n_shown: Count
     n_clues: Count
     n_after: Count | None = None
+
+
+class TwinSide(msgspec.Struct, frozen=True, kw_only=True):
+    """One question of a pair of twins: what it is paired with, and how much of the change it shows.
+
+    Attributes:
+        pair: name of the pair of questions.
+        fact: name of the changed fact; several pairs may be about one.
+        kind: kind of the edit that made the pair of worlds.
+        traj_id: name of this world's trajectory.
+        answers: gold answers in the other world.
+        n_frames: number of shown frames.
+        n_differing: number of these that differ between the worlds.
+        n_since_change: number of frames of the trajectory since the changed objects were last
+            changed by the agent; None if it left them as they were at the start.
+    """
+
+    pair: str
+    fact: str
+    kind: str
+    traj_id: str
+    answers: Annotated[tuple[str | int | float, ...], Meta(min_length=1)]
+    n_frames: Count
+    n_differing: Count
+    n_since_change: Count | None
 
 
 class NiehRecall(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="nieh_recall"):
@@ -90,6 +124,7 @@ class NiehAnswer(
         guess: what can be guessed of the question; None if it is not known.
         shown_clues: clue frames among the shown ones; None if they are not known, or if no frame is
             evidence.
+        twin: what it is paired with; None for a question that is no twin.
         recall: what a memory recalled; None where the context has no memory.
         reply: the reply; None if the model failed.
         scores: scores of the reply by metric; empty if there is none.
@@ -106,6 +141,7 @@ class NiehAnswer(
     file: str = ""
     guess: Guess | None = None
     shown_clues: ShownClues | None = None
+    twin: TwinSide | None = None
     recall: NiehRecall | None = None
     reply: str | None = None
     scores: dict[str, float] = {}
@@ -114,7 +150,11 @@ class NiehAnswer(
 
     @classmethod
     def of(
-        cls, question: Question, guess: Guess | None = None, shown_clues: ShownClues | None = None
+        cls,
+        question: Question,
+        guess: Guess | None = None,
+        shown_clues: ShownClues | None = None,
+        twin: TwinSide | None = None,
     ) -> "NiehAnswer":
         """Return the payload of a question before it is asked."""
         return cls(
@@ -126,6 +166,7 @@ class NiehAnswer(
             file=question.file,
             guess=guess,
             shown_clues=shown_clues,
+            twin=twin,
         )
 
     def with_reply(

@@ -5,13 +5,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.nieh.contexts import (
+    DEFAULT_CONTEXT,
     Context,
     ContextPart,
     ContextSettings,
@@ -126,9 +127,9 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
     """Return the samples of a task.
 
     Args:
-        config: `dataset_kwargs` of the task file with the options of the run: name of the context,
-            arguments of `find_set`, and settings of the context
-            (`infthor_eval.nieh.contexts.ContextSettings`).
+        config: `dataset_kwargs` of the task file with the options of the run: name of the context
+            (the clue frames, if none is named), arguments of `find_set`, and settings of the
+            context (`infthor_eval.nieh.contexts.ContextSettings`).
         limit: number of questions, chosen evenly from all trajectories by the seed; None for all.
 
     Raises:
@@ -136,10 +137,11 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
             words, or the set does not allow the ablation.
         DataError: the set cannot be read.
     """
-    context = context_named(config["context"])
+    name = config.get("context", DEFAULT_CONTEXT)
+    context = context_named(name)
     settings = ContextSettings.read(config)
     data = find_set(**config)
-    check_prompt(config["context"], settings.prompt)
+    check_prompt(name, settings.prompt)
     frame_ablation = FrameAblation(settings.frames, settings.seed)
     frame_ablation.check(data)
     items = [
@@ -151,7 +153,7 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
     skipped = [sample for sample in items if isinstance(sample, SkippedQuestion)]
     sources = context.sources(data, settings)
     return TaskSamples(
-        data, config["context"], context, samples, skipped, sources, frame_ablation, settings.prompt
+        data, name, context, samples, skipped, sources, frame_ablation, settings.prompt
     )
 
 
@@ -161,29 +163,52 @@ _Items = list[Sample | SkippedQuestion]  # of one question
 def _by_question(
     data: NiehSet, context: Context, settings: ContextSettings, limit: int | None
 ) -> list[_Items]:
-    """Return samples by question in the set's order; with a limit, of those read to reach it."""
+    """Return samples by question in the set's order; with a limit, of those read to reach it.
+
+    A limit takes whole pairs of twins, so it may take one question more.
+    """
     problems: dict[FrameRef, str | None] = {}
 
     def skip_unreadable(sample: Sample) -> Sample | SkippedQuestion:
         problem = _find_problem(context.select_frames(data, sample), problems)
         return SkippedQuestion(sample.question, problem, sample.variant) if problem else sample
 
-    trajectories = [
-        row.traj_id if isinstance(row, Question) else row.question.traj_id for row in data.rows
-    ]
-    positions = range(len(data.rows)) if limit is None else spread(trajectories, str, settings.seed)
     by_position: dict[int, _Items] = {}
     n_asked = 0
-    for position in positions:
-        row = data.rows[position]
-        items = _samples(context, data, row, settings) if isinstance(row, Question) else [row]
-        by_position[position] = [
-            skip_unreadable(sample) if isinstance(sample, Sample) else sample for sample in items
-        ]
-        n_asked += any(isinstance(sample, Sample) for sample in by_position[position])
-        if n_asked == limit:
+    groups = _pairs_together(data.rows)
+    in_turn = (
+        groups
+        if limit is None
+        else [groups[at] for at in spread(groups, lambda group: group.cluster, settings.seed)]
+    )
+    for group in in_turn:
+        for position in group.positions:
+            row = data.rows[position]
+            items = _samples(context, data, row, settings) if isinstance(row, Question) else [row]
+            by_position[position] = [
+                skip_unreadable(sample) if isinstance(sample, Sample) else sample
+                for sample in items
+            ]
+            n_asked += any(isinstance(sample, Sample) for sample in by_position[position])
+        if limit is not None and n_asked >= limit:
             break
     return [by_position[position] for position in sorted(by_position)]
+
+
+class _Together(NamedTuple):
+    """Positions of questions that a limit takes together: both of a pair, or one alone."""
+
+    cluster: str
+    positions: list[int]
+
+
+def _pairs_together(rows: Sequence[Question | SkippedQuestion]) -> list[_Together]:
+    groups: dict[tuple[str, int], _Together] = {}
+    for position, row in enumerate(rows):
+        question = row.question if isinstance(row, SkippedQuestion) else row
+        key = (question.pair, 0) if question.pair else ("", position)
+        groups.setdefault(key, _Together(question.cluster, [])).positions.append(position)
+    return list(groups.values())
 
 
 def _samples(

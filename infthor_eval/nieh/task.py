@@ -6,11 +6,18 @@ from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from typing import Any, Literal
 
-from infthor_eval.errors import DataError, UsageError
+from infthor_eval.errors import DataError, UsageError, unknown_name
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.memory import parse_options, read_budget
 from infthor_eval.nieh.config import MetricsConfig, NiehTaskConfig, SkippedSample
-from infthor_eval.nieh.contexts import CONTEXTS, MEMORY, ContextSettings, Sample, check_prompt
+from infthor_eval.nieh.contexts import (
+    CONTEXTS,
+    DEFAULT_CONTEXT,
+    MEMORY,
+    ContextSettings,
+    Sample,
+    check_prompt,
+)
 from infthor_eval.nieh.metrics import PUBLISHED, Metrics, metrics_of
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.samples import TaskSamples, find_samples, find_set
@@ -57,7 +64,8 @@ class NiehTask:
     """A task file, as far as it can be read before the model is loaded.
 
     Attributes:
-        settings: contents of its file.
+        settings: contents of its file; with the run's context, if it leaves that open.
+        takes_context: True if its context is one of the run's options.
         needs_size: True if the samples depend on the model's tokens per frame.
         takes_memory: True if its memory is one of the run's options.
         takes_prompt: True if its prompt is.
@@ -74,9 +82,13 @@ class NiehTask:
         file.require(*_NEEDED)
         check_task_file(file)
         self.name = file.name
-        self.settings: Mapping[str, Any] = file.settings
+        own = file.settings["dataset_kwargs"]
+        self.takes_context = "context" not in own
+        if self.takes_context:
+            own = _context_of(request.options) | own
+        self.settings: Mapping[str, Any] = {**file.settings, "dataset_kwargs": own}
         self._limit = request.limit
-        self._config: dict[str, Any] = _run_settings(request) | file.settings["dataset_kwargs"]
+        self._config: dict[str, Any] = _run_settings(request) | own
         self._generation_kwargs = _drawn(file.settings["generation_kwargs"], request.options)
         self.decoding: Decoding = decoding_of(self._generation_kwargs, request.seed, str(file.path))
         self._max_thinking_tokens = request.options.max_thinking_tokens
@@ -86,10 +98,8 @@ class NiehTask:
         self.needs_size = (
             CONTEXTS[self._config["context"]].needs_model or self._config.get("budget") is not None
         )
-        self.takes_memory = (
-            self._config["context"] == MEMORY and "memory" not in file.settings["dataset_kwargs"]
-        )
-        self.takes_prompt = "prompt" not in file.settings["dataset_kwargs"]
+        self.takes_memory = self._config["context"] == MEMORY and "memory" not in own
+        self.takes_prompt = "prompt" not in own
         self.task_samples: TaskSamples | None = (
             None if self.needs_size else find_samples(self._config, self._limit)
         )
@@ -161,8 +171,8 @@ def check_task_file(file: TaskFile) -> None:
     file.require("dataset_kwargs")
     location = f"{file.path}: dataset_kwargs"
     raw = file.settings["dataset_kwargs"]
-    if not isinstance(raw, Mapping) or not isinstance(raw.get("context"), str):
-        raise DataError(f"{location} must be a mapping with the name of a context (context: NAME)")
+    if not isinstance(raw, Mapping):
+        raise DataError(f"{location} must be a mapping of names to values")
     known = (*_OF_SETS, *(setting.name for setting in fields(ContextSettings)))
     for key in raw:
         if key not in known:
@@ -172,26 +182,43 @@ def check_task_file(file: TaskFile) -> None:
     for key in _OF_SETS:
         if not isinstance(raw.get(key, ""), str):
             raise DataError(f"{location}: {key} is {raw[key]!r:.60}; it is a name")
-    context = CONTEXTS.get(raw["context"])
-    if context is None:
-        raise UsageError(
-            f"{location}: context is {raw['context']!r:.60}; it is one of {', '.join(CONTEXTS)}"
-        )
     settings = ContextSettings.read(raw, location)
-    try:
-        check_prompt(raw["context"], settings.prompt)
-    except UsageError as error:
-        raise UsageError(f"{location}: {error}") from error
-    if context.needs_model and settings.ctx_size is None:
-        raise UsageError(
-            f"{location}: ctx_size is missing; {raw['context']} needs it, a number of kilo-tokens "
-            "above 0"
-        )
+    if "context" in raw:
+        _check_context(raw["context"], settings, location)
     if "bundled" in raw:
         try:
             packaged_folder(f"sets/{raw['bundled']}")
         except DataError as error:
             raise DataError(f"{location}: bundled is {raw['bundled']!r:.60}: {error}") from error
+
+
+def _check_context(name: str, settings: ContextSettings, location: str) -> None:
+    context = CONTEXTS.get(name)
+    if context is None:
+        raise UsageError(f"{location}: context is {name!r:.60}; it is one of {', '.join(CONTEXTS)}")
+    try:
+        check_prompt(name, settings.prompt)
+    except UsageError as error:
+        raise UsageError(f"{location}: {error}") from error
+    if context.needs_model and settings.ctx_size is None:
+        raise UsageError(
+            f"{location}: ctx_size is missing; {name} needs it, a number of kilo-tokens above 0"
+        )
+
+
+def _context_of(options: NiehOptions) -> dict[str, Any]:
+    """Return the settings of a run's context, for a task that leaves it open.
+
+    Raises:
+        UsageError: there is no such context, or its size is missing.
+    """
+    name = options.context or DEFAULT_CONTEXT
+    if name not in CONTEXTS:
+        raise unknown_name("context", name, CONTEXTS)
+    if CONTEXTS[name].needs_model and options.ctx_size is None:
+        raise UsageError(f"--context {name}: needs a size; give --ctx-size in kilo-tokens")
+    size = {} if options.ctx_size is None else {"ctx_size": options.ctx_size}
+    return {"context": name} | size
 
 
 def _drawn(generation_kwargs: Any, options: NiehOptions) -> Any:

@@ -6,10 +6,11 @@ from typing import Any
 
 from msgspec.structs import replace as replace_fields
 
-from infthor_eval.nieh.contexts.base import Sample, clue_positions
+from infthor_eval.nieh.contexts.base import Sample
 from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
 from infthor_eval.nieh.records import Guess, NiehAnswer, ShownClues
 from infthor_eval.nieh.samples import TaskSamples
+from infthor_eval.nieh.twins import twin_side
 from infthor_eval.runs import Unit, UnitKey, UnitRecord
 
 __all__ = ["NiehUnit", "shown_clues"]
@@ -39,8 +40,12 @@ class NiehUnit(Unit[NiehAnswer]):
         knowledge = visible_knowledge(task_samples.context_name)
         return cls(
             UnitKey(task, question.id, sample.variant, repeat),
-            question.traj_id,
-            NiehAnswer.of(question, shown_clues=shown_clues(task_samples, sample)),
+            question.cluster,
+            NiehAnswer.of(
+                question,
+                shown_clues=shown_clues(task_samples, sample),
+                twin=twin_side(task_samples, sample),
+            ),
             sample,
             lambda: find_guesses(task_samples.data, knowledge).get(question.id),
         )
@@ -63,9 +68,9 @@ def shown_clues(task_samples: TaskSamples, sample: Sample) -> ShownClues | None:
     """Return the clue frames that a sample shows; None for absences and sets without frames."""
     data = task_samples.data
     question = sample.question
-    if question.absence or not data.has_frames:
+    if not question.has_evidence or not data.has_frames:
         return None
-    clues = clue_positions(data, question)
+    clues = sorted(set(data.clue_positions(question)))
     positions = set(task_samples.context.positions(data, sample))
     n_after = len(data.frames(question.traj_id)) - 1 - clues[-1]
     return ShownClues(

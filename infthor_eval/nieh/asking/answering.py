@@ -26,6 +26,7 @@ from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.metrics import MetricError
 from infthor_eval.nieh.records import NiehAnswer, NiehRecall
 from infthor_eval.nieh.task import PreparedTask
+from infthor_eval.nieh.twins import twin_side
 from infthor_eval.nieh.units import NiehUnit, shown_clues
 from infthor_eval.runs import NOTHING, Session, Tokens, UnitRecord, Usage
 from infthor_eval.storage.digests import fingerprint
@@ -101,7 +102,7 @@ class _UnitRequest:
 
 
 class OpenAnswerer(Protocol):
-    """Gives the replies to the units of a task on one trajectory."""
+    """Gives the replies to the units of a task on one trajectory, or on twins of one."""
 
     @property
     def batch_size(self) -> int:
@@ -209,7 +210,7 @@ def answer_units(
     answerer: OpenAnswerer,
     session: Session[NiehAnswer],
 ) -> Iterator[UnitRecord[NiehAnswer]]:
-    """Yield the records of units on one trajectory.
+    """Yield the records of units on one trajectory, or on twins of one.
 
     Those with one context are answered together, and all of them if the answerer batches contexts.
     Neighbours share as long a prefix as there is, which a model's conversation encodes once; so do
@@ -290,7 +291,10 @@ def _recall(unit: NiehUnit, recaller: Recaller, prepared: PreparedTask) -> NiehU
         return error
     sample = apply_recall(unit.sample, recall)
     payload = replace_fields(
-        unit.payload, recall=recall, shown_clues=shown_clues(prepared.task_samples, sample)
+        unit.payload,
+        recall=recall,
+        shown_clues=shown_clues(prepared.task_samples, sample),
+        twin=twin_side(prepared.task_samples, sample),
     )
     return replace(unit, sample=sample, payload=payload)
 

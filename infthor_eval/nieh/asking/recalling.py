@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from infthor_eval.errors import InfthorError, ModelError, UsageError
+from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.memory import (
     Memory,
@@ -26,7 +27,7 @@ from infthor_eval.memory import (
     wrap_memory_errors,
 )
 from infthor_eval.nieh.contexts import Sample
-from infthor_eval.nieh.contexts.base import RecallSettings, clue_positions
+from infthor_eval.nieh.contexts.base import RecallSettings
 from infthor_eval.nieh.records import NiehRecall
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.storage.digests import fingerprint
@@ -101,11 +102,13 @@ class Recaller:
         known = self._find(inputs)
         if known is not None:
             return known
-        built = self._build(question.traj_id, settings, steps)
+        built = self._build(question, settings, steps)
         memory = built.memory
         past = built.steps[:-1]
         present = built.steps[-1]
-        clues = clue_positions(self._task_samples.data, question) if not question.absence else ()
+        clues: tuple[int, ...] = ()
+        if question.has_evidence:
+            clues = tuple(sorted(set(self._task_samples.data.clue_positions(question))))
         query = Query(
             text=question.text,
             present=present,
@@ -150,9 +153,10 @@ class Recaller:
         )
 
     def _build(
-        self, traj_id: str, settings: RecallSettings, steps: Sequence[Observation]
+        self, question: Question, settings: RecallSettings, steps: Sequence[Observation]
     ) -> _Built:
         """Return the memory with the trajectory observed."""
+        traj_id = question.traj_id
         if self._built is None or (self._built.traj_id, self._built.settings) != (
             traj_id,
             settings,
@@ -164,7 +168,7 @@ class Recaller:
                     f"the memory {settings.memory} asks the model under test, and there is none"
                 )
             facts = TrajectoryFacts(
-                name=traj_id,
+                name=question.cluster,
                 tokens_per_frame=settings.tokens_per_frame,
                 seed=settings.seed,
                 write=write,

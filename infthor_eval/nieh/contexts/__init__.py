@@ -18,6 +18,7 @@ from infthor_eval.nieh.prompts import PROMPTS
 
 __all__ = [
     "CONTEXTS",
+    "DEFAULT_CONTEXT",
     "MEMORY",
     "Context",
     "ContextPart",
@@ -27,6 +28,7 @@ __all__ = [
     "context_named",
 ]
 
+DEFAULT_CONTEXT = "clues"  # of tasks and docs that leave it open
 MEMORY = "memory"  # the context that a memory recalls
 _INTERLEAVED = "Answer the question given the state and action sequence of the embodied agent."
 

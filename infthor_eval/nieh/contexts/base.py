@@ -22,7 +22,6 @@ __all__ = [
     "ContextSettings",
     "RecallSettings",
     "Sample",
-    "clue_positions",
     "trajectories_identity",
 ]
 
@@ -263,12 +262,6 @@ class Context:
         return parts, question_text(
             self.text_intro if has_texts else self.intro, sample.question, prompt
         )
-
-
-def clue_positions(data: NiehSet, question: Question) -> tuple[int, ...]:
-    """Return the positions of the clues in the trajectory's time order, each once, ascending."""
-    order = {frame: position for position, frame in enumerate(data.frames(question.traj_id))}
-    return tuple(sorted({order[frame] for frame in data.clue_frames(question)}))
 
 
 def trajectories_identity(data: NiehSet, _settings: ContextSettings) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.nieh.contexts.base import ContextSettings, Sample, clue_positions
+from infthor_eval.nieh.contexts.base import ContextSettings, Sample
 
 __all__ = ["haystack", "sampling_pool"]
 
@@ -32,12 +32,12 @@ def haystack(
     """Return a question on one window per depth."""
     n_all = len(data.frames(question.traj_id))
     n = settings.n_frames(_K_TOKENS)
-    if question.absence:
+    if not question.has_evidence:
         return [_anywhere(question, n_all, n, settings.seed)]
-    clues = clue_positions(data, question)
+    clues = tuple(sorted(set(data.clue_positions(question))))
     samples: list[Sample | SkippedQuestion] = []
     for depth in settings.depths:
-        draw = random.Random(f"{settings.seed}/{question.id}/{n}/{depth:g}")
+        draw = random.Random(f"{settings.seed}/{question.draw_name}/{n}/{depth:g}")
         window = _window(clues, n_all, n, round(depth * _STEPS), draw)
         variant = f"depth={depth:g}"
         samples.append(
@@ -94,5 +94,5 @@ def _anywhere(question: Question, n_all: int, n: int, seed: int) -> Sample | Ski
     variant = "no needle"
     if n < 1 or n > n_all:
         return SkippedQuestion(question, _OUTSIDE, variant)
-    start = random.Random(f"{seed}/{question.id}/{n}").randrange(n_all - n + 1)
+    start = random.Random(f"{seed}/{question.draw_name}/{n}").randrange(n_all - n + 1)
     return Sample(question, tuple(range(start, start + n)), variant)

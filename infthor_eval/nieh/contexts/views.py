@@ -18,8 +18,7 @@ def clues(
     """Ask on the evidence alone, in time order whatever the file's (the paper's Table 4)."""
     if not data.has_frames:  # baselines need no more than their number
         return [Sample(question, tuple(sorted(question.clues)))]
-    order = {frame: position for position, frame in enumerate(data.frames(question.traj_id))}
-    return [Sample(question, tuple(sorted(order[frame] for frame in data.clue_frames(question))))]
+    return [Sample(question, tuple(sorted(data.clue_positions(question))))]
 
 
 def trajectory(

@@ -73,13 +73,15 @@ def held_out(
 ) -> HoldOut:
     """Return what a sample is left out with: its trajectory, or itself if there is one alone.
 
+    Twins are left out with all twins of their trajectory.
+
     Args:
         samples: all samples that are guessed.
         scenes: scene by id of the trajectory, to leave out whole scenes.
     """
 
     def group(sample: Sample) -> str:
-        return scenes.get(sample.question.traj_id, sample.question.traj_id)
+        return scenes.get(sample.question.traj_id, sample.question.cluster)
 
     is_alone = len(set(map(group, samples))) == 1
     return (lambda sample: sample.question.id) if is_alone else group

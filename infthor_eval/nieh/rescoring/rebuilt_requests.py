@@ -32,11 +32,13 @@ class RebuiltRequest(NamedTuple):
     """A request as it was sent.
 
     Attributes:
+        traj_id: name of the question's trajectory.
         context: what the model saw, frames as references.
         text: the text after it, which ends with the question.
         positions: where in the trajectory's time order the shown frames are, from 0 on.
     """
 
+    traj_id: str
     context: tuple[ContextPart, ...]
     text: str
     positions: Sequence[int]
@@ -77,7 +79,8 @@ class RequestRebuilder:
             != record.fingerprint
         ):
             raise DataError("made again, it is another request than the one that was sent")
-        return RebuiltRequest(context, text, self._context.positions(self._samples.data, sample))
+        positions = self._context.positions(self._samples.data, sample)
+        return RebuiltRequest(sample.question.traj_id, context, text, positions)
 
     def _find_sample(self, record: UnitRecord[NiehAnswer]) -> Sample:
         question = self._questions.get(record.id)

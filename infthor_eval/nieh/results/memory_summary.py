@@ -70,7 +70,7 @@ def summarise_memory(
 def time_memory(records: Sequence[Record]) -> MemoryTimes | None:
     """Return the seconds of a task's memory; None if it has none."""
     recalls = [
-        (record.cluster, record.payload.recall)
+        (_trajectory(record), record.payload.recall)
         for record in records
         if record.payload.recall is not None
     ]
@@ -80,3 +80,8 @@ def time_memory(records: Sequence[Record]) -> MemoryTimes | None:
     return MemoryTimes(
         fmean(by_trajectory.values()), fmean(recall.recall_s for _, recall in recalls)
     )
+
+
+def _trajectory(record: Record) -> str:
+    twin = record.payload.twin
+    return record.cluster if twin is None else twin.traj_id

@@ -22,6 +22,7 @@ from infthor_eval.nieh.results.memory_summary import (
     summarise_memory,
     time_memory,
 )
+from infthor_eval.nieh.results.pair_summary import PairSummary, summarise_pairs
 from infthor_eval.nieh.results.repeat_summary import (
     RepeatSummary,
     by_question,
@@ -137,6 +138,7 @@ class TaskSummary(msgspec.Struct, frozen=True):
         scores: scores by metric and trajectory, in the order of the samples' keys, by which runs
             are paired.
         memory: the memory that recalled what was shown; None if there is none.
+        pairs: how pairs of twins were answered under the main metric; None if there are none.
     """
 
     n: int
@@ -159,6 +161,7 @@ class TaskSummary(msgspec.Struct, frozen=True):
     scores: dict[str, dict[str, list[float]]]
     failures: list[Failure]
     memory: MemorySummary | None = None
+    pairs: PairSummary | None = None
 
 
 class NiehSummary(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -204,9 +207,12 @@ def _main_metric(metrics: Sequence[str]) -> str:
 
 
 def primary_metrics(summary: NiehSummary) -> dict[str, Rate]:
-    """Return the mean of all samples under the main metric, for each task with any."""
+    """Return the main metric of each task with any sample: of twins the pairs', else the mean."""
     rates = {}
     for name, task in summary.tasks.items():
+        if task.pairs is not None:
+            rates[name] = task.pairs.pair_accuracy
+            continue
         total = task.by_clues["total"]
         if total.n:
             score = total.scores[main_metric(task)]
@@ -241,6 +247,7 @@ def _task(replies: Sequence[Record], task: NiehTaskConfig, config: NiehConfig) -
         scores={name: _by_trajectory(records, name) for name in metrics},
         failures=_failures(replies),
         memory=summarise_memory(config, task, records),
+        pairs=summarise_pairs(replies, _main_metric(metrics)),
     )
 
 

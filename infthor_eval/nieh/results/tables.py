@@ -15,6 +15,7 @@ from infthor_eval.nieh.results.evidence_tables import (
 )
 from infthor_eval.nieh.results.gains import Gain, find_gains, frames_of, name_of
 from infthor_eval.nieh.results.memory_tables import memory_tables
+from infthor_eval.nieh.results.pair_tables import pair_overview, pair_tables
 from infthor_eval.nieh.results.repeat_tables import repeat_tables
 from infthor_eval.nieh.results.summary import (
     CLUE_COLUMNS,
@@ -61,6 +62,7 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
         if not _is_by_clues(table) and table.context in contexts
     ]
     return [
+        *pair_tables(runs),
         *_depth_table(runs),
         *others,
         clues_table(runs),
@@ -74,7 +76,7 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def overview(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return each task's accuracy with intervals; and gains, memories and repeats if any.
+    """Return each task's accuracy with intervals; and pairs, gains, memories and repeats if any.
 
     A task that asked nothing is a line below the table.
     """
@@ -91,7 +93,13 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
         *_notes(runs),
     )
     table = Table("NIEH accuracy, %, strict scorer", (*_NAMES, *map(Column, numbers)), rows, notes)
-    return [table, *_gains_table(runs), *memory_tables(runs), *repeat_tables(runs)]
+    return [
+        *pair_overview(runs),
+        table,
+        *_gains_table(runs),
+        *memory_tables(runs),
+        *repeat_tables(runs),
+    ]
 
 
 def _name_and_total(name: str, task: TaskSummary) -> tuple[str, ...]:

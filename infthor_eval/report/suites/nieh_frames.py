@@ -94,8 +94,7 @@ class _TrajectoryFacts:
 def _choose_frames(data: NiehSet, question: Question, facts: Sequence[FrameFacts]) -> _FrameChoice:
     frames = data.frames(question.traj_id)
     # The clues of an absence are a sample of the trajectory, and no evidence.
-    clue_frames = set() if question.absence else set(data.clue_frames(question))
-    clues = frozenset(index for index, frame in enumerate(frames) if frame in clue_frames)
+    clues = frozenset(data.clue_positions(question) if question.has_evidence else ())
     last = len(frames) - 1
     others = {near for index in clues for near in (index - 1, index + 1) if 0 <= near <= last}
     if not clues:

@@ -63,7 +63,7 @@ def _prompt(
         return Prompt(problem=str(rebuilder))
     try:
         request = rebuilder.rebuild(record)
-        positions = {frame: position for position, frame in enumerate(data.frames(record.cluster))}
+        positions = {frame: position for position, frame in enumerate(data.frames(request.traj_id))}
     except InfthorError as error:
         return Prompt(problem=str(error))
     before = request.text.removesuffix(record.payload.question)

@@ -1,0 +1,304 @@
+"""How pairs of twins were answered: both right or nothing (docs/reference/metrics.md).
+
+A pair is one question in two worlds that differ in one thing. Who answers without seeing that says
+the same in both worlds, and has no pair right. Intervals are clustered by the trajectory that both
+worlds were made of, so pairs of one edit, and of one fact, are within one cluster.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from statistics import fmean
+
+import msgspec
+
+from infthor_eval.distances import DISTANCES, distance_class
+from infthor_eval.nieh.prompts import last_line
+from infthor_eval.nieh.records import NiehAnswer, TwinSide
+from infthor_eval.nieh.scoring import plain_form, score
+from infthor_eval.rates import Rate, clustered_rate
+from infthor_eval.runs import UnitRecord
+
+__all__ = [
+    "NEVER_CHANGED",
+    "N_SHOWN",
+    "SHOWN_DIFFERENCE",
+    "PairScore",
+    "PairSummary",
+    "find_pairs",
+    "score_pairs",
+    "summarise_pairs",
+]
+
+# Frames shown, in classes that double, as budgets of memories do.
+_SIZES = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)
+N_SHOWN = (*(f"<={size}" for size in _SIZES), f">{_SIZES[-1]}")
+SHOWN_DIFFERENCE = ("yes", "no")
+NEVER_CHANGED = "never"
+
+Record = UnitRecord[NiehAnswer]
+
+
+class PairSummary(msgspec.Struct, frozen=True):
+    """The summary of a task's pairs. Rates are 0 to 1, with intervals by trajectory.
+
+    Attributes:
+        n_pairs: number of pairs, in each variant of the context.
+        n_facts: number of different facts that they are about.
+        n_trajectories: number of trajectories that their worlds were made of.
+        n_incomplete: number of questions whose twin was not asked; they are in no pair.
+        pair_accuracy: both answers right, with full marks: the primary metric.
+        by_fact: mean over facts of the accuracy of their pairs.
+        single: single answers right, with full marks.
+        flipped: the reply to the twin is another.
+        right_when_flipped: of these pairs, both right; None if no reply differs.
+        one_right: exactly one of both is right.
+        one_is_commoner: of these pairs, the right one has the commoner gold answer of its form
+            (a half where both are as common): prior knowledge, not memory; None if there are none.
+        wrong_twin: single answers that are wrong, and right in the other world.
+        by_kind: accuracy by kind of edit.
+        by_question_type: accuracy by type of question.
+        by_distance: accuracy by frames between the last clue and the end of the trajectory.
+        by_shown: accuracy by the number of frames shown.
+        by_difference: accuracy by whether a frame that differs was shown in both worlds.
+        by_age: accuracy by frames since the agent last changed what is asked about; "never" where
+            it is as at the start.
+    """
+
+    n_pairs: int
+    n_facts: int
+    n_trajectories: int
+    n_incomplete: int
+    pair_accuracy: Rate
+    by_fact: Rate
+    single: Rate
+    flipped: Rate
+    right_when_flipped: Rate | None
+    one_right: Rate
+    one_is_commoner: Rate | None
+    wrong_twin: Rate
+    by_kind: dict[str, Rate]
+    by_question_type: dict[str, Rate]
+    by_distance: dict[str, Rate]
+    by_shown: dict[str, Rate]
+    by_difference: dict[str, Rate]
+    by_age: dict[str, Rate]
+
+
+@dataclass(frozen=True)
+class _Side:
+    """A question of a pair, with what it is paired with."""
+
+    record: Record
+    twin: TwinSide
+
+
+@dataclass(frozen=True)
+class TwinRecords:
+    """The two records of a pair in one repetition."""
+
+    sides: tuple[_Side, _Side]
+
+    @property
+    def cluster(self) -> str:
+        """The trajectory that both worlds were made of."""
+        return self.sides[0].record.cluster
+
+    def rights(self, metric: str) -> tuple[bool, bool]:
+        """Return which answers have full marks."""
+        first, second = (_is_right(side.record, metric) for side in self.sides)
+        return first, second
+
+    def is_right(self, metric: str) -> bool:
+        """Return True if both answers have full marks."""
+        return all(self.rights(metric))
+
+    @property
+    def is_flipped(self) -> bool:
+        """True if both were answered, and not the same."""
+        first, second = (_said(side.record) for side in self.sides)
+        return first is not None and second is not None and first != second
+
+
+class PairScore(msgspec.Struct, frozen=True):
+    """A pair's score, 0 to 1: the share of its repetitions in which both answers are right."""
+
+    pair: str
+    variant: str
+    fact: str
+    cluster: str
+    score: float
+
+
+def find_pairs(records: Iterable[Record]) -> tuple[list[TwinRecords], int]:
+    """Return the pairs among the records of a task, and the number of questions without a twin."""
+    sides: dict[tuple[str, str, int], list[_Side]] = {}
+    for record in sorted(records, key=lambda record: record.key):
+        twin = record.payload.twin
+        if twin is not None:
+            key = twin.pair, record.variant, record.repeat
+            sides.setdefault(key, []).append(_Side(record, twin))
+    pairs = [TwinRecords((it[0], it[1])) for _, it in sorted(sides.items()) if len(it) == 2]
+    return pairs, sum(len(it) for it in sides.values() if len(it) != 2)
+
+
+def score_pairs(records: Iterable[Record], metric: str) -> list[PairScore]:
+    """Return the scores of the pairs of a task under a metric."""
+    pairs, _ = find_pairs(records)
+    return list(_scores(pairs, metric))
+
+
+def summarise_pairs(records: Sequence[Record], metric: str) -> PairSummary | None:
+    """Return how the pairs of a task were answered under its main metric; None without any."""
+    pairs, n_incomplete = find_pairs(records)
+    if not pairs:
+        return None
+    return _Pairs(pairs, metric).summary(n_incomplete)
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """Summarises pairs under a metric."""
+
+    pairs: Sequence[TwinRecords]
+    metric: str
+
+    def summary(self, n_incomplete: int) -> PairSummary:
+        """Return the summary."""
+        scores = list(_scores(self.pairs, self.metric))
+        flipped = [pair for pair in self.pairs if pair.is_flipped]
+        one_right = [pair for pair in self.pairs if sum(pair.rights(self.metric)) == 1]
+        return PairSummary(
+            n_pairs=len(scores),
+            n_facts=len({it.fact for it in scores}),
+            n_trajectories=len({it.cluster for it in scores}),
+            n_incomplete=n_incomplete,
+            pair_accuracy=_certain([it.score for it in scores], [it.cluster for it in scores]),
+            by_fact=_by_fact(scores),
+            single=self._of_sides(lambda side: _is_right(side.record, self.metric)),
+            flipped=_mean(self.pairs, lambda pair: pair.is_flipped),
+            right_when_flipped=self._right(flipped) if flipped else None,
+            one_right=_mean(self.pairs, lambda pair: sum(pair.rights(self.metric)) == 1),
+            one_is_commoner=self._commoner(one_right) if one_right else None,
+            wrong_twin=self._of_sides(self._is_wrong_twin),
+            by_kind=self._by(lambda pair: pair.sides[0].twin.kind),
+            by_question_type=self._by(lambda pair: pair.sides[0].record.payload.question_type),
+            by_distance=self._by(_distance, DISTANCES),
+            by_shown=self._by(_shown, N_SHOWN),
+            by_difference=self._by(_difference, SHOWN_DIFFERENCE),
+            by_age=self._by(_age, (*DISTANCES, NEVER_CHANGED)),
+        )
+
+    def _right(self, pairs: Sequence[TwinRecords]) -> Rate:
+        return _mean(pairs, lambda pair: pair.is_right(self.metric))
+
+    def _of_sides(self, value: Callable[[_Side], bool]) -> Rate:
+        """Return the mean over single answers."""
+        values = [float(value(side)) for pair in self.pairs for side in pair.sides]
+        return _certain(values, [pair.cluster for pair in self.pairs for _ in pair.sides])
+
+    def _by(
+        self, name_of: Callable[[TwinRecords], str | None], order: Sequence[str] = ()
+    ) -> dict[str, Rate]:
+        """Return the accuracy of groups of pairs, in this order, else by name."""
+        groups: dict[str, list[TwinRecords]] = {}
+        for pair in self.pairs:
+            name = name_of(pair)
+            if name is not None:
+                groups.setdefault(name, []).append(pair)
+        return {
+            name: self._right(groups[name]) for name in order or sorted(groups) if name in groups
+        }
+
+    def _is_wrong_twin(self, side: _Side) -> bool:
+        """Return True for an answer that is right in the other world alone: the wrong memory."""
+        reply = side.record.payload.reply
+        if reply is None or _is_right(side.record, self.metric):
+            return False
+        return score(last_line(reply), side.twin.answers, "strict") >= 1
+
+    def _commoner(self, pairs: Sequence[TwinRecords]) -> Rate:
+        """Return how often the answer that was got right is the commoner one of its form."""
+        counts: dict[str, Counter[tuple[str | int | float, ...]]] = {}
+        for pair in self.pairs:
+            for side in pair.sides:
+                payload = side.record.payload
+                counts.setdefault(payload.question_type, Counter())[payload.answers] += 1
+
+        def is_commoner(pair: TwinRecords) -> float:
+            right, wrong = sorted(
+                pair.sides, key=lambda side: not _is_right(side.record, self.metric)
+            )
+            of_form = counts[right.record.payload.question_type]
+            margin = of_form[right.record.payload.answers] - of_form[wrong.record.payload.answers]
+            return 0.5 if margin == 0 else float(margin > 0)
+
+        return _mean(pairs, is_commoner)
+
+
+def _scores(pairs: Sequence[TwinRecords], metric: str) -> Iterator[PairScore]:
+    """Yield the score of each pair in each variant, over its repetitions."""
+
+    def key(pair: TwinRecords) -> tuple[str, str]:
+        side = pair.sides[0]
+        return side.twin.pair, side.record.variant
+
+    for (name, variant), same in groupby(sorted(pairs, key=key), key=key):
+        repetitions = list(same)
+        yield PairScore(
+            name,
+            variant,
+            repetitions[0].sides[0].twin.fact,
+            repetitions[0].cluster,
+            fmean(pair.is_right(metric) for pair in repetitions),
+        )
+
+
+def _by_fact(scores: Sequence[PairScore]) -> Rate:
+    """Return the mean over facts, of which each is one observation."""
+    facts: dict[tuple[str, str], list[float]] = {}
+    for it in scores:
+        facts.setdefault((it.cluster, it.fact), []).append(it.score)
+    return _certain([fmean(values) for values in facts.values()], [key[0] for key in facts])
+
+
+def _mean(pairs: Sequence[TwinRecords], value: Callable[[TwinRecords], float]) -> Rate:
+    return _certain([float(value(pair)) for pair in pairs], [pair.cluster for pair in pairs])
+
+
+def _certain(values: Sequence[float], clusters: Sequence[str]) -> Rate:
+    rate = clustered_rate(values, clusters)
+    assert rate is not None  # there are values
+    return rate
+
+
+def _is_right(record: Record, metric: str) -> bool:
+    return record.payload.scores.get(metric, 0.0) >= 1
+
+
+def _said(record: Record) -> str | None:
+    """Return what a reply says, as scorers compare it; None if there is none."""
+    reply = record.payload.reply
+    return None if reply is None else plain_form(last_line(reply)).casefold()
+
+
+def _distance(pair: TwinRecords) -> str | None:
+    clues = [side.record.payload.shown_clues for side in pair.sides]
+    after = [it.n_after for it in clues if it is not None and it.n_after is not None]
+    return distance_class(min(after)) if after else None
+
+
+def _shown(pair: TwinRecords) -> str:
+    most = max(side.twin.n_frames for side in pair.sides)
+    return next((f"<={size}" for size in _SIZES if most <= size), N_SHOWN[-1])
+
+
+def _difference(pair: TwinRecords) -> str:
+    return SHOWN_DIFFERENCE[not all(side.twin.n_differing for side in pair.sides)]
+
+
+def _age(pair: TwinRecords) -> str:
+    ages = [side.twin.n_since_change for side in pair.sides]
+    known = [age for age in ages if age is not None]
+    return distance_class(min(known)) if known else NEVER_CHANGED

@@ -1,0 +1,133 @@
+"""Tables of pairs of twins: both right, what the replies to twins were, and the memory curves."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+from infthor_eval.distances import DISTANCES
+from infthor_eval.nieh.results.gains import name_of
+from infthor_eval.nieh.results.pair_summary import (
+    N_SHOWN,
+    NEVER_CHANGED,
+    SHOWN_DIFFERENCE,
+    PairSummary,
+)
+from infthor_eval.nieh.results.summary import NiehSummary
+from infthor_eval.rates import Rate, format_percent
+from infthor_eval.runs import RunSummary
+from infthor_eval.tables import Column, Row, Table, TableCell
+
+__all__ = ["pair_overview", "pair_tables"]
+
+_HEADS = (Column("model", False), Column("task", False), Column("context", False))
+_NOTES = (
+    "pairs: both worlds' answers right, %, with the interval clustered by trajectory. Who sees "
+    "neither world, or does not remember, says the same in both and has 0; who draws one of two "
+    "answers anew for each world has 25 at most.",
+    "by fact: mean over changed facts, which several pairs may be about. flipped: the reply to the "
+    "twin is another one; right then: both right, of these. one right: of both, and how often it "
+    "is the commoner answer of its form (prior knowledge). wrong twin: single replies that are "
+    "right in the other world. bases: trajectories that the worlds were made of.",
+)
+_CURVES: tuple[
+    tuple[str, Callable[[PairSummary], Mapping[str, Rate]], tuple[str, ...]],
+    ...,
+] = (
+    (
+        "frames between the last clue and the end of the trajectory",
+        lambda pairs: pairs.by_distance,
+        DISTANCES,
+    ),
+    ("number of frames shown", lambda pairs: pairs.by_shown, N_SHOWN),
+    (
+        "whether both worlds were shown a frame that differs",
+        lambda pairs: pairs.by_difference,
+        SHOWN_DIFFERENCE,
+    ),
+    (
+        "frames since the agent last changed what is asked about",
+        lambda pairs: pairs.by_age,
+        (*DISTANCES, NEVER_CHANGED),
+    ),
+)
+
+_Found = tuple[str, str, str, PairSummary]  # model, task, context, pairs
+
+
+def pair_overview(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return the table of tasks that have pairs, if there are any."""
+    rows = tuple(
+        Row((run, task, context, *_cells(pairs))) for run, task, context, pairs in _find(runs)
+    )
+    names = (
+        *("pairs", "by fact", "single", "flipped", "right then"),
+        *("one right", "commoner", "wrong twin", "n", "facts", "bases"),
+    )
+    columns = (*_HEADS, *map(Column, names))
+    return [Table("Twins: pairs right, %, strict scorer", columns, rows, _NOTES)] if rows else []
+
+
+def pair_tables(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return the table of pairs, those by kind and type, and the memory curves; none without."""
+    found = list(_find(runs))
+    if not found:
+        return []
+    tables = pair_overview(runs)
+    for title, groups, names in (
+        ("kind of edit", lambda pairs: pairs.by_kind, ()),
+        ("type of question", lambda pairs: pairs.by_question_type, ()),
+        *_CURVES,
+    ):
+        tables.append(_grouped(title, found, groups, names))
+    return tables
+
+
+def _find(runs: Sequence[RunSummary]) -> Iterator[_Found]:
+    for run in runs:
+        assert isinstance(run.summary, NiehSummary)
+        for name, task in run.summary.tasks.items():
+            if task.pairs is not None:
+                yield name_of(run), name, task.context, task.pairs
+
+
+def _cells(pairs: PairSummary) -> tuple[TableCell | str, ...]:
+    """Return the numbers of a row; the intervals of all but the first are in files alone."""
+    rates = (
+        pairs.by_fact,
+        pairs.single,
+        pairs.flipped,
+        pairs.right_when_flipped,
+        pairs.one_right,
+        pairs.one_is_commoner,
+        pairs.wrong_twin,
+    )
+    numbers = (pairs.n_pairs, pairs.n_facts, pairs.n_trajectories)
+    return (format_percent(pairs.pair_accuracy), *map(_mean_cell, rates), *map(str, numbers))
+
+
+def _mean_cell(rate: Rate | None) -> TableCell:
+    cell = format_percent(rate)
+    return TableCell(cell.numbers[""] or "-", cell.numbers)
+
+
+def _grouped(
+    title: str,
+    found: Sequence[_Found],
+    groups: Callable[[PairSummary], Mapping[str, Rate]],
+    order: Sequence[str],
+) -> Table:
+    used = {name for *_, pairs in found for name in groups(pairs)}
+    names = [name for name in order or sorted(used) if name in used]
+    rows = tuple(
+        Row((run, task, context, *(_grouped_cell(groups(pairs).get(name)) for name in names)))
+        for run, task, context, pairs in found
+    )
+    note = "In brackets: 95 % interval, clustered by trajectory; in parentheses: pairs."
+    return Table(
+        f"Twins: pairs right, % by {title} (pairs)", (*_HEADS, *map(Column, names)), rows, (note,)
+    )
+
+
+def _grouped_cell(rate: Rate | None) -> TableCell:
+    cell = format_percent(rate)
+    if rate is None:
+        return TableCell(cell, {**cell.numbers, "pairs": ""})
+    return TableCell(f"{cell} ({rate.n})", {**cell.numbers, "pairs": str(rate.n)})

@@ -1,0 +1,88 @@
+"""Questions of twins in a set: what each is paired with, and how long ago that last changed."""
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
+from infthor_eval.formats.step_log import ObjectState, iter_object_states, read_steps
+from infthor_eval.nieh.contexts.base import Sample
+from infthor_eval.nieh.records import TwinSide
+from infthor_eval.nieh.samples import TaskSamples
+
+__all__ = ["twin_side"]
+
+
+def twin_side(task_samples: TaskSamples, sample: Sample) -> TwinSide | None:
+    """Return what a sample's question is paired with; None if it is no twin.
+
+    Raises:
+        DataError: the set has no other question of the pair, or no pair of its worlds.
+    """
+    data = task_samples.data
+    question = sample.question
+    if not question.pair:
+        return None
+    pair = data.twins.get(question.traj_id)
+    if pair is None:
+        raise DataError(
+            f"{data.root}: twins.jsonl has no pair with {question.traj_id}; make the twins again"
+        )
+    positions = task_samples.context.positions(data, sample)
+    return TwinSide(
+        pair=question.pair,
+        fact=question.fact,
+        kind=pair.kind,
+        traj_id=question.traj_id,
+        answers=_other(data, question).answers,
+        n_frames=len(positions),
+        n_differing=sum(not pair.frames[position].same for position in positions),
+        n_since_change=_frames_since_change(data, question.traj_id),
+    )
+
+
+def _other(data: NiehSet, question: Question) -> Question:
+    """Return the question of the same pair in the other world."""
+    others = [it for it in _by_pair(data)[question.pair] if it.traj_id != question.traj_id]
+    if len(others) != 1:
+        raise DataError(
+            f"{data.root}: {len(others)} questions are paired with {question.id} as "
+            f"{question.pair!r:.60}, not one; make the twins again"
+        )
+    return others[0]
+
+
+@lru_cache(maxsize=8)
+def _by_pair(data: NiehSet) -> Mapping[str, Sequence[Question]]:
+    by_pair: dict[str, list[Question]] = {}
+    for question in data.questions:
+        by_pair.setdefault(question.pair, []).append(question)
+    return by_pair
+
+
+@lru_cache(maxsize=1024)
+def _frames_since_change(data: NiehSet, traj_id: str) -> int | None:
+    """Return the number of frames since the agent last changed one of the objects that differ."""
+    if not data.has_frames:
+        return None
+    pair = data.twins[traj_id]
+    ids = pair.changed
+    if traj_id == pair.traj_ids[1]:
+        ids = tuple(pair.ids.get(key, key) for key in ids)
+    steps = sorted(read_steps(data.folder(traj_id)), key=lambda step: step.img_idx)
+    before: list[tuple[object, ...]] = []
+    last = None
+    for number, states in enumerate(iter_object_states(steps)):
+        now = [_what_is_asked(states.get(key)) for key in ids]
+        if number and now != before:
+            last = number
+        before = now
+    return None if last is None else len(steps) - 1 - last
+
+
+def _what_is_asked(state: ObjectState | None) -> tuple[object, ...]:
+    """Return what questions ask of an object's state."""
+    if state is None:
+        return ()
+    return state.parents, state.held, state.exists, state.is_open, state.is_sliced
