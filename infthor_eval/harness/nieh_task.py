@@ -30,6 +30,8 @@ __all__ = [
     "doc_to_image",
     "doc_to_target",
     "doc_to_text",
+    "pair_accuracy",
+    "process_pair",
     "process_results",
 ]
 
@@ -86,6 +88,26 @@ def doc_to_target(doc: Doc) -> str:
 def process_results(doc: Doc, results: list[str]) -> dict[str, float]:
     """Return both scores of a response."""
     return scores(results[0], json.loads(doc["answers"]))
+
+
+def process_pair(doc: Doc, results: list[str]) -> dict[str, Any]:
+    """Return both scores of a response, and what `pair_accuracy` needs of one world's."""
+    by_scorer = process_results(doc, results)
+    side = doc["pair"], doc["variant"], by_scorer["strict"] >= 1
+    return {**by_scorer, "pair_accuracy": side}
+
+
+def pair_accuracy(sides: Sequence[tuple[str, str, bool]]) -> float:
+    """Return the share of pairs that are right in both worlds (aggregation of `nieh_twins`).
+
+    Questions whose twin was not asked are in no pair; without any pair it is 0.
+    """
+    pairs: dict[tuple[str, str], list[bool]] = {}
+    for pair, variant, is_right in sides:
+        if pair:
+            pairs.setdefault((pair, variant), []).append(is_right)
+    whole = [rights for rights in pairs.values() if len(rights) == 2]
+    return sum(map(all, whole)) / len(whole) if whole else 0.0
 
 
 class NiehRequests:

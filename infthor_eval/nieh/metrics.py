@@ -24,7 +24,11 @@ from infthor_eval.storage.digests import digest_of_file
 
 __all__ = ["PUBLISHED", "MetricError", "Metrics", "finite", "metrics_of", "wrap_metric_errors"]
 
-_OURS = "infthor_eval.harness.nieh_task.process_results"
+_OURS = (
+    "infthor_eval.harness.nieh_task.process_results",
+    "infthor_eval.harness.nieh_task.process_pair",
+)
+_PAIRS = "pair_accuracy"  # of two samples, so no metric of one: summaries have it wherever it is
 ProcessResults = Callable[[Doc, list[str]], Mapping[str, Any]]
 
 
@@ -100,9 +104,11 @@ def metrics_of(task: TaskFile) -> Metrics:
     """
     name = task.settings["process_results"]
     listed = task.settings.get("metric_list") or []
+    if name in _OURS:
+        listed = [it for it in listed if not isinstance(it, Mapping) or it.get("metric") != _PAIRS]
     for entry in listed:
         _check(entry, f"{task.path}: metric_list: ")
-    if name == _OURS:
+    if name in _OURS:
         return _our_metrics([entry["metric"] for entry in listed], f"{task.path}: metric_list: ")
     if not listed:
         raise DataError(

@@ -5,6 +5,7 @@ questions alone, and guesses those of a tenth of the trajectories from the other
 right is there to be exploited by any model that is tuned on such a set.
 """
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from types import MappingProxyType
@@ -58,7 +59,9 @@ def guess_by_learning(
     answers = np.array([doc_target(sample.question) for sample in samples], dtype=object)
     guesses = np.empty(len(samples), dtype=object)
     # These products are small: on a busy machine many threads take ten times as long as one.
-    with threadpool_limits(limits=1):
+    with threadpool_limits(limits=1), warnings.catch_warnings():
+        # As if they were numbers to be fitted: small sets have many answers for their size.
+        warnings.filterwarnings("ignore", "The number of unique classes")
         for known, unknown in GroupKFold(min(_FOLDS, n_groups)).split(features, answers, groups):
             if len(set(answers[known])) == 1:
                 guesses[unknown] = answers[known][0]
