@@ -69,6 +69,7 @@ class TwinSide(msgspec.Struct, frozen=True, kw_only=True):
         answers: gold answers in the other world.
         n_frames: number of shown frames.
         n_differing: number of these that differ between the worlds.
+        n_after_clues: number of shown frames after the last clue.
         n_since_change: number of frames of the trajectory since the changed objects were last
             changed by the agent; None if it left them as they were at the start.
     """
@@ -80,6 +81,7 @@ class TwinSide(msgspec.Struct, frozen=True, kw_only=True):
     answers: Annotated[tuple[str | int | float, ...], Meta(min_length=1)]
     n_frames: Count
     n_differing: Count
+    n_after_clues: Count
     n_since_change: Count | None
 
 

@@ -30,6 +30,7 @@ def twin_side(task_samples: TaskSamples, sample: Sample) -> TwinSide | None:
             f"{data.root}: twins.jsonl has no pair with {question.traj_id}; make the twins again"
         )
     positions = task_samples.context.positions(data, sample)
+    clues = data.clue_positions(question) if data.has_frames else question.clues
     return TwinSide(
         pair=question.pair,
         fact=question.fact,
@@ -38,6 +39,7 @@ def twin_side(task_samples: TaskSamples, sample: Sample) -> TwinSide | None:
         answers=_other(data, question).answers,
         n_frames=len(positions),
         n_differing=sum(not pair.frames[position].same for position in positions),
+        n_after_clues=sum(position > max(clues) for position in positions),
         n_since_change=_frames_since_change(data, question.traj_id),
     )
 

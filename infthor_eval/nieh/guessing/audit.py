@@ -87,6 +87,22 @@ class Group:
         """Return the mean score of each guesser."""
         return _means([audited.scores for audited in self.questions])
 
+    def pair_means(self) -> tuple[float, ...]:
+        """Return the share of pairs of twins that each guesser has right in both worlds.
+
+        It is empty if no question of the group is paired with another of it.
+        """
+        pairs: dict[str, list[tuple[float, ...]]] = {}
+        for audited in self.questions:
+            if audited.question.pair:
+                pairs.setdefault(audited.question.pair, []).append(audited.scores)
+        rows = []
+        for scores in pairs.values():
+            if len(scores) == 2:
+                both = zip(*scores, strict=True)
+                rows.append(tuple(float(min(sides) >= 1) for sides in both))
+        return _means(rows)
+
     def best(self) -> tuple[str, float]:
         """Return the name of the best guesser, the simplest of equals, and its score."""
         means = self.means()

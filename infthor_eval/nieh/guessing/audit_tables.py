@@ -22,20 +22,22 @@ _HEADS = {
 
 
 def guessers_table(audited: Audit) -> Table:
-    """Return what each guesser gets on each file."""
-    files = audited.groups("file")
-    rows = []
-    for number, name in enumerate(audited.guessers):
-        means = [f"{100 * group.means()[number]:.2f}" for group in files]
-        rows.append(Row((name, *means)))
-    columns = (Column("guesser", False), *(Column(group.name) for group in files))
+    """Return what each guesser gets on each file, and of its pairs of twins if it has any."""
+    means: dict[str, tuple[float, ...]] = {}
+    for group in audited.groups("file"):
+        means[group.name] = group.means()
+        if of_pairs := group.pair_means():
+            means[f"{group.name}, pairs"] = of_pairs
+    rows = tuple(
+        Row((name, *(f"{100 * column[number]:.2f}" for column in means.values())))
+        for number, name in enumerate(audited.guessers)
+    )
     note = (
         "Each question is guessed from questions on other trajectories in its file; nobody sees a "
         "frame."
     )
-    return Table(
-        "What can be guessed, % by guesser and file (strict scorer)", columns, tuple(rows), (note,)
-    )
+    title = "What can be guessed, % by guesser and file (strict scorer)"
+    return Table(title, (Column("guesser", False), *map(Column, means)), rows, (note,))
 
 
 def audit_tables(audited: Audit) -> list[Table]:

@@ -13,7 +13,7 @@ from statistics import fmean
 
 import msgspec
 
-from infthor_eval.distances import DISTANCES, distance_class
+from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
 from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.records import NiehAnswer, TwinSide
 from infthor_eval.nieh.scoring import plain_form, score
@@ -60,6 +60,8 @@ class PairSummary(msgspec.Struct, frozen=True):
         by_kind: accuracy by kind of edit.
         by_question_type: accuracy by type of question.
         by_distance: accuracy by frames between the last clue and the end of the trajectory.
+        by_tokens: accuracy by thousand tokens of the frames shown after the last clue, where the
+            model counts tokens.
         by_shown: accuracy by the number of frames shown.
         by_difference: accuracy by whether a frame that differs was shown in both worlds.
         by_age: accuracy by frames since the agent last changed what is asked about; "never" where
@@ -81,6 +83,7 @@ class PairSummary(msgspec.Struct, frozen=True):
     by_kind: dict[str, Rate]
     by_question_type: dict[str, Rate]
     by_distance: dict[str, Rate]
+    by_tokens: dict[str, Rate]
     by_shown: dict[str, Rate]
     by_difference: dict[str, Rate]
     by_age: dict[str, Rate]
@@ -185,6 +188,7 @@ class _Pairs:
             by_kind=self._by(lambda pair: pair.sides[0].twin.kind),
             by_question_type=self._by(lambda pair: pair.sides[0].record.payload.question_type),
             by_distance=self._by(_distance, DISTANCES),
+            by_tokens=self._by(_tokens, LENGTHS),
             by_shown=self._by(_shown, N_SHOWN),
             by_difference=self._by(_difference, SHOWN_DIFFERENCE),
             by_age=self._by(_age, (*DISTANCES, NEVER_CHANGED)),
@@ -287,6 +291,16 @@ def _distance(pair: TwinRecords) -> str | None:
     clues = [side.record.payload.shown_clues for side in pair.sides]
     after = [it.n_after for it in clues if it is not None and it.n_after is not None]
     return distance_class(min(after)) if after else None
+
+
+def _tokens(pair: TwinRecords) -> str | None:
+    """Return the class of the tokens of frames after the last clue; each frame has as many."""
+    tokens = [
+        side.record.tokens.context * side.twin.n_after_clues / max(1, side.twin.n_frames)
+        for side in pair.sides
+        if side.record.tokens.context is not None
+    ]
+    return length_class(min(tokens)) if tokens else None
 
 
 def _shown(pair: TwinRecords) -> str:

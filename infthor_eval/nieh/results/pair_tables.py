@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from infthor_eval.distances import DISTANCES
+from infthor_eval.distances import DISTANCES, LENGTHS
 from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.pair_summary import (
     N_SHOWN,
@@ -27,14 +27,20 @@ _NOTES = (
     "is the commoner answer of its form (prior knowledge). wrong twin: single replies that are "
     "right in the other world. bases: trajectories that the worlds were made of.",
 )
-_CURVES: tuple[
-    tuple[str, Callable[[PairSummary], Mapping[str, Rate]], tuple[str, ...]],
-    ...,
-] = (
+_Groups = Callable[[PairSummary], Mapping[str, Rate]]
+# By title of the table: its groups, and their order; by name if there is none.
+_GROUPED: Sequence[tuple[str, _Groups, Sequence[str]]] = (
+    ("kind of edit", lambda pairs: pairs.by_kind, ()),
+    ("type of question", lambda pairs: pairs.by_question_type, ()),
     (
         "frames between the last clue and the end of the trajectory",
         lambda pairs: pairs.by_distance,
         DISTANCES,
+    ),
+    (
+        "thousand tokens of frames shown after the last clue",
+        lambda pairs: pairs.by_tokens,
+        LENGTHS,
     ),
     ("number of frames shown", lambda pairs: pairs.by_shown, N_SHOWN),
     (
@@ -70,14 +76,10 @@ def pair_tables(runs: Sequence[RunSummary]) -> list[Table]:
     found = list(_find(runs))
     if not found:
         return []
-    tables = pair_overview(runs)
-    for title, groups, names in (
-        ("kind of edit", lambda pairs: pairs.by_kind, ()),
-        ("type of question", lambda pairs: pairs.by_question_type, ()),
-        *_CURVES,
-    ):
-        tables.append(_grouped(title, found, groups, names))
-    return tables
+    return [
+        *pair_overview(runs),
+        *(_grouped(title, found, groups, order) for title, groups, order in _GROUPED),
+    ]
 
 
 def _find(runs: Sequence[RunSummary]) -> Iterator[_Found]:
@@ -111,7 +113,7 @@ def _mean_cell(rate: Rate | None) -> TableCell:
 def _grouped(
     title: str,
     found: Sequence[_Found],
-    groups: Callable[[PairSummary], Mapping[str, Rate]],
+    groups: _Groups,
     order: Sequence[str],
 ) -> Table:
     used = {name for *_, pairs in found for name in groups(pairs)}

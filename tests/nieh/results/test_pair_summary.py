@@ -36,6 +36,7 @@ def side(
         answers=(other,),
         n_frames=n_frames,
         n_differing=n_differing,
+        n_after_clues=n_frames - 1,
         n_since_change=age,
     )
     shown = None if n_after is None else ShownClues(n_shown=1, n_clues=1, n_after=n_after)
