@@ -300,7 +300,7 @@ def _tokens(pair: TwinRecords) -> str | None:
         for side in pair.sides
         if side.record.tokens.context is not None
     ]
-    return length_class(min(tokens)) if tokens else None
+    return length_class(round(min(tokens))) if tokens else None
 
 
 def _shown(pair: TwinRecords) -> str:
