@@ -114,9 +114,7 @@ class Rooms:
     def log_counts(counts: Mapping[str, Counter[Any]], room: str, things: Iterable[Any]) -> float:
         """Return the sum of the logarithms of how often things are in other rooms."""
         others = [counter for name, counter in counts.items() if name != room]
-        return sum(
-            math.log(sum(counter[thing] for counter in others) + 0.5) for thing in things
-        )
+        return sum(math.log(sum(counter[thing] for counter in others) + 0.5) for thing in things)
 
 
 def features(world: World, rooms: Rooms) -> Iterator[tuple[str, float]]:
@@ -134,9 +132,7 @@ def _of_places(world: World, rooms: Rooms) -> Iterator[tuple[str, float]]:
     yield "places: common", rooms.log_counts(rooms.places, room, changed)
     least = [rooms.log_counts(rooms.places, room, [place]) for place in changed]
     yield "places: least common", min(least, default=0.0)
-    by_type = {
-        name: Counter(_by_first(counter)) for name, counter in rooms.places.items()
-    }
+    by_type = {name: Counter(_by_first(counter)) for name, counter in rooms.places.items()}
     yield "places: types", rooms.log_counts(by_type, room, [name for name, _ in changed])
     yield "places: puts", rooms.log_counts(rooms.puts, room, world.puts())
 
@@ -156,9 +152,11 @@ def _of_poses(world: World) -> Iterator[tuple[str, float]]:
     }
     for key, state in world.changed.items():
         digits = [float(number) for number in key.split("|")[1:4]]
-        yield "poses: id is not the place", max(
-            abs(one - other) for one, other in zip(digits, state.position, strict=True)
-        ) > 0.006
+        yield (
+            "poses: id is not the place",
+            max(abs(one - other) for one, other in zip(digits, state.position, strict=True))
+            > 0.006,
+        )
         yield "poses: digits", sum(round(abs(number) * 100) % 5 == 0 for number in digits)
         yield "poses: height", state.position[1]
         yield from _of_neighbours(world, key, state, by_place)
@@ -182,9 +180,14 @@ def _of_neighbours(
         yield "poses: from the middle", math.dist(state.position, holder.position)
     if pose is not None:
         yield "poses: decimals", sum(len(str(pose["position"][axis])) for axis in "xyz")
-        yaws = [poses[other.position]["rotation"]["y"] for other in beside if other.position in poses]
+        yaws = [
+            poses[other.position]["rotation"]["y"] for other in beside if other.position in poses
+        ]
         turns = [round(abs(yaw - pose["rotation"]["y"]) % 360) for yaw in yaws]
-        yield "poses: turned unlike those beside", sum(turn != 0 for turn in turns) / max(1, len(turns))
+        yield (
+            "poses: turned unlike those beside",
+            sum(turn != 0 for turn in turns) / max(1, len(turns)),
+        )
         yield "poses: turned by 90 degrees", sum(turn % 180 == 90 for turn in turns)
         yield f"poses: yaw {round(pose['rotation']['y'])}", 1.0
     yield f"poses: {key.partition('|')[0]} at {world.parent(state)}", 1.0
@@ -194,7 +197,12 @@ def _of_pictures(world: World) -> Iterator[tuple[str, float]]:
     names = (world.folder / "frames.txt").read_text().splitlines()
     differing = [number for number, frame in enumerate(world.pair.frames) if not frame.same]
     pixels = [
-        (shown.pixels, math.dist(((shown.box[0] + shown.box[2]) / 2, (shown.box[1] + shown.box[3]) / 2), (150, 150)))
+        (
+            shown.pixels,
+            math.dist(
+                ((shown.box[0] + shown.box[2]) / 2, (shown.box[1] + shown.box[3]) / 2), (150, 150)
+            ),
+        )
         for number in differing
         for key, shown in (world.steps[number].seen or {}).items()
         if key in world.changed
@@ -249,7 +257,9 @@ def read_examples(sets: Sequence[Path]) -> list[Example]:
     for out in sets:
         for file in sorted(out.glob("drafts/*.draft")):
             pairs = msgspec.json.decode(file.read_bytes(), type=TwinDraft).pairs
-            worlds += [(World(out, pair, 0), World(out, pair, 1)) for pair in pairs if pair.kind in KINDS]
+            worlds += [
+                (World(out, pair, 0), World(out, pair, 1)) for pair in pairs if pair.kind in KINDS
+            ]
     rooms = Rooms()
     for both in worlds:
         for world in both:
@@ -304,7 +314,10 @@ def fit(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 def print_guesses(examples: Sequence[Example]) -> None:
     """Print the share of originals that are guessed, with standard errors, by kind and features."""
-    groups = ["", *sorted({f"{name.partition(':')[0]}:" for one in examples for name in one.differences})]
+    groups = [
+        "",
+        *sorted({f"{name.partition(':')[0]}:" for one in examples for name in one.differences}),
+    ]
     kinds = [kind for kind in KINDS if any(one.kind == kind for one in examples)]
     print("| features | all | " + " | ".join(f"`{kind}`" for kind in kinds) + " |")
     print("|---" * (len(kinds) + 2) + "|")
@@ -312,7 +325,9 @@ def print_guesses(examples: Sequence[Example]) -> None:
         right = guesses(examples, group)
         cells = [_share(right)]
         for kind in kinds:
-            cells.append(_share([r for r, one in zip(right, examples, strict=True) if one.kind == kind]))
+            cells.append(
+                _share([r for r, one in zip(right, examples, strict=True) if one.kind == kind])
+            )
         print(f"| {group.rstrip(':') or 'all'} | " + " | ".join(cells) + " |")
 
 
