@@ -193,24 +193,26 @@ def _of_neighbours(
     yield f"poses: {key.partition('|')[0]} at {world.parent(state)}", 1.0
 
 
+def _turn(one: dict[str, Any], other: dict[str, Any]) -> int:
+    """Return by how many degrees one pose is turned from another."""
+    return round(abs(one["rotation"]["y"] - other["rotation"]["y"]) % 360)
+
+
 def _of_pictures(world: World) -> Iterator[tuple[str, float]]:
     names = (world.folder / "frames.txt").read_text().splitlines()
     differing = [number for number, frame in enumerate(world.pair.frames) if not frame.same]
-    pixels = [
-        (
-            shown.pixels,
-            math.dist(
-                ((shown.box[0] + shown.box[2]) / 2, (shown.box[1] + shown.box[3]) / 2), (150, 150)
-            ),
-        )
+    shown = [
+        one
         for number in differing
-        for key, shown in (world.steps[number].seen or {}).items()
+        for key, one in (world.steps[number].seen or {}).items()
         if key in world.changed
     ]
-    yield "pictures: frames that show it", len(pixels)
-    yield "pictures: its pixels", float(np.mean([size for size, _ in pixels] or [0]))
-    yield "pictures: largest", max((size for size, _ in pixels), default=0)
-    yield "pictures: from the middle", float(np.mean([away for _, away in pixels] or [0]))
+    sizes = [one.pixels for one in shown]
+    away = [math.dist(np.add(one.box[:2], one.box[2:]) / 2, (150, 150)) for one in shown]
+    yield "pictures: frames that show it", len(shown)
+    yield "pictures: its pixels", float(np.mean(sizes or [0]))
+    yield "pictures: largest", max(sizes, default=0)
+    yield "pictures: from the middle", float(np.mean(away or [0]))
     values = []
     for number in differing:
         path = world.out / "frames" / f"{names[number]}.png"

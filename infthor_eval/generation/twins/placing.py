@@ -9,6 +9,7 @@ from msgspec.structs import asdict
 
 from infthor_eval.formats.trajectory import ObjectPose, Scene
 from infthor_eval.generation.twins.kinds import EditRefused
+from infthor_eval.generation.twins.tolerance import tolerance_of
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import Box, SimulatorView, ThorObject, Vector
@@ -52,10 +53,11 @@ def moved_scene(
         _place(simulator, waiting[item.object_id], where, before)
     after = simulator.view.objects
     moved = {item.object_id for item in lifted}
+    tolerance = tolerance_of(simulator)
     for key, obj in before.items():
         if key not in moved and obj.parent_receptacles != after[key].parent_receptacles:
             raise EditRefused("the move changed what a third object is in or on")
-        if key not in moved and obj.position != after[key].position:
+        if key not in moved and not tolerance.is_same_place(obj.position, after[key].position):
             raise EditRefused("the move moved a third object")
     if not all(_has_place(simulator.view, item, where) for item, where in moves):
         raise EditRefused("an object is not where the other was")
