@@ -15,7 +15,6 @@ from pathlib import Path
 from statistics import mean, median
 
 import msgspec
-
 from twins_original import print_guesses, read_examples
 
 from infthor_eval.formats.twins import read_pairs
