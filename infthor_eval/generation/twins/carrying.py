@@ -73,8 +73,8 @@ def _clearest(
         found.setdefault((*one.keys, *other.keys), (one, other, []))[2].append(index)
     best = []
     for keys, (one, other, indices) in sorted(found.items()):
-        index = episode.history.clearest(sorted(indices), *keys)
-        best += [] if index is None else [(index, one, other)]
+        clearest = episode.history.clearest(sorted(indices), *keys)
+        best += [] if clearest is None else [(clearest, one, other)]
     return best
 
 
