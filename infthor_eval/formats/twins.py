@@ -80,7 +80,7 @@ class TwinPair(msgspec.Struct, frozen=True):
         changed: ids in the first world of what may differ.
         displaced: ids in the first world of third objects that lie a little beside, on the same
             receptacle, as what was changed was in the way.
-        types: object types that the changed fact is about.
+        types: object types that the changed fact is about; # stands for a count of all objects.
         frames: how each frame compares.
         questions: the paired questions.
     """

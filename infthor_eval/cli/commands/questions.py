@@ -131,6 +131,9 @@ def questions(
     "--seed", type=WholeNumber(0), default=0, show_default=True, help="Seed of every choice."
 )
 @click.option("--limit", type=click.IntRange(1), help="Trajectories, at most.")
+@click.option(
+    "--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator."
+)
 @worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
 @click.pass_context
@@ -143,6 +146,7 @@ def twins(
     per_kind: int,
     seed: int,
     limit: int | None,
+    unity: bool,
     as_json: bool,
     **workers: Any,
 ) -> None:
@@ -161,7 +165,7 @@ def twins(
     from infthor_eval.nieh.scoring import score
     from infthor_eval.storage.files import prepare_folder
     from infthor_eval.terminal import console, error_console, progress_bar
-    from infthor_eval.thor.launch import embedded_launch
+    from infthor_eval.thor import launch
     from infthor_eval.thor.supplement import supplement_file
 
     worker_settings = parse_worker_settings(**workers)
@@ -175,7 +179,7 @@ def twins(
     ):
         summary = make_twins(
             selection,
-            embedded_launch(None, supplement),
+            launch.unity_launch() if unity else launch.embedded_launch(None, supplement),
             out,
             settings,
             partial(score, scorer="strict"),

@@ -15,10 +15,11 @@ from infthor_eval.generation.questions.candidates import Candidate, further_type
 from infthor_eval.generation.questions.history import Event, ObjectMove, TrajectoryHistory
 from infthor_eval.household.wording import noun, with_article
 
-__all__ = ["FURTHER", "QUESTION_TYPE", "counts", "further_counts"]
+__all__ = ["ALL", "FURTHER", "QUESTION_TYPE", "counts", "further_counts"]
 
 QUESTION_TYPE = "movement_counting"
 FURTHER = further_type(QUESTION_TYPE)
+ALL = "#"  # the subject of a count of all objects, which is about no type
 _CLUES = 8  # of a further question whose answer is smaller
 
 
@@ -106,7 +107,7 @@ def _items(history: TrajectoryHistory) -> Iterator[Candidate]:
     is_shown = all(history.shows(frame, item) for item, frame in first.items())
     if first and is_shown and not are_alike:
         yield _count(
-            FURTHER, "How many different objects did you pick up?", (), sorted(first.values()), "#"
+            FURTHER, "How many different objects did you pick up?", (), sorted(first.values()), ALL
         )
 
 

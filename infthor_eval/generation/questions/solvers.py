@@ -275,8 +275,8 @@ def _moves(facts: Sequence[FrameFacts], words: str) -> list[str]:
     if facts[0].everything:
         count = len(events_of(facts, "PutObject", words))
         paired = count == len(events_of(facts, "PickupObject", words)) > 1
-    else:  # by Table 3's rule each clue shows it put down once
-        count = len(_track(facts, words))
+    else:  # the hand tells, or by Table 3's rule each clue shows it put down once
+        count = len(events_of(facts, "PutObject", words)) or len(_track(facts, words))
         paired = True
     return [str(count)] if count and paired else []
 

@@ -1,14 +1,15 @@
 """Whether two replays differ in nothing but what was declared.
 
-Poses of the agent must be equal in every frame, and pictures wherever nothing that differs is in
-view. What differs is found by comparing logged states, not taken from the edit, so that a side
-effect shows.
+Poses of the agent must be equal in every frame, and pictures, within a tolerance, wherever nothing
+that differs is in view. What differs is found by comparing logged states, not taken from the edit,
+so that a side effect shows.
 """
 
 import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from msgspec.structs import replace
 
@@ -16,6 +17,7 @@ from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
 from infthor_eval.formats.twins import ComparedFrame
 from infthor_eval.generation.twins.kinds import Worlds
 from infthor_eval.generation.twins.rewriting import exchange_ids, whole_of
+from infthor_eval.generation.twins.tolerance import EXACT, Tolerance
 
 __all__ = ["Difference", "World", "compare"]
 
@@ -34,16 +36,24 @@ class World:
     Attributes:
         steps: its log.
         pictures: digest of each frame's picture.
+        files: file of each frame's picture, which a tolerance needs.
     """
 
     steps: Sequence[Step]
     pictures: Sequence[str]
+    files: Sequence[Path] = ()
 
 
 def compare(
-    worlds: Worlds, first: World, second: World
+    worlds: Worlds, first: World, second: World, tolerance: Tolerance = EXACT
 ) -> tuple[tuple[ComparedFrame, ...], frozenset[str]]:
     """Return how each frame compares, and the ids of the third objects that are displaced.
+
+    Args:
+        worlds: what was declared.
+        first: replay of the first world.
+        second: replay of the second world.
+        tolerance: what counts as equal.
 
     Raises:
         Difference: the agent is not in the same place throughout, an object differs that was not to
@@ -51,7 +61,7 @@ def compare(
     """
     if len(first.steps) != len(second.steps):
         raise Difference("another number of frames")
-    comparison = _Comparison(worlds)
+    comparison = _Comparison(worlds, tolerance)
     states = zip(iter_object_states(first.steps), iter_object_states(second.steps), strict=True)
     compared = []
     for number, (of_first, of_second) in enumerate(states):
@@ -62,11 +72,19 @@ def compare(
         in_view = comparison.changed_in_view(
             (one, _existing(of_first)), (other, _existing(of_second))
         )
-        same = first.pictures[number] == second.pictures[number]
+        same = _is_same_picture(first, second, number, tolerance)
         if not same and not in_view:
             raise Difference("a picture differs though nothing that differs is in view")
         compared.append(ComparedFrame(same, tuple(sorted(in_view))))
     return tuple(compared), frozenset(comparison.displaced)
+
+
+def _is_same_picture(first: World, second: World, number: int, tolerance: Tolerance) -> bool:
+    if first.pictures[number] == second.pictures[number]:
+        return True
+    if tolerance == EXACT:
+        return False
+    return tolerance.is_same_picture(first.files[number], second.files[number])
 
 
 def _existing(states: dict[str, ObjectState]) -> dict[str, ObjectState]:
@@ -81,8 +99,9 @@ class _Comparison:
             changed one was in the way.
     """
 
-    def __init__(self, worlds: Worlds) -> None:
+    def __init__(self, worlds: Worlds, tolerance: Tolerance) -> None:
         self.displaced: set[str] = set()
+        self._tolerance = tolerance
         self._changed = worlds.changed
         self._new_id = exchange_ids(worlds.ids)
         self._old_id = exchange_ids({new: old for old, new in worlds.ids.items()})
@@ -126,7 +145,8 @@ class _Comparison:
         """Return True if states are equal, whatever the order of the parents."""
         if state is None or other is None:
             return False
+        if not self._tolerance.is_same_place(state.position, other.position):
+            return False
         parents = Counter(map(self._new_id, state.parents))
-        return parents == Counter(other.parents) and replace(state, parents=()) == replace(
-            other, parents=()
-        )
+        there = replace(other, parents=(), position=state.position)
+        return parents == Counter(other.parents) and replace(state, parents=()) == there

@@ -22,6 +22,7 @@ from infthor_eval.generation.twins.episode import Episode, read_episode
 from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Proposal, Worlds
 from infthor_eval.generation.twins.pairing import AskedWorld, ScoreReply, pair_questions
 from infthor_eval.generation.twins.rewriting import without_traces
+from infthor_eval.generation.twins.tolerance import tolerance_of
 from infthor_eval.storage.digests import digest, digest_of_file
 from infthor_eval.storage.files import write_atomically
 from infthor_eval.storage.scratch import ScratchFolder
@@ -138,8 +139,8 @@ class _Replays:
         if report.refusals:
             return f"{report.refusals[0].action.partition(' ')[0]} is refused"
         steps = read_steps(folder)
-        pictures = [digest_of_file(folder / "img" / step.img_filename) for step in steps]
-        return _Replayed(World(steps, pictures), folder)
+        files = [folder / "img" / step.img_filename for step in steps]
+        return _Replayed(World(steps, [digest_of_file(file) for file in files], files), folder)
 
 
 class _Maker:
@@ -191,7 +192,8 @@ class _Maker:
         if is_flipped(pair_id):
             worlds = worlds.flipped()
         replays = [self._replays.replayed(without_traces(one, _WORLD)) for one in worlds.pair]
-        frames, displaced = compare(worlds, replays[0].world, replays[1].world)
+        tolerance = tolerance_of(self._replays.simulator)
+        frames, displaced = compare(worlds, replays[0].world, replays[1].world, tolerance)
         seed = self._draft.settings.seed
         asked = (
             AskedWorld(replays[0].world.steps, worlds.changed, seed),
@@ -213,11 +215,19 @@ class _Maker:
             questions=tuple(pair_questions(asked, worlds.types, self._score)),
         )
         if pair.questions:
-            self._write(worlds, names, replays)
+            self._write(worlds, pair, replays)
         return pair
 
-    def _write(self, worlds: Worlds, names: Sequence[str], replays: Sequence[_Replayed]) -> None:
-        for name, trajectory, replayed in zip(names, worlds.pair, replays, strict=True):
+    def _write(self, worlds: Worlds, pair: TwinPair, replays: Sequence[_Replayed]) -> None:
+        first, second = (replayed.world.files for replayed in replays)
+        # What counts as equal is one picture, so that no noise tells the worlds apart.
+        shared = [
+            one if frame.same else other
+            for frame, one, other in zip(pair.frames, first, second, strict=True)
+        ]
+        pictures = (first, shared)
+        for side, replayed in enumerate(replays):
+            name = pair.traj_ids[side]
             final = self._out / "metadata" / name
             if final.exists():
                 shutil.rmtree(final)  # of a run that was interrupted before this draft was whole
@@ -225,13 +235,10 @@ class _Maker:
                 folder.mkdir()
                 for file in _COPIED:
                     shutil.copyfile(replayed.folder / file, folder / file)
-                document = encode_trajectory(without_traces(trajectory, name))
+                document = encode_trajectory(without_traces(worlds.pair[side], name))
                 (folder / "traj_data.json").write_bytes(document)
-                images = (
-                    replayed.folder / "img" / step.img_filename for step in replayed.world.steps
-                )
                 write_frame_names(
-                    folder, [store_picture(self._out, image, name) for image in images]
+                    folder, [store_picture(self._out, image, name) for image in pictures[side]]
                 )
 
 

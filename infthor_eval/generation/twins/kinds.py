@@ -28,7 +28,9 @@ KINDS = PluginTable(
         "replace": f"{_HERE}.start_states:Replace",
         "state": f"{_HERE}.start_states:Opened",
         "count-open": f"{_HERE}.openings:CountOpen",
-        "put-target": f"{_HERE}.targets:PutTarget",
+        "count-move": f"{_HERE}.carrying:CountMove",
+        "count-put": f"{_HERE}.carrying:CountPut",
+        "put-target": f"{_HERE}.carrying:PutTarget",
     },
     "docs/twins.md",
 )

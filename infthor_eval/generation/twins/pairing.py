@@ -13,7 +13,7 @@ from functools import cached_property
 from infthor_eval.formats.question import Answer
 from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.twins import PairedQuestion
-from infthor_eval.generation.questions import order, presence
+from infthor_eval.generation.questions import counting, order, presence
 from infthor_eval.generation.questions.candidates import (
     MANY,
     Candidate,
@@ -167,7 +167,7 @@ def _shared_clues(
     No frame is evidence for an absence. For a derived question a sighting of a changed object is
     added.
     """
-    own = {clue for side in sides if not side.absence for clue in side.clues}
+    own = {clue for side in sides if not side.absence for clue in _clues_to_share(side)}
     is_derived = any(not side.clues for side in sides)
     further = {frame for world in worlds for frame in world.sightings()} if is_derived else set()
     for added in (set(), *({frame} for frame in sorted(further))):
@@ -175,6 +175,15 @@ def _shared_clues(
         if all(world.gives(side, clues) for world, side in zip(worlds, sides, strict=True)):
             return clues
     return None
+
+
+def _clues_to_share(side: Candidate) -> set[int]:
+    """Return a question's clues; how often a thing was moved needs the frames before, too.
+
+    In the other world it may lie there without having been moved: only the hand tells.
+    """
+    before = {clue - 1 for clue in side.clues if side.question_type == counting.QUESTION_TYPE}
+    return {*side.clues, *before}
 
 
 def _paired(

@@ -9,6 +9,7 @@ from msgspec.structs import asdict
 
 from infthor_eval.formats.trajectory import ObjectPose, Scene
 from infthor_eval.generation.twins.kinds import EditRefused
+from infthor_eval.generation.twins.tolerance import tolerance_of
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import Box, SimulatorView, ThorObject, Vector
@@ -43,17 +44,20 @@ def moved_scene(
     """
     restore(simulator, scene)
     before = simulator.view.objects
-    lifted = [*(item for item, _ in moves), *aside]
+    # What goes aside first, so that it is at the same place whatever is moved.
+    lifted = [*aside, *(_turned(item, where) for item, where in moves)]
     for number, item in enumerate(lifted):
         _lift(simulator, item, {"x": 0.0, "y": _FAR + number, "z": 0.0})
+    waiting = simulator.view.objects
     for item, where in moves:
-        _place(simulator, item, where, before)
+        _place(simulator, waiting[item.object_id], where, before)
     after = simulator.view.objects
     moved = {item.object_id for item in lifted}
+    tolerance = tolerance_of(simulator)
     for key, obj in before.items():
         if key not in moved and obj.parent_receptacles != after[key].parent_receptacles:
             raise EditRefused("the move changed what a third object is in or on")
-        if key not in moved and obj.position != after[key].position:
+        if key not in moved and not tolerance.is_same_place(obj.position, after[key].position):
             raise EditRefused("the move moved a third object")
     if not all(_has_place(simulator.view, item, where) for item, where in moves):
         raise EditRefused("an object is not where the other was")
@@ -72,7 +76,7 @@ def scene_of(scene: Scene, view: SimulatorView) -> Scene:
 
 def may_fit(item: ThorObject, where: ThorObject, objects: Mapping[str, ThorObject]) -> bool:
     """Return True if an object is not too large for the place of another one."""
-    own = item.axis_aligned_bounding_box
+    own = _turned(item, where).axis_aligned_bounding_box
     other = where.axis_aligned_bounding_box
     if own is None or other is None:
         return False
@@ -80,6 +84,20 @@ def may_fit(item: ThorObject, where: ThorObject, objects: Mapping[str, ThorObjec
     if container is None:
         return max(own.size.x - other.size.x, own.size.z - other.size.z) <= _WIDER
     return any(_is_within(box, container) for box in _boxes_beside(own, other))
+
+
+def _turned(item: ThorObject, where: ThorObject) -> ThorObject:
+    """Return an object as it stands at another one's place: in line with what it stands on.
+
+    Rooms are generated and recorded so; an object in its old rotation would tell the moved one.
+    """
+    rotation = msgspec.structs.replace(item.rotation, y=where.rotation.y)
+    box = item.axis_aligned_bounding_box
+    turn = abs(where.rotation.y - item.rotation.y) % 180
+    if box is not None and abs(turn - 90) < 45:
+        size = msgspec.structs.replace(box.size, x=box.size.z, z=box.size.x)
+        box = msgspec.structs.replace(box, size=size)
+    return msgspec.structs.replace(item, rotation=rotation, axis_aligned_bounding_box=box)
 
 
 def _container(where: ThorObject, objects: Mapping[str, ThorObject]) -> Box | None:
@@ -133,7 +151,7 @@ def _place(
 
     Args:
         simulator: simulator with the restored scene.
-        item: the object.
+        item: the object, in the rotation that it is to have.
         where: the other one, before it was moved.
         before: the objects before any was moved.
     """

@@ -16,12 +16,10 @@ from infthor_eval.formats.trajectory import (
     Trajectory,
 )
 from infthor_eval.household.tasks import sub_task, task_of
-from infthor_eval.thor.view import ThorObject
 
 __all__ = [
     "exchange_ids",
     "in_world",
-    "put_elsewhere",
     "whole_of",
     "with_inserted",
     "without_traces",
@@ -96,35 +94,6 @@ def with_inserted(trajectory: Trajectory, index: int, actions: Sequence[ApiActio
     return msgspec.structs.replace(
         trajectory,
         plan=msgspec.structs.replace(plan, low_actions=numbered),
-        sub_trajs=parts,
-    )
-
-
-def put_elsewhere(trajectory: Trajectory, index: int, receptacle: ThorObject) -> Trajectory:
-    """Return a copy in which the put of an index, and its task, have another receptacle."""
-    plan = trajectory.plan
-    low_actions = list(plan.low_actions)
-    low = low_actions[index]
-    old = object_type_of(low.api_action.receptacle_id or "")
-    api = msgspec.structs.replace(low.api_action, receptacle_id=receptacle.object_id)
-    low_actions[index] = msgspec.structs.replace(low, api_action=api)
-    types = {old: receptacle.object_type}
-    high_pddl = list(plan.high_pddl)
-    if low.high_idx < len(high_pddl):
-        high = high_pddl[low.high_idx]
-        new_id = exchange_ids({high.planner_action.receptacle_id or "": receptacle.object_id})
-        high_pddl[low.high_idx] = _high_action(high, new_id, types)
-    sub_tasks = list(trajectory.sub_tasks)
-    parts = list(trajectory.sub_trajs)
-    for number, part in enumerate(parts[: len(sub_tasks)]):
-        if part.low_pddl_idx[0] <= index < part.low_pddl_idx[1]:
-            sub_tasks[number] = _task(sub_tasks[number], types)
-            subgoal = sub_tasks[number].task_desc
-            parts[number] = msgspec.structs.replace(part, subgoal=subgoal)
-    return msgspec.structs.replace(
-        trajectory,
-        plan=msgspec.structs.replace(plan, low_actions=low_actions, high_pddl=high_pddl),
-        sub_tasks=sub_tasks,
         sub_trajs=parts,
     )
 

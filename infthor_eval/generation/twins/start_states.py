@@ -14,7 +14,7 @@ from infthor_eval.generation.questions import presence
 from infthor_eval.generation.twins.episode import ASKED_OPEN, Episode
 from infthor_eval.generation.twins.exchanges import Untouched
 from infthor_eval.generation.twins.kinds import EditRefused, Worlds
-from infthor_eval.generation.twins.placing import moved_scene, scene_of
+from infthor_eval.generation.twins.placing import moved_scene
 from infthor_eval.generation.twins.rewriting import in_world
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.thor.restore import restore
@@ -119,20 +119,24 @@ class _Replacement:
     other: ThorObject
 
     def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
-        """See `Proposal`: the place where the second object was is empty in both worlds."""
-        trajectory = episode.trajectory
-        moved = moved_scene(trajectory.scene, simulator, [(self.other, self.one)], aside=[self.one])
-        first = in_world(trajectory, scene_of(trajectory.scene, episode.start))
-        second = in_world(trajectory, moved)
-        if restore(simulator, moved).lines():
-            raise EditRefused("the exchanged start cannot be restored")
-        after = {obj.name: obj.object_id for obj in simulator.view.objects.values()}
-        keys = {obj.object_id: after[obj.name] for obj in (self.one, self.other)}
+        """See `Proposal`: the place where the second object was is empty in both worlds.
+
+        What is not there is put aside in both, as its pose is written, too.
+        """
+        scene = episode.trajectory.scene
+        worlds = []
+        ids = []
+        for there, gone in ((self.one, self.other), (self.other, self.one)):
+            moves = [] if there is self.one else [(there, self.one)]
+            moved = moved_scene(scene, simulator, moves, aside=[gone])
+            if restore(simulator, moved).lines():
+                raise EditRefused("the exchanged start cannot be restored")
+            ids.append({obj.name: obj.object_id for obj in simulator.view.objects.values()})
+            world = in_world(episode.trajectory, moved)
+            worlds.append(_with_states(world, StartState(gone.name, is_disabled=True)))
+        keys = {ids[0][obj.name]: ids[1][obj.name] for obj in (self.one, self.other)}
         return Worlds(
-            pair=(
-                _with_states(first, StartState(self.other.name, is_disabled=True)),
-                _with_states(second, StartState(self.one.name, is_disabled=True)),
-            ),
+            pair=(worlds[0], worlds[1]),
             changed=frozenset(keys),
             types=frozenset({self.one.object_type, self.other.object_type}),
             ids=keys,

@@ -2,11 +2,14 @@
 
 import json
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.twins import read_pairs
+from infthor_eval.thor import launch
+from infthor_eval.thor.launch import embedded_launch
 
 from ...helpers.command_line import assert_refused
 from ...helpers.trajectories import FORK, MUG, cut_trajectory, write_trajectories
@@ -81,3 +84,13 @@ def test_a_trajectory_that_does_not_replay_is_named_and_the_others_are_made(tmp_
     assert (code, summary["trajectories"], len(summary["failures"])) == (1, 1, 1)
     assert FORK in summary["failures"][0] and "PickupObject" in summary["failures"][0]
     assert "Traceback" not in err
+
+
+def test_the_same_command_with_unity(data, tmp_path, run_cli, monkeypatch):
+    # No Unity is here: the embedded simulator answers in its place, behind the same client.
+    monkeypatch.setattr(launch, "unity_launch", lambda: replace(embedded_launch(), label="unity"))
+    options = ("--kinds", "state", "--per-kind", 1, "--unity")
+    code, _, _ = run_cli("twins", data, "--out", tmp_path, *options)
+    assert code == 0
+    assert read_pairs(tmp_path)
+    assert json.loads((tmp_path / "set.json").read_text())["simulator"] == "unity"

@@ -171,7 +171,9 @@ def shape(value):
     return [shape(item) for item in value] if isinstance(value, list) else type(value).__name__
 
 
-@pytest.mark.parametrize("name", ["swap", "move", "replace", "state", "count-open", "put-target"])
+@pytest.mark.parametrize(
+    "name", ["swap", "move", "replace", "state", "count-open", "count-move", "put-target"]
+)
 def test_both_worlds_are_written_alike(name, episode, simulator):
     kind = KINDS.load(name, EditKind)()
     for proposal in kind.propose(episode, random.Random(1)):
@@ -189,6 +191,36 @@ def test_both_worlds_are_written_alike(name, episode, simulator):
         assert flipped.flipped() == worlds
         return
     pytest.skip("no room for any")
+
+
+def first_worlds(name, episode, simulator):
+    """The two scenes of a kind's first edit for which there is room."""
+    for proposal in KINDS.load(name, EditKind)().propose(episode, random.Random(1)):
+        try:
+            return [world.scene for world in proposal.apply(episode, simulator).pair]
+        except EditRefused:
+            continue
+    raise AssertionError("no room for any")
+
+
+def test_what_is_not_there_is_put_aside_in_both_worlds(episode, simulator):
+    scenes = first_worlds("replace", episode, simulator)
+    places = []
+    for scene in scenes:
+        (gone,) = (state.name for state in scene.object_states or [] if state.is_disabled)
+        places += [pose.position for pose in scene.object_poses if pose.name == gone]
+    assert places[0] == places[1]
+    assert places[0]["y"] > 10
+
+
+def test_a_moved_object_stands_in_line_with_what_it_stands_on(episode, simulator):
+    before, after = (
+        {pose.name: pose for pose in scene.object_poses}
+        for scene in first_worlds("move", episode, simulator)
+    )
+    one, other = (name for name, pose in before.items() if pose != after[name])
+    assert after[one].rotation == before[other].rotation
+    assert after[other].rotation == before[one].rotation
 
 
 def test_labels_are_drawn_by_coin():

@@ -4,6 +4,7 @@ from functools import partial
 
 import pytest
 
+from infthor_eval.generation.questions import counting
 from infthor_eval.generation.twins.pairing import AskedWorld, pair_questions
 from infthor_eval.nieh.scoring import score
 
@@ -51,6 +52,28 @@ def test_the_order_of_two_things():
     pairs = paired(history(start, *one, *other), history(start, *other, *one), "Mug", "Apple")
     assert pairs["Did you pick up the mug before the apple?"].answers == (("yes",), ("no",))
     assert pairs["Did you pick up the apple before the mug?"].answers == (("no",), ("yes",))
+
+
+def test_how_often_a_thing_was_moved_is_told_by_the_hand():
+    start = {**PLACES, MUG: state(MUG, TABLE), BOOK: state(BOOK, TABLE)}
+    mug = moved(MUG, TABLE, TABLE)
+    worlds = history(start, *mug * 3), history(start, *mug * 2, *moved(BOOK, TABLE, TABLE))
+    times = paired(*worlds, "Mug", "Book")["How many times did you move the mug?"]
+    assert times.answers == (("3",), ("2",))
+    assert times.clues == (1, 2, 3, 4, 5, 6)  # in the last two the hand holds the book in one world
+
+
+def test_a_count_of_all_objects_is_about_no_type():
+    start = {**PLACES, MUG: state(MUG, TABLE), BOOK: state(BOOK, TABLE)}
+    mug = moved(MUG, TABLE, TABLE)
+    idle = (("MoveAhead", None, None, {}),) * 12
+    worlds = (
+        history(start, *mug * 2, *idle),
+        history(start, *mug, *moved(BOOK, TABLE, TABLE), *idle),
+    )
+    text = "How many different objects did you pick up?"
+    assert text not in paired(*worlds, "Mug", "Book")
+    assert paired(*worlds, "Mug", "Book", counting.ALL)[text].answers == (("1",), ("2",))
 
 
 def test_equal_answers_are_no_pair():

@@ -13,12 +13,10 @@ from infthor_eval.formats.trajectory import (
 from infthor_eval.generation.twins.rewriting import (
     exchange_ids,
     in_world,
-    put_elsewhere,
     whole_of,
     with_inserted,
     without_traces,
 )
-from infthor_eval.thor.view import ThorObject, Vector
 
 from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
 
@@ -65,16 +63,6 @@ def test_inserted_actions_belong_to_the_task_that_they_are_in(trajectory):
     assert [low.api_action.action for low in lows[2:4]] == ["LookUp", "LookDown"]
     assert [low.low_idx for low in lows] == list(range(len(trajectory.plan.low_actions) + 2))
     assert longer.sub_trajs[0].low_pddl_idx == (0, trajectory.sub_trajs[0].low_pddl_idx[1] + 2)
-
-
-def test_another_receptacle_is_in_the_task_too(trajectory):
-    lows = trajectory.plan.low_actions
-    index = next(n for n, low in enumerate(lows) if low.api_action.action == "PutObject")
-    table = ThorObject("DiningTable|1|1|1", "DiningTable", "Table_1", Vector(0.0, 0.0, 0.0))
-    world = put_elsewhere(trajectory, index, table)
-    assert world.plan.low_actions[index].api_action.receptacle_id == table.object_id
-    assert world.sub_tasks[0].task_info.receptacle == "DiningTable"
-    assert "dining table" in world.sub_tasks[0].task_desc
 
 
 def test_what_tells_where_a_trajectory_comes_from_is_left_out(trajectory):
