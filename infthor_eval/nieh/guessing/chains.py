@@ -84,7 +84,7 @@ def held_out(
         return scenes.get(sample.question.traj_id, sample.question.cluster)
 
     is_alone = len(set(map(group, samples))) == 1
-    return (lambda sample: sample.question.id) if is_alone else group
+    return (lambda sample: sample.question.draw_name) if is_alone else group
 
 
 class Guesser:
