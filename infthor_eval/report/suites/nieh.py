@@ -1,13 +1,14 @@
 """Presenter of NIEH: questions with the clue frames that answer them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from infthor_eval.nieh.records import Guess, NiehAnswer
 from infthor_eval.nieh.results.above_guessing import score_above_guessing
+from infthor_eval.nieh.results.pair_summary import score_pairs
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.plain import PlainPresenter
-from infthor_eval.report.presenter import Description, Timelines
+from infthor_eval.report.presenter import Description, GroupScore, Timelines
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
 from infthor_eval.report.web.samples import Prompt
@@ -26,6 +27,7 @@ class NiehPresenter(PlainPresenter):
     title = "Questions"
     measure = "questions right"
     target_label = "gold answer"
+    member_label = "world"
     main_metric = "strict"
     compares_scorers = True
     columns = NIEH_COLUMNS
@@ -42,6 +44,19 @@ class NiehPresenter(PlainPresenter):
             for scorer, score in scores.items()
             if score is not None
         }
+
+    def group(self, record: Record) -> str:
+        """See `Presenter.group`: the pair of a question of twins."""
+        twin = record.payload.twin
+        return "" if twin is None else twin.pair
+
+    def group_scores(self, records: Sequence[Record]) -> Iterator[GroupScore]:
+        """See `Presenter.group_scores`: whether both replies to a pair of twins are right."""
+        metrics = dict.fromkeys(name for record in records for name in record.payload.scores)
+        metric = self.main_metric if self.main_metric in metrics else next(iter(metrics), "")
+        for pair in score_pairs(records, metric):
+            name = " ".join(filter(None, (pair.pair, pair.variant)))
+            yield GroupScore("pair_accuracy", name, pair.cluster, pair.score)
 
     def charts(self, runs: Sequence[ReportRun]) -> list[Chart]:
         """See `Presenter.charts`."""
