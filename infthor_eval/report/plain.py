@@ -34,6 +34,10 @@ class PlainPresenter:
     figures: Mapping[str, Figure] = {}
     columns: Sequence[SampleColumn] = ()
 
+    def measure_of(self, task: str, summary: Any) -> str:
+        """See `Presenter.measure_of`: `measure`."""
+        return self.measure
+
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`: a metric with a value below 0 or above 1 is none."""
         return all(0 <= score <= 1 for score in scores)
@@ -49,6 +53,10 @@ class PlainPresenter:
     def group_scores(self, records: Sequence[UnitRecord[Any]]) -> Iterable[GroupScore]:
         """See `Presenter.group_scores`: none."""
         return ()
+
+    def opening(self, runs: Sequence[ReportRun]) -> Section | None:
+        """See `Presenter.opening`: none."""
+        return None
 
     def charts(self, runs: Sequence[ReportRun]) -> Sequence[Chart]:
         """See `Presenter.charts`: none."""

@@ -254,6 +254,10 @@ class Presenter(Protocol):
     figures: Mapping[str, Figure]
     columns: Sequence[SampleColumn]
 
+    def measure_of(self, task: str, summary: Any) -> str:
+        """Return what the primary metric of a task measures, by the suite's summary of a run;
+        `measure`, unless tasks of the suite measure different things."""
+
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """Whether a metric with these scores is a share, which is shown in percent; others are
         shown as they are."""
@@ -271,6 +275,10 @@ class Presenter(Protocol):
     def group_scores(self, records: Sequence[Record]) -> Iterable[GroupScore]:
         """Return the scores of the groups in a run's records of a task; runs are compared on
         them."""
+
+    def opening(self, runs: Sequence[ReportRun]) -> Section | None:
+        """Build the section that comes before the suite's own, with charts and tables of its own;
+        tables of the suite that it has are not shown again."""
 
     def charts(self, runs: Sequence[ReportRun]) -> Sequence[Chart]:
         """Draw the charts of the suite's section; its tables are `Suite.tables`."""

@@ -6,19 +6,33 @@ from pathlib import Path
 from infthor_eval.nieh.records import Guess, NiehAnswer
 from infthor_eval.nieh.results.above_guessing import score_above_guessing
 from infthor_eval.nieh.results.pair_summary import score_pairs
+from infthor_eval.nieh.results.summary import NiehSummary
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.plain import PlainPresenter
-from infthor_eval.report.presenter import Description, GroupScore, Timelines
+from infthor_eval.report.presenter import (
+    Description,
+    Figure,
+    FigureRequest,
+    FigureResult,
+    GroupScore,
+    Timelines,
+)
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
 from infthor_eval.report.web.samples import Prompt
-from infthor_eval.report.web.sections import Chart
+from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 
 __all__ = ["NiehPresenter"]
 
 Record = UnitRecord[NiehAnswer]
+
+
+def _build_pairs_figure(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+    from infthor_eval.report.suites.pair_charts import build_pairs_figure
+
+    return build_pairs_figure(runs, request)
 
 
 class NiehPresenter(PlainPresenter):
@@ -31,6 +45,15 @@ class NiehPresenter(PlainPresenter):
     main_metric = "strict"
     compares_scorers = True
     columns = NIEH_COLUMNS
+    figures: Mapping[str, Figure] = {
+        "pairs": Figure(
+            "pairs of twins right by distance, frames shown and age", _build_pairs_figure, False
+        )
+    }
+
+    def measure_of(self, task: str, summary: NiehSummary) -> str:
+        """See `Presenter.measure_of`: of twins, pairs count."""
+        return self.measure if summary.tasks[task].pairs is None else "pairs right"
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`: all of them, although the reference scorer can exceed 1."""
@@ -57,6 +80,12 @@ class NiehPresenter(PlainPresenter):
         for pair in score_pairs(records, metric):
             name = " ".join(filter(None, (pair.pair, pair.variant)))
             yield GroupScore("pair_accuracy", name, pair.cluster, pair.score)
+
+    def opening(self, runs: Sequence[ReportRun]) -> Section | None:
+        """See `Presenter.opening`: pairs of twins, if there are any."""
+        from infthor_eval.report.suites.pair_charts import pairs_section
+
+        return pairs_section(runs)
 
     def charts(self, runs: Sequence[ReportRun]) -> list[Chart]:
         """See `Presenter.charts`."""

@@ -128,9 +128,7 @@ def _timeline(
 ) -> Timeline:
     frames = []
     for index in sorted(choice.clues | choice.others):
-        known = msgspec.structs.replace(
-            choice.facts[index], changed=choice.changed.get(index, ())
-        )
+        known = msgspec.structs.replace(choice.facts[index], changed=choice.changed.get(index, ()))
         frames.append(
             TimelineFrame(
                 index,

@@ -106,7 +106,11 @@ def _suite_sections(runs: Sequence[PresentedRun]) -> Iterator[Section]:
     suite = runs[0].suite
     presenter = runs[0].presenter
     title = presenter.title or suite.name.replace("_", " ").capitalize()
+    opening = presenter.opening(runs) or Section("", "")
+    if not opening.is_empty:
+        yield opening
     tables = suite.tables([run.summary for run in runs])
+    tables = [table for table in tables if table not in opening.tables]
     yield Section(suite.name, title, tuple(presenter.charts(runs)), tuple(tables))
     for section in presenter.sections(runs):
         yield replace(section, is_linked=False)

@@ -1,5 +1,11 @@
 // A sample of several members, such as both questions of a pair of twins: their replies side by side, their frames
 // one above the other.
+const sum = values => values.some(value => value == null) ? null : values.reduce((one, other) => one + other, 0);
+const total = results => {
+  const known = results.filter(Boolean);
+  return { seconds: sum(known.map(of => of.seconds ?? 0)), tokens: [0, 1].map(at => sum(known.map(of => of.tokens?.[at]))) };
+};
+
 const groupResults = sample => {
   const { members } = sample;
   const names = metricsOf(members);
@@ -13,7 +19,7 @@ const groupResults = sample => {
     return make("tr", {}, make("td", { class: "run" }, runs[at]),
       make("td", {}, mark(result, runs[at]), ` ${result?.outcome ?? "not evaluated"}`), ...replies,
       ...names.map(metric => numberCell(metric, each(results, of => of.scores?.[metric]?.toFixed(2) ?? "-"))),
-      numberCell("seconds", each(results, secondsOf)), numberCell("tokens", each(results, tokensOf)));
+      numberCell("seconds", secondsOf(total(results))), numberCell("tokens", tokensOf(total(results))));
   });
   return resultTable(head, 2 + members.length, rows);
 };

@@ -26,9 +26,7 @@ def group_samples(samples: Iterable[tuple[GroupKey, PageSample]]) -> list[PageSa
     for number, (key, sample) in enumerate(samples):
         groups.setdefault(key if key.name else number, []).append(sample)
     return [
-        _group(key.name, members)
-        if isinstance(key, GroupKey) and len(members) > 1
-        else members[0]
+        _group(key.name, members) if isinstance(key, GroupKey) and len(members) > 1 else members[0]
         for key, members in groups.items()
     ]
 
