@@ -4,13 +4,13 @@ import pytest
 from msgspec.structs import replace
 
 from infthor_eval.errors import DataError
-from infthor_eval.nieh.records import Guess, TwinSide
+from infthor_eval.nieh.records import Guess
 from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.report.comparison import compare, comparison_table
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.suites.nieh import NiehPresenter
 
-from ..helpers.nieh_runs import make_record
+from ..helpers.nieh_runs import make_record, make_twins
 
 ABOVE = "strict, above guessing"
 
@@ -19,31 +19,6 @@ def make_guessed_record(number, reply, score=0.5, mean=0.5):
     return make_record(
         number, reply, guess=Guess(form="f", scores={"strict": score}, form_scores={"strict": mean})
     )
-
-
-def make_twins(number, replies, base):
-    """Both records of a pair: the mug is in the bowl in one world, and on the sofa in the other."""
-    worlds = (("one", "bowl", "sofa"), ("two", "sofa", "bowl"))
-    return [
-        make_record(
-            number,
-            reply,
-            (answer,),
-            id=f"{base}-{world}/{number}",
-            cluster=base,
-            twin=TwinSide(
-                pair=f"p/{number}",
-                fact="mug",
-                kind="swap",
-                traj_id=f"{base}-{world}",
-                answers=(other,),
-                n_frames=1,
-                n_differing=1,
-                n_since_change=None,
-            ),
-        )
-        for (world, answer, other), reply in zip(worlds, replies, strict=True)
-    ]
 
 
 def compared(first, second, presenter=None):
