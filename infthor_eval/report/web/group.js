@@ -18,7 +18,7 @@ const groupResults = sample => {
       mark(of, titles[member]), ` ${of ? of.reply ?? "" : "not evaluated"}`, of ? reasonOf(of) : ""));
     return make("tr", {}, make("td", { class: "run" }, runs[at]),
       make("td", {}, mark(result, runs[at]), ` ${result?.outcome ?? "not evaluated"}`), ...replies,
-      ...names.map(metric => numberCell(metric, each(results, of => of.scores?.[metric]?.toFixed(2) ?? "-"))),
+      ...names.map(metric => numberCell(metric, each(results, of => of.scores?.[metric] === undefined ? "-" : Number(of.scores[metric].toFixed(2))))),
       numberCell("seconds", secondsOf(total(results))), numberCell("tokens", tokensOf(total(results))));
   });
   return resultTable(head, 2 + members.length, rows);
@@ -54,7 +54,9 @@ const strips = sample => {
     return make("figure", differs ? { class: "differs" } : {}, ...pictures, make("figcaption", {}, label));
   });
   const n_differing = ordered.filter(([, frames]) => frames.some(frame => frame?.differs)).length;
-  const remark = `${n_differing} of these ${ordered.length} frames differ (≠, marked blue) and ${ordered.length - n_differing} are the same in all; ` +
-    `${members[0].timeline.n_frames} frames in the trajectory; clues are framed in orange, dashed where a context left them out`;
+  const clues = members.some(({ timeline: { frames: of = [] } }) => of.some(frame => frame.is_clue))
+    ? "; clues are framed in orange, dashed where a context left them out" : "";
+  const remark = `differing frames (≠, framed in blue): ${n_differing} of these ${ordered.length}; ` +
+    `${members[0].timeline.n_frames} frames in the trajectory${clues}`;
   return [...blinking.elements, make("div", { class: "strips" }, ...cards), make("p", { class: "note" }, remark)];
 };

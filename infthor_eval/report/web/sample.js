@@ -11,7 +11,7 @@ const partsOf = sample => {
     sample.members ? groupResults(sample) : results(sample),
     ...shown,
     ...ofEach(episodes),
-    ...ofEach(detailRows),
+    ...ofEach((member, name) => folded(name && `Further facts, ${name}`, detailRows(member))),
     ...ofEach(tracebacksOf),
     ...ofEach(promptsOf),
     make("p", { class: "note" }, facts),
@@ -52,11 +52,14 @@ const results = sample => {
   return resultTable(head, 3, rows);
 };
 
+// Parts below a heading that unfolds them; as they are without one.
+const folded = (heading, parts) => heading && parts.length ? [make("details", {}, make("summary", {}, heading), ...parts)] : parts;
+
 // Further facts: once where all runs have the same, else by run.
-const detailRows = (sample, name) => {
+const detailRows = sample => {
   const told = ofSuite(sample).filter(([result]) => result?.details).map(([result, at]) => [detailsOf(result), runs[at]]);
   const isCommon = (name, value) => told.length > 1 && told.every(([facts]) => facts[name] === value);
-  const block = (heading, facts) => facts.length === 0 ? [] : [make("div", { class: "details" }, make("b", {}, withName(heading, name)),
+  const block = (heading, facts) => facts.length === 0 ? [] : [make("div", { class: "details" }, make("b", {}, heading),
     make("dl", {}, ...facts.flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)])))];
   const [common, own] = [true, false].map(wanted => told.map(([facts, label]) =>
     [label, Object.entries(facts).filter(([name, value]) => isCommon(name, value) === wanted)]));

@@ -3,6 +3,8 @@
 import pytest
 
 from infthor_eval.cli import main
+from infthor_eval.report.live.state import LiveRun
+from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.web.sample_groups import GroupKey, group_samples
 from infthor_eval.report.web.samples import PageSample, SampleResult
 
@@ -245,3 +247,14 @@ def test_equal_pictures_of_different_steps_have_their_own_facts(page):
     first, second = (frames[index] for index in STILL)
     assert first.picture == second.picture
     assert [page.frames[it.facts].step for it in (first, second)] == list(STILL)
+
+
+def test_the_page_on_a_run_as_it_goes_says_that_pairs_count(twin_runs):
+    assert LiveRun(twin_runs[0]).state().measure == "pairs right"
+
+
+def test_rows_of_samples_name_their_pair(twin_runs):
+    (run,) = read_report_runs(twin_runs[:1])
+    cells = {column.name: list(map(column.value, run.records)) for column in run.presenter.columns}
+    assert sorted(cells["pair"]) == sorted(2 * ["swap-1/1", "swap-1/2", "swap-2/1", "swap-2/2"])
+    assert set(cells["fact"]) == {"swap-1/mug", "swap-2/mug"}
