@@ -11,7 +11,7 @@ const blinker = (titles, columns) => {
   let top = 0; // the member that is seen
   let timer = null;
 
-  const stage = make("div", { class: "stage", role: "img" });
+  const stage = make("div", { class: "stage", role: "img", "aria-live": "off" }); // nobody is told of each blink
   const place = make("span", { class: "place", role: "status" });
   const list = make("dl");
   const button = (text, title, act) => {
