@@ -1,7 +1,8 @@
 """Two runs of one suite on the same units: how their scores differ, with interval and p value.
 
 A unit that was repeated counts with its mean scores, so that runs of different numbers of
-repetitions can be compared.
+repetitions can be compared. Groups of units that are scored together, such as pairs of twins, are
+compared as groups too.
 """
 
 import math
@@ -11,7 +12,7 @@ from statistics import fmean, variance
 from typing import Any
 
 from infthor_eval.errors import DataError
-from infthor_eval.report.presenter import Presenter
+from infthor_eval.report.presenter import GroupScore, Presenter
 from infthor_eval.runs import Suite, UnitKey, UnitRecord
 from infthor_eval.statistics import Difference, paired_difference
 from infthor_eval.tables import Column, Row, Table, interval_cell
@@ -33,10 +34,11 @@ class Comparison:
         is_share: whether the metric is a share, which is shown in percent.
         first: mean score of the first run on the shared units.
         second: mean score of the second run on them.
-        difference: second minus first, paired by unit and clustered.
-        n_unshared: number of units that only one of the runs evaluated; they are not compared.
+        difference: second minus first, paired by unit, or by group of units, and clustered.
+        n_unshared: number of units, or of groups, that only one of the runs evaluated; they are not
+            compared.
         drawing: half the width of the difference's 95 % interval over other drawings of both runs'
-            replies to the same units; None if not every unit was repeated in both.
+            replies to the same units; None if not every unit was repeated in both, and for groups.
     """
 
     task: str
@@ -69,6 +71,7 @@ def compare(
         units = [_PairedUnit(firsts[key], seconds[key]) for key in shared if key.task == task]
         n_unshared = sum(key.task == task for key in firsts.keys() ^ seconds.keys())
         compared = _TaskComparison(presenter, task, n_unshared)
+        comparisons += compared.by_groups(_of_task(firsts, task), _of_task(seconds, task))
         comparisons += compared.by_scores(units, suite)
         comparisons += compared.by_further_scores(units, suite)
     return comparisons
@@ -80,6 +83,10 @@ def _by_unit(records: Iterable[Record]) -> dict[UnitKey, list[Record]]:
     for record in records:
         units.setdefault(record.key.once, []).append(record)
     return units
+
+
+def _of_task(units: Mapping[UnitKey, Sequence[Record]], task: str) -> list[Record]:
+    return [record for key, records in units.items() if key.task == task for record in records]
 
 
 @dataclass(frozen=True)
@@ -123,6 +130,21 @@ class _TaskComparison:
     task: str
     n_unshared: int
 
+    def by_groups(self, first: Sequence[Record], second: Sequence[Record]) -> Iterator[Comparison]:
+        """Compare in the scores of groups of records, on the groups that both runs have."""
+        firsts, seconds = (_by_group(self.presenter.group_scores(it)) for it in (first, second))
+        shared = [key for key in firsts if key in seconds]
+        for metric in dict.fromkeys(metric for metric, _ in shared):
+            keys = [key for key in shared if key[0] == metric]
+            n_unshared = sum(key[0] == metric for key in firsts.keys() ^ seconds.keys())
+            yield self._comparison(
+                metric,
+                [firsts[key].score for key in keys],
+                [seconds[key].score for key in keys],
+                [firsts[key].cluster for key in keys],
+                n_unshared=n_unshared,
+            )
+
     def by_scores(self, units: Sequence[_PairedUnit], suite: Suite) -> Iterator[Comparison]:
         """Compare in the suite's metrics; a unit without a result counts as 0."""
         scores = [unit.scores(suite.scores) for unit in units]
@@ -146,18 +168,40 @@ class _TaskComparison:
     def _compare(self, metric: str, scores: Sequence[_PairedScores]) -> Comparison:
         firsts = [_values(unit.first, metric) for unit in scores]
         seconds = [_values(unit.second, metric) for unit in scores]
-        first = list(map(fmean, firsts))
-        second = list(map(fmean, seconds))
+        return self._comparison(
+            metric,
+            list(map(fmean, firsts)),
+            list(map(fmean, seconds)),
+            [unit.cluster for unit in scores],
+            n_unshared=self.n_unshared,
+            drawing=_drawing([*firsts, *seconds], len(scores)),
+        )
+
+    def _comparison(
+        self,
+        metric: str,
+        first: Sequence[float],
+        second: Sequence[float],
+        clusters: Sequence[str],
+        *,
+        n_unshared: int,
+        drawing: float | None = None,
+    ) -> Comparison:
         return Comparison(
             task=self.task,
             metric=metric,
             is_share=self.presenter.is_share(metric, [*first, *second]),
             first=sum(first) / len(first),
             second=sum(second) / len(second),
-            difference=paired_difference(first, second, [unit.cluster for unit in scores]),
-            n_unshared=self.n_unshared,
-            drawing=_drawing([*firsts, *seconds], len(scores)),
+            difference=paired_difference(first, second, clusters),
+            n_unshared=n_unshared,
+            drawing=drawing,
         )
+
+
+def _by_group(scores: Iterable[GroupScore]) -> dict[tuple[str, str], GroupScore]:
+    """Return scores by metric and group."""
+    return {(score.metric, score.group): score for score in scores}
 
 
 def _shared_metrics(scores: Sequence[_PairedScores]) -> list[str]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.report.presenter import Description, Figure, Replay, Timelines
+from infthor_eval.report.presenter import Description, Figure, GroupScore, Replay, Timelines
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.sample_columns import SampleColumn
 from infthor_eval.report.web.samples import Prompt, StepRow
@@ -27,11 +27,16 @@ class PlainPresenter:
     measure: str = "primary metric"
     target_label: str = "target"
     reply_label: str = "reply"
+    member_label: str = "part"
     main_metric: str | None = None
     compares_scorers: bool = False
     replay: Replay | None = None
     figures: Mapping[str, Figure] = {}
     columns: Sequence[SampleColumn] = ()
+
+    def measure_of(self, task: str, summary: Any) -> str:
+        """See `Presenter.measure_of`: `measure`."""
+        return self.measure
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`: a metric with a value below 0 or above 1 is none."""
@@ -40,6 +45,18 @@ class PlainPresenter:
     def further_scores(self, record: UnitRecord[Any]) -> Mapping[str, float]:
         """See `Presenter.further_scores`: none."""
         return {}
+
+    def group(self, record: UnitRecord[Any]) -> str:
+        """See `Presenter.group`: none."""
+        return ""
+
+    def group_scores(self, records: Sequence[UnitRecord[Any]]) -> Iterable[GroupScore]:
+        """See `Presenter.group_scores`: none."""
+        return ()
+
+    def opening(self, runs: Sequence[ReportRun]) -> Section | None:
+        """See `Presenter.opening`: none."""
+        return None
 
     def charts(self, runs: Sequence[ReportRun]) -> Sequence[Chart]:
         """See `Presenter.charts`: none."""

@@ -26,6 +26,7 @@ __all__ = [
     "Figure",
     "FigureRequest",
     "FigureResult",
+    "GroupScore",
     "OpenReplay",
     "Presenter",
     "Recording",
@@ -53,18 +54,34 @@ class Description(NamedTuple):
     clues: str = ""
 
 
+class GroupScore(NamedTuple):
+    """The score of a group of records, such as both replies to a pair of twins.
+
+    Attributes:
+        metric: name of the metric.
+        group: name of the group, by which runs are paired.
+        cluster: what the group's interval clusters by.
+        score: the score, over the group's repetitions.
+    """
+
+    metric: str
+    group: str
+    cluster: str
+    score: float
+
+
 class Timelines(NamedTuple):
     """Frames that samples are about.
 
     Attributes:
         by_unit: timeline of each unit that has one.
         notes: reasons why frames are missing, a line each.
-        facts: what is known of frames, by the numbers of their thumbnails.
+        facts: what is known of frames, by the numbers that the timelines' frames have for it.
     """
 
     by_unit: Mapping[UnitKey, Timeline] = {}
     notes: Sequence[str] = ()
-    facts: Mapping[int, FrameFacts] = {}
+    facts: Sequence[FrameFacts] = ()
 
 
 @dataclass(frozen=True)
@@ -216,6 +233,7 @@ class Presenter(Protocol):
         measure: what the primary metric measures, in words.
         target_label: what a sample's target is called.
         reply_label: what the reply to a sample is called.
+        member_label: what each record of a group is called, before its letter ("world").
         main_metric: metric that decides whether a sample is right; None for the first one of each
             sample.
         compares_scorers: whether the metrics judge the same reply, so that samples can be filtered
@@ -229,11 +247,16 @@ class Presenter(Protocol):
     measure: str
     target_label: str
     reply_label: str
+    member_label: str
     main_metric: str | None
     compares_scorers: bool
     replay: Replay | None
     figures: Mapping[str, Figure]
     columns: Sequence[SampleColumn]
+
+    def measure_of(self, task: str, summary: Any) -> str:
+        """Return what the primary metric of a task measures, by the suite's summary of a run;
+        `measure`, unless tasks of the suite measure different things."""
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """Whether a metric with these scores is a share, which is shown in percent; others are
@@ -241,6 +264,21 @@ class Presenter(Protocol):
 
     def further_scores(self, record: Record) -> Mapping[str, float]:
         """Return scores that only some samples have, by name; runs are compared on those."""
+
+    def group(self, record: Record) -> str:
+        """Return the name of the record's group, which is one sample and right if all of it is.
+
+        A group is of one task, variant and repetition. Empty for a record that is a sample by
+        itself.
+        """
+
+    def group_scores(self, records: Sequence[Record]) -> Iterable[GroupScore]:
+        """Return the scores of the groups in a run's records of a task; runs are compared on
+        them."""
+
+    def opening(self, runs: Sequence[ReportRun]) -> Section | None:
+        """Build the section that comes before the suite's own, with charts and tables of its own;
+        tables of the suite that it has are not shown again."""
 
     def charts(self, runs: Sequence[ReportRun]) -> Sequence[Chart]:
         """Draw the charts of the suite's section; its tables are `Suite.tables`."""

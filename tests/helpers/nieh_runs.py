@@ -6,12 +6,12 @@ import msgspec
 
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.config import NiehConfig
-from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.records import NiehAnswer, ShownClues, TwinSide
 from infthor_eval.nieh.results.summary import summarise
 from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.runs import RunHeader, RunSummary, Tokens, UnitRecord
 
-_PAYLOAD = ("question", "question_type", "file", "guess", "shown_clues", "recall")
+_PAYLOAD = ("question", "question_type", "file", "guess", "shown_clues", "twin", "recall")
 
 
 def make_record(
@@ -47,6 +47,33 @@ def make_record(
         "tokens": Tokens(reply=n_reply_tokens),
     }
     return UnitRecord(**{**fields, **changes})
+
+
+def make_twins(
+    number: int,
+    replies: tuple[str | None, str | None],
+    base: str,
+    n_after: int | None = None,
+    n_frames: int = 1,
+) -> list[UnitRecord[NiehAnswer]]:
+    """Both records of a pair: the mug is in the bowl in one world, and on the sofa in the other."""
+    worlds = (("one", "bowl", "sofa"), ("two", "sofa", "bowl"))
+    records = []
+    for (world, answer, other), reply in zip(worlds, replies, strict=True):
+        twin = TwinSide(
+            pair=f"p/{number}",
+            fact="mug",
+            kind="swap",
+            traj_id=f"{base}-{world}",
+            answers=(other,),
+            n_frames=n_frames,
+            n_differing=1,
+            n_since_change=None,
+        )
+        clues = ShownClues(n_shown=1, n_clues=1, n_after=n_after)
+        about = {"id": f"{base}-{world}/{number}", "cluster": base, "twin": twin}
+        records.append(make_record(number, reply, (answer,), shown_clues=clues, **about))
+    return records
 
 
 def make_config(

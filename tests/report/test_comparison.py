@@ -10,7 +10,7 @@ from infthor_eval.report.comparison import compare, comparison_table
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.suites.nieh import NiehPresenter
 
-from ..helpers.nieh_runs import make_record
+from ..helpers.nieh_runs import make_record, make_twins
 
 ABOVE = "strict, above guessing"
 
@@ -107,3 +107,55 @@ def test_units_that_one_run_alone_has_are_counted_and_without_a_shared_one_there
     }
     with pytest.raises(DataError, match="share no unit of the same task"):
         compared([make_record(0, "mug")], [make_record(1, "mug")])
+
+
+BOTH = ("bowl", "sofa")
+SAME = ("bowl", "bowl")
+SWAPPED = ("sofa", "bowl")
+
+
+def test_runs_are_compared_on_pairs_of_twins_clustered_by_what_they_were_made_of():
+    # By base: t has pairs 0 and 1, u has 2, v has 3.
+    places = ((0, "t"), (1, "t"), (2, "u"), (3, "v"))
+    first, second = (
+        [
+            record
+            for (number, base), replies in zip(places, of_run, strict=True)
+            for record in make_twins(number, replies, base)
+        ]
+        for of_run in ((SAME, SAME, BOTH, SWAPPED), (BOTH, BOTH, BOTH, SAME))
+    )
+    comparisons = compared(first, second)
+    assert list(comparisons) == ["pair_accuracy", "reference", "strict"]
+    pairs = comparisons["pair_accuracy"]
+    assert (pairs.first, pairs.second) == (0.25, 0.75)
+    assert (pairs.difference.estimate.n, pairs.difference.estimate.n_clusters) == (4, 3)
+    assert pairs.difference.estimate.mean == pytest.approx(0.5)
+    assert (pairs.is_share, pairs.n_unshared, pairs.drawing) == (True, 0, None)
+    # Single answers alone hide it: half of them are right where a pair is answered the same.
+    strict = comparisons["strict"]
+    assert (strict.first, strict.second, strict.difference.estimate.n) == (0.5, 0.875, 8)
+    assert "pair_accuracy" not in compared(first, second, PlainPresenter())
+
+
+def test_a_pair_that_one_run_has_not_is_counted_and_repetitions_are_one_pair():
+    first = [*make_twins(0, BOTH, "t"), *make_twins(1, SAME, "u")]
+    again = [replace(record, repeat=2) for record in make_twins(0, SAME, "t")]
+    second = [*make_twins(0, BOTH, "t"), *again, *make_twins(1, BOTH, "u")[:1]]
+    pairs = compared(first, second)["pair_accuracy"]
+    assert (pairs.first, pairs.second, pairs.difference.estimate.n) == (1.0, 0.5, 1)
+    assert pairs.n_unshared == 1
+    row = comparison_table([pairs], "a", "b").rows[0].cells
+    assert row[:6] == ("nieh_gt", "pair_accuracy", "%", "100.00", "50.00", "-50.00")
+
+
+def test_pairs_of_a_task_without_the_strict_scorer_are_compared_in_its_own():
+    def own(records):
+        return [
+            replace(it, payload=replace(it.payload, scores={"own": it.payload.scores["strict"]}))
+            for it in records
+        ]
+
+    first, second = (own(make_twins(0, replies, "t")) for replies in (SAME, BOTH))
+    pairs = compared(first, second)["pair_accuracy"]
+    assert (pairs.first, pairs.second) == (0.0, 1.0)

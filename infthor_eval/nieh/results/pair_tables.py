@@ -1,6 +1,7 @@
 """Tables of pairs of twins: both right, what the replies to twins were, and the memory curves."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from infthor_eval.distances import DISTANCES, LENGTHS
 from infthor_eval.nieh.results.gains import name_of
@@ -15,7 +16,7 @@ from infthor_eval.rates import Rate, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, TableCell
 
-__all__ = ["pair_overview", "pair_tables"]
+__all__ = ["MEMORY_CURVES", "PairCurve", "pair_overview", "pair_tables"]
 
 _HEADS = (Column("model", False), Column("task", False), Column("context", False))
 _NOTES = (
@@ -27,32 +28,50 @@ _NOTES = (
     "is the commoner answer of its form (prior knowledge). wrong twin: single replies that are "
     "right in the other world. bases: trajectories that the worlds were made of.",
 )
-_Groups = Callable[[PairSummary], Mapping[str, Rate]]
-# By title of the table: its groups, and their order; by name if there is none.
-_GROUPED: Sequence[tuple[str, _Groups, Sequence[str]]] = (
-    ("kind of edit", lambda pairs: pairs.by_kind, ()),
-    ("type of question", lambda pairs: pairs.by_question_type, ()),
-    (
-        "frames between the last clue and the end of the trajectory",
-        lambda pairs: pairs.by_distance,
-        DISTANCES,
-    ),
-    (
-        "thousand tokens of frames shown after the last clue",
-        lambda pairs: pairs.by_tokens,
-        LENGTHS,
-    ),
-    ("number of frames shown", lambda pairs: pairs.by_shown, N_SHOWN),
-    (
-        "whether both worlds were shown a frame that differs",
-        lambda pairs: pairs.by_difference,
-        SHOWN_DIFFERENCE,
-    ),
-    (
-        "frames since the agent last changed what is asked about",
-        lambda pairs: pairs.by_age,
-        (*DISTANCES, NEVER_CHANGED),
-    ),
+
+
+class PairCurve(NamedTuple):
+    """Accuracy of pairs over classes.
+
+    Attributes:
+        title: what the classes are of, in words.
+        rates: returns the accuracy by class.
+        classes: all classes in their order; none for that of their names.
+    """
+
+    title: str
+    rates: Callable[[PairSummary], Mapping[str, Rate]]
+    classes: tuple[str, ...] = ()
+
+
+_BY_DISTANCE = PairCurve(
+    "frames between the last clue and the end of the trajectory",
+    lambda pairs: pairs.by_distance,
+    DISTANCES,
+)
+_BY_TOKENS = PairCurve(
+    "thousand tokens of frames shown after the last clue", lambda pairs: pairs.by_tokens, LENGTHS
+)
+_BY_SHOWN = PairCurve("number of frames shown", lambda pairs: pairs.by_shown, N_SHOWN)
+_BY_DIFFERENCE = PairCurve(
+    "whether both worlds were shown a frame that differs",
+    lambda pairs: pairs.by_difference,
+    SHOWN_DIFFERENCE,
+)
+_BY_AGE = PairCurve(
+    "frames since the agent last changed what is asked about",
+    lambda pairs: pairs.by_age,
+    (*DISTANCES, NEVER_CHANGED),
+)
+MEMORY_CURVES = (_BY_DISTANCE, _BY_SHOWN, _BY_AGE)
+_GROUPINGS = (
+    PairCurve("kind of edit", lambda pairs: pairs.by_kind),
+    PairCurve("type of question", lambda pairs: pairs.by_question_type),
+    _BY_DISTANCE,
+    _BY_TOKENS,
+    _BY_SHOWN,
+    _BY_DIFFERENCE,
+    _BY_AGE,
 )
 
 _Found = tuple[str, str, str, PairSummary]  # model, task, context, pairs
@@ -76,10 +95,7 @@ def pair_tables(runs: Sequence[RunSummary]) -> list[Table]:
     found = list(_find(runs))
     if not found:
         return []
-    return [
-        *pair_overview(runs),
-        *(_grouped(title, found, groups, order) for title, groups, order in _GROUPED),
-    ]
+    return [*pair_overview(runs), *(_grouped(curve, found) for curve in _GROUPINGS)]
 
 
 def _find(runs: Sequence[RunSummary]) -> Iterator[_Found]:
@@ -110,22 +126,16 @@ def _mean_cell(rate: Rate | None) -> TableCell:
     return TableCell(cell.numbers[""] or "-", cell.numbers)
 
 
-def _grouped(
-    title: str,
-    found: Sequence[_Found],
-    groups: _Groups,
-    order: Sequence[str],
-) -> Table:
-    used = {name for *_, pairs in found for name in groups(pairs)}
-    names = [name for name in order or sorted(used) if name in used]
-    rows = tuple(
-        Row((run, task, context, *(_grouped_cell(groups(pairs).get(name)) for name in names)))
-        for run, task, context, pairs in found
-    )
+def _grouped(curve: PairCurve, found: Sequence[_Found]) -> Table:
+    used = {name for *_, pairs in found for name in curve.rates(pairs)}
+    names = [name for name in curve.classes or sorted(used) if name in used]
+    rows = []
+    for run, task, context, pairs in found:
+        rates = curve.rates(pairs)
+        rows.append(Row((run, task, context, *(_grouped_cell(rates.get(name)) for name in names))))
     note = "In brackets: 95 % interval, clustered by trajectory; in parentheses: pairs."
-    return Table(
-        f"Twins: pairs right, % by {title} (pairs)", (*_HEADS, *map(Column, names)), rows, (note,)
-    )
+    title = f"Twins: pairs right, % by {curve.title} (pairs)"
+    return Table(title, (*_HEADS, *map(Column, names)), tuple(rows), (note,))
 
 
 def _grouped_cell(rate: Rate | None) -> TableCell:

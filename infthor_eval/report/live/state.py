@@ -122,6 +122,7 @@ class LiveRun:
         self._journal: FollowedJournal | None = None
         self._totals = Totals()
         self._metrics: Mapping[str, Rate] = {}
+        self._measure = ""
         self._failures: tuple[LiveSample, ...] = ()
         self._has_new_metrics = False
         self._metrics_due = 0.0
@@ -177,7 +178,7 @@ class LiveRun:
             if header.n_units is not None
             else _n_units(results, self._totals.n_done),
             totals=self._totals,
-            measure=presenter.measure,
+            measure=self._measure or presenter.measure,
             target_label=presenter.target_label,
             metrics=self._metrics,
             failures=self._failures,
@@ -206,6 +207,8 @@ class LiveRun:
             return
         summary = run.suite.summarise(run.header, journal.log.records)
         self._metrics = dict(run.suite.primary_metrics(summary))
+        measures = (run.presenter.measure_of(task, summary) for task in self._metrics)
+        self._measure = ", ".join(dict.fromkeys(measures))
         self._has_new_metrics = False
         ended = time.monotonic()
         self._metrics_due = ended + _REST * (ended - started)

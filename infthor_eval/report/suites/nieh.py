@@ -1,17 +1,26 @@
 """Presenter of NIEH: questions with the clue frames that answer them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from infthor_eval.nieh.records import Guess, NiehAnswer
 from infthor_eval.nieh.results.above_guessing import score_above_guessing
+from infthor_eval.nieh.results.pair_summary import score_pairs
+from infthor_eval.nieh.results.summary import NiehSummary
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.plain import PlainPresenter
-from infthor_eval.report.presenter import Description, Timelines
+from infthor_eval.report.presenter import (
+    Description,
+    Figure,
+    FigureRequest,
+    FigureResult,
+    GroupScore,
+    Timelines,
+)
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
 from infthor_eval.report.web.samples import Prompt
-from infthor_eval.report.web.sections import Chart
+from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 
@@ -20,15 +29,31 @@ __all__ = ["NiehPresenter"]
 Record = UnitRecord[NiehAnswer]
 
 
+def _build_pairs_figure(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+    from infthor_eval.report.suites.pair_charts import build_pairs_figure
+
+    return build_pairs_figure(runs, request)
+
+
 class NiehPresenter(PlainPresenter):
     """See `Presenter`."""
 
     title = "Questions"
     measure = "questions right"
     target_label = "gold answer"
+    member_label = "world"
     main_metric = "strict"
     compares_scorers = True
     columns = NIEH_COLUMNS
+    figures: Mapping[str, Figure] = {
+        "pairs": Figure(
+            "pairs of twins right by distance, frames shown and age", _build_pairs_figure, False
+        )
+    }
+
+    def measure_of(self, task: str, summary: NiehSummary) -> str:
+        """See `Presenter.measure_of`: of twins, pairs count."""
+        return self.measure if summary.tasks[task].pairs is None else "pairs right"
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`: all of them, although the reference scorer can exceed 1."""
@@ -42,6 +67,25 @@ class NiehPresenter(PlainPresenter):
             for scorer, score in scores.items()
             if score is not None
         }
+
+    def group(self, record: Record) -> str:
+        """See `Presenter.group`: the pair of a question of twins."""
+        twin = record.payload.twin
+        return "" if twin is None else twin.pair
+
+    def group_scores(self, records: Sequence[Record]) -> Iterator[GroupScore]:
+        """See `Presenter.group_scores`: whether both replies to a pair of twins are right."""
+        metrics = dict.fromkeys(name for record in records for name in record.payload.scores)
+        metric = self.main_metric if self.main_metric in metrics else next(iter(metrics), "")
+        for pair in score_pairs(records, metric):
+            name = " ".join(filter(None, (pair.pair, pair.variant)))
+            yield GroupScore("pair_accuracy", name, pair.cluster, pair.score)
+
+    def opening(self, runs: Sequence[ReportRun]) -> Section | None:
+        """See `Presenter.opening`: pairs of twins, if there are any."""
+        from infthor_eval.report.suites.pair_charts import pairs_section
+
+        return pairs_section(runs)
 
     def charts(self, runs: Sequence[ReportRun]) -> list[Chart]:
         """See `Presenter.charts`."""

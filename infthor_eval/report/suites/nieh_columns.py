@@ -28,6 +28,10 @@ def _recall(name: str, record: UnitRecord[NiehAnswer]) -> float | None:
     return getattr(record.payload.recall, name, None)
 
 
+def _twin(name: str, record: UnitRecord[NiehAnswer]) -> str | None:
+    return getattr(record.payload.twin, name, None)
+
+
 def _n_recalled(record: UnitRecord[NiehAnswer]) -> int | None:
     recall = record.payload.recall
     return None if recall is None else len(recall.recalled)
@@ -48,6 +52,8 @@ NIEH_COLUMNS = (
         SampleColumn(f"above_guessing_{scorer}", float, partial(_above_guessing, scorer))
         for scorer in SCORERS
     ),
+    SampleColumn("pair", str, partial(_twin, "pair")),
+    SampleColumn("fact", str, partial(_twin, "fact")),
     SampleColumn("n_recalled", int, _n_recalled),
     SampleColumn("build_seconds", float, partial(_recall, "build_s")),
     SampleColumn("recall_seconds", float, partial(_recall, "recall_s")),

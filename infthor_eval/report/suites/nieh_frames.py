@@ -1,24 +1,31 @@
-"""Frames of questions: the clues with their neighbours, or some of all, and what logs say."""
+"""Frames of questions: the clues with their neighbours, or some of all, and what logs say.
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+Of twins: the clues, and frames that differ between both worlds; the same ones of either.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+
+import msgspec
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import LoggedPose, Step, read_steps
+from infthor_eval.formats.twins import TwinPair
 from infthor_eval.report.presenter import Timelines
 from infthor_eval.report.runs import ReportRun, choose_evenly, records_by_unit
 from infthor_eval.report.suites.nieh_sets import RunSets
-from infthor_eval.report.web.samples import FrameFacts, Timeline, TimelineFrame
+from infthor_eval.report.web.samples import FrameFacts, Numbered, Timeline, TimelineFrame
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey
 
 __all__ = ["find_timelines"]
 
 _OVERVIEW = 5  # frames of a trajectory that are shown for a question without clues
+_DIFFERING = 6  # frames beside the clues that are shown of those that differ from the twin's
 
 
 def find_timelines(
@@ -52,14 +59,9 @@ def find_timelines(
         for index in sorted(choice.clues):
             _picture(choice.frames[index], thumbnails)
     notes = [f"{task}: no frames are shown: {problem}" for task, problem in sets.problems.items()]
-    timelines = {key: _timeline(choice, thumbnails) for key, choice in chosen.items()}
-    facts = {
-        frame.picture: chosen[key].facts[frame.index]
-        for key, timeline in timelines.items()
-        for frame in timeline.frames
-        if frame.picture is not None
-    }
-    return Timelines(timelines, notes, facts)
+    facts = Numbered[FrameFacts]()
+    timelines = {key: _timeline(choice, thumbnails, facts) for key, choice in chosen.items()}
+    return Timelines(timelines, notes, facts.values)
 
 
 @dataclass(frozen=True)
@@ -71,12 +73,15 @@ class _FrameChoice:
         facts: what the set's log says of each of them.
         clues: indices of the clues.
         others: indices of further frames.
+        changed: types of what is in view and differs from the twin's frame, by the frame's index,
+            for all frames whose pictures differ.
     """
 
     frames: Sequence[FrameRef]
     facts: Sequence[FrameFacts]
     clues: frozenset[int]
     others: frozenset[int]
+    changed: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
 
 
 class _TrajectoryFacts:
@@ -95,6 +100,11 @@ def _choose_frames(data: NiehSet, question: Question, facts: Sequence[FrameFacts
     frames = data.frames(question.traj_id)
     # The clues of an absence are a sample of the trajectory, and no evidence.
     clues = frozenset(data.clue_positions(question) if question.has_evidence else ())
+    pair = data.twins.get(question.traj_id) if question.pair else None
+    if pair is not None:
+        changed = _changed(pair, question.traj_id)
+        differing = choose_evenly(sorted(changed.keys() - clues), _DIFFERING)
+        return _FrameChoice(frames, facts, clues, frozenset(differing), changed)
     last = len(frames) - 1
     others = {near for index in clues for near in (index - 1, index + 1) if 0 <= near <= last}
     if not clues:
@@ -102,11 +112,32 @@ def _choose_frames(data: NiehSet, question: Question, facts: Sequence[FrameFacts
     return _FrameChoice(frames, facts, clues, frozenset(others - clues))
 
 
-def _timeline(choice: _FrameChoice, thumbnails: ThumbnailStore) -> Timeline:
-    frames = (
-        TimelineFrame(index, _picture(choice.frames[index], thumbnails), index in choice.clues)
-        for index in sorted(choice.clues | choice.others)
-    )
+def _changed(pair: TwinPair, traj_id: str) -> dict[int, tuple[str, ...]]:
+    """Return the types of what differs in one world's frames, by the indices of those frames."""
+    is_first = traj_id == pair.traj_ids[0]
+    changed = {}
+    for index, frame in enumerate(pair.frames):
+        if not frame.same:
+            names = (name if is_first else pair.ids.get(name, name) for name in frame.changed)
+            changed[index] = tuple(sorted({name.partition("|")[0] for name in names}))
+    return changed
+
+
+def _timeline(
+    choice: _FrameChoice, thumbnails: ThumbnailStore, facts: Numbered[FrameFacts]
+) -> Timeline:
+    frames = []
+    for index in sorted(choice.clues | choice.others):
+        known = msgspec.structs.replace(choice.facts[index], changed=choice.changed.get(index, ()))
+        frames.append(
+            TimelineFrame(
+                index,
+                _picture(choice.frames[index], thumbnails),
+                index in choice.clues,
+                index in choice.changed,
+                facts.number(known),
+            )
+        )
     note = (
         ""
         if choice.clues

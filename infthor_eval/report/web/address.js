@@ -12,7 +12,8 @@ const hasAddress = () => new URLSearchParams(location.hash.slice(1)).has(KEY);
 const findAddressed = () => {
   const asked = new URLSearchParams(location.hash.slice(1));
   const fits = (name, value) => !asked.has(name) || asked.get(name) === (value ?? "");
-  return samples.findIndex(({ id, task, variant }) => id === asked.get(KEY) && fits("task", task) && fits("variant", variant));
+  const isAsked = ({ id, task, variant }) => id === asked.get(KEY) && fits("task", task) && fits("variant", variant);
+  return samples.findIndex(sample => isAsked(sample) || membersOf(sample).some(isAsked));
 };
 
 const linkTo = sample => {

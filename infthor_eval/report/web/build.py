@@ -15,7 +15,7 @@ from infthor_eval.report.web.progress import PageProgress, Silent
 from infthor_eval.report.web.replays import EpisodeReplays
 from infthor_eval.report.web.run_tables import costs_table, left_out_table, primary_metrics_table
 from infthor_eval.report.web.sample_list import SharedTexts, build_samples
-from infthor_eval.report.web.samples import FrameFacts, PageSample
+from infthor_eval.report.web.samples import PageSample
 from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 
@@ -72,14 +72,12 @@ def build_page(
     )
     samples: list[PageSample] = []
     notes: list[str] = []
-    facts: dict[int, FrameFacts] = {}
     texts = SharedTexts()
     for same in by_suite.values():
         of_suite = build_samples(same, request.data, replays, thumbnails, texts, progress)
         run_indices = [runs.index(run) for run in same]
         samples += [sample.spread_over(len(runs), run_indices) for sample in of_suite.samples]
         notes += of_suite.notes
-        facts |= of_suite.facts
     if thumbnails.n_left_out:
         notes.append(f"{thumbnails.n_left_out:,} pictures left out, to keep the page small")
     return Page(
@@ -93,7 +91,7 @@ def build_page(
         pictures=thumbnails.encoded,
         notes=notes,
         large=thumbnails.large,
-        frames=facts,
+        frames=texts.frames.values,
         prompts=texts.prompts.values,
         tracebacks=texts.tracebacks.values,
     )
@@ -108,7 +106,11 @@ def _suite_sections(runs: Sequence[PresentedRun]) -> Iterator[Section]:
     suite = runs[0].suite
     presenter = runs[0].presenter
     title = presenter.title or suite.name.replace("_", " ").capitalize()
+    opening = presenter.opening(runs) or Section("", "")
+    if not opening.is_empty:
+        yield opening
     tables = suite.tables([run.summary for run in runs])
+    tables = [table for table in tables if table not in opening.tables]
     yield Section(suite.name, title, tuple(presenter.charts(runs)), tuple(tables))
     for section in presenter.sections(runs):
         yield replace(section, is_linked=False)
@@ -139,7 +141,11 @@ def _labels(runs: Sequence[PresentedRun], same: Sequence[PresentedRun]) -> Suite
     presenter = same[0].presenter
     run_indices = tuple(runs.index(run) for run in same)
     return SuiteLabels(
-        run_indices, presenter.target_label, presenter.reply_label, presenter.compares_scorers
+        run_indices,
+        presenter.target_label,
+        presenter.reply_label,
+        presenter.compares_scorers,
+        presenter.member_label,
     )
 
 
@@ -149,7 +155,8 @@ def _metrics(runs: Sequence[PresentedRun], samples: Sequence[PageSample]) -> lis
     names = dict.fromkeys(
         name
         for sample in samples
-        for result in sample.results
+        for part in sample.parts
+        for result in part.results
         if result is not None
         for name in result.scores
     )

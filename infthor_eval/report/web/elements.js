@@ -11,11 +11,15 @@ const make = (name, attributes = {}, ...children) => {
   return element;
 };
 const sourceOf = number => `data:image/webp;base64,${pictures[number]}`;
+const withName = (heading, name) => [heading, name].filter(Boolean).join(", ");
 const mark = (result, label) => make(
   "span", { class: `mark ${result?.outcome ?? "none"}`, title: `${label}: ${result?.outcome ?? "not evaluated"}` },
   result ? MARKS[result.outcome] : "·");
 
 const resultsOf = sample => sample.results.filter(Boolean);
+// The samples that are one together, or the sample itself; each has a name where there are several.
+const membersOf = sample => sample.members ?? [sample];
+const nameOf = (sample, at) => sample.members ? `${suites[sample.suite].member} ${String.fromCharCode(65 + at)}` : "";
 // Results with the places of their runs: those of the suite that have the task at all.
 const runsWith = {};
 for (const { task, results } of samples) results.forEach((result, at) => { if (result) (runsWith[task] ??= new Set()).add(at); });

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ _SCRIPTS = (
     "address.js",
     "enlarged.js",
     "prompts.js",
+    "blink.js",
+    "group.js",
     "sample.js",
     "report.js",
 )  # one script on the page, in this order
@@ -64,12 +67,14 @@ class SuiteLabels(msgspec.Struct, frozen=True):
         target: what a sample's target is called.
         reply: what the reply to a sample is called.
         compares_scorers: whether samples can be filtered by disagreement of the metrics.
+        member: what each member of a group is called, before its letter.
     """
 
     runs: tuple[int, ...]
     target: str
     reply: str
     compares_scorers: bool
+    member: str = ""
 
 
 @dataclass(frozen=True)
@@ -87,7 +92,7 @@ class Page:
         pictures: WebP in base64, by their numbers in the samples.
         notes: remarks on the samples.
         large: number of the enlarged picture by that of its thumbnail.
-        frames: what is known of frames, by the numbers of their thumbnails.
+        frames: what is known of frames, by their numbers in the samples.
         prompts: requests as they were sent, by their numbers in the samples.
         tracebacks: tracebacks of failures, by their numbers in the samples.
     """
@@ -102,7 +107,7 @@ class Page:
     pictures: Sequence[str]
     notes: Sequence[str] = ()
     large: Mapping[int, int] = field(default_factory=dict)
-    frames: Mapping[int, FrameFacts] = field(default_factory=dict)
+    frames: Sequence[FrameFacts] = ()
     prompts: Sequence[Prompt] = ()
     tracebacks: Sequence[str] = ()
 
@@ -163,8 +168,8 @@ def _data(page: Page) -> Markup:
 def _share_details(samples: list[Any]) -> tuple[list[Any], list[tuple[str, str]]]:
     """Return samples with numbers of details, and the details: many have the same."""
     facts: Numbered[tuple[str, str]] = Numbered()
-    for sample in samples:
-        for result in filter(None, sample["results"]):
-            if "details" in result:
-                result["details"] = [facts.number(pair) for pair in result["details"].items()]
+    parts = chain.from_iterable(sample.get("members", [sample]) for sample in samples)
+    for result in filter(None, chain.from_iterable(part["results"] for part in parts)):
+        if "details" in result:
+            result["details"] = [facts.number(pair) for pair in result["details"].items()]
     return samples, facts.values

@@ -17,18 +17,18 @@ const runsByValue = (sample, valueOf) => {
   return [...labels];
 };
 
-const promptsOf = sample => runsByValue(sample, result => result.prompt).map(([number, labels]) => {
+const promptsOf = (sample, name) => runsByValue(sample, result => result.prompt).map(([number, labels]) => {
   const { parts = [], problem, note } = prompts[number];
   const body = problem
     ? [make("p", { class: "note" }, `It is not known exactly: ${problem}.`)]
     : [make("pre", {}, ...parts.map(part => typeof part === "string" ? part : framesPart(part)), sample.title),
       make("p", { class: "note" }, "Made again from the run's settings and its set; by its hash it is what was asked. Each model has its own chat template around it.")];
-  return make("details", { class: "prompt" }, make("summary", {}, "The whole prompt, ", make("b", {}, labels.join(", "))),
+  return make("details", { class: "prompt" }, make("summary", {}, "The whole prompt, ", make("b", {}, withName(labels.join(", "), name))),
     note ? make("p", { class: "note" }, note) : null, ...body);
 });
 
-const tracebacksOf = sample => runsByValue(sample, result => result.traceback).map(([number, labels]) =>
-  make("details", { class: "traceback" }, make("summary", {}, "Traceback, ", make("b", {}, labels.join(", "))),
+const tracebacksOf = (sample, name) => runsByValue(sample, result => result.traceback).map(([number, labels]) =>
+  make("details", { class: "traceback" }, make("summary", {}, "Traceback, ", make("b", {}, withName(labels.join(", "), name))),
     make("pre", {}, tracebacks[number])));
 
 // Labels of the runs whose context left out a frame, of those whose prompt is known.

@@ -39,11 +39,12 @@
     const scores = metrics.map(name => result.scores?.[name]).filter(score => score !== undefined);
     return new Set(scores).size > 1;
   };
-  const textOf = sample => [
+  const wordsOf = sample => [
     sample.title, sample.target, sample.cluster, sample.id, sample.variant,
     ...resultsOf(sample).flatMap(result => [
       result.reply, result.reason, ...(result.details ?? []).map(number => details[number][1]), ...(result.steps ?? []).map(step => step.action)]),
-  ].join("\n").toLowerCase();
+  ];
+  const textOf = sample => [sample.id, ...membersOf(sample).flatMap(wordsOf)].join("\n").toLowerCase();
   let texts = null; // made when the page is there and nobody waits, or at the first search if that comes before
   const index = () => { texts ??= samples.map(textOf); };
   (window.requestIdleCallback ?? setTimeout)(index); // Safari has no idle callbacks
@@ -64,7 +65,7 @@
       clues && (sample => sample.clues === clues),
       run && (sample => sample.results[Number(run)]),
       outcome && (sample => of(sample).some(result => result.outcome === outcome)),
-      byId("disagree").checked && (sample => suites[sample.suite].compares_scorers && of(sample).some(disagrees)),
+      byId("disagree").checked && (sample => suites[sample.suite].compares_scorers && membersOf(sample).flatMap(of).some(disagrees)),
       byId("differ").checked && (sample => new Set(ofSuite(sample).map(([result]) => result?.outcome)).size > 1),
       wanted && contains(wanted),
     ].filter(Boolean);
@@ -162,6 +163,7 @@
     } else if (event.key === "k" || (isInList && event.key === "ArrowUp")) {
       if (chosen > 0) choose(chosen - 1);
     } else if (event.key === "/") byId("search").focus();
+    else if (event.key === "b") byId("sample").querySelector(".switch")?.click();
     else if (event.key === "t") toggleTheme();
     else return;
     event.preventDefault();

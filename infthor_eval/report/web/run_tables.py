@@ -16,11 +16,12 @@ _MEASURABLE_S = 0.05  # less is the clock's noise: baselines take microseconds
 
 def primary_metrics_table(runs: Sequence[PresentedRun]) -> Table:
     """Return the primary metric of each run and task, with a row for each."""
-    rows = [
-        Row((run.label, task, run.presenter.measure, *_cells(rate), str(rate.n)))
-        for run in runs
-        for task, rate in run.suite.primary_metrics(run.summary.summary).items()
-    ]
+    rows = []
+    for run in runs:
+        summary = run.summary.summary
+        for task, rate in run.suite.primary_metrics(summary).items():
+            measure = run.presenter.measure_of(task, summary)
+            rows.append(Row((run.label, task, measure, *_cells(rate), str(rate.n))))
     columns = (*_NAMES, Column("measure", False), *map(Column, ("%", "95 % interval", "samples")))
     return Table("", columns, tuple(rows))
 

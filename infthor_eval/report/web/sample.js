@@ -2,39 +2,58 @@
 const partsOf = sample => {
   const facts = [sample.suite, sample.task, sample.kind, sample.clues && `clues: ${sample.clues}`, sample.variant,
     sample.cluster, sample.id].filter(Boolean).join("  ·  ");
+  // Parts of each member, which are named where there are several.
+  const ofEach = partsOfOne => membersOf(sample).flatMap((member, at) => partsOfOne(member, nameOf(sample, at)));
+  const shown = isAligned(sample) ? strips(sample) : ofEach(member => member.timeline ? timeline(member, member.timeline) : []);
   return [
     make("div", { class: "head" }, make("h3", {}, sample.title), linkTo(sample)),
-    sample.target ? make("p", { class: "target" }, `${suites[sample.suite].target}: `, make("b", {}, sample.target)) : "",
-    results(sample),
-    ...(sample.timeline ? timeline(sample, sample.timeline) : []),
-    ...episodes(sample),
-    ...detailRows(sample),
-    ...tracebacksOf(sample),
-    ...promptsOf(sample),
+    ...targets(sample),
+    sample.members ? groupResults(sample) : results(sample),
+    ...shown,
+    ...ofEach(episodes),
+    ...ofEach((member, name) => folded(name && `Further facts, ${name}`, detailRows(member))),
+    ...ofEach(tracebacksOf),
+    ...ofEach(promptsOf),
     make("p", { class: "note" }, facts),
   ];
 };
 
+// What is right: of each member where there are several, with its own title if that is another one.
+const targets = sample => {
+  const told = membersOf(sample).map((member, at) => [member, nameOf(sample, at)]).filter(([member]) => member.target);
+  return told.length === 0 ? [] : [make("p", { class: "target" }, `${suites[sample.suite].target}: `, ...told.map(([member, name]) => make("span", {},
+    name && `${name} `, member.title === sample.title ? "" : `${member.title} `, make("b", {}, member.target))))];
+};
+
+const numberCell = (name, value) => make("td", { class: "n", "data-name": name }, value); // on narrow pages its name is beside it
+const metricsOf = members => metrics.filter(name => members.flatMap(resultsOf).some(result => result.scores?.[name] !== undefined));
+const secondsOf = result => (result.seconds ?? 0).toFixed(2);
+const tokensOf = ({ tokens: [context, cached] = [] }) =>
+  context == null ? "-" : context.toLocaleString("en") + (cached ? ` (${cached.toLocaleString("en")} cached)` : "");
+const reasonOf = result => {
+  const reason = [result.reason, ...(result.faults ?? [])].filter(Boolean).join("; ");
+  return reason ? make("span", { class: "note" }, ` (${reason})`) : "";
+};
+const resultTable = (head, n_words, rows) => make("div", { class: "scroll" }, make("table", { class: "results" },
+  make("thead", {}, make("tr", {}, ...head.map((name, at) => make("th", at < n_words ? {} : { class: "n" }, name)))),
+  make("tbody", {}, ...rows)));
+
 const results = sample => {
-  const names = metrics.filter(name => resultsOf(sample).some(result => result.scores?.[name] !== undefined));
+  const names = metricsOf([sample]);
   const head = ["run", "", suites[sample.suite].reply, ...names, "seconds", "tokens"];
-  // On narrow pages a row is a block, and each number has its name beside it.
-  const number = (name, value) => make("td", { class: "n", "data-name": name }, value);
   const rows = ofSuite(sample).map(([result, at]) => {
     const name = make("td", { class: "run" }, runs[at]);
     if (!result) return make("tr", {}, name, make("td", {}, mark(null, runs[at])), make("td", { class: "note" }, "not evaluated"));
-    const reason = [result.reason, ...(result.faults ?? [])].filter(Boolean).join("; ");
-    const reply = make("td", { class: "reply" }, result.reply ?? "", reason ? make("span", { class: "note" }, ` (${reason})`) : "");
-    const scores = names.map(metric => number(metric, result.scores?.[metric]?.toFixed(2) ?? "-"));
-    const [context, cached] = result.tokens ?? [];
-    const tokens = context == null ? "-" : context.toLocaleString("en") + (cached ? ` (${cached.toLocaleString("en")} cached)` : "");
+    const reply = make("td", { class: "reply" }, result.reply ?? "", reasonOf(result));
+    const scores = names.map(metric => numberCell(metric, result.scores?.[metric]?.toFixed(2) ?? "-"));
     return make("tr", {}, name, make("td", {}, mark(result, runs[at]), ` ${result.outcome}`), reply,
-      ...scores, number("seconds", (result.seconds ?? 0).toFixed(2)), number("tokens", tokens));
+      ...scores, numberCell("seconds", secondsOf(result)), numberCell("tokens", tokensOf(result)));
   });
-  return make("div", { class: "scroll" }, make("table", { class: "results" },
-    make("thead", {}, make("tr", {}, ...head.map((name, at) => make("th", at > 2 ? { class: "n" } : {}, name)))),
-    make("tbody", {}, ...rows)));
+  return resultTable(head, 3, rows);
 };
+
+// Parts below a heading that unfolds them; as they are without one.
+const folded = (heading, parts) => heading && parts.length ? [make("details", {}, make("summary", {}, heading), ...parts)] : parts;
 
 // Further facts: once where all runs have the same, else by run.
 const detailRows = sample => {
@@ -47,12 +66,12 @@ const detailRows = sample => {
   return [...(common.length ? block("all runs", common[0][1]) : []), ...own.flatMap(([label, facts]) => block(label, facts))];
 };
 
-const factsOf = ({ index, picture, is_clue }, without) => {
-  const { step, action, error, objects = [], held = [], pose } = frames[picture] ?? {};
+const factsOf = ({ index, is_clue, facts }, without) => {
+  const { step, action, error, objects = [], held = [], pose, changed = [] } = frames[facts] ?? {};
   return [
     ["frame", is_clue ? `${index}, a clue` : index], ["step", step], ["action", action || (index === 0 ? "none yet" : "")],
     ["succeeded", action ? (error ? `no: ${error}` : "yes") : ""], ["in the hand", held.join(", ")],
-    ["in view", objects.join(", ")], ["agent", pose],
+    ["in view", objects.join(", ")], ["agent", pose], ["differs in", changed.join(", ")],
     ["not shown to", without.join(", ")]];
 };
 
@@ -84,9 +103,9 @@ const timeline = (sample, { n_frames, frames: shown = [], note }) => {
 };
 
 // Of many runs the first two are open, the others at a click.
-const episodes = sample => sample.results
+const episodes = (sample, name) => sample.results
   .map((result, at) => result?.steps ? [result, runs[at]] : null).filter(Boolean)
-  .map(([result, label], number) => episode(result, label, number < 2));
+  .map(([result, label], number) => episode(result, withName(label, name), number < 2));
 
 const factsOfStep = ({ action, error, reply, reward, note }) => [
   ["action", action || "none that is valid"], ["succeeded", error ? `no: ${error}` : "yes"], ["reply", reply],

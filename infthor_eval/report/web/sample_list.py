@@ -11,6 +11,7 @@ from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.runs import records_by_unit
 from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.replays import EpisodePictures, EpisodeReplays
+from infthor_eval.report.web.sample_groups import GroupKey, group_samples
 from infthor_eval.report.web.samples import (
     FrameFacts,
     Numbered,
@@ -35,22 +36,22 @@ class SuiteSamples(NamedTuple):
     """Samples of the runs of a suite.
 
     Attributes:
-        samples: samples of all units that have a record, in the order of their keys.
+        samples: samples of all units that have a record, in the order of their keys; those of a
+            group are one (`Presenter.group`).
         notes: reasons why pictures are missing, a line each.
-        facts: what is known of frames, by the numbers of their thumbnails.
     """
 
     samples: list[PageSample]
     notes: list[str]
-    facts: Mapping[int, FrameFacts]
 
 
 @dataclass(frozen=True)
 class SharedTexts:
-    """Long texts that samples refer to by number, as many samples have the same."""
+    """What samples refer to by number, as many samples have the same: texts, facts of frames."""
 
     prompts: Numbered[Prompt] = field(default_factory=Numbered)
     tracebacks: Numbered[str] = field(default_factory=Numbered)
+    frames: Numbered[FrameFacts] = field(default_factory=Numbered)
 
 
 def build_samples(
@@ -68,10 +69,15 @@ def build_samples(
         data: folder of the data set; None for the one that each run names.
         replays: replays some of the episodes.
         thumbnails: collects the pictures.
-        texts: collects prompts and tracebacks.
+        texts: collects prompts, tracebacks, and what is known of frames.
         progress: observes what takes long.
     """
-    timelines = runs[0].presenter.timelines(runs, data, thumbnails)
+    presenter = runs[0].presenter
+    timelines = presenter.timelines(runs, data, thumbnails)
+    fact_numbers = list(map(texts.frames.number, timelines.facts))
+    timeline_of = {
+        key: timeline.renumbered(fact_numbers) for key, timeline in timelines.by_unit.items()
+    }
     replayed = [replays.replay(run) for run in runs]
     progress.begin(_PROMPTS, len(runs))
     sources = []
@@ -85,9 +91,11 @@ def build_samples(
     samples = []
     for key, records in records_by_unit(runs).items():
         pictures = [of_run.get(key) for of_run, _ in replayed]
-        samples.append(_sample(key, sources, records, pictures, timelines.by_unit))
+        sample = _sample(key, sources, records, pictures, timeline_of)
+        name = presenter.group(next(record for record in records if record is not None))
+        samples.append((GroupKey(key.task, key.variant, key.repeat, name), sample))
     notes = [*timelines.notes, *(note for _, notes in replayed for note in notes)]
-    return SuiteSamples(samples, notes, timelines.facts)
+    return SuiteSamples(group_samples(samples), notes)
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ class FrameFacts(msgspec.Struct, frozen=True, omit_defaults=True):
         objects: types of the visible objects.
         held: types of the objects in the agent's hand.
         pose: the agent's pose in words; empty if the log has none.
+        changed: types of what is in view and differs from the same frame of the twin.
     """
 
     step: int | None = None
@@ -39,6 +40,7 @@ class FrameFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     objects: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
     pose: str = ""
+    changed: tuple[str, ...] = ()
 
 
 class Numbered(Generic[T]):
@@ -64,11 +66,15 @@ class TimelineFrame(msgspec.Struct, frozen=True, omit_defaults=True):
         index: place in the trajectory, from 0 on.
         picture: number of the thumbnail; None if there was no room for it.
         is_clue: whether the frame is evidence for the answer.
+        differs: whether the other samples of its group have another picture there.
+        facts: number of what is known of the frame; None if nothing is.
     """
 
     index: int
     picture: int | None = None
     is_clue: bool = False
+    differs: bool = False
+    facts: int | None = None
 
 
 class Timeline(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -83,6 +89,16 @@ class Timeline(msgspec.Struct, frozen=True, omit_defaults=True):
     n_frames: int
     frames: tuple[TimelineFrame, ...] = ()
     note: str = ""
+
+    def renumbered(self, numbers: Sequence[int]) -> "Timeline":
+        """Return the same timeline, with other numbers of facts."""
+        frames = (
+            frame
+            if frame.facts is None
+            else msgspec.structs.replace(frame, facts=numbers[frame.facts])
+            for frame in self.frames
+        )
+        return msgspec.structs.replace(self, frames=tuple(frames))
 
 
 class PromptFrames(msgspec.Struct, frozen=True):
@@ -186,8 +202,10 @@ class PageSample(msgspec.Struct, frozen=True, omit_defaults=True):
         clues: number of clues in words; empty for none.
         title: the question, or the instruction.
         target: the gold answers, or the goal.
-        results: a result per run of the page; None for runs that did not evaluate the sample.
+        results: a result per run of the page; None for runs that did not evaluate the sample, or
+            not all of its members.
         timeline: the trajectory that the sample is about.
+        members: the samples that are one together; none for a sample by itself.
     """
 
     suite: str
@@ -201,10 +219,17 @@ class PageSample(msgspec.Struct, frozen=True, omit_defaults=True):
     clues: str = ""
     target: str = ""
     timeline: Timeline | None = None
+    members: tuple["PageSample", ...] = ()
+
+    @property
+    def parts(self) -> tuple["PageSample", ...]:
+        """Its members, or itself if it has none."""
+        return self.members or (self,)
 
     def spread_over(self, n_runs: int, run_indices: Sequence[int]) -> "PageSample":
-        """Return the same sample for a page of more runs: `places` are those of its results."""
+        """Return the same sample for a page of more runs: `run_indices` are its results' places."""
         results: list[SampleResult | None] = [None] * n_runs
         for run_index, result in zip(run_indices, self.results, strict=True):
             results[run_index] = result
-        return msgspec.structs.replace(self, results=tuple(results))
+        members = tuple(member.spread_over(n_runs, run_indices) for member in self.members)
+        return msgspec.structs.replace(self, results=tuple(results), members=members)

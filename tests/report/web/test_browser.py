@@ -216,7 +216,7 @@ def test_a_frame_opens_large_with_its_step_and_the_arrows_go_on(page, open_page)
     image = tab.locator("#enlarged img")
     image.evaluate("it => it.decode()")
     assert image.evaluate("it => it.naturalWidth") == 300  # the set's own size
-    facts = page.frames[frames[1].picture]
+    facts = page.frames[frames[1].facts]
     assert enlarged(tab)["action"] == facts.action
     assert enlarged(tab)["step"] == str(facts.step)
     assert enlarged(tab)["succeeded"] == "yes"

@@ -1,0 +1,181 @@
+"""Charts of pairs of twins: the memory curves, pairs right by distance, frames shown and age."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from infthor_eval.errors import UsageError
+from infthor_eval.nieh.results.pair_summary import PairSummary
+from infthor_eval.nieh.results.pair_tables import MEMORY_CURVES, PairCurve, pair_tables
+from infthor_eval.rates import Rate, format_percent
+from infthor_eval.report.figures.style import (
+    LEGEND,
+    Look,
+    add_legend,
+    add_words,
+    inline_svg,
+    looks_of,
+    save_figure,
+)
+from infthor_eval.report.presenter import FigureRequest, FigureResult
+from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.web.sections import Chart, Section
+from infthor_eval.tables import Column, Row, Table
+
+__all__ = ["build_pairs_figure", "pairs_section"]
+
+# inches
+_PANEL = (4.6, 2.6)
+_MARGIN = 0.8
+_SPREAD = 0.3  # share of a class's width that the points of several runs are spread over
+
+
+class _Line(NamedTuple):
+    """Pairs of a run in a task."""
+
+    label: str
+    pairs: PairSummary
+    look: Look
+
+
+def pairs_section(runs: Sequence[ReportRun]) -> Section | None:
+    """Return the section of the page on pairs; None if the runs have none."""
+    tables = pair_tables([run.summary for run in runs])
+    if not tables:
+        return None
+    return Section("pairs", "Pairs of twins", tuple(_charts(runs)), tuple(tables))
+
+
+def _charts(runs: Sequence[ReportRun]) -> Iterator[Chart]:
+    """Yield a chart per task and memory curve that has several classes."""
+    for task in _tasks(runs):
+        lines = _lines(runs, task)
+        for curve in MEMORY_CURVES:
+            names = _classes(curve, lines)
+            if len(names) > 1:
+                yield _chart(task, curve, names, lines)
+
+
+def build_pairs_figure(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+    """Return the memory curves of a task as one figure, a panel each.
+
+    Raises:
+        UsageError: the runs have no pairs, or none in the task, or several tasks have some.
+    """
+    tasks = _tasks(runs)
+    if request.task is None and len(tasks) > 1:
+        raise UsageError(f"--figure pairs: give --task, one of {', '.join(tasks)}")
+    task = request.task or next(iter(tasks), "")
+    if task not in tasks:
+        raise UsageError(
+            f"--figure pairs: {task or 'no task'} of these runs has pairs of twins; give a run of "
+            "nieh_twins"
+        )
+    lines = _lines(runs, task)
+    return FigureResult(
+        _table(task, lines),
+        lambda folder, name: save_figure(lambda: _pairs_figure(task, lines), folder, name),
+    )
+
+
+def _tasks(runs: Sequence[ReportRun]) -> list[str]:
+    """Return the tasks with pairs."""
+    by_name = ((name, task) for run in runs for name, task in run.summary.summary.tasks.items())
+    return list(dict.fromkeys(name for name, task in by_name if task.pairs is not None))
+
+
+def _lines(runs: Sequence[ReportRun], task: str) -> list[_Line]:
+    looks = looks_of(run.label for run in runs)
+    summaries = [(run.label, run.summary.summary.tasks.get(task)) for run in runs]
+    return [
+        _Line(label, summary.pairs, looks[label])
+        for label, summary in summaries
+        if summary is not None and summary.pairs is not None
+    ]
+
+
+def _classes(curve: PairCurve, lines: Sequence[_Line]) -> list[str]:
+    """Return the curve's classes that a run has pairs in."""
+    used = {name for line in lines for name in curve.rates(line.pairs)}
+    return [name for name in curve.classes if name in used]
+
+
+def _chart(task: str, curve: PairCurve, names: Sequence[str], lines: Sequence[_Line]) -> Chart:
+    def draw() -> Figure:
+        figure = Figure(figsize=(_PANEL[0] + LEGEND, _PANEL[1]), layout="constrained")
+        axes = figure.subplots()
+        _draw(axes, curve, names, lines)
+        add_legend(axes, [(line.label, line.look) for line in lines])
+        return figure
+
+    described = []
+    for line in lines:
+        rates = curve.rates(line.pairs)
+        texts = [f"{100 * rates[name].mean:.1f} % at {name}" for name in names if name in rates]
+        described.append(f"{line.label} {', '.join(texts)}")
+    title = f"{task}: pairs of twins right, by {curve.title}"
+    return Chart(title, inline_svg(draw), "; ".join(described))
+
+
+def _draw(axes: Axes, curve: PairCurve, names: Sequence[str], lines: Sequence[_Line]) -> None:
+    """Draw a curve of each run over the classes, with intervals, and the first run's counts."""
+    for number, line in enumerate(lines):
+        offset = _SPREAD * (number / max(len(lines) - 1, 1) - 0.5) if len(lines) > 1 else 0.0
+        _draw_line(axes, curve.rates(line.pairs), names, line.look, offset)
+    first = curve.rates(lines[0].pairs)
+    counts = [first[name].n if name in first else 0 for name in names]
+    axes.set_xticks(
+        range(len(names)), [f"{name}\n({n})" for name, n in zip(names, counts, strict=True)]
+    )
+    axes.set_ylim(-3, 103)
+    axes.set_ylabel("pairs right (%)")
+    axes.set_xlabel(f"{curve.title} (pairs)")
+    axes.grid(axis="x", visible=False)
+
+
+def _draw_line(
+    axes: Axes, rates: Mapping[str, Rate], names: Sequence[str], look: Look, offset: float
+) -> None:
+    known = [(at + offset, rates[name]) for at, name in enumerate(names) if name in rates]
+    means = [100 * rate.mean for _, rate in known]
+    places = [place for place, _ in known]
+    axes.plot(
+        places, means, color=look.colour, ls=look.style, lw=look.width, marker="o", ms=4, zorder=3
+    )
+    for place, rate in known:
+        if rate.low is not None and rate.high is not None:
+            axes.vlines(
+                place, 100 * rate.low, 100 * rate.high, color=look.colour, lw=1.2, zorder=2.8
+            )
+
+
+def _pairs_figure(task: str, lines: Sequence[_Line]) -> Figure:
+    """Return a figure with a panel per curve."""
+    width = len(MEMORY_CURVES) * _PANEL[0] + LEGEND
+    figure = Figure(figsize=(width, _PANEL[1] + _MARGIN), layout="constrained")
+    panels = figure.subplots(1, len(MEMORY_CURVES), squeeze=False)[0]
+    for axes, curve in zip(panels, MEMORY_CURVES, strict=True):
+        _draw(axes, curve, _classes(curve, lines), lines)
+    add_legend(panels[-1], [(line.label, line.look) for line in lines])
+    first = lines[0].pairs
+    heading = (
+        f"Pairs of twins right on {task}: {first.n_pairs} pairs of {first.n_trajectories} "
+        "trajectories, with 95 % intervals clustered by trajectory"
+    )
+    add_words(figure, [heading], [f"In parentheses: pairs of {lines[0].label}."], width)
+    return figure
+
+
+def _table(task: str, lines: Sequence[_Line]) -> Table:
+    """Return the numbers of the figure, a row per run, curve and class."""
+    rows = []
+    for line in lines:
+        for curve in MEMORY_CURVES:
+            for name, rate in curve.rates(line.pairs).items():
+                cells = (line.label, curve.title, name, format_percent(rate), str(rate.n))
+                rows.append(Row(cells))
+    names = (Column("run", False), Column("by", False), Column("class", False))
+    columns = (*names, Column("pairs right, %"), Column("pairs"))
+    return Table(f"{task}: pairs of twins right", columns, tuple(rows))
