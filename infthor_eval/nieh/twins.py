@@ -29,14 +29,14 @@ def twin_side(task_samples: TaskSamples, sample: Sample) -> TwinSide | None:
         raise DataError(
             f"{data.root}: twins.jsonl has no pair with {question.traj_id}; make the twins again"
         )
-    positions = task_samples.context.positions(data, sample)
+    positions = task_samples.true_positions(sample)
     return TwinSide(
         pair=question.pair,
         fact=question.fact,
         kind=pair.kind,
         traj_id=question.traj_id,
         answers=_other(data, question).answers,
-        n_frames=len(positions),
+        n_frames=len(task_samples.positions(sample)),
         n_differing=sum(not pair.frames[position].same for position in positions),
         n_since_change=_frames_since_change(data, question.traj_id),
     )

@@ -1,6 +1,7 @@
 import pytest
 
-from infthor_eval.household.scene_types import scene_type, usual_tasks
+from infthor_eval.formats.scene_types import scene_type
+from infthor_eval.household.possible_tasks import usual_tasks
 from infthor_eval.household.tasks import SAMPLED, TaskType
 
 
