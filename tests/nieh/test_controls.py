@@ -241,7 +241,11 @@ def test_frames_are_in_the_same_order_in_both_worlds(twins, context):
 
 def test_the_flag_is_a_run_with_each_control(twins, tmp_path, run_cli):
     words = option_words(
-        model="oracle", tasks="nieh_twins", data=twins, output=tmp_path / "out", context="trajectory"
+        model="oracle",
+        tasks="nieh_twins",
+        data=twins,
+        output=tmp_path / "out",
+        context="trajectory",
     )
     code, output, err = run_cli(*words, "--controls")
     assert code == 0, err

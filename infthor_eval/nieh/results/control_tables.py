@@ -24,6 +24,10 @@ _NOTES = (
     "memory: shown minus no-clue. knowledge of homes: other minus blank. In points, with the 95 % "
     "interval, paired by question and clustered by trajectory.",
 )
+_ON_CLUES = (
+    "On the clue frames alone no-clue is blank, so its difference has knowledge of homes in it: "
+    "what is of this home there is shown minus other."
+)
 _PAIRS = (
     "pairs: both worlds' answers right, %. Who sees the same in both worlds has none, whatever it "
     "knows of homes."
@@ -46,7 +50,8 @@ def control_tables(runs: Sequence[RunSummary]) -> list[Table]:
         *map(Column, ("of which memory", "knowledge of homes", "n")),
     )
     rows = tuple(Row(tuple(_cells(group, task, with_pairs))) for group, task in found)
-    notes = (*_NOTES, *((_PAIRS,) if with_pairs else ()))
+    on_clues = any(row.cells[2] == "clues" for row in rows)
+    notes = (*_NOTES, *((_ON_CLUES,) if on_clues else ()), *((_PAIRS,) if with_pairs else ()))
     return [Table("Controls: memory of this home, and knowledge of homes", columns, rows, notes)]
 
 
