@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
-from infthor_eval.formats.scene_types import scene_type
 from infthor_eval.household import affordances
 from infthor_eval.household.affordances import (
     GOALS_BY_ROOM,
@@ -16,6 +15,7 @@ from infthor_eval.household.affordances import (
 )
 from infthor_eval.household.symbolic import ABSENT, SymbolicRoom
 from infthor_eval.household.tasks import SAMPLED, Task, TaskType
+from infthor_eval.scene_types import scene_type
 
 __all__ = ["tasks_of", "usual_tasks"]
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
-from infthor_eval.formats.scene_types import scene_type
+from infthor_eval.scene_types import scene_type
 
 __all__ = ["count_homes", "draw_other_home", "without_alike"]
 

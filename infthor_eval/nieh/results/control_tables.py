@@ -66,8 +66,8 @@ def without_alike_notes(runs: Sequence[RunSummary]) -> list[str]:
     if not names:
         return []
     return [
-        f"other: {', '.join(sorted(names))}: the set has no other home of this kind of room, so one "
-        "of another kind was shown."
+        f"other: {', '.join(sorted(names))}: the set has no other home of this kind of room, so "
+        "one of another kind was shown."
     ]
 
 
