@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.video import Video
@@ -80,6 +81,30 @@ def test_a_film_loses_its_clues(twins):
     seen = by_world(task_samples)
     own = own_pictures(twins, "0-one")
     assert seen["0-one"] == [own[at] for at in range(N_FRAMES) if at not in CLUES]
+
+
+def test_a_film_on_disk_loses_the_clues_among_its_sampled_frames(make_nieh_set, write_video):
+    # A frame a second of 50 steps are steps 0, 16, 33 and 49; the second is a clue, as is 20, which
+    # nobody sees.
+    root = make_nieh_set(
+        [Question("t", "Is there a mug?", (16, 20), ("yes",))], n_frames=50, size=8
+    )
+    write_video(root / "metadata" / "t" / "t_10fps.mp4", range(0, 250, 5))
+    shown, without = (find(root, frames, "video") for frames in ("shown", "no-clue"))
+    (sample,) = without.samples
+    (all_seen,) = by_world(shown).values()
+    (seen,) = by_world(without).values()
+    assert seen == [*all_seen[:1], *all_seen[2:]] and len(seen) == 3
+    assert shown_clues(without, sample).n_shown == 0
+    assert shown_clues(shown, shown.samples[0]).n_shown == 1
+
+
+def test_a_film_that_is_not_of_its_steps_is_refused(make_nieh_set, write_video):
+    root = make_nieh_set([Question("t", "Is there a mug?", (1,), ("yes",))], n_frames=20, size=8)
+    write_video(root / "metadata" / "t" / "t_10fps.mp4", range(0, 250, 5))
+    task_samples = find(root, "no-clue", "video", fps=10)
+    with pytest.raises(DataError, match="it is not known which are clues"):
+        task_samples.request(task_samples.samples[0])
 
 
 def test_nothing_is_taken_from_an_absence_or_changed_in_text(make_nieh_set):

@@ -97,7 +97,7 @@ def _cells(group: _Controls, task: str, with_pairs: bool) -> Iterator[str]:
         yield "-" if score is None else f"{100 * score.mean:.1f}"
     for frames in _FRAMES if with_pairs else ():
         pairs = tasks[frames].pairs if frames in tasks else None
-        yield format_percent(pairs and pairs.pair_accuracy)
+        yield format_percent(pairs.pair_accuracy if pairs else None)
     for frames, without in _DIFFERENCES:
         is_known = frames in group and without in group
         yield _points(
