@@ -1,11 +1,13 @@
 """Frame ablations of twins and of memories: both worlds see the same, and records say what."""
 
+import json
 from dataclasses import replace
 
 import pytest
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.outline import read_outline
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.video import Video
 from infthor_eval.nieh.asking.recalling import recall_all
@@ -290,3 +292,21 @@ def test_the_flag_beside_frames_and_for_other_suites_is_refused(twins, tmp_path,
     )
     words = option_words(model="scripted", tasks="infthor_plans_mini", output=tmp_path / "out")
     assert_refused(run_cli(*words, "--controls"), "--controls is for tasks of nieh")
+
+
+@pytest.mark.parametrize(
+    ("scene", "expected"),
+    [
+        ({"floor_plan": "kitchen-501"}, "kitchen-501"),
+        ({"floor_plan": "FloorPlan5", "scene_num": 9}, "FloorPlan5"),
+        # As the published saver writes them.
+        ({"floor_plan": "", "scene_num": 12}, "FloorPlan12"),
+        ({"floor_plan": None, "scene_num": "FloorPlan12"}, "FloorPlan12"),
+        ({}, None),
+        (None, None),
+    ],
+)
+def test_a_trajectorys_file_tells_its_scene(tmp_path, scene, expected):
+    path = tmp_path / "t.json"
+    path.write_text(json.dumps({"plan": {"low_actions": []}, "scene": scene}))
+    assert read_outline(path).floor_plan == expected

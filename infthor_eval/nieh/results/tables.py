@@ -78,7 +78,7 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def overview(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return each task's accuracy with intervals; and further tables, if there are any:
+    """Return each task's accuracy with intervals, and further tables as far as there are any:
     pairs, controls, gains, memories and repeats.
 
     A task that asked nothing is a line below the table.
