@@ -33,7 +33,7 @@ from infthor_eval.generation.questions.generate import (
 )
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.replay_set import replay_set, select
-from infthor_eval.household.scene_types import scene_type
+from infthor_eval.scene_types import scene_type
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 

@@ -43,6 +43,18 @@ class _Range(msgspec.Struct):
     low_pddl_idx: tuple[int, int]
 
 
+class _Scene(msgspec.Struct):
+    floor_plan: str | None = None
+    scene_num: int | str | None = None
+
+    @property
+    def name(self) -> str | None:
+        """The floor plan; from its number alone, where the published saver leaves it empty."""
+        if self.floor_plan or self.scene_num is None:
+            return self.floor_plan
+        return f"FloorPlan{str(self.scene_num).removeprefix('FloorPlan')}"
+
+
 class Outline(msgspec.Struct):
     """The part of a trajectory that contexts show.
 
@@ -52,6 +64,7 @@ class Outline(msgspec.Struct):
         sub_trajs: range [first, end) of the low-level actions of each goal.
         long_horizon_task: the final task.
         state_summary: state in words after each low-level action.
+        scene: where it is; None if the file does not say.
     """
 
     plan: _Plan
@@ -59,6 +72,12 @@ class Outline(msgspec.Struct):
     sub_trajs: list[_Range] = []
     long_horizon_task: _Goal | None = None
     state_summary: dict[int, str] | None = None
+    scene: _Scene | None = None
+
+    @property
+    def floor_plan(self) -> str | None:
+        """Name of the scene; None if the file does not say."""
+        return self.scene.name if self.scene else None
 
     @property
     def actions(self) -> list[str]:

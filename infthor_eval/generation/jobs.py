@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.generation.settings import MAX_FAIL, TrajectorySettings
-from infthor_eval.household.scene_types import BATHROOM, scene_type
+from infthor_eval.scene_types import BATHROOM, scene_type
 from infthor_eval.storage.limits import TRAJECTORIES
 
 __all__ = ["trajectory_jobs", "without_bathrooms"]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from infthor_eval.formats.object_ids import Words
-from infthor_eval.household.scene_types import usual_tasks
+from infthor_eval.household.possible_tasks import usual_tasks
 from infthor_eval.household.tasks import SAMPLED, TaskType
 
 __all__ = ["MAX_FAIL", "MIN_STEPS", "MIN_SUBGOALS", "TrajectorySettings"]

@@ -1,10 +1,11 @@
-"""The tasks that are possible with the objects of a room."""
+"""The tasks that are possible with the objects of a room, and those that its type usually has."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
 from infthor_eval.household import affordances
 from infthor_eval.household.affordances import (
+    GOALS_BY_ROOM,
     KNIVES,
     LIGHTS,
     MOVABLE_RECEPTACLES,
@@ -13,9 +14,10 @@ from infthor_eval.household.affordances import (
     goes_into,
 )
 from infthor_eval.household.symbolic import ABSENT, SymbolicRoom
-from infthor_eval.household.tasks import Task, TaskType
+from infthor_eval.household.tasks import SAMPLED, Task, TaskType
+from infthor_eval.scene_types import scene_type
 
-__all__ = ["tasks_of"]
+__all__ = ["tasks_of", "usual_tasks"]
 
 _TREATED = {
     TaskType.CLEAN: affordances.CLEANABLE,
@@ -27,6 +29,12 @@ _APPLIANCES = {
     TaskType.HEAT: {"Microwave"},
     TaskType.COOL: {"Fridge"},
 }
+
+
+def usual_tasks(scene: str) -> frozenset[TaskType]:
+    """Return the task types drawn from in a scene's room type, or all if that is unknown."""
+    room = scene_type(scene)
+    return frozenset(name for name in SAMPLED if room is None or room in GOALS_BY_ROOM[name])
 
 
 def tasks_of(room: SymbolicRoom, extra_types: Iterable[str] = ()) -> list[Task]:

@@ -4,16 +4,18 @@ To add a frame ablation: its effect here, its name in `options.py: FRAMES`.
 """
 
 import random
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
 from infthor_eval.formats.video import Video
 from infthor_eval.nieh.contexts import Context, ContextPart, Sample
-from infthor_eval.nieh.options import SHOWN, check_frames
+from infthor_eval.nieh.options import BLANK, NO_CLUE, OTHER, SHOWN, check_frames
+from infthor_eval.nieh.other_homes import count_homes, draw_other_home
 
 __all__ = ["FrameAblation"]
 
@@ -24,9 +26,10 @@ class FrameAblation:
 
     Attributes:
         frames: "shown" (the true frames), "blank" (grey frames of the same size), "shuffled" (the
-            true frames in another order) or "other" (frames at the same positions of another
-            trajectory of the set).
-        seed: seed of the order and of the choice of the other trajectory.
+            true frames in another order), "other" (frames at the same positions of another home of
+            the same kind of room) or "no-clue" (without the frames with the evidence, of twins of
+            both worlds).
+        seed: seed of the order and of the choice of the other home.
     """
 
     frames: str = SHOWN
@@ -40,9 +43,9 @@ class FrameAblation:
         """Check that a set allows the ablation.
 
         Raises:
-            UsageError: the set has no other trajectory.
+            UsageError: the set has no other home.
         """
-        if self.frames == "other" and len(_trajectories(data)) < 2:
+        if self.frames == OTHER and count_homes(data) < 2:
             raise UsageError(
                 f"--frames other: {data.root} has questions on one trajectory only; give another "
                 "set"
@@ -51,47 +54,113 @@ class FrameAblation:
     def apply(
         self, parts: Sequence[ContextPart], data: NiehSet, context: Context, sample: Sample
     ) -> list[ContextPart]:
-        """Return the parts of a request with the frames replaced."""
-        if self.frames == SHOWN:
-            return list(parts)
-        frames = [frame for part in parts for frame in _frames_in(part)]
-        if self.frames == "blank":
-            replacements = [blank_like(frame) for frame in frames]
-        elif self.frames == "shuffled":
-            replacements = self._shuffle(frames, sample.question.traj_id)
-        else:
-            replacements = self._frames_elsewhere(frames, data, context, sample)
-        left = iter(replacements)
-        return [_with_frames(part, [next(left) for _ in _frames_in(part)]) for part in parts]
+        """Return the parts of a request with the frames replaced, or without the clue frames.
 
-    def _shuffle(self, frames: Sequence[FrameRef], traj_id: str) -> list[FrameRef]:
-        """Return frames in another order, if any; the same for all questions in a context."""
-        draw = random.Random(
-            f"{self.seed}/{traj_id}/{'/'.join(frame.path.name for frame in frames)}"
-        )
-        shuffled = list(frames)
-        while len(set(frames)) > 1 and shuffled == list(frames):
-            draw.shuffle(shuffled)
-        return shuffled
+        Raises:
+            DataError: the other home cannot be read, or it is not known which frames of a film are
+                clues.
+        """
+        frames = [frame for part in parts for frame in _frames_in(part)]
+        if self.frames == SHOWN or not frames:
+            return list(parts)
+        # A memory that has not recalled yet shows the last of its frames alone.
+        places = sample.frames[-len(frames) :]
+        if self.frames == BLANK:
+            replaced: Sequence[FrameRef | None] = [blank_like(frame) for frame in frames]
+        elif self.frames == "shuffled":
+            replaced = self._shuffle(frames, places, sample.question)
+        elif self.frames == NO_CLUE:
+            positions = self._positions(data, context, sample)[-len(frames) :]
+            replaced = self._without_clues(frames, positions, data, sample)
+        else:
+            replaced = self._frames_elsewhere(places, data, context, sample)
+        left = iter(replaced)
+        return [kept for part in parts for kept in _with_frames(part, left)]
+
+    def hidden(self, data: NiehSet, question: Question) -> frozenset[int]:
+        """Return the positions in the trajectory of the frames that nobody is shown: the clues.
+
+        There are none without this ablation, and for an absence, of which no frame is evidence.
+        """
+        if self.frames != NO_CLUE or not question.has_evidence or not data.has_frames:
+            return frozenset()
+        return frozenset(data.clue_positions(question))
+
+    def positions(self, data: NiehSet, context: Context, sample: Sample) -> list[int]:
+        """Return where in the trajectory's time order the frames of a request are.
+
+        Those that stand for others have the positions of these.
+
+        Raises:
+            DataError: it is not known which frames of a film are clues.
+        """
+        positions = self._positions(data, context, sample)
+        hidden = self.hidden(data, sample.question)
+        if _keeps_places(sample) or hidden.issuperset(positions):
+            return positions
+        return [position for position in positions if position not in hidden]
+
+    def true_positions(self, data: NiehSet, context: Context, sample: Sample) -> list[int]:
+        """Return the same, of those frames alone that are what the trajectory has there."""
+        if self.frames in (BLANK, OTHER):
+            return []
+        hidden = self.hidden(data, sample.question)
+        positions = self.positions(data, context, sample)
+        return [position for position in positions if position not in hidden]
+
+    def _positions(self, data: NiehSet, context: Context, sample: Sample) -> list[int]:
+        """Return where in the trajectory the frames of a sample are, before any is taken out."""
+        positions = list(context.positions(data, sample))
+        if self.frames == NO_CLUE and len(positions) != len(sample.frames):
+            raise DataError(
+                f"the film of {sample.question.traj_id} shows {len(sample.frames)} frames where "
+                f"its trajectory has {len(positions)}, so it is not known which are clues; leave "
+                "out --frames no-clue"
+            )
+        return positions
+
+    def _without_clues(
+        self,
+        frames: Sequence[FrameRef],
+        positions: Sequence[int],
+        data: NiehSet,
+        sample: Sample,
+    ) -> list[FrameRef | None]:
+        """Return frames without the clues: None, or blank where positions or any frame must be
+        kept."""
+        hidden = self.hidden(data, sample.question)
+        blanks = _keeps_places(sample) or hidden.issuperset(positions)
+        return [
+            frame if position not in hidden else blank_like(frame) if blanks else None
+            for frame, position in zip(frames, positions, strict=True)
+        ]
+
+    def _shuffle(
+        self, frames: Sequence[FrameRef], places: Sequence[int], question: Question
+    ) -> list[FrameRef]:
+        """Return frames in another order, if any; the same for all questions in a context.
+
+        It depends on where they are, not on their pictures, so it is the same in both worlds of
+        twins.
+        """
+        draw = random.Random(f"{self.seed}/{question.cluster}/{'/'.join(map(str, places))}")
+        order = list(range(len(places)))
+        while len(set(places)) > 1 and [places[at] for at in order] == list(places):
+            draw.shuffle(order)
+        return [frames[at] for at in order]
 
     def _frames_elsewhere(
-        self, frames: Sequence[FrameRef], data: NiehSet, context: Context, sample: Sample
+        self, places: Sequence[int], data: NiehSet, context: Context, sample: Sample
     ) -> list[FrameRef]:
-        """Return another trajectory's frames at the same positions, modulo its length."""
-        traj_id = sample.question.traj_id
-        others = [other for other in _trajectories(data) if other != traj_id]
-        other_frames = context.frames(
-            data, random.Random(f"{self.seed}/{traj_id}").choice(others), sample.fps
-        )
-        positions = {
-            frame: position
-            for position, frame in enumerate(context.frames(data, traj_id, sample.fps))
-        }
-        return [other_frames[positions[frame] % len(other_frames)] for frame in frames]
+        """Return another home's frames at the same positions, modulo its length."""
+        other = draw_other_home(data, sample.question, self.seed)
+        frames = context.frames(data, other, sample.fps)
+        return [frames[place % len(frames)] for place in places]
 
 
-def _trajectories(data: NiehSet) -> list[str]:
-    return sorted({question.traj_id for question in data.questions})
+def _keeps_places(sample: Sample) -> bool:
+    """Return True where a memory recalls by position: no frame can be taken out."""
+    return sample.recall is not None or sample.recalled is not None
 
 
 def _frames_in(part: ContextPart) -> tuple[FrameRef, ...]:
@@ -100,7 +169,9 @@ def _frames_in(part: ContextPart) -> tuple[FrameRef, ...]:
     return (part,) if isinstance(part, FrameRef) else ()
 
 
-def _with_frames(part: ContextPart, frames: Sequence[FrameRef]) -> ContextPart:
-    if isinstance(part, Video):
-        return Video(tuple(frames), part.fps)
-    return frames[0] if frames else part
+def _with_frames(part: ContextPart, left: Iterator[FrameRef | None]) -> list[ContextPart]:
+    """Return a part with the next of the frames that are left; none if its own is taken out."""
+    if isinstance(part, str):
+        return [part]
+    frames = [frame for _ in _frames_in(part) if (frame := next(left)) is not None]
+    return [Video(tuple(frames), part.fps)] if isinstance(part, Video) else list(frames)

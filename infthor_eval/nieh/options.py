@@ -6,10 +6,13 @@ from infthor_eval.errors import UsageError
 from infthor_eval.memory.options import MemoryOptions
 from infthor_eval.nieh.prompts import PROMPTS, PUBLISHED_MAIN
 
-__all__ = ["FRAMES", "SHOWN", "NiehOptions", "check_frames"]
+__all__ = ["BLANK", "FRAMES", "NO_CLUE", "OTHER", "SHOWN", "NiehOptions", "check_frames"]
 
 SHOWN = "shown"
-FRAMES = (SHOWN, "blank", "shuffled", "other")  # see `infthor_eval.nieh.frame_ablations`
+BLANK = "blank"
+OTHER = "other"
+NO_CLUE = "no-clue"
+FRAMES = (SHOWN, BLANK, "shuffled", OTHER, NO_CLUE)  # see `infthor_eval.nieh.frame_ablations`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,10 +77,17 @@ class NiehOptions(MemoryOptions):
     frames: str = field(
         default=SHOWN,
         metadata={
-            "help": f"Frames to show, a run with each: {', '.join(FRAMES)} (of another "
-            "trajectory).",
+            "help": f"Frames to show, a run with each: {SHOWN}, {BLANK}, shuffled, {OTHER} (of "
+            f"another home), {NO_CLUE} (without the evidence).",
             "metavar": "HOW,...",
             "each": True,
+            "shorthands": {
+                "controls": (
+                    f"{SHOWN},{NO_CLUE},{BLANK},{OTHER}",
+                    "What of the score is memory, and what knowledge of homes: a run with each of "
+                    f"--frames {SHOWN},{NO_CLUE},{BLANK},{OTHER}.",
+                )
+            },
         },
     )
     prompt: str | None = field(

@@ -47,7 +47,8 @@ class ShownClues(msgspec.Struct, frozen=True, kw_only=True):
     """How much of the evidence was among the shown frames.
 
     Attributes:
-        n_shown: number of clue frames among them.
+        n_shown: number of clue frames among them. Blank frames and those of another home count as
+            what they stand for; those that are taken out or hidden do not.
         n_clues: number of different clue frames.
         n_after: number of frames of the trajectory after the last clue; None if its length is not
             known.

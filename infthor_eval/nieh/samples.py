@@ -21,6 +21,7 @@ from infthor_eval.nieh.contexts import (
     context_named,
 )
 from infthor_eval.nieh.frame_ablations import FrameAblation
+from infthor_eval.nieh.options import NO_CLUE
 from infthor_eval.nieh.prompts import PUBLISHED_MAIN
 from infthor_eval.nieh.published.hub_data import default_folder
 from infthor_eval.runs.limiting import spread
@@ -73,15 +74,29 @@ class TaskSamples:
     def all_frames(self, sample: Sample) -> list[FrameRef]:
         """Return all frames of the trajectory as a memory observes them: ablated, in their order.
 
+        Those that one question alone hides are not (`hidden`).
+
         Raises:
             DataError: the trajectory cannot be read.
         """
         frames = self.data.frames(sample.question.traj_id)
         # The shown ones are shuffled, once they are recalled.
-        if self.frame_ablation.frames == "shuffled":
+        if self.frame_ablation.frames in ("shuffled", NO_CLUE):
             return list(frames)
         ablated = self.frame_ablation.apply(frames, self.data, self.context, sample)
         return [part for part in ablated if isinstance(part, FrameRef)]
+
+    def hidden(self, sample: Sample) -> frozenset[int]:
+        """See `FrameAblation.hidden`."""
+        return self.frame_ablation.hidden(self.data, sample.question)
+
+    def positions(self, sample: Sample) -> list[int]:
+        """See `FrameAblation.positions`."""
+        return self.frame_ablation.positions(self.data, self.context, sample)
+
+    def true_positions(self, sample: Sample) -> list[int]:
+        """See `FrameAblation.true_positions`."""
+        return self.frame_ablation.true_positions(self.data, self.context, sample)
 
     def request(self, sample: Sample) -> tuple[list[ContextPart], str]:
         """Return the request of a sample: the context, and the text with the question after it."""

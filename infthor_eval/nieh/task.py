@@ -19,7 +19,8 @@ from infthor_eval.nieh.contexts import (
     check_prompt,
 )
 from infthor_eval.nieh.metrics import PUBLISHED, Metrics, metrics_of
-from infthor_eval.nieh.options import NiehOptions
+from infthor_eval.nieh.options import OTHER, NiehOptions
+from infthor_eval.nieh.other_homes import without_alike
 from infthor_eval.nieh.samples import TaskSamples, find_samples, find_set
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
@@ -145,6 +146,9 @@ class NiehTask:
         film: Literal["video", "images"] | None = None
         if samples.shows_films and video_input is not None:
             film = "video" if video_input else "images"
+        without: tuple[str, ...] = ()
+        if samples.frame_ablation.frames == OTHER:
+            without = without_alike(samples.data, [it.question for it in samples.samples])
         return NiehTaskConfig(
             settings=dict(self.settings),
             decoding=prepared.decoding.document(),
@@ -158,6 +162,7 @@ class NiehTask:
                 for it in samples.skipped
             ),
             film=film,
+            without_alike=without,
         )
 
 

@@ -29,7 +29,8 @@ def twin_side(task_samples: TaskSamples, sample: Sample) -> TwinSide | None:
         raise DataError(
             f"{data.root}: twins.jsonl has no pair with {question.traj_id}; make the twins again"
         )
-    positions = task_samples.context.positions(data, sample)
+    shown = task_samples.positions(sample)
+    true = task_samples.true_positions(sample)
     clues = data.clue_positions(question) if data.has_frames else question.clues
     return TwinSide(
         pair=question.pair,
@@ -37,9 +38,9 @@ def twin_side(task_samples: TaskSamples, sample: Sample) -> TwinSide | None:
         kind=pair.kind,
         traj_id=question.traj_id,
         answers=_other(data, question).answers,
-        n_frames=len(positions),
-        n_differing=sum(not pair.frames[position].same for position in positions),
-        n_after_clues=sum(position > max(clues) for position in positions),
+        n_frames=len(shown),
+        n_differing=sum(not pair.frames[position].same for position in true),
+        n_after_clues=sum(position > max(clues) for position in shown),
         n_since_change=_frames_since_change(data, question.traj_id),
     )
 

@@ -65,13 +65,16 @@ class NiehUnit(Unit[NiehAnswer]):
 
 
 def shown_clues(task_samples: TaskSamples, sample: Sample) -> ShownClues | None:
-    """Return the clue frames that a sample shows; None for absences and sets without frames."""
+    """Return the clue frames that a sample shows; None for absences and sets without frames.
+
+    Blank frames and those of another home count as what they stand for; hidden ones do not.
+    """
     data = task_samples.data
     question = sample.question
     if not question.has_evidence or not data.has_frames:
         return None
     clues = sorted(set(data.clue_positions(question)))
-    positions = set(task_samples.context.positions(data, sample))
+    positions = set(task_samples.positions(sample)) - task_samples.hidden(sample)
     n_after = len(data.frames(question.traj_id)) - 1 - clues[-1]
     return ShownClues(
         n_shown=len(positions.intersection(clues)), n_clues=len(clues), n_after=n_after

@@ -1,7 +1,8 @@
 import pytest
 
-from infthor_eval.household.scene_types import scene_type, usual_tasks
+from infthor_eval.household.possible_tasks import usual_tasks
 from infthor_eval.household.tasks import SAMPLED, TaskType
+from infthor_eval.scene_types import scene_type
 
 
 @pytest.mark.parametrize(

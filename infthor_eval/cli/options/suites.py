@@ -22,6 +22,11 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     Suites with an option of one name share it; its help has the text of each.
     """
+    for name, by_suite in _shorthands().items():
+        _, help_text = next(iter(by_suite.values())).metadata["shorthands"][name]
+        command = click.option(
+            f"--{name}", is_flag=True, default=None, help=f"{help_text} [{', '.join(by_suite)}]"
+        )(command)
     for name, by_suite in reversed(_options_by_name().items()):
         first, option = next(iter(by_suite.items()))
         kind = _value_type(typing.get_type_hints(options_class(first))[name])
@@ -42,14 +47,14 @@ def suite_values(params: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options of all suites among the parameters of a command; None where not given."""
     # A suite that was installed after the command was imported has options that the command does
     # not know.
-    return {name: params.get(name) for name in _options_by_name()}
+    return {name: params.get(name) for name in (*_options_by_name(), *_shorthands())}
 
 
 def expand_suite_options(suite: str, params: Mapping[str, Any], used: Collection[str]) -> list[Any]:
     """Return the options of a suite for each of its runs.
 
     An option with `each` in its metadata takes several values with commas, and there is a run for
-    each of them.
+    each of them. A flag in its `shorthands` stands for such values.
 
     Args:
         suite: name of the suite.
@@ -57,16 +62,18 @@ def expand_suite_options(suite: str, params: Mapping[str, Any], used: Collection
         used: names of the suites that the tasks belong to.
 
     Raises:
-        UsageError: an option belongs to no suite that is used.
+        UsageError: an option belongs to no suite that is used, or a flag stands for one that is
+            given as well.
     """
     _refuse_unused(params, used)
     kinds = typing.get_type_hints(options_class(suite))
     values: dict[str, list[Any]] = {}
     for option in fields(options_class(suite)):
-        if params.get(option.name) is not None:
-            typed = [params[option.name]]
+        value = _value(option, params)
+        if value is not None:
+            typed = [value]
             if option.metadata.get("each"):
-                typed = list(split_names(params[option.name], f"--{option.name}"))
+                typed = list(split_names(value, f"--{option.name}"))
             values[option.name] = [
                 msgspec.convert(value, kinds[option.name], strict=False) for value in typed
             ]
@@ -94,6 +101,20 @@ def refuse_duplicate_options(command: Callable[..., Any]) -> None:
         )
 
 
+def _value(option: Field[Any], params: Mapping[str, Any]) -> Any:
+    """Return what is given for an option, by itself or by a flag that stands for its values."""
+    value = params.get(option.name)
+    for name, (meant, _) in option.metadata.get("shorthands", {}).items():
+        if params.get(name):
+            if value is not None:
+                raise UsageError(
+                    f"--{name} and --{option.name}: the first is --{option.name} {meant}; give one "
+                    "of them"
+                )
+            return meant
+    return value
+
+
 def _options_by_name() -> dict[str, dict[str, Field[Any]]]:
     """The options of all suites by name, then by suite."""
     options: dict[str, dict[str, Field[Any]]] = {}
@@ -103,8 +124,18 @@ def _options_by_name() -> dict[str, dict[str, Field[Any]]]:
     return options
 
 
+def _shorthands() -> dict[str, dict[str, Field[Any]]]:
+    """The options that have a flag for several of their values: by the flag, then by suite."""
+    flags: dict[str, dict[str, Field[Any]]] = {}
+    for by_suite in _options_by_name().values():
+        for suite, option in by_suite.items():
+            for flag in option.metadata.get("shorthands", {}):
+                flags.setdefault(flag, {})[suite] = option
+    return flags
+
+
 def _refuse_unused(params: Mapping[str, Any], used: Collection[str]) -> None:
-    for name, by_suite in _options_by_name().items():
+    for name, by_suite in (_options_by_name() | _shorthands()).items():
         if params.get(name) is not None and not set(by_suite) & set(used):
             raise UsageError(
                 f"--{name.replace('_', '-')} is for tasks of {' and '.join(by_suite)}; --tasks "

@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from infthor_eval.errors import InfthorError, ModelError, UsageError
+from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.memory import (
@@ -42,10 +43,10 @@ _IN_USE = threading.Lock()  # memories are shared by a process, and serve one tr
 
 
 class _Built(NamedTuple):
-    """A memory that has observed a trajectory up to the step before the last: steps as it sees
-    them, seconds taken."""
+    """A memory that has observed a trajectory up to the step before the last: steps as they are and
+    as it sees them, seconds taken."""
 
-    traj_id: str
+    observed: Sequence[Observation]
     settings: RecallSettings
     memory: Memory
     steps: Sequence[Observation]
@@ -128,11 +129,20 @@ class Recaller:
         return result
 
     def _observations(self, sample: Sample) -> tuple[list[Observation], list[str]]:
+        """Return what is observed for a sample's question: blank frames where its clues are hidden,
+        which keeps the positions of all others."""
         traj_id = sample.question.traj_id
         if traj_id not in self._observed:
             steps = _observations(self._task_samples, sample)
             self._observed[traj_id] = steps, [step.frame.digest for step in steps]
-        return self._observed[traj_id]
+        hidden = self._task_samples.hidden(sample)
+        if not hidden:
+            return self._observed[traj_id]
+        steps = [
+            replace(step, frame=blank_like(step.frame)) if step.number in hidden else step
+            for step in self._observed[traj_id][0]
+        ]
+        return steps, [step.frame.digest for step in steps]
 
     def _identity(self, settings: RecallSettings) -> dict[str, Any]:
         if settings not in self._identities:  # it reads the source of a memory of one's own
@@ -156,11 +166,8 @@ class Recaller:
         self, question: Question, settings: RecallSettings, steps: Sequence[Observation]
     ) -> _Built:
         """Return the memory with the trajectory observed."""
-        traj_id = question.traj_id
-        if self._built is None or (self._built.traj_id, self._built.settings) != (
-            traj_id,
-            settings,
-        ):
+        built = self._built
+        if built is None or built.observed is not steps or built.settings != settings:
             memory = open_memory(settings.memory, settings.options)
             write = self._write if memory.capabilities.writes else None
             if memory.capabilities.writes and write is None:
@@ -179,8 +186,9 @@ class Recaller:
                 memory.begin(facts)
                 for step in seen[:-1]:
                     memory.observe(step)
-            self._built = _Built(traj_id, settings, memory, seen, time.perf_counter() - start)
-        return self._built
+            built = _Built(steps, settings, memory, seen, time.perf_counter() - start)
+            self._built = built
+        return built
 
 
 def apply_recall(sample: Sample, recall: NiehRecall) -> Sample:

@@ -79,7 +79,7 @@ class RequestRebuilder:
             != record.fingerprint
         ):
             raise DataError("made again, it is another request than the one that was sent")
-        positions = self._context.positions(self._samples.data, sample)
+        positions = self._samples.positions(sample)
         return RebuiltRequest(sample.question.traj_id, context, text, positions)
 
     def _find_sample(self, record: UnitRecord[NiehAnswer]) -> Sample:

@@ -1,4 +1,7 @@
-"""Gains over blank frames: how much higher a model scores with frames than by the wording alone."""
+"""Gains by frames: how much higher a model scores with some frames than with others or with none.
+
+Runs are set side by side if they are alike but for their frames.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -6,19 +9,17 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from infthor_eval.nieh.config import NiehConfig
-from infthor_eval.nieh.options import SHOWN
+from infthor_eval.nieh.options import BLANK, SHOWN
 from infthor_eval.nieh.results.summary import TaskSummary
 from infthor_eval.runs import RunSummary
 from infthor_eval.statistics import MeanEstimate, paired_difference
 
-__all__ = ["Gain", "find_gains", "frames_of", "name_of"]
-
-_BLANK = "blank"
+__all__ = ["Gain", "alike_but_for_frames", "find_gains", "frames_of", "name_of"]
 
 
 @dataclass(frozen=True)
 class Gain:
-    """The gain of a run with frames over its run on blank ones, in one task under one scorer."""
+    """The gain of a run over its run that sees less, in one task under one scorer."""
 
     run: RunSummary
     task: str
@@ -57,12 +58,25 @@ def find_gains(runs: Sequence[RunSummary]) -> Iterator[Gain]:
     """Yield the gain of every run that has a run on blank frames, equal but for that, beside it."""
     for run in runs:
         for blind in runs:
-            is_pair = frames_of(run) != _BLANK and frames_of(blind) == _BLANK
+            is_pair = frames_of(run) != BLANK and frames_of(blind) == BLANK
             if is_pair and _without_frames(run) == _without_frames(blind):
                 for name, task in run.summary.tasks.items():
                     yield from (
                         Gain(run, name, m, task, blind.summary.tasks[name]) for m in task.metrics
                     )
+
+
+def alike_but_for_frames(runs: Sequence[RunSummary]) -> list[dict[str, RunSummary]]:
+    """Return the groups of runs that differ in their frames alone: of each group by its frames."""
+    groups: list[tuple[NiehConfig, dict[str, RunSummary]]] = []
+    for run in runs:
+        config = _without_frames(run)
+        group = next((group for known, group in groups if known == config), None)
+        if group is None:
+            group = {}
+            groups.append((config, group))
+        group.setdefault(frames_of(run), run)
+    return [group for _, group in groups]
 
 
 def frames_of(run: RunSummary) -> str:
@@ -81,4 +95,5 @@ def _without_frames(run: RunSummary) -> NiehConfig:
     rescored = config.rescored
     if rescored is not None:  # from runs that differ in their frames
         rescored = replace(rescored, source=None)
-    return replace(config, frames="", rescored=rescored)
+    tasks = {name: replace(task, without_alike=()) for name, task in config.tasks.items()}
+    return replace(config, frames="", rescored=rescored, tasks=tasks)

@@ -6,6 +6,7 @@ from infthor_eval.formats.published import PublishedRow, PublishedTable, publish
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.rescoring.report import sources_of
+from infthor_eval.nieh.results.control_tables import control_tables, without_alike_notes
 from infthor_eval.nieh.results.effective_length import effective_lengths
 from infthor_eval.nieh.results.evidence_tables import (
     above_guessing_cell,
@@ -47,7 +48,7 @@ _EMBEDDED = (
 
 
 def tables(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return the tables of runs: by depth and clues, gains over blank frames, form of replies.
+    """Return the tables of runs: by depth and clues, controls, gains over blank frames, form.
 
     Published rows by clues are below ours; a published table of other columns (question types,
     question files) is a table of its own beside runs in its context, with ours in it where they
@@ -63,6 +64,7 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
     ]
     return [
         *pair_tables(runs),
+        *control_tables(runs),
         *_depth_table(runs),
         *others,
         clues_table(runs),
@@ -76,7 +78,8 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def overview(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return each task's accuracy with intervals; and pairs, gains, memories and repeats if any.
+    """Return each task's accuracy with intervals, and further tables as far as there are any:
+    pairs, controls, gains, memories and repeats.
 
     A task that asked nothing is a line below the table.
     """
@@ -96,6 +99,7 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
     return [
         *pair_overview(runs),
         table,
+        *control_tables(runs),
         *_gains_table(runs),
         *memory_tables(runs),
         *repeat_tables(runs),
@@ -164,6 +168,7 @@ def _notes(runs: Sequence[RunSummary]) -> list[str]:
     )
     return [
         *embedded,
+        *without_alike_notes(runs),
         *(f"{metric}: {source}." for metric, source in sources if metric not in SCORERS),
     ]
 

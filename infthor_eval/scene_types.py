@@ -1,11 +1,8 @@
-"""Room types of scenes, by their names, and the task types of each."""
+"""Room types of scenes, by their names."""
 
 import re
 
-from infthor_eval.household.affordances import GOALS_BY_ROOM
-from infthor_eval.household.tasks import SAMPLED, TaskType
-
-__all__ = ["BATHROOM", "scene_type", "usual_tasks"]
+__all__ = ["BATHROOM", "scene_type"]
 
 BATHROOM = "Bathroom"
 _PROCEDURAL = {
@@ -30,9 +27,3 @@ def scene_type(scene: str) -> str | None:
             (name for name, numbers in _FLOOR_PLANS.items() if int(number[1]) in numbers), None
         )
     return _PROCEDURAL.get(scene.rpartition("-")[0])
-
-
-def usual_tasks(scene: str) -> frozenset[TaskType]:
-    """Return the task types drawn from in a scene's room type, or all if that is unknown."""
-    room = scene_type(scene)
-    return frozenset(name for name in SAMPLED if room is None or room in GOALS_BY_ROOM[name])
