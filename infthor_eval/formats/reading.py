@@ -31,6 +31,7 @@ __all__ = [
     "lines_of",
     "read_bytes",
     "read_json",
+    "read_packed_bytes",
     "read_text",
     "require_file",
     "require_plain_files",
@@ -92,6 +93,26 @@ def read_bytes(path: Path, hint: str) -> bytes:
         return path.read_bytes()
 
 
+def read_packed_bytes(path: Path, hint: str) -> bytes:
+    """Return the unpacked content of a file that may be packed (`.gz`).
+
+    Raises:
+        DataError: as `read_bytes`, or it is damaged.
+    """
+    if path.suffix != ".gz":
+        return read_bytes(path, hint)
+    require_file(path, hint)
+    limit = FILE_MB.value * _MB
+    with (
+        wrap_errors(f"{path}: cannot be unpacked", hint, catch=(OSError, *DAMAGED)),
+        gzip.open(path) as file,
+    ):
+        content = file.read(limit + 1)
+    if len(content) > limit:
+        raise DataError(f"{path}: is larger than {FILE_MB.value} MiB; {FILE_MB.hint}")
+    return content
+
+
 def read_text(path: Path, hint: str) -> str:
     """Return the content of a UTF-8 file without byte order mark; line ends are not converted.
 
@@ -107,13 +128,13 @@ def read_json(path: Path, hint: str) -> Any: ...
 @overload
 def read_json(path: Path, hint: str, data_type: type[T]) -> T: ...
 def read_json(path: Path, hint: str, data_type: Any = Any) -> Any:
-    """Return the content of a JSON file as the type that `msgspec` decodes it to.
+    """Return the content of a JSON file (`.gz` too) as the type that `msgspec` decodes it to.
 
     Raises:
-        DataError: as `read_bytes`, or the content is not JSON, nested too deep, or does not match
-            the type.
+        DataError: as `read_packed_bytes`, or the content is not JSON, nested too deep, or does not
+            match the type.
     """
-    content = read_bytes(path, hint)
+    content = read_packed_bytes(path, hint)
     expected = "valid JSON" if data_type is Any else "in its documented form"
     with wrap_errors(f"{path}: not {expected}", hint, catch=NOT_JSON):
         return msgspec.json.decode(content, type=data_type)

@@ -1,5 +1,7 @@
 """The log of a replayed trajectory: `metadata/<traj_id>/metadata.json`, one entry per frame.
 
+It may be packed, as `metadata.json.gz`.
+
 Published data have four layouts (`Layout`), and all are read. In the last one `img_idx` is a list
 of objects with `low_idx` and `img_filename`, as the loader of the branch `dev` reads it. Published
 entries have `img_idx`, `img_filename`, `step` and `object_log`. Ours add optional fields for the
@@ -9,6 +11,7 @@ Frame 0 shows the scene before the first action, frame k + 1 the outcome of low-
 `step` is the index of that action. Frame 0 has step 0, as in the published logs, and no `action`.
 """
 
+import gzip
 from collections.abc import Iterator, Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -28,11 +31,14 @@ __all__ = [
     "Step",
     "iter_object_states",
     "layout_of",
+    "log_file",
+    "pack_steps",
     "read_steps",
     "write_steps",
 ]
 
 _FILE = "metadata.json"
+_PACKED = ".gz"
 _HINT = "replay the trajectory again or restore the published file"
 
 
@@ -160,13 +166,19 @@ class Step(msgspec.Struct, omit_defaults=True):
     low_idx: int | None = None
 
 
+def log_file(folder: Path) -> Path:
+    """Return the file of the log of the trajectory in `metadata/<traj_id>`, if it has one."""
+    packed = Path(folder) / f"{_FILE}{_PACKED}"
+    return packed if packed.is_file() else Path(folder) / _FILE
+
+
 def read_steps(folder: Path) -> list[Step]:
     """Read the log of the trajectory in `metadata/<traj_id>`: an entry a frame, in file order.
 
     Raises:
         DataError: the file is missing, not JSON, or has none of the known layouts.
     """
-    path = Path(folder) / _FILE
+    path = log_file(folder)
     document = read_json(path, _HINT)
     return [_step(path, index, entry) for index, entry in enumerate(_entries(path, document))]
 
@@ -175,6 +187,12 @@ def write_steps(folder: Path, steps: Sequence[Step]) -> None:
     """Write the log of a trajectory into its folder, which must exist: a list, an entry a line."""
     lines = b",\n".join(msgspec.json.encode(step) for step in steps)
     (Path(folder) / _FILE).write_bytes(b"[\n" + lines + b"\n]\n")
+
+
+def pack_steps(source: Path, folder: Path) -> None:
+    """Write the log of the trajectory in `source` into another folder, packed."""
+    content = gzip.compress(log_file(source).read_bytes(), mtime=0)  # the same bytes each time
+    (folder / f"{_FILE}{_PACKED}").write_bytes(content)
 
 
 def iter_object_states(steps: Sequence[Step]) -> Iterator[dict[str, ObjectState]]:
@@ -194,7 +212,7 @@ def layout_of(folder: Path) -> Layout:
     Raises:
         DataError: the file is missing, not JSON, or has none of the known layouts.
     """
-    path = Path(folder) / _FILE
+    path = log_file(folder)
     return _layout(path, read_json(path, _HINT))
 
 

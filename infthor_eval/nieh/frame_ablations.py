@@ -66,9 +66,7 @@ class FrameAblation:
 
     def _shuffle(self, frames: Sequence[FrameRef], traj_id: str) -> list[FrameRef]:
         """Return frames in another order, if any; the same for all questions in a context."""
-        draw = random.Random(
-            f"{self.seed}/{traj_id}/{'/'.join(frame.path.name for frame in frames)}"
-        )
+        draw = random.Random(f"{self.seed}/{traj_id}/{'/'.join(frame.name for frame in frames)}")
         shuffled = list(frames)
         while len(set(frames)) > 1 and shuffled == list(frames):
             draw.shuffle(shuffled)
