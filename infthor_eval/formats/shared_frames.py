@@ -2,7 +2,8 @@
 
 They are in the set's `frames/`, named by the digest of their content. `frames.txt` in a
 trajectory's folder has the name of each frame's picture, a line a frame. Patches that are laid over
-it follow in the same line, the lowest first: `NAME NAME@LEFT,TOP`.
+it follow in the same line, the lowest first: `NAME NAME@LEFT,TOP`. The file may be packed, as
+`frames.txt.xz`.
 """
 
 import re
@@ -12,8 +13,9 @@ from pathlib import Path
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef, Patch
-from infthor_eval.formats.reading import read_text
+from infthor_eval.formats.reading import find_packed, read_text
 from infthor_eval.storage.digests import digest, digest_of_file
+from infthor_eval.storage.files import write_packed
 
 __all__ = [
     "patched_name",
@@ -62,9 +64,13 @@ def patched_name(below: str, patch: str, left: int, top: int) -> str:
     return f"{below} {patch}@{left},{top}"
 
 
-def write_frame_names(folder: Path, names: Sequence[str]) -> None:
+def write_frame_names(folder: Path, names: Sequence[str], *, packed: bool = False) -> None:
     """Write the names of a trajectory's pictures into its folder, in order of the frames."""
-    (folder / _NAMES).write_text("".join(f"{name}\n" for name in names), encoding="utf-8")
+    content = "".join(f"{name}\n" for name in names).encode()
+    if packed:
+        write_packed(folder / _NAMES, content)
+    else:
+        (folder / _NAMES).write_bytes(content)
 
 
 def read_shared_frames(folder: Path, numbers: Sequence[int]) -> dict[int, FrameRef] | None:
@@ -73,7 +79,7 @@ def read_shared_frames(folder: Path, numbers: Sequence[int]) -> dict[int, FrameR
     Raises:
         DataError: a name is none of ours, or there is not one for each number.
     """
-    path = folder / _NAMES
+    path = find_packed(folder / _NAMES)
     if not path.is_file():
         return None
     root = folder.parent.parent

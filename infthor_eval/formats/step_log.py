@@ -1,6 +1,6 @@
 """The log of a replayed trajectory: `metadata/<traj_id>/metadata.json`, one entry per frame.
 
-It may be packed, as `metadata.json.gz`.
+It may be packed, as `metadata.json.xz`.
 
 Published data have four layouts (`Layout`), and all are read. In the last one `img_idx` is a list
 of objects with `low_idx` and `img_filename`, as the loader of the branch `dev` reads it. Published
@@ -11,7 +11,6 @@ Frame 0 shows the scene before the first action, frame k + 1 the outcome of low-
 `step` is the index of that action. Frame 0 has step 0, as in the published logs, and no `action`.
 """
 
-import gzip
 from collections.abc import Iterator, Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -20,7 +19,8 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.reading import read_json
+from infthor_eval.formats.reading import find_packed, read_json, read_packed_bytes
+from infthor_eval.storage.files import write_packed
 
 __all__ = [
     "Layout",
@@ -38,7 +38,6 @@ __all__ = [
 ]
 
 _FILE = "metadata.json"
-_PACKED = ".gz"
 _HINT = "replay the trajectory again or restore the published file"
 
 
@@ -168,8 +167,7 @@ class Step(msgspec.Struct, omit_defaults=True):
 
 def log_file(folder: Path) -> Path:
     """Return the file of the log of the trajectory in `metadata/<traj_id>`, if it has one."""
-    packed = Path(folder) / f"{_FILE}{_PACKED}"
-    return packed if packed.is_file() else Path(folder) / _FILE
+    return find_packed(Path(folder) / _FILE)
 
 
 def read_steps(folder: Path) -> list[Step]:
@@ -191,8 +189,7 @@ def write_steps(folder: Path, steps: Sequence[Step]) -> None:
 
 def pack_steps(source: Path, folder: Path) -> None:
     """Write the log of the trajectory in `source` into another folder, packed."""
-    content = gzip.compress(log_file(source).read_bytes(), mtime=0)  # the same bytes each time
-    (folder / f"{_FILE}{_PACKED}").write_bytes(content)
+    write_packed(Path(folder) / _FILE, read_packed_bytes(log_file(source), _HINT))
 
 
 def iter_object_states(steps: Sequence[Step]) -> Iterator[dict[str, ObjectState]]:

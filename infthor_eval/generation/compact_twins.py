@@ -57,7 +57,7 @@ def _copy_worlds(
         folder = out / "metadata" / name
         folder.mkdir(parents=True)
         stored = [pictures.name(frame) for frame in frames]
-        write_frame_names(folder, stored)
+        write_frame_names(folder, stored, packed=True)
         pack_steps(data.folder(name), folder)
         yield name, stored
 
