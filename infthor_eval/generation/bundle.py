@@ -17,7 +17,7 @@ from PIL import Image
 from infthor_eval.errors import DataError
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.reading import read_json
-from infthor_eval.generation.compact_twins import copy_compactly
+from infthor_eval.generation.compact.twins import copy_compactly
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.generate import GeneratedQuestions, generate_questions
 from infthor_eval.generation.replay_set import replay_set, select
@@ -98,6 +98,12 @@ class TwinsManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     files: dict[str, str] = {}
 
 
+class _AnyForm(msgspec.Struct):
+    """What tells a manifest of twins."""
+
+    twins: Any = None
+
+
 _AnyManifest = TypeVar("_AnyManifest", Manifest, TwinsManifest)
 
 
@@ -107,9 +113,10 @@ def read_manifest(path: Path) -> Manifest | TwinsManifest:
     Raises:
         DataError: the file cannot be read or is not a manifest.
     """
-    document: Any = read_json(path, _HINT)
-    is_of_twins = isinstance(document, dict) and "twins" in document
-    return read_json(path, _HINT, TwinsManifest if is_of_twins else Manifest)
+    is_of_twins = read_json(path, _HINT, _AnyForm).twins is not None
+    if is_of_twins:
+        return read_json(path, _HINT, TwinsManifest)
+    return read_json(path, _HINT, Manifest)
 
 
 def build_bundle(

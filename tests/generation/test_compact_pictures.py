@@ -11,7 +11,7 @@ from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.shared_frames import read_shared_frames, write_frame_names
-from infthor_eval.generation.compact_pictures import PictureStore
+from infthor_eval.generation.compact.pictures import PictureStore
 
 SIDE = 24
 COLORS = np.array(

@@ -51,9 +51,10 @@ class PictureStore:
     def __init__(self, root: Path, frames: Iterable[FrameRef], colors: int) -> None:
         self._root = root
         pictures = {frame: frame.load() for frame in dict.fromkeys(frames)}
-        self._palette = _palette_of(pictures.values(), colors)
+        palette = _palette_of(pictures.values(), colors)
+        self._colors = np.array(palette.getpalette(), dtype=np.uint8).reshape(-1, 3)
         self._pixels = {
-            frame: np.asarray(picture.quantize(palette=self._palette, dither=Image.Dither.NONE))
+            frame: np.asarray(picture.quantize(palette=palette, dither=Image.Dither.NONE))
             for frame, picture in pictures.items()
         }
         self._names: dict[bytes, str] = {}
@@ -106,8 +107,7 @@ class PictureStore:
         """Return a PNG with the colours that occur; -1 is transparent."""
         used, indices = np.unique(pixels, return_inverse=True)
         image = Image.fromarray(indices.reshape(pixels.shape).astype(np.uint8), mode="P")
-        palette = np.reshape(self._palette.getpalette(), (-1, 3))
-        image.putpalette(palette[np.maximum(used, 0)].astype(np.uint8).tobytes())
+        image.putpalette(self._colors[np.maximum(used, 0)].tobytes())
         content = BytesIO()
         options = {"transparency": 0} if used[0] < 0 else {}
         image.save(content, "PNG", optimize=True, **options)

@@ -12,7 +12,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.shared_frames import write_frame_names
 from infthor_eval.formats.step_log import pack_steps
 from infthor_eval.formats.twins import ComparedFrame, TwinPair, read_pairs, write_pairs
-from infthor_eval.generation.compact_pictures import PictureStore
+from infthor_eval.generation.compact.pictures import PictureStore
 
 __all__ = ["copy_compactly"]
 
