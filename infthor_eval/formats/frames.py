@@ -1,8 +1,10 @@
 """References to frames, which are decoded only where pixels are needed.
 
 A trajectory has thousands of frames and a question refers to many of them, so requests carry
-references and the model's adapter decodes. Caches recognise a frame by the digest of its file's
-content.
+references and the model's adapter decodes. Caches recognise a frame by the digest of its content.
+
+A frame is a file, or a file with patches laid over it: twins have frames that differ in a small
+part (`shared_frames`).
 """
 
 import struct
@@ -11,16 +13,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 
 from PIL import Image, UnidentifiedImageError
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import file_problem, require_file
-from infthor_eval.storage.digests import digest_of_file
+from infthor_eval.storage.digests import digest, digest_of_file
 from infthor_eval.storage.limits import IMAGE_ASPECT, IMAGE_MEGAPIXELS
 
-__all__ = ["FrameRef"]
+__all__ = ["FrameRef", "Patch"]
 
 Image.MAX_IMAGE_PIXELS = None  # `_wrong_size` has the limit, which users can raise
 
@@ -46,21 +49,59 @@ _DAMAGED = (
 
 
 @dataclass(frozen=True)
-class FrameRef:
-    """One frame of a trajectory: path of its image (PNG or JPEG, 300x300 in the published data)."""
+class Patch:
+    """A picture laid over a part of another one, which shows where the patch is transparent.
+
+    Attributes:
+        path: its file (PNG).
+        left: column of the picture below where it begins, pixels.
+        top: row of the picture below where it begins, pixels.
+    """
 
     path: Path
+    left: int
+    top: int
+
+
+@dataclass(frozen=True)
+class FrameRef:
+    """One frame of a trajectory.
+
+    Attributes:
+        path: its image (PNG or JPEG, 300x300 in the published data), or the one below its patches.
+        patches: what is laid over it, the lowest first.
+    """
+
+    path: Path
+    patches: tuple[Patch, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name of its file; with patches another one, which differs where any of them does."""
+        if not self.patches:
+            return self.path.name
+        layers = [f"{patch.path.name}@{patch.left},{patch.top}" for patch in self.patches]
+        return f"{digest(' '.join([self.path.name, *layers]))}.png"
+
+    @property
+    def n_bytes(self) -> int | None:
+        """Size of its files, or None if one is missing."""
+        try:
+            return sum(path.stat().st_size for path in self._paths)
+        except OSError:
+            return None
 
     @cached_property
     def digest(self) -> str:
-        """Hash of the file's content (hex, 32 characters).
+        """Hash of its content (hex, 32 characters): of its file's if it has no patches.
 
         Raises:
-            DataError: the file cannot be read.
+            DataError: a file cannot be read.
         """
-        require_file(self.path, _HINT)
-        with wrap_errors(f"{self.path}: cannot be read", _HINT):
-            return digest_of_file(self.path)
+        if not self.patches:
+            return _digest_of(self.path)
+        layers = [f"{_digest_of(patch.path)}@{patch.left},{patch.top}" for patch in self.patches]
+        return digest(" ".join([_digest_of(self.path), *layers]))
 
     @cached_property
     def size(self) -> tuple[int, int]:
@@ -69,65 +110,97 @@ class FrameRef:
         Raises:
             DataError: as `load`, for errors that show in the header.
         """
-        with self._open() as image:
+        with _open(self.path) as image:
             return image.size
 
     def problem(self) -> str | None:
-        """Return why this cannot be a frame, by its first bytes, or None if those are right."""
-        reason = file_problem(self.path)
-        if reason is not None:
-            return f"{self.path}: {reason}"
-        try:
-            with self.path.open("rb") as file:
-                head = file.read(_HEAD)
-        except OSError as error:
-            return f"{self.path}: cannot be read ({error.strerror})"
-        if not head.startswith(_SIGNATURES):
-            return f"{self.path}: not a PNG or JPEG image"
-        is_whole_png_head = head.startswith(_PNG) and len(head) == _HEAD and head[12:16] == b"IHDR"
-        return self._wrong_size(*struct.unpack(">II", head[16:])) if is_whole_png_head else None
+        """Return why this cannot be a frame, by the first bytes of its files, or None."""
+        return next(filter(None, map(_problem_of, self._paths)), None)
 
     def load(self) -> Image.Image:
         """Return the frame as an RGB image.
 
         Raises:
-            DataError: the file is missing, truncated, or no image of a valid size.
+            DataError: a file is missing, truncated, or no image of a valid size, or a patch reaches
+                beyond the picture below it.
         """
-        with self._open() as image:
-            return image.convert("RGB")
+        with _open(self.path) as image:
+            frame = image.convert("RGB")
+        for patch in self.patches:
+            with _open(patch.path) as image:
+                layer = image.convert("RGBA")
+            right = patch.left + layer.width
+            bottom = patch.top + layer.height
+            if right > frame.width or bottom > frame.height:
+                raise DataError(
+                    f"{patch.path}: reaches to {right},{bottom}, beyond the {frame.width}x"
+                    f"{frame.height} pixels of {self.path.name}; {_HINT}"
+                )
+            frame.paste(layer, (patch.left, patch.top), layer)
+        return frame
 
-    @contextmanager
-    def _open(self) -> Iterator[Image.Image]:
-        require_file(self.path, _HINT)
-        with (
-            wrap_errors(f"{self.path}: not a readable image", _HINT, catch=_DAMAGED),
-            self._opened() as image,
-        ):
-            problem = self._wrong_size(*image.size)
-            if problem is not None:
-                raise DataError(f"{problem}; {_HINT}")
-            yield image
+    def png(self) -> bytes:
+        """Return the frame as the content of a PNG file.
 
-    def _opened(self) -> Image.Image:
-        try:
-            return Image.open(self.path, formats=("PNG", "JPEG"))
-        except UnidentifiedImageError as error:  # its message is the path
-            raise DataError(
-                f"{self.path}: not a readable image (neither PNG nor JPEG); {_HINT}"
-            ) from error
+        Raises:
+            DataError: as `load`.
+        """
+        content = BytesIO()
+        self.load().save(content, "PNG")
+        return content.getvalue()
 
-    def _wrong_size(self, width: int, height: int) -> str | None:
-        """Return why an image of this size is refused: for its memory, or by image processors."""
-        if min(width, height) < 1:
-            return f"{self.path}: an image of {width}x{height} pixels"
-        if width * height > IMAGE_MEGAPIXELS.value * 1_000_000:
-            return (
-                f"{self.path}: an image of {width}x{height} pixels is too large; "
-                f"{IMAGE_MEGAPIXELS.hint}"
-            )
-        if max(width, height) > IMAGE_ASPECT.value * min(width, height):
-            return (
-                f"{self.path}: an image of {width}x{height} pixels is too narrow; "
-                f"{IMAGE_ASPECT.hint}"
-            )
-        return None
+    @property
+    def _paths(self) -> list[Path]:
+        return [self.path, *(patch.path for patch in self.patches)]
+
+
+def _digest_of(path: Path) -> str:
+    require_file(path, _HINT)
+    with wrap_errors(f"{path}: cannot be read", _HINT):
+        return digest_of_file(path)
+
+
+def _problem_of(path: Path) -> str | None:
+    reason = file_problem(path)
+    if reason is not None:
+        return f"{path}: {reason}"
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except OSError as error:
+        return f"{path}: cannot be read ({error.strerror})"
+    if not head.startswith(_SIGNATURES):
+        return f"{path}: not a PNG or JPEG image"
+    is_whole_png_head = head.startswith(_PNG) and len(head) == _HEAD and head[12:16] == b"IHDR"
+    return _wrong_size(path, *struct.unpack(">II", head[16:])) if is_whole_png_head else None
+
+
+@contextmanager
+def _open(path: Path) -> Iterator[Image.Image]:
+    require_file(path, _HINT)
+    with (
+        wrap_errors(f"{path}: not a readable image", _HINT, catch=_DAMAGED),
+        _opened(path) as image,
+    ):
+        problem = _wrong_size(path, *image.size)
+        if problem is not None:
+            raise DataError(f"{problem}; {_HINT}")
+        yield image
+
+
+def _opened(path: Path) -> Image.Image:
+    try:
+        return Image.open(path, formats=("PNG", "JPEG"))
+    except UnidentifiedImageError as error:  # its message is the path
+        raise DataError(f"{path}: not a readable image (neither PNG nor JPEG); {_HINT}") from error
+
+
+def _wrong_size(path: Path, width: int, height: int) -> str | None:
+    """Return why an image of this size is refused: for its memory, or by image processors."""
+    if min(width, height) < 1:
+        return f"{path}: an image of {width}x{height} pixels"
+    if width * height > IMAGE_MEGAPIXELS.value * 1_000_000:
+        return f"{path}: an image of {width}x{height} pixels is too large; {IMAGE_MEGAPIXELS.hint}"
+    if max(width, height) > IMAGE_ASPECT.value * min(width, height):
+        return f"{path}: an image of {width}x{height} pixels is too narrow; {IMAGE_ASPECT.hint}"
+    return None

@@ -25,7 +25,7 @@ from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.shared_frames import read_shared_frames
-from infthor_eval.formats.step_log import read_steps
+from infthor_eval.formats.step_log import log_file, read_steps
 from infthor_eval.formats.twins import TwinPair, read_pairs
 from infthor_eval.formats.video import Video, read_video
 
@@ -146,9 +146,9 @@ class NiehSet:
         for file in self._files:
             digest.update(file.read_bytes())
         for traj_id in sorted({question.traj_id for question in self.questions if self.has_frames}):
-            digest.update((self.folder(traj_id) / "metadata.json").read_bytes())
+            digest.update(log_file(self.folder(traj_id)).read_bytes())
             for index, frame in self._trajectory(traj_id).items():
-                digest.update(f"{traj_id}/{index}:{frame.path.name}:{_size(frame.path)}\n".encode())
+                digest.update(f"{traj_id}/{index}:{frame.name}:{frame.n_bytes}\n".encode())
         return digest.hexdigest()
 
     def _read_file(self, file: Path) -> tuple[Question | SkippedQuestion, ...]:
@@ -246,7 +246,9 @@ class NiehSet:
             )
             if logged is not None:
                 return logged
-        positions = {frame.path.stem: index for index, frame in enumerate(self.frames(traj_id))}
+        positions = {
+            Path(frame.name).stem: index for index, frame in enumerate(self.frames(traj_id))
+        }
         return read_action_log(path, positions)
 
     def states(self, traj_id: str) -> dict[int, str]:
@@ -374,11 +376,3 @@ def _images(folder: Path) -> dict[str, Path]:
 
 def _first_duplicate(values: Sequence[T]) -> T | None:
     return next((value for value, count in Counter(values).items() if count > 1), None)
-
-
-def _size(path: Path) -> int | None:
-    """Return the size of a file in bytes, or None if it is missing."""
-    try:
-        return path.stat().st_size
-    except OSError:
-        return None

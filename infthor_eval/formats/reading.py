@@ -20,17 +20,20 @@ from typing import Any, TypeVar, overload
 import msgspec
 
 from infthor_eval.errors import DataError, in_one_line, wrap_errors
+from infthor_eval.storage.files import PACKED
 from infthor_eval.storage.limits import FILE_MB, LINE_MB
 
 __all__ = [
     "DAMAGED",
     "NOT_JSON",
     "file_problem",
+    "find_packed",
     "json_lines_of",
     "json_value",
     "lines_of",
     "read_bytes",
     "read_json",
+    "read_packed_bytes",
     "read_text",
     "require_file",
     "require_plain_files",
@@ -43,6 +46,7 @@ DAMAGED = (EOFError, zlib.error, lzma.LZMAError)
 # What `msgspec` raises on what is not JSON of its type.
 NOT_JSON = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 _MB = 2**20
+_XZ_MB = 256  # memory that a packed file may ask for
 
 
 def file_problem(path: Path) -> str | None:
@@ -92,14 +96,40 @@ def read_bytes(path: Path, hint: str) -> bytes:
         return path.read_bytes()
 
 
-def read_text(path: Path, hint: str) -> str:
-    """Return the content of a UTF-8 file without byte order mark; line ends are not converted.
+def find_packed(path: Path) -> Path:
+    """Return the packed file (`.xz`) in a file's place, or the file itself if there is none."""
+    packed = path.with_name(f"{path.name}{PACKED}")
+    return packed if packed.exists() else path
+
+
+def read_packed_bytes(path: Path, hint: str) -> bytes:
+    """Return the unpacked content of a file that may be packed (`.xz`).
 
     Raises:
-        DataError: as `read_bytes`, or the content is not UTF-8.
+        DataError: as `read_bytes`, or it is damaged.
+    """
+    if path.suffix != PACKED:
+        return read_bytes(path, hint)
+    packed = read_bytes(path, hint)
+    limit = FILE_MB.value * _MB
+    unpacker = lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=_XZ_MB * _MB)
+    with wrap_errors(f"{path}: cannot be unpacked", hint, catch=lzma.LZMAError):
+        content = unpacker.decompress(packed, limit + 1)
+    if len(content) > limit:
+        raise DataError(f"{path}: is larger than {FILE_MB.value} MiB; {FILE_MB.hint}")
+    if not unpacker.eof:
+        raise DataError(f"{path}: cannot be unpacked (it ends early); {hint}")
+    return content
+
+
+def read_text(path: Path, hint: str) -> str:
+    """Return the content of a UTF-8 file (`.xz` too) without byte order mark; line ends are kept.
+
+    Raises:
+        DataError: as `read_packed_bytes`, or the content is not UTF-8.
     """
     with wrap_errors(f"{path}: not UTF-8 text", hint, catch=UnicodeDecodeError):
-        return read_bytes(path, hint).decode("utf-8-sig")
+        return read_packed_bytes(path, hint).decode("utf-8-sig")
 
 
 @overload
@@ -107,13 +137,13 @@ def read_json(path: Path, hint: str) -> Any: ...
 @overload
 def read_json(path: Path, hint: str, data_type: type[T]) -> T: ...
 def read_json(path: Path, hint: str, data_type: Any = Any) -> Any:
-    """Return the content of a JSON file as the type that `msgspec` decodes it to.
+    """Return the content of a JSON file (`.xz` too) as the type that `msgspec` decodes it to.
 
     Raises:
-        DataError: as `read_bytes`, or the content is not JSON, nested too deep, or does not match
-            the type.
+        DataError: as `read_packed_bytes`, or the content is not JSON, nested too deep, or does not
+            match the type.
     """
-    content = read_bytes(path, hint)
+    content = read_packed_bytes(path, hint)
     expected = "valid JSON" if data_type is Any else "in its documented form"
     with wrap_errors(f"{path}: not {expected}", hint, catch=NOT_JSON):
         return msgspec.json.decode(content, type=data_type)

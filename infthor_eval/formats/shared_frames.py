@@ -1,7 +1,9 @@
 """Pictures that several trajectories of a set share, each stored once.
 
 They are in the set's `frames/`, named by the digest of their content. `frames.txt` in a
-trajectory's folder has the name of each frame's picture, a line a frame.
+trajectory's folder has the name of each frame's picture, a line a frame. Patches that are laid over
+it follow in the same line, the lowest first: `NAME NAME@LEFT,TOP`. The file may be packed, as
+`frames.txt.xz`.
 """
 
 import re
@@ -10,15 +12,23 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.reading import read_text
-from infthor_eval.storage.digests import digest_of_file
+from infthor_eval.formats.frames import FrameRef, Patch
+from infthor_eval.formats.reading import find_packed, read_text
+from infthor_eval.storage.digests import digest, digest_of_file
+from infthor_eval.storage.files import write_packed
 
-__all__ = ["read_shared_frames", "store_picture", "write_frame_names"]
+__all__ = [
+    "patched_name",
+    "read_shared_frames",
+    "store_encoded",
+    "store_picture",
+    "write_frame_names",
+]
 
 _PICTURES = "frames"
 _NAMES = "frames.txt"
 _NAME = re.compile(r"[0-9a-f]{32}")
+_LAYER = re.compile(rf"({_NAME.pattern})@(\d{{1,5}}),(\d{{1,5}})")
 _HINT = "make the set again"
 
 
@@ -40,9 +50,27 @@ def store_picture(root: Path, picture: Path, writer: str) -> str:
     return name
 
 
-def write_frame_names(folder: Path, names: Sequence[str]) -> None:
+def store_encoded(root: Path, content: bytes) -> str:
+    """Write the content of a picture (PNG) into a set that nobody else writes; return its name."""
+    name = digest(content)
+    path = _path(root, name)
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(content)
+    return name
+
+
+def patched_name(below: str, patch: str, left: int, top: int) -> str:
+    """Return the name of a picture, patched or not, with one more patch over it."""
+    return f"{below} {patch}@{left},{top}"
+
+
+def write_frame_names(folder: Path, names: Sequence[str], *, packed: bool = False) -> None:
     """Write the names of a trajectory's pictures into its folder, in order of the frames."""
-    (folder / _NAMES).write_text("".join(f"{name}\n" for name in names), encoding="utf-8")
+    content = "".join(f"{name}\n" for name in names).encode()
+    if packed:
+        write_packed(folder / _NAMES, content)
+    else:
+        (folder / _NAMES).write_bytes(content)
 
 
 def read_shared_frames(folder: Path, numbers: Sequence[int]) -> dict[int, FrameRef] | None:
@@ -51,21 +79,27 @@ def read_shared_frames(folder: Path, numbers: Sequence[int]) -> dict[int, FrameR
     Raises:
         DataError: a name is none of ours, or there is not one for each number.
     """
-    path = folder / _NAMES
+    path = find_packed(folder / _NAMES)
     if not path.is_file():
         return None
-    names = read_text(path, _HINT).splitlines()
-    wrong = next((name for name in names if not _NAME.fullmatch(name)), None)
-    if wrong is not None:
-        raise DataError(f"{path}: {wrong[:40]!r} is not the name of a picture; {_HINT}")
-    if len(names) != len(numbers):
-        raise DataError(
-            f"{path}: {len(names)} names but {len(numbers)} entries in metadata.json; {_HINT}"
-        )
     root = folder.parent.parent
-    return {
-        number: FrameRef(_path(root, name)) for number, name in zip(numbers, names, strict=True)
-    }
+    frames = [_frame(root, path, line) for line in read_text(path, _HINT).splitlines()]
+    if len(frames) != len(numbers):
+        raise DataError(
+            f"{path}: {len(frames)} names but {len(numbers)} entries in metadata.json; {_HINT}"
+        )
+    return dict(zip(numbers, frames, strict=True))
+
+
+def _frame(root: Path, path: Path, line: str) -> FrameRef:
+    name, *layers = line.split(" ")
+    matches = [match for match in map(_LAYER.fullmatch, layers) if match is not None]
+    if not _NAME.fullmatch(name) or len(matches) != len(layers):
+        raise DataError(f"{path}: {line[:120]!r} is not the name of a picture; {_HINT}")
+    patches = (
+        Patch(_path(root, match[1]), left=int(match[2]), top=int(match[3])) for match in matches
+    )
+    return FrameRef(_path(root, name), tuple(patches))
 
 
 def _path(root: Path, name: str) -> Path:

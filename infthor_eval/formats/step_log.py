@@ -1,5 +1,7 @@
 """The log of a replayed trajectory: `metadata/<traj_id>/metadata.json`, one entry per frame.
 
+It may be packed, as `metadata.json.xz`.
+
 Published data have four layouts (`Layout`), and all are read. In the last one `img_idx` is a list
 of objects with `low_idx` and `img_filename`, as the loader of the branch `dev` reads it. Published
 entries have `img_idx`, `img_filename`, `step` and `object_log`. Ours add optional fields for the
@@ -17,7 +19,8 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.reading import read_json
+from infthor_eval.formats.reading import find_packed, read_json, read_packed_bytes
+from infthor_eval.storage.files import write_packed
 
 __all__ = [
     "Layout",
@@ -28,6 +31,8 @@ __all__ = [
     "Step",
     "iter_object_states",
     "layout_of",
+    "log_file",
+    "pack_steps",
     "read_steps",
     "write_steps",
 ]
@@ -160,13 +165,18 @@ class Step(msgspec.Struct, omit_defaults=True):
     low_idx: int | None = None
 
 
+def log_file(folder: Path) -> Path:
+    """Return the file of the log of the trajectory in `metadata/<traj_id>`, if it has one."""
+    return find_packed(Path(folder) / _FILE)
+
+
 def read_steps(folder: Path) -> list[Step]:
     """Read the log of the trajectory in `metadata/<traj_id>`: an entry a frame, in file order.
 
     Raises:
         DataError: the file is missing, not JSON, or has none of the known layouts.
     """
-    path = Path(folder) / _FILE
+    path = log_file(folder)
     document = read_json(path, _HINT)
     return [_step(path, index, entry) for index, entry in enumerate(_entries(path, document))]
 
@@ -175,6 +185,11 @@ def write_steps(folder: Path, steps: Sequence[Step]) -> None:
     """Write the log of a trajectory into its folder, which must exist: a list, an entry a line."""
     lines = b",\n".join(msgspec.json.encode(step) for step in steps)
     (Path(folder) / _FILE).write_bytes(b"[\n" + lines + b"\n]\n")
+
+
+def pack_steps(source: Path, folder: Path) -> None:
+    """Write the log of the trajectory in `source` into another folder, packed."""
+    write_packed(Path(folder) / _FILE, read_packed_bytes(log_file(source), _HINT))
 
 
 def iter_object_states(steps: Sequence[Step]) -> Iterator[dict[str, ObjectState]]:
@@ -194,7 +209,7 @@ def layout_of(folder: Path) -> Layout:
     Raises:
         DataError: the file is missing, not JSON, or has none of the known layouts.
     """
-    path = Path(folder) / _FILE
+    path = log_file(folder)
     return _layout(path, read_json(path, _HINT))
 
 

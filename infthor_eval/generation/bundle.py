@@ -1,12 +1,14 @@
 """Building the question sets of the package reproducibly from a manifest of scenes and seeds.
 
-The manifest has the trajectories to generate and how questions are sampled. The copy of it in the
-set also has the digest of every file, so that a test can check that the same files are built again.
+The manifest has the trajectories to generate and how questions are sampled, or how twins are made
+of them. The copy of it in the set also has the digest of every file, so that a test can check that
+the same files are built again.
 """
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 from msgspec import Meta
@@ -15,24 +17,33 @@ from PIL import Image
 from infthor_eval.errors import DataError
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.reading import read_json
+from infthor_eval.generation.compact.twins import copy_compactly
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.generate import GeneratedQuestions, generate_questions
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.settings import TrajectorySettings
+from infthor_eval.generation.twins.drafting import TwinSettings
+from infthor_eval.generation.twins.pairing import ScoreReply
+from infthor_eval.generation.twins.twin_set import TwinSummary, make_twins
 from infthor_eval.storage.digests import digest_of_file
 from infthor_eval.storage.scratch import ScratchFolder
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
+from infthor_eval.workers import WorkerSettings
 
 __all__ = [
     "MANIFEST",
     "Manifest",
     "TrajectoryRecipe",
+    "TwinsManifest",
     "build_bundle",
+    "build_twins",
     "differing_files",
     "read_manifest",
 ]
 
 MANIFEST = "manifest.json"
+_HINT = "give a manifest"
 _NOT_SHIPPED = "replay.json"  # has wall times, which differ from build to build
 
 
@@ -46,7 +57,7 @@ class TrajectoryRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Everything that determines a bundled set.
+    """Everything that determines a bundled set of questions.
 
     Attributes:
         name: name of the set; the question file is `qa_set_<name>.csv`.
@@ -67,13 +78,45 @@ class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     files: dict[str, str] = {}
 
 
-def read_manifest(path: Path) -> Manifest:
-    """Read a manifest.
+class TwinsManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Everything that determines a bundled set of twins.
+
+    Attributes:
+        name: name of the set.
+        trajectories: trajectories to generate, of which twins are made.
+        twins: how twins are made; manifests of questions have no such field.
+        per_trajectory: maximum number of paired questions on one trajectory.
+        colors: number of colours of the pictures of one trajectory.
+        files: digests of all files of the set by path; empty in a manifest before the first build.
+    """
+
+    name: Annotated[str, Meta(pattern=r"^[\w.-]+$")]
+    trajectories: Annotated[tuple[TrajectoryRecipe, ...], Meta(min_length=1)]
+    twins: TwinSettings
+    per_trajectory: Annotated[int, Meta(ge=1)] = 25
+    colors: Annotated[int, Meta(ge=2, le=255)] = 64
+    files: dict[str, str] = {}
+
+
+class _AnyForm(msgspec.Struct):
+    """What tells a manifest of twins."""
+
+    twins: Any = None
+
+
+_AnyManifest = TypeVar("_AnyManifest", Manifest, TwinsManifest)
+
+
+def read_manifest(path: Path) -> Manifest | TwinsManifest:
+    """Read a manifest, of questions or of twins.
 
     Raises:
         DataError: the file cannot be read or is not a manifest.
     """
-    return read_json(path, "give a manifest", Manifest)
+    is_of_twins = read_json(path, _HINT, _AnyForm).twins is not None
+    if is_of_twins:
+        return read_json(path, _HINT, TwinsManifest)
+    return read_json(path, _HINT, Manifest)
 
 
 def build_bundle(
@@ -96,12 +139,9 @@ def build_bundle(
     Raises:
         DataError: the folder is not empty, or a trajectory could not be generated or replayed.
     """
-    if out.exists() and any(out.iterdir()):
-        raise DataError(f"{out}: not empty; give a new folder")
-    recipes = manifest.trajectories
-    jobs = [TrajectorySettings(**msgspec.structs.asdict(recipe)) for recipe in recipes]
+    _require_new(out)
     with ScratchFolder() as folder:
-        _raise_first(generate_set(jobs, simulator, folder, progress).failures)
+        _generate(manifest, simulator, folder, progress)
         replayed = replay_set(select([folder]), simulator, out, progress)
     _raise_first([failure.message for failure in replayed.failures])
     generated = generate_questions(
@@ -115,17 +155,82 @@ def build_bundle(
         _reduce_colors(frame, manifest.colors)
     for path in out.rglob(_NOT_SHIPPED):
         path.unlink()
-    finished = msgspec.structs.replace(manifest, files=_digests(out))
-    (out / MANIFEST).write_bytes(
-        msgspec.json.format(msgspec.json.encode(finished), indent=1) + b"\n"
-    )
-    return finished, generated
+    return _write_manifest(manifest, out), generated
 
 
-def differing_files(expected: Manifest, built: Manifest) -> list[str]:
+def build_twins(
+    manifest: TwinsManifest,
+    score: ScoreReply,
+    out: Path,
+    progress: Callable[[bool], None] = lambda _: None,
+) -> tuple[TwinsManifest, TwinSummary]:
+    """Build the set: generate trajectories, make twins of them, keep what their questions need.
+
+    Args:
+        manifest: the manifest; its digests are not used.
+        score: the strict score of a reply.
+        out: folder of the set, new or empty.
+        progress: called twice for each trajectory, with True if it is of an earlier run.
+
+    Returns:
+        The manifest with the digests of the new files, and the numbers of the set.
+
+    Raises:
+        DataError: the folder is not empty, a trajectory could not be generated, or twins could not
+            be made of it.
+    """
+    _require_new(out)
+    out.mkdir(exist_ok=True)
+    with ExitStack() as stack:
+        trajectories = stack.enter_context(ScratchFolder())
+        whole = stack.enter_context(ScratchFolder())
+        with Simulator(embedded_launch(), image=False) as simulator:
+            _generate(manifest, simulator, trajectories, progress)
+        summary = make_twins(
+            select([trajectories]),
+            embedded_launch(),
+            whole,
+            manifest.twins,
+            score,
+            per_trajectory=manifest.per_trajectory,
+            worker_settings=WorkerSettings(),
+            progress=progress,
+        )
+        _raise_first(summary.failures)
+        copy_compactly(whole, out, manifest.colors)
+    return _write_manifest(manifest, out), summary
+
+
+def differing_files(
+    expected: Manifest | TwinsManifest, built: Manifest | TwinsManifest
+) -> list[str]:
     """Return the paths of files whose digests differ, or that only one of two manifests has."""
     names = expected.files.keys() | built.files.keys()
     return sorted(name for name in names if expected.files.get(name) != built.files.get(name))
+
+
+def _require_new(out: Path) -> None:
+    if out.exists() and any(out.iterdir()):
+        raise DataError(f"{out}: not empty; give a new folder")
+
+
+def _generate(
+    manifest: Manifest | TwinsManifest,
+    simulator: Simulator,
+    folder: Path,
+    progress: Callable[[bool], None],
+) -> None:
+    recipes = manifest.trajectories
+    jobs = [TrajectorySettings(**msgspec.structs.asdict(recipe)) for recipe in recipes]
+    _raise_first(generate_set(jobs, simulator, folder, progress).failures)
+
+
+def _write_manifest(manifest: _AnyManifest, out: Path) -> _AnyManifest:
+    """Write the manifest with the digests of the set's files into the set, and return it."""
+    finished = msgspec.structs.replace(manifest, files=_digests(out))
+    content = msgspec.json.format(msgspec.json.encode(finished), indent=1)
+    (out / MANIFEST).write_bytes(content + b"\n")
+    return finished
 
 
 def _raise_first(failures: list[str]) -> None:

@@ -6,8 +6,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from PIL import Image
-
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
@@ -109,8 +107,7 @@ def _read_trajectory(data: NiehSet, traj_id: str, contents: SetContents) -> None
     if frames:
         contents.image_folders[frames[0].path.parent.name] += 1
         if frames[0].problem() is None:
-            with Image.open(frames[0].path) as image:
-                contents.image_sizes[image.size] += 1
+            contents.image_sizes[frames[0].size] += 1
 
 
 def read_asked_tasks(root: Path, trajectories: Path | None = None) -> Iterator[AskedTask]:

@@ -1,5 +1,6 @@
 """The page on which a person decides about questions that no model answered."""
 
+import base64
 import os
 from collections.abc import Sequence
 from importlib import resources
@@ -9,6 +10,7 @@ from urllib.parse import quote
 from jinja2 import Environment
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.validation.cross_validation import DECISIONS, JudgedQuestion
 
@@ -49,7 +51,12 @@ def _describe(judged: JudgedQuestion, data: NiehSet, folder: Path) -> dict[str, 
             (model, "(failed)" if reply is None else reply)
             for model, reply in judged.replies.items()
         ],
-        "frames": [
-            {"index": i, "url": quote(os.path.relpath(frame.path, folder))} for i, frame in frames
-        ],
+        "frames": [{"index": i, "url": _address(frame, folder)} for i, frame in frames],
     }
+
+
+def _address(frame: FrameRef, folder: Path) -> str:
+    """Return where a page in `folder` finds a frame; one with patches is in the page itself."""
+    if frame.patches:
+        return f"data:image/png;base64,{base64.b64encode(frame.png()).decode()}"
+    return quote(os.path.relpath(frame.path, folder))

@@ -1,5 +1,6 @@
 """Writing files and folders atomically, and checking the output paths before the work starts."""
 
+import lzma
 import os
 import shutil
 import tempfile
@@ -11,13 +12,16 @@ from infthor_eval.errors import DataError, wrap_errors
 
 __all__ = [
     "OVERWRITE_HINT",
+    "PACKED",
     "prepare_file",
     "prepare_folder",
     "refuse_overwrite",
     "require_writable",
     "write_atomically",
+    "write_packed",
 ]
 
+PACKED = ".xz"  # ends the name of a packed file
 OVERWRITE_HINT = "give another --out, or --overwrite if nobody edited it"
 _HINT = "make room, or give another place with"
 _PROBE = b"x" * 4096  # a full disk still creates an empty file, so content is written too
@@ -113,3 +117,13 @@ def _remove(path: Path) -> None:
         shutil.rmtree(path)
     else:
         path.unlink(missing_ok=True)
+
+
+def write_packed(path: Path, content: bytes) -> None:
+    """Write content packed, under the file's name with `PACKED`; the same content as equal bytes.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    packed = lzma.compress(content, check=lzma.CHECK_CRC32, preset=6 | lzma.PRESET_EXTREME)
+    path.with_name(f"{path.name}{PACKED}").write_bytes(packed)

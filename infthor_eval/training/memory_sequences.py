@@ -122,7 +122,7 @@ class _Retrieved:
         ):
             images = msgspec.convert(trajectory.images, list[_Image])
         self._of_actions = _by_action(images)
-        self._frames = {frame.path.stem: frame for frame in data.frames(trajectory.traj_id)}
+        self._frames = {Path(frame.name).stem: frame for frame in data.frames(trajectory.traj_id)}
 
     @property
     def actions(self) -> Sequence[int]:

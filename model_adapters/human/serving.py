@@ -86,10 +86,12 @@ class _Page:
         index = request.path_params["index"]
         if index >= len(frames):
             return _problem("there is no such frame", 404)
-        path = frames[index].path
-        if not path.is_file():
-            return _problem(f"{path.name}: the frame is not there", 404)
-        return FileResponse(path)
+        frame = frames[index]
+        if not frame.path.is_file():
+            return _problem(f"{frame.name}: the frame is not there", 404)
+        if frame.patches:
+            return Response(await run_in_threadpool(frame.png), media_type="image/png")
+        return FileResponse(frame.path)
 
     async def answer(self, request: Request) -> Response:
         """Take an answer."""

@@ -1,11 +1,19 @@
 """`infthor-eval bundle`: build a question set from a manifest of scenes and seeds."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
+
+if TYPE_CHECKING:
+    from infthor_eval.generation.bundle import Manifest, TwinsManifest
 
 __all__ = ["command"]
 
@@ -18,29 +26,28 @@ __all__ = ["command"]
 @click.argument("manifest", type=PATH)
 @click.option("--out", type=PATH, required=True, help="Folder of the set, new or empty.")
 def command(manifest: Path, out: Path) -> int:
-    """Build the question set that MANIFEST describes: trajectories, frames, questions.
+    """Build the set that MANIFEST describes: trajectories, frames, questions or twins.
 
     If the manifest has digests, as that of a bundled set does, the files are compared with them;
     exit code 1 if one differs.
     """
     from infthor_eval.cli.progress.bar import PacedBar
-    from infthor_eval.generation.bundle import build_bundle, differing_files, read_manifest
+    from infthor_eval.generation.bundle import Manifest, differing_files, read_manifest
     from infthor_eval.storage.files import prepare_folder
     from infthor_eval.terminal import error_console, print_line, progress_bar
-    from infthor_eval.thor.launch import embedded_launch
-    from infthor_eval.thor.simulator import Simulator
 
     expected = read_manifest(manifest)
     prepare_folder(out)
-    with Simulator(embedded_launch()) as simulator, progress_bar(error_console()) as progress:
+    with progress_bar(error_console()) as progress:
         bar = PacedBar(progress, expected.name, 2 * len(expected.trajectories))
-        built, questions = build_bundle(expected, simulator, out, bar.advance)
+        built: Manifest | TwinsManifest
+        if isinstance(expected, Manifest):
+            built, lines = _build_questions(expected, out, bar.advance)
+        else:
+            built, lines = _build_twins(expected, out, bar.advance)
     size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
-    print_line(
-        f"{len(questions.questions)} questions on {questions.trajectories} trajectories, "
-        f"{size / 1e6:.1f} MB: {out}"
-    )
-    print_line(questions.summary_text())
+    print_line(f"{lines[0]}, {size / 1e6:.1f} MB: {out}")
+    print_line(lines[1])
     if not expected.files:
         return 0
     n_files = len(expected.files.keys() | built.files.keys())
@@ -49,3 +56,33 @@ def command(manifest: Path, out: Path) -> int:
     for name in differing[:10]:
         error_console().print(f"differs: {name}")
     return int(bool(differing))
+
+
+def _build_questions(
+    manifest: Manifest, out: Path, progress: Callable[[bool], None]
+) -> tuple[Manifest, tuple[str, str]]:
+    """Build a set of questions; return its manifest, and what is in it and in which proportions."""
+    from infthor_eval.generation.bundle import build_bundle
+    from infthor_eval.thor.launch import embedded_launch
+    from infthor_eval.thor.simulator import Simulator
+
+    with Simulator(embedded_launch()) as simulator:
+        built, generated = build_bundle(manifest, simulator, out, progress)
+    content = f"{len(generated.questions)} questions on {generated.trajectories} trajectories"
+    return built, (content, generated.summary_text())
+
+
+def _build_twins(
+    manifest: TwinsManifest, out: Path, progress: Callable[[bool], None]
+) -> tuple[TwinsManifest, tuple[str, str]]:
+    """Build a set of twins; return what `_build_questions` does."""
+    from infthor_eval.generation.bundle import build_twins
+    from infthor_eval.nieh.scoring import score
+
+    built, numbers = build_twins(manifest, partial(score, scorer="strict"), out, progress)
+    content = (
+        f"{numbers.pairs} paired questions of {numbers.found} on {numbers.facts} facts of "
+        f"{numbers.trajectories} trajectories"
+    )
+    by_kind = ", ".join(f"{name} {count}" for name, count in numbers.by_kind.items())
+    return built, (content, f"by kind: {by_kind}")

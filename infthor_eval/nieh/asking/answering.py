@@ -261,8 +261,8 @@ def _names(request: _UnitRequest) -> list[str]:
 
 def _names_in(part: Part) -> list[str]:
     if isinstance(part, Video):
-        return [f"video of {part.fps} fps", *(frame.path.name for frame in part.frames)]
-    return [part.path.name if isinstance(part, FrameRef) else part]
+        return [f"video of {part.fps} fps", *(frame.name for frame in part.frames)]
+    return [part.name if isinstance(part, FrameRef) else part]
 
 
 def _recall_all(

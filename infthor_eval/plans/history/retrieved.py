@@ -121,7 +121,7 @@ def _resized(frame: FrameRef) -> FrameRef:
     Raises:
         DataError: it cannot be read or written.
     """
-    path = frame.path.with_name(f"{frame.path.stem}-{_SIDE}.png")
+    path = frame.path.with_name(f"{Path(frame.name).stem}-{_SIDE}.png")
     if not path.is_file():
         image = frame.load().resize((_SIDE, _SIDE), resample=Image.Resampling.LANCZOS)
         with wrap_errors(f"{path}: cannot be written", "make room, or set TMPDIR", catch=OSError):

@@ -148,7 +148,7 @@ def _timeline(
 
 def _picture(frame: FrameRef, thumbnails: ThumbnailStore) -> int | None:
     try:
-        return thumbnails.add(str(frame.path), frame.load)
+        return thumbnails.add(str(frame.path.with_name(frame.name)), frame.load)
     except DataError:  # an unreadable frame has its place on the timeline, without a picture
         return None
 

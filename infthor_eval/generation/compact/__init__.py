@@ -1,0 +1,1 @@
+"""Storing sets in few bytes, for the package."""
