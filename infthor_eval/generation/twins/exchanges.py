@@ -110,16 +110,12 @@ class ExchangeKind:
     def _fits(self, episode: Episode, item: ThorObject, partner: ThorObject, place: str) -> bool:
         """Return True if an object goes where its partner is at the start, and is put."""
         objects = episode.start.objects
-        if not may_fit(item, partner, objects) or not self.suits(item.object_type, place):
+        if not may_fit(item, partner, objects) or not goes_into(item.object_type, place):
             return False
         return all(
             goes_into(item.object_type + episode.suffix(move), objects[move.target].object_type)
             for move in episode.moves_of(partner.object_id)
         )
-
-    def suits(self, object_type: str, place: str) -> bool:
-        """Return True if a type of object may be at a type of place at the start."""
-        return goes_into(object_type, place)
 
 
 def _n_unseen(episode: Episode, pair: _Pair) -> int:
@@ -174,10 +170,6 @@ class SwapSliced(ExchangeKind):
         for exchange in super().propose(episode, rng):
             if {exchange.one.object_type, exchange.other.object_type} <= SLICEABLE:
                 yield exchange
-
-    def suits(self, object_type: str, place: str) -> bool:
-        """See the base: foods stand for each other, wherever rooms have one."""
-        return True
 
     def allows(self, first: set[str], second: set[str]) -> bool:
         """See the base."""
