@@ -8,6 +8,7 @@ from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_task
 from infthor_eval.formats.published import published_tables
 from infthor_eval.plans.config import PlansTaskConfig
 from infthor_eval.plans.summary import FINAL_COLUMNS, NEVER, PlanTaskSummary
+from infthor_eval.plans.twins.tables import twin_tables
 from infthor_eval.rates import Rate, format_number, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
@@ -44,7 +45,13 @@ def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
     """Return all tables of some runs."""
     tasks = list(named_tasks(runs))
     endings = endings_table("How plans ended", tasks, "actions", _actions)
-    return [_success_table(runs, tasks), *_distance_tables(tasks), _reward_table(tasks), endings]
+    return [
+        *twin_tables(tasks),
+        _success_table(runs, tasks),
+        *_distance_tables(tasks),
+        _reward_table(tasks),
+        endings,
+    ]
 
 
 def _success_table(
