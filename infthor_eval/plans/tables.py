@@ -3,12 +3,14 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from msgspec import UNSET
+
 from infthor_eval.distances import DISTANCES, LENGTHS
 from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes
 from infthor_eval.formats.published import published_tables
 from infthor_eval.plans.config import PlansTaskConfig
 from infthor_eval.plans.summary import FINAL_COLUMNS, NEVER, PlanTaskSummary
-from infthor_eval.plans.twins.tables import twin_tables
+from infthor_eval.plans.twins.tables import PAIRS_RIGHT, format_pairs, twin_tables
 from infthor_eval.rates import Rate, format_number, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
@@ -32,12 +34,18 @@ _PUBLISHED_RULES = (
 
 
 def overview_table(runs: Sequence[RunSummary]) -> Table:
-    """Return completed plans and reward, one number a task."""
+    """Return completed plans and reward, one number a task; and pairs, if there are twins."""
+    tasks = list(named_tasks(runs))
+    has_twins = any(task.twins is not UNSET for *_, task in tasks)
     rows = []
-    for *names, task in named_tasks(runs):
+    for *names, task in tasks:
+        pairs = [format_pairs(task.twins)] if has_twins else []
         success = format_percent(task.success.get("total"))
-        rows.append(Row((*names, success, format_percent(task.reward_share), *_sizes(task)[:3])))
-    columns = (*NAME_COLUMNS, *map(Column, ("completed, %", "reward, % of the most", *_COUNTS[:3])))
+        reward = format_percent(task.reward_share)
+        rows.append(Row((*names, *pairs, success, reward, *_sizes(task)[:3])))
+    pairs_column = [PAIRS_RIGHT] if has_twins else []
+    names_of_columns = (*pairs_column, "completed, %", "reward, % of the most", *_COUNTS[:3])
+    columns = (*NAME_COLUMNS, *map(Column, names_of_columns))
     return Table("Plans, 95 % interval in brackets", columns, tuple(rows), result_notes(runs))
 
 

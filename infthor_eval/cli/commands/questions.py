@@ -12,6 +12,8 @@ from infthor_eval.cli.options.values import PATH, FiniteFloat, WholeNumber
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rich.console import Console
 
     from infthor_eval.generation.twins.final_task_set import FinalTaskSummary
@@ -157,8 +159,8 @@ def twins(
 
     A twin is the same episode in a world with one thing changed, so that a question in the same
     words has another answer. Writes an NIEH set with both worlds of each pair; trajectories that
-    are done are not tried again. With --final-tasks, writes trajectories for the task infthor_twins.
-    Exit code 1 if twins of a trajectory cannot be made at all.
+    are done are not tried again. With --final-tasks, writes trajectories for the task
+    infthor_twins. Exit code 1 if twins of a trajectory cannot be made at all.
     """
     from functools import partial
 
@@ -182,7 +184,7 @@ def twins(
         supplement_file(trajectory for _, trajectory in selection.items) as supplement,
         progress_bar(notes) as progress,
     ):
-        make = make_final_tasks
+        make: Callable[..., TwinSummary | FinalTaskSummary] = make_final_tasks
         if not final_tasks:
             make = partial(
                 make_twins, score=partial(score, scorer="strict"), per_trajectory=per_trajectory

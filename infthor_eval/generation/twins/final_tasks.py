@@ -236,9 +236,7 @@ class _FinalRun:
         places: where the object is, and where it is in the twin.
     """
 
-    def __init__(
-        self, simulator: Simulator, world: Trajectory, errand: Errand, side: int
-    ) -> None:
+    def __init__(self, simulator: Simulator, world: Trajectory, errand: Errand, side: int) -> None:
         """Repeat the history, and carry the final task out.
 
         Raises:

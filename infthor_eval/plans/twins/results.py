@@ -6,8 +6,8 @@ import msgspec
 from msgspec import UNSET, UnsetType
 
 from infthor_eval.household.first_place import FirstPlace
-from infthor_eval.plans.records import PlanRecord
-from infthor_eval.rates import Rate, clustered_rate
+from infthor_eval.plans.records import PlanRecord, TwinRecord
+from infthor_eval.rates import Rate, clustered_rate, paired_rate
 from infthor_eval.runs import UnitRecord
 
 __all__ = ["TwinResults", "first_place_score", "twin_results"]
@@ -84,41 +84,50 @@ class _Pairs:
             n_incomplete=n_incomplete,
             pair_accuracy=self._share(lambda one, other: _is_right(one) and _is_right(other)),
             pair_success=self._share(lambda one, other: _is_done(one) and _is_done(other)),
-            accuracy=self._mean(lambda world: float(_is_right(world))),
+            accuracy=self._share_of_worlds(_is_right),
             one_of_two=self._share(lambda one, other: _is_right(one) != _is_right(other)),
             same_place=self._share(_went_to_the_same),
-            nowhere=self._mean(lambda world: float(_first(world) is None)),
-            opened=self._mean(_n_opened),
-            excess=self._mean(_excess),
+            nowhere=self._share_of_worlds(lambda world: _first(world) is None),
+            opened=self._mean_opened(),
+            excess=self._mean_excess(),
         )
 
     def _share(self, holds: Callable[[_World, _World], bool]) -> Rate | None:
         values = [float(holds(one, other)) for one, other in self._pairs]
         return clustered_rate(values, [_base(one) for one, _ in self._pairs])
 
-    def _mean(self, value: Callable[[_World], float | None]) -> Rate | None:
-        """Return the mean over worlds that have a value."""
-        values = []
-        bases = []
-        for pair in self._pairs:
-            for world in pair:
-                of_world = value(world)
-                if of_world is not None:
-                    values.append(of_world)
-                    bases.append(_base(world))
-        return clustered_rate(values, bases)
+    def _share_of_worlds(self, holds: Callable[[_World], bool]) -> Rate | None:
+        values = [float(holds(world)) for world in self._worlds]
+        return clustered_rate(values, [_base(world) for world in self._worlds])
+
+    def _mean_opened(self) -> Rate | None:
+        counts = [float(_twin(world).n_opened) for world in self._worlds]
+        # Differences from 0: counts are no shares, also where none is above 1.
+        return paired_rate([0.0] * len(counts), counts, [_base(world) for world in self._worlds])
+
+    def _mean_excess(self) -> Rate | None:
+        found = [world for world in self._worlds if world[0].payload.done]
+        own = [float(len(world[0].payload.steps)) for world in found]
+        expert = [float(world[0].payload.n_expert_steps) for world in found]
+        return paired_rate(expert, own, [_base(world) for world in found])
+
+    @property
+    def _worlds(self) -> list[_World]:
+        return [world for pair in self._pairs for world in pair]
+
+
+def _twin(world: _World) -> TwinRecord:
+    twin = world[0].payload.twin
+    assert twin is not None
+    return twin
 
 
 def _base(world: _World) -> str:
-    twin = world[0].payload.twin
-    assert twin is not None
-    return twin.base
+    return _twin(world).base
 
 
 def _first(world: _World) -> FirstPlace | None:
-    twin = world[0].payload.twin
-    assert twin is not None
-    return twin.first
+    return _twin(world).first
 
 
 def _is_right(world: _World) -> bool:
@@ -132,14 +141,3 @@ def _is_done(world: _World) -> bool:
 def _went_to_the_same(one: _World, other: _World) -> bool:
     """Return True if one of the two places was looked at first in both worlds."""
     return {_first(one), _first(other)} == {FirstPlace.OWN, FirstPlace.TWIN}
-
-
-def _n_opened(world: _World) -> float:
-    twin = world[0].payload.twin
-    assert twin is not None
-    return float(twin.n_opened)
-
-
-def _excess(world: _World) -> float | None:
-    plan = world[0].payload
-    return float(len(plan.steps) - plan.n_expert_steps) if plan.done else None

@@ -2,22 +2,24 @@
 
 from collections.abc import Sequence
 
-from msgspec import UNSET
+from msgspec import UNSET, UnsetType
 
 from infthor_eval.episodes.tables import NAME_COLUMNS
 from infthor_eval.plans.summary import PlanTaskSummary
+from infthor_eval.plans.twins.results import TwinResults
 from infthor_eval.rates import format_number, format_percent
-from infthor_eval.tables import Column, Row, Table
+from infthor_eval.tables import Column, Row, Table, TableCell
 
-__all__ = ["twin_tables"]
+__all__ = ["PAIRS_RIGHT", "format_pairs", "twin_tables"]
 
+PAIRS_RIGHT = "pairs right, %"
 _COLUMNS = (
-    "pairs right",
-    "both done",
-    "worlds right",
-    "one of two",
-    "same place",
-    "nowhere",
+    PAIRS_RIGHT,
+    "both done, %",
+    "worlds right, %",
+    "one of two, %",
+    "same place, %",
+    "nowhere, %",
     "opened in vain",
     "excess actions",
     "pairs",
@@ -28,6 +30,11 @@ _NOTE = (
     "the same place in both, and has 0 pairs; who draws at random has at most 25 %. Containers and "
     "actions are means of worlds."
 )
+
+
+def format_pairs(twins: TwinResults | UnsetType) -> TableCell:
+    """Return the cell of the pairs of which both worlds are right."""
+    return format_percent(None if twins is UNSET else twins.pair_accuracy)
 
 
 def twin_tables(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> list[Table]:
@@ -58,4 +65,6 @@ def twin_tables(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> list[Table
             )
         )
     columns = (*NAME_COLUMNS, *map(Column, _COLUMNS))
-    return [Table("Twins: first place, % of pairs", columns, tuple(rows), (_NOTE,))] if rows else []
+    return (
+        [Table("Twins: the place looked at first", columns, tuple(rows), (_NOTE,))] if rows else []
+    )
