@@ -34,18 +34,16 @@ _PUBLISHED_RULES = (
 
 
 def overview_table(runs: Sequence[RunSummary]) -> Table:
-    """Return completed plans and reward, one number a task; and pairs, if there are twins."""
+    """Return completed plans and reward, or pairs if there are twins, one number a task."""
     tasks = list(named_tasks(runs))
     has_twins = any(task.twins is not UNSET for *_, task in tasks)
     rows = []
     for *names, task in tasks:
-        pairs = [format_pairs(task.twins)] if has_twins else []
         success = format_percent(task.success.get("total"))
-        reward = format_percent(task.reward_share)
-        rows.append(Row((*names, *pairs, success, reward, *_sizes(task)[:3])))
-    pairs_column = [PAIRS_RIGHT] if has_twins else []
-    names_of_columns = (*pairs_column, "completed, %", "reward, % of the most", *_COUNTS[:3])
-    columns = (*NAME_COLUMNS, *map(Column, names_of_columns))
+        second = format_pairs(task.twins) if has_twins else format_percent(task.reward_share)
+        rows.append(Row((*names, success, second, *_sizes(task)[:3])))
+    second_column = PAIRS_RIGHT if has_twins else "reward, % of the most"
+    columns = (*NAME_COLUMNS, *map(Column, ("completed, %", second_column, *_COUNTS[:3])))
     return Table("Plans, 95 % interval in brackets", columns, tuple(rows), result_notes(runs))
 
 

@@ -65,6 +65,8 @@ def errands(
     Raises:
         Difference: there is none; the message is the reason that comes nearest.
     """
+    if any(state.held for history in histories for state in history.states(last).values()):
+        raise Difference("the agent has something in its hand")
     found = False
     reasons = ["no object has another place in the end"]
     keys = sorted(key for key in worlds.changed if whole_of(key) == key)

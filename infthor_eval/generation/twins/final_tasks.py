@@ -8,10 +8,12 @@ import random
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import msgspec
+from msgspec.structs import replace
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.trajectory import SubTask, SubTrajectory, Trajectory, encode_trajectory
@@ -39,7 +41,7 @@ from infthor_eval.storage.digests import digest
 from infthor_eval.storage.files import write_atomically
 from infthor_eval.thor.recorder import object_log
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import AgentPose
+from infthor_eval.thor.view import AgentPose, teleport_call
 
 __all__ = ["MOVING_KINDS", "TRAJECTORIES", "FinalTaskDraft", "draft_final_tasks"]
 
@@ -48,6 +50,11 @@ MOVING_KINDS = ("swap", "swap-task", "move", "put-target")
 TRAJECTORIES = "trajectories"  # folder in that of the set
 _MOST_STEPS = 30  # of the planner to the object, so that the limit of a plan leaves time to search
 _LEAST_STEPS = 40  # of the history
+_TRIALS = 6  # final tasks at most that are carried out for one pair
+# Degrees of the camera, and of the agent, in looking around before the final task.
+_HORIZONS = (0.0, 30.0)
+_HEADINGS = (0.0, 90.0, 180.0, 270.0)
+_MIN_PIXELS = 45  # of 90,000: half of what counts as shown
 _WORLD = "twin"  # what a world is called before it has its name
 
 
@@ -168,7 +175,7 @@ class _Maker:
     ) -> list[Trajectory]:
         """Return both worlds with the first final task that the planner carries out in both.
 
-        The history ends with the last task after which there is one.
+        The history ends with the last sub-goal after which there is one, maybe within a task.
 
         Raises:
             Difference: there is none; the message is the reason of the longest history.
@@ -176,16 +183,18 @@ class _Maker:
         rng = random.Random(pair_id)
         names = name_worlds(self._draft.rooms, pair_id)
         reasons: list[str] = []
-        for n_parts in range(len(worlds.pair[0].sub_trajs), 0, -1):
-            pair = [_begin(world, n_parts) for world in worlds.pair]
+        n_tried = 0
+        for n_high in range(len(worlds.pair[0].plan.high_pddl), 0, -1):
+            pair = [_begin(world, n_high) for world in worlds.pair]
             last = len(pair[0].plan.low_actions)
-            if last < _LEAST_STEPS:
+            if last < _LEAST_STEPS or n_tried >= _TRIALS:
                 break
             try:
                 if not same[last]:
                     raise Difference("the final task begins with another view")
                 fixtures = self._episode.start.objects
                 for errand in errands(worlds, histories, last, fixtures, rng):
+                    n_tried += 1
                     made = self._carry_out(pair, errand, reasons)
                     if made:
                         twin = partial(TwinWorld, pair_id, self._draft.digest, kind)
@@ -209,19 +218,25 @@ class _Maker:
             return []
 
 
-def _begin(world: Trajectory, n_parts: int) -> Trajectory:
-    """Return the first parts of a world: those tasks, their sub-goals and actions."""
-    plan = world.plan
-    part = world.sub_trajs[n_parts - 1]
+def _begin(world: Trajectory, n_high: int) -> Trajectory:
+    """Return the first sub-goals of a world: their actions, and the tasks that they are of."""
+    high_pddl = world.plan.high_pddl[:n_high]
+    known = {high.high_idx for high in high_pddl}
+    low_actions = [low for low in world.plan.low_actions if low.high_idx in known]
+    parts = [
+        msgspec.structs.replace(
+            part,
+            high_pddl_idx=(part.high_pddl_idx[0], min(part.high_pddl_idx[1], n_high)),
+            low_pddl_idx=(part.low_pddl_idx[0], min(part.low_pddl_idx[1], len(low_actions))),
+        )
+        for part in world.sub_trajs
+        if part.high_pddl_idx[0] < n_high
+    ]
     return msgspec.structs.replace(
         world,
-        plan=msgspec.structs.replace(
-            plan,
-            low_actions=plan.low_actions[: part.low_pddl_idx[1]],
-            high_pddl=plan.high_pddl[: part.high_pddl_idx[1]],
-        ),
-        sub_tasks=_tasks(world)[:n_parts],
-        sub_trajs=world.sub_trajs[:n_parts],
+        plan=msgspec.structs.replace(world.plan, low_actions=low_actions, high_pddl=high_pddl),
+        sub_tasks=_tasks(world)[: len(parts)],
+        sub_trajs=parts,
         long_horizon_task=None,
     )
 
@@ -240,7 +255,8 @@ class _FinalRun:
         """Repeat the history, and carry the final task out.
 
         Raises:
-            Difference: the planner fails, takes too long, or passes the other place first.
+            Difference: the object is seen without a step, or the planner fails, takes too long, or
+                passes the other place first.
         """
         self.world = world
         self.places: tuple[TwinPlace, TwinPlace] = (errand.places[side], errand.places[1 - side])
@@ -252,6 +268,7 @@ class _FinalRun:
         object_type = simulator.view.objects[item].object_type
         self.task = Task(TaskType.PLACE, object_type, receptacle)
         start = simulator.view.agent
+        _require_hidden(simulator, item)
         self.trace = Trace(simulator, len(world.plan.high_pddl))
         rollout = Rollout(self.trace, Walker(self.trace))
         try:
@@ -271,6 +288,17 @@ class _FinalRun:
             raise Difference("the agent stands at one of the places")
         if first_place(self.places, _looks(actions)) != FirstPlace.OWN:
             raise Difference("the way to the object passes its other place")
+
+
+def _require_hidden(simulator: Simulator, item: str) -> None:
+    """Raise Difference if an agent that turns around where it stands sees an object."""
+    start = simulator.view.agent
+    for heading, horizon in product(_HEADINGS, _HORIZONS):
+        pose = replace(start, rotation=heading, horizon=horizon)
+        seen = simulator.query(**teleport_call(pose), renderImage=False).instances or {}
+        if item in seen and seen[item].pixels >= _MIN_PIXELS:
+            raise Difference("the object is seen by looking around")
+    simulator.query(**teleport_call(start), renderImage=False)
 
 
 def _looks(actions: Sequence[ExecutedAction]) -> Iterator[tuple[AgentPose, str | None]]:

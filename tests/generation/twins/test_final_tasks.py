@@ -110,5 +110,5 @@ def test_a_trajectory_without_tasks_is_refused(data, tmp_path):
     lone = write_trajectories(tmp_path / "lone", document)
     (failure,) = make(lone, tmp_path / "out").failures
     assert "it has no tasks for a final one to follow" in failure
-    with pytest.raises(DataError, match="no .* file in this folder"):
+    with pytest.raises(DataError, match=r"no .* file in this folder"):
         list(iter_trajectories(tmp_path / "out" / "trajectories"))
