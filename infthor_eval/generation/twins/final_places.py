@@ -19,7 +19,7 @@ from infthor_eval.household.first_place import apart
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["Errand", "errands"]
+__all__ = ["Errand", "are_apart", "errands", "place_in"]
 
 _AGO = 10  # frames at least since the object was last shown where it is
 _APART = 1.5  # metres at least between its two places: nobody reaches both from one pose
@@ -95,25 +95,45 @@ def _places(
         _place(item, history, last, fixtures)
         for item, history in zip(items, histories, strict=True)
     )
-    types = {canonical_type(fixtures[place.receptacle].object_type) for place in (one, other)}
-    if len(types) == 1:
-        raise Difference("the object's places are of one type")
-    if apart((one, other)) < _APART:
-        raise Difference("the object's places are near each other")
+    if not are_apart((one, other), fixtures):
+        raise Difference("the object's places are of one type, or near each other")
     return one, other
+
+
+def are_apart(places: tuple[TwinPlace, TwinPlace], fixtures: dict[str, ThorObject]) -> bool:
+    """Return True if two places are on furniture of different types, and not near each other."""
+    types = {canonical_type(fixtures[place.receptacle].object_type) for place in places}
+    return len(types) == len(places) and apart(places) >= _APART
 
 
 def _place(
     item: str, history: TrajectoryHistory, last: int, fixtures: dict[str, ThorObject]
 ) -> TwinPlace:
-    """Return where an object is in the end, if it was shown there, and not of late."""
+    """Return where the only object of its type is in the end; see `place_in`."""
+    if not history.is_only_one(last, item):
+        raise Difference("there are more of the object's type")
+    return place_in(history, last, item, fixtures)
+
+
+def place_in(
+    history: TrajectoryHistory, last: int, item: str, fixtures: dict[str, ThorObject]
+) -> TwinPlace:
+    """Return where an object is in the end, if it was shown there, and not of late.
+
+    Args:
+        history: what happened.
+        last: frame with which the history ends.
+        item: id of the object.
+        fixtures: the objects at the start, by id.
+
+    Raises:
+        Difference: it is on nothing that stays, was never shown there, or a moment ago.
+    """
     states = history.states(last)
     state = states.get(item)
     holder = None if state is None else logged_parent(state, states)
     if state is None or holder is None or not _is_fixture(holder, fixtures):
         raise Difference("the object is in or on nothing that stays")
-    if not history.is_only_one(last, item):
-        raise Difference("there are more of the object's type")
     shown = [frame for frame in range(last + 1) if _shows_there(history, frame, item, holder)]
     if not shown:
         raise Difference("the object is not shown at its place")

@@ -5,15 +5,14 @@ walk, so that no plan says where the object is. In both worlds the planner carri
 """
 
 import random
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import msgspec
-from msgspec.structs import replace
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.trajectory import SubTask, SubTrajectory, Trajectory, encode_trajectory
@@ -32,6 +31,7 @@ from infthor_eval.generation.twins.drafting import (
 from infthor_eval.generation.twins.episode import Episode, read_episode
 from infthor_eval.generation.twins.final_places import Errand, errands
 from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Proposal, Worlds
+from infthor_eval.generation.twins.prospects import Prospects, seen_around
 from infthor_eval.generation.twins.rewriting import without_traces
 from infthor_eval.generation.walking import Walker
 from infthor_eval.household.first_place import FirstPlace, first_place, is_looked_at
@@ -41,20 +41,16 @@ from infthor_eval.storage.digests import digest
 from infthor_eval.storage.files import write_atomically
 from infthor_eval.thor.recorder import object_log
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import AgentPose, teleport_call
+from infthor_eval.thor.view import AgentPose
 
 __all__ = ["MOVING_KINDS", "TRAJECTORIES", "FinalTaskDraft", "draft_final_tasks"]
 
-# Kinds of edits after which an object is elsewhere in the end.
-MOVING_KINDS = ("swap", "swap-task", "move", "put-target")
+# Kinds of edits after which an object may be far from where it is in the twin.
+MOVING_KINDS = ("swap", "swap-task", "move")
 TRAJECTORIES = "trajectories"  # folder in that of the set
 _MOST_STEPS = 30  # of the planner to the object, so that the limit of a plan leaves time to search
 _LEAST_STEPS = 40  # of the history
-_TRIALS = 6  # final tasks at most that are carried out for one pair
-# Degrees of the camera, and of the agent, in looking around before the final task.
-_HORIZONS = (0.0, 30.0)
-_HEADINGS = (0.0, 90.0, 180.0, 270.0)
-_MIN_PIXELS = 45  # of 90,000: half of what counts as shown
+_TRIALS = 4  # final tasks at most that are carried out for one pair
 _WORLD = "twin"  # what a world is called before it has its name
 
 
@@ -115,6 +111,7 @@ class _Maker:
         self._episode = episode
         self._replays = replays
         self._out = out
+        self._prospects = Prospects(episode, replays.simulator, _LEAST_STEPS)
 
     def try_kind(self, name: str) -> None:
         """Try the edits of a kind until enough are kept, or have been proposed."""
@@ -125,6 +122,8 @@ class _Maker:
         n_proposed = 0
         n_kept = 0
         for proposal in kind.propose(self._episode, random.Random(stream)):
+            if not self._prospects.may_be_needed(proposal):
+                continue
             if n_proposed == 2 * settings.per_kind or n_kept == settings.per_kind:
                 break
             pair_id = f"{name}-{digest(f'{stream}/{n_proposed}', 4)}"
@@ -178,7 +177,7 @@ class _Maker:
         The history ends with the last sub-goal after which there is one, maybe within a task.
 
         Raises:
-            Difference: there is none; the message is the reason of the longest history.
+            Difference: there is none; the message is the most frequent reason.
         """
         rng = random.Random(pair_id)
         names = name_worlds(self._draft.rooms, pair_id)
@@ -190,7 +189,7 @@ class _Maker:
             if last < _LEAST_STEPS or n_tried >= _TRIALS:
                 break
             try:
-                if not same[last]:
+                if not same[last] or not self._prospects.hides(last, sorted(worlds.changed)):
                     raise Difference("the final task begins with another view")
                 fixtures = self._episode.start.objects
                 for errand in errands(worlds, histories, last, fixtures, rng):
@@ -204,7 +203,8 @@ class _Maker:
                         ]
             except Difference as error:
                 reasons.append(str(error))
-        raise Difference(reasons[0] if reasons else "the history is too short")
+        [(reason, _)] = Counter(reasons or ["the history is too short"]).most_common(1)
+        raise Difference(reason)
 
     def _carry_out(
         self, pair: Sequence[Trajectory], errand: Errand, reasons: list[str]
@@ -268,7 +268,8 @@ class _FinalRun:
         object_type = simulator.view.objects[item].object_type
         self.task = Task(TaskType.PLACE, object_type, receptacle)
         start = simulator.view.agent
-        _require_hidden(simulator, item)
+        if item in seen_around(simulator):
+            raise Difference("the object is seen by looking around")
         self.trace = Trace(simulator, len(world.plan.high_pddl))
         rollout = Rollout(self.trace, Walker(self.trace))
         try:
@@ -288,17 +289,6 @@ class _FinalRun:
             raise Difference("the agent stands at one of the places")
         if first_place(self.places, _looks(actions)) != FirstPlace.OWN:
             raise Difference("the way to the object passes its other place")
-
-
-def _require_hidden(simulator: Simulator, item: str) -> None:
-    """Raise Difference if an agent that turns around where it stands sees an object."""
-    start = simulator.view.agent
-    for heading, horizon in product(_HEADINGS, _HORIZONS):
-        pose = replace(start, rotation=heading, horizon=horizon)
-        seen = simulator.query(**teleport_call(pose), renderImage=False).instances or {}
-        if item in seen and seen[item].pixels >= _MIN_PIXELS:
-            raise Difference("the object is seen by looking around")
-    simulator.query(**teleport_call(start), renderImage=False)
 
 
 def _looks(actions: Sequence[ExecutedAction]) -> Iterator[tuple[AgentPose, str | None]]:

@@ -23,7 +23,7 @@ SETTINGS = TwinSettings(("move",), 1, 1)
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp("data") / "one"
-    return write_trajectories(folder, cut_trajectory(FORK, 8))
+    return write_trajectories(folder, cut_trajectory(FORK, 15))
 
 
 @pytest.fixture(scope="module")
