@@ -81,3 +81,13 @@ def test_a_trajectory_that_does_not_replay_is_named_and_the_others_are_made(tmp_
     assert (code, summary["trajectories"], len(summary["failures"])) == (1, 1, 1)
     assert FORK in summary["failures"][0] and "PickupObject" in summary["failures"][0]
     assert "Traceback" not in err
+
+
+def test_twins_with_final_tasks_print_their_numbers(data, tmp_path, run_cli):
+    # Two short trajectories, after which there is no room for a history of 40 actions.
+    code, out, _ = run_cli("twins", data, "--out", tmp_path / "agents", "--final-tasks")
+    assert code == 0
+    assert "2 trajectories (0 of earlier runs): 0 of 0 edits kept; 0 pairs of final tasks" in out
+    code, out, _ = run_cli("twins", data, "--out", tmp_path / "agents", "--final-tasks", "--json")
+    summary = json.loads(out)
+    assert (code, summary["resumed"], summary["pairs"]) == (0, 2, 0)
