@@ -81,7 +81,7 @@ _BUILT_IN = {
         "infthor_eval.plans.options:PlansOptions",
         "infthor_eval.report.suites.plans:PlansPresenter",
         "infthor_eval.harness.plans_task:PlansRequests",
-        ("planner", "random", "scripted", "history"),
+        ("planner", "random", "scripted", "history", "recall"),
     ),
 }
 _DOCS = "docs/own-tasks.md"

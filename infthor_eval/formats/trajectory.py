@@ -17,6 +17,7 @@ from msgspec import Meta
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import lines_of, read_bytes
+from infthor_eval.formats.twins import TwinWorld
 from infthor_eval.storage.digests import digest
 from infthor_eval.storage.limits import OBJECT_POSES
 
@@ -224,7 +225,10 @@ class SubTrajectory(_Fields, omit_defaults=False):
 
 
 class Trajectory(_Fields):
-    """One trajectory; not all formats have the fields below `plan` (see the module's docstring)."""
+    """One trajectory; not all formats have the fields below `plan` (see the module's docstring).
+
+    `twin` is our addition, for pairs of twins with a final task.
+    """
 
     scene: Scene
     plan: ExpertPlan
@@ -241,6 +245,7 @@ class Trajectory(_Fields):
     retrieved_image: dict[str, Any] | None = None
     turk_annotations: dict[str, Any] | None = None
     gen_info: dict[str, Any] | None = None
+    twin: TwinWorld | None = None
 
 
 @dataclass(frozen=True)

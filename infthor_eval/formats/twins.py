@@ -1,6 +1,7 @@
-"""Pairs of twins: `twins.jsonl` of a set, a line a pair of worlds.
+"""Pairs of twins: `twins.jsonl` of a set, a line a pair of worlds; and the twins of agents.
 
-Both worlds are trajectories of the set like any other; their pictures are `shared_frames`.
+Both worlds of a set are trajectories like any other; their pictures are `shared_frames`. Twins of
+agents are trajectories that say themselves which pair they are of (`TwinWorld`).
 """
 
 from collections.abc import Iterable
@@ -19,6 +20,8 @@ __all__ = [
     "ComparedFrame",
     "PairedQuestion",
     "TwinPair",
+    "TwinPlace",
+    "TwinWorld",
     "read_pairs",
     "write_pairs",
 ]
@@ -97,6 +100,30 @@ class TwinPair(msgspec.Struct, frozen=True):
     types: tuple[str, ...]
     frames: tuple[ComparedFrame, ...]
     questions: tuple[PairedQuestion, ...]
+
+
+class TwinPlace(msgspec.Struct, frozen=True):
+    """Where the object of a final task lies: its receptacle, and its own x and z in metres."""
+
+    receptacle: str = msgspec.field(name="receptacleObjectId")
+    x: float
+    z: float
+
+
+class TwinWorld(msgspec.Struct, frozen=True):
+    """One world of a pair whose final task needs an object that is elsewhere in the other.
+
+    Attributes:
+        pair: id of the pair.
+        base: hash of the trajectory that the pair was made of; its pairs are one cluster.
+        kind: kind of the edit.
+        places: where the object is at the end of the history, in this world and in the other one.
+    """
+
+    pair: str
+    base: str
+    kind: str
+    places: tuple[TwinPlace, TwinPlace]
 
 
 def read_pairs(folder: Path) -> list[TwinPair]:

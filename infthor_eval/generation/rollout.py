@@ -76,6 +76,31 @@ class Rollout:
         self._walker.step_aside(outer or receptacle, receptacle if outer else None)
         self._put_from_here(item, receptacle, outer)
 
+    def fetch(self, item: str) -> None:
+        """Pick up an object in one sub-goal that includes its walk: no sub-goal names its place.
+
+        What it is in is opened if it is closed, and stays open.
+
+        Raises:
+            RolloutError: as `run`.
+        """
+        self._begin("PickupObject", item)
+        holder = self._closed_around(item)
+        self._walker.step_aside(holder or item, item if holder else None)
+        if holder is not None:
+            self._interact("OpenObject", holder)
+        self._interact("PickupObject", item)
+
+    def bring(self, item: str, receptacle: str) -> None:
+        """Put a held object into an open receptacle in one sub-goal that includes its walk.
+
+        Raises:
+            RolloutError: as `run`.
+        """
+        self._begin("PutObject", item, receptacle)
+        self._walker.step_aside(receptacle)
+        self._interact("PutObject", item, receptacle)
+
     # -- sub-goals
 
     def _pickup_or_slice(self, operator: Operator) -> None:

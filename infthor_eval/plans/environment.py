@@ -12,7 +12,12 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.goal_conditions import GoalConditions, goal_conditions
 from infthor_eval.household.navigation import Grid
-from infthor_eval.household.scout import HORIZON_STEP, grid_pose_of, reachable_grid
+from infthor_eval.household.scout import (
+    HORIZON_STEP,
+    find_viewpoint,
+    grid_pose_of,
+    reachable_grid,
+)
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.expert import Expert, ExpertAction
 from infthor_eval.plans.history.past import Past
@@ -280,6 +285,25 @@ class PlanEnvironment:
         recorded = filter(None, (present.object_id, present.receptacle_id))
         ids = [grounding.ground(key, view) for key in recorded]
         return [key for key in ids if key is not None]
+
+    def actions_to(self, object_id: str) -> list[str]:
+        """Return the shortest way to where an object is visible; none if there is no such way.
+
+        For subjects that know the room, not for what a subject sees.
+
+        Raises:
+            SimulatorError: the simulator fails.
+        """
+        grid = reachable_grid(self._simulator)
+        viewpoint = find_viewpoint(self._simulator, grid, [object_id])
+        agent = self._simulator.view.agent
+        path = None
+        if viewpoint is not None:
+            path = grid.path(grid_pose_of(agent, grid), viewpoint.pose)
+        if viewpoint is None or path is None:
+            return []
+        looks = round((viewpoint.horizon - agent.horizon) / self.look_degrees)
+        return [*path, *["LookDown" if looks > 0 else "LookUp"] * abs(looks)]
 
     def _ground(
         self, action: str | Mapping[str, Any], view: SimulatorView

@@ -3,11 +3,12 @@
 import msgspec
 
 from infthor_eval.episodes.records import EpisodeRecord
+from infthor_eval.household.first_place import FirstPlace
 from infthor_eval.plans.config import PlansConfig
 from infthor_eval.runs.journals.records import RecordTypes
 from infthor_eval.runs.usage import Count, Total
 
-__all__ = ["RECORDS", "PlanRecord", "StepRecord"]
+__all__ = ["RECORDS", "PlanRecord", "StepRecord", "TwinRecord"]
 
 
 class StepRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -27,6 +28,24 @@ class StepRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     message: str = ""
     reward: float = 0.0
     n_context_tokens: Count | None = None
+
+
+class TwinRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A plan of a final task that has a twin.
+
+    Attributes:
+        pair: id of the pair.
+        base: hash of the trajectory that the pair was made of.
+        finds: whether it is the plan that finds the object, the final task's first.
+        first: place that the agent looked at first for it; None if it looked at none.
+        n_opened: containers opened in which the object was not.
+    """
+
+    pair: str
+    base: str
+    finds: bool = False
+    first: FirstPlace | None = None
+    n_opened: Count = 0
 
 
 class PlanRecord(
@@ -52,6 +71,7 @@ class PlanRecord(
             it goes to, was last in view to the task's first frame; None if it never was or that is
             not known.
         clue_tokens: the same in tokens of the whole history; None if the subject counts no tokens.
+        twin: the pair of twins that it is of; None for others.
     """
 
     plan: str
@@ -66,6 +86,7 @@ class PlanRecord(
     conditions: tuple[Count, Total] | None = None
     clue_distance: Count | None = None
     clue_tokens: Count | None = None
+    twin: TwinRecord | None = None
 
 
 RECORDS = RecordTypes(unit=PlanRecord, config=PlansConfig)

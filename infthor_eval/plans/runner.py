@@ -16,6 +16,7 @@ from infthor_eval.plans.plan import Plan
 from infthor_eval.plans.records import PlanRecord, StepRecord
 from infthor_eval.plans.task import PlansTask
 from infthor_eval.plans.trajectories import PlanTrajectory
+from infthor_eval.plans.twins.looking import completed_twin, twin_record
 from infthor_eval.runs import Tokens, Usage
 from infthor_eval.thor.frames import FrameFolder, NoFrames
 from infthor_eval.thor.simulator import Simulator
@@ -40,6 +41,7 @@ def plan_record(trajectory: PlanTrajectory, plan: Plan) -> PlanRecord:
         n_expert_steps=end - first,
         is_final=plan.is_final,
         clue_distance=None if clue is None else trajectory.first_frame(plan) - clue,
+        twin=twin_record(trajectory, plan),
     )
 
 
@@ -120,7 +122,13 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
             self._actor.end(acts[-1][1])
         replies = [act.reply for act, _ in acts if act.reply is not None]
         faults = tuple(fault for reply in replies for fault in reply.faults)
-        return EpisodeResult(_completed_record(self.begun, acts), _tokens(replies), faults)
+        completed = _completed_record(self.begun, acts)
+        if completed.twin is not None and completed.twin.finds:
+            item = environment.named_objects(plan.index)[0]
+            outcomes = [outcome for _, outcome in acts]
+            twin = completed_twin(completed.twin, self._trajectory, item, observation, outcomes)
+            completed = msgspec.structs.replace(completed, twin=twin)
+        return EpisodeResult(completed, _tokens(replies), faults)
 
     def _with_clue_tokens(self, begun: PlanRecord, plan: Plan) -> PlanRecord:
         """Return the record with the distance of a final plan's clue, in tokens of the history."""

@@ -3,13 +3,16 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
+from msgspec import UNSET
+
 from infthor_eval.plans.actors.baselines import BASELINES
 from infthor_eval.plans.evaluation import PlansEvaluation
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.records import RECORDS, PlanRecord
-from infthor_eval.plans.summary import PlansSummary, summarise_plans
+from infthor_eval.plans.summary import PlansSummary, PlanTaskSummary, summarise_plans
 from infthor_eval.plans.tables import overview_table, result_tables
 from infthor_eval.plans.task import check_task_file
+from infthor_eval.plans.twins.results import first_place_score
 from infthor_eval.rates import Rate
 from infthor_eval.runs import (
     RecordTypes,
@@ -52,20 +55,20 @@ class PlansSuite:
         return summarise_plans(header.config, records)
 
     def scores(self, record: UnitRecord[PlanRecord]) -> Mapping[str, float]:
-        """See `Suite.scores`: whether the plan was completed, and its reward if it has one."""
+        """See `Suite.scores`: whether the plan was completed, and its reward if it has one.
+
+        Of twins, also whether the place looked at first is the right one.
+        """
         payload = record.payload
         if not payload.attempted:
             return {}
         reward = {} if payload.max_reward is None else {"reward": payload.reward}
-        return {"success": float(payload.done), **reward}
+        return {"success": float(payload.done), **reward, **first_place_score(payload)}
 
     def primary_metrics(self, summary: PlansSummary) -> Mapping[str, Rate]:
-        """See `Suite.primary_metrics`: share of completed plans."""
-        return {
-            name: task.success["total"]
-            for name, task in summary.tasks.items()
-            if "total" in task.success
-        }
+        """See `Suite.primary_metrics`: pair accuracy of twins, else share of completed plans."""
+        rates = {name: _primary_rate(task) for name, task in summary.tasks.items()}
+        return {name: rate for name, rate in rates.items() if rate is not None}
 
     def overview(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.overview`."""
@@ -74,3 +77,7 @@ class PlansSuite:
     def tables(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.tables`."""
         return result_tables(runs)
+
+
+def _primary_rate(task: PlanTaskSummary) -> Rate | None:
+    return task.success.get("total") if task.twins is UNSET else task.twins.pair_accuracy

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from msgspec import UNSET, UnsetType
+
 from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
 from infthor_eval.episodes.summary import (
     EpisodesSummary,
@@ -16,6 +18,7 @@ from infthor_eval.plans.config import PlansConfig, PlansTaskConfig
 from infthor_eval.plans.plan import PlanKind
 from infthor_eval.plans.published.log import log_rows
 from infthor_eval.plans.records import PlanRecord
+from infthor_eval.plans.twins.results import TwinResults, twin_results
 from infthor_eval.rates import Rate, clustered_rate, rate_over_clusters
 from infthor_eval.runs import UnitRecord
 
@@ -56,6 +59,7 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
         rules: name of the reward rules; None for imported counts.
         logged: totals of a trajectory as the published script logs them, by its names; empty under
             other rules.
+        twins: results of pairs of twins; not written where there are none.
     """
 
     n_plans: int
@@ -73,6 +77,7 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     n_actions: int | None
     rules: str | None
     logged: dict[str, Rate]
+    twins: TwinResults | UnsetType = UNSET
 
 
 PlansSummary = EpisodesSummary[PlanTaskSummary]
@@ -112,6 +117,7 @@ def _summarise_task(config: PlansTaskConfig, records: Sequence[Record]) -> PlanT
         n_actions=sum(len(record.payload.steps) for record in acted) if has_steps else None,
         rules=_rules(config.rewards),
         logged=_logged(acted),
+        twins=twin_results(records),
     )
 
 

@@ -3,11 +3,14 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from msgspec import UNSET
+
 from infthor_eval.distances import DISTANCES, LENGTHS
 from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes
 from infthor_eval.formats.published import published_tables
 from infthor_eval.plans.config import PlansTaskConfig
 from infthor_eval.plans.summary import FINAL_COLUMNS, NEVER, PlanTaskSummary
+from infthor_eval.plans.twins.tables import PAIRS_RIGHT, format_pairs, twin_tables
 from infthor_eval.rates import Rate, format_number, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
@@ -31,12 +34,16 @@ _PUBLISHED_RULES = (
 
 
 def overview_table(runs: Sequence[RunSummary]) -> Table:
-    """Return completed plans and reward, one number a task."""
+    """Return completed plans and reward, or pairs if there are twins, one number a task."""
+    tasks = list(named_tasks(runs))
+    has_twins = any(task.twins is not UNSET for *_, task in tasks)
     rows = []
-    for *names, task in named_tasks(runs):
+    for *names, task in tasks:
         success = format_percent(task.success.get("total"))
-        rows.append(Row((*names, success, format_percent(task.reward_share), *_sizes(task)[:3])))
-    columns = (*NAME_COLUMNS, *map(Column, ("completed, %", "reward, % of the most", *_COUNTS[:3])))
+        second = format_pairs(task.twins) if has_twins else format_percent(task.reward_share)
+        rows.append(Row((*names, success, second, *_sizes(task)[:3])))
+    second_column = PAIRS_RIGHT if has_twins else "reward, % of the most"
+    columns = (*NAME_COLUMNS, *map(Column, ("completed, %", second_column, *_COUNTS[:3])))
     return Table("Plans, 95 % interval in brackets", columns, tuple(rows), result_notes(runs))
 
 
@@ -44,7 +51,13 @@ def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
     """Return all tables of some runs."""
     tasks = list(named_tasks(runs))
     endings = endings_table("How plans ended", tasks, "actions", _actions)
-    return [_success_table(runs, tasks), *_distance_tables(tasks), _reward_table(tasks), endings]
+    return [
+        *twin_tables(tasks),
+        _success_table(runs, tasks),
+        *_distance_tables(tasks),
+        _reward_table(tasks),
+        endings,
+    ]
 
 
 def _success_table(

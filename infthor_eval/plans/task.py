@@ -20,6 +20,7 @@ from infthor_eval.plans.published.final_protocol import MAX_STEPS as MAX_FINAL_S
 from infthor_eval.plans.published.final_protocol import FinalForm, chat_form, final_form
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.trajectories import PlanTrajectory, read_plan_trajectory
+from infthor_eval.plans.twins.looking import worlds_together
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.runs.limiting import limit_items
@@ -108,9 +109,9 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
             self.decoding = self._form.decoding(request.seed)
         super().__init__(file, request, settings, partial(read_plan_trajectory, words=self.words))
         having_plans = [one for one in self.trajectories.trajectories if self.plans(one)]
-        self.evaluated_trajectories = limit_items(
-            having_plans, lambda trajectory: trajectory.traj_id, request.seed, request.limit
-        )
+        worlds = worlds_together(having_plans)
+        chosen = limit_items(worlds, lambda pair: pair[0].traj_id, request.seed, request.limit)
+        self.evaluated_trajectories = [world for pair in chosen for world in pair]
         if not self.evaluated_trajectories:
             raise UsageError(
                 f"{self.name}: no trajectory there has a final task; make some with --test-set"

@@ -12,8 +12,11 @@ from infthor_eval.cli.options.values import PATH, FiniteFloat, WholeNumber
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rich.console import Console
 
+    from infthor_eval.generation.twins.final_task_set import FinalTaskSummary
     from infthor_eval.generation.twins.twin_set import TwinSummary
 
 __all__ = ["questions", "twins"]
@@ -134,6 +137,11 @@ def questions(
 @click.option(
     "--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator."
 )
+@click.option(
+    "--final-tasks",
+    is_flag=True,
+    help="Make twins for agents: trajectories with a final task, in place of questions.",
+)
 @worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
 @click.pass_context
@@ -147,6 +155,7 @@ def twins(
     seed: int,
     limit: int | None,
     unity: bool,
+    final_tasks: bool,
     as_json: bool,
     **workers: Any,
 ) -> None:
@@ -154,13 +163,15 @@ def twins(
 
     A twin is the same episode in a world with one thing changed, so that a question in the same
     words has another answer. Writes an NIEH set with both worlds of each pair; trajectories that
-    are done are not tried again. Exit code 1 if twins of a trajectory cannot be made at all.
+    are done are not tried again. With --final-tasks, writes trajectories for the task
+    infthor_twins. Exit code 1 if twins of a trajectory cannot be made at all.
     """
     from functools import partial
 
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.generation.replay_set import select
     from infthor_eval.generation.twins.drafting import TwinSettings
+    from infthor_eval.generation.twins.final_task_set import make_final_tasks
     from infthor_eval.generation.twins.twin_set import make_twins
     from infthor_eval.nieh.scoring import score
     from infthor_eval.storage.files import prepare_folder
@@ -169,7 +180,7 @@ def twins(
     from infthor_eval.thor.supplement import supplement_file
 
     worker_settings = parse_worker_settings(**workers)
-    settings = TwinSettings(_parse_kinds(kinds), seed, per_kind)
+    settings = TwinSettings(_parse_kinds(kinds, final_tasks), seed, per_kind)
     notes = error_console()
     prepare_folder(out)
     selection = select(trajectories, limit)
@@ -177,13 +188,16 @@ def twins(
         supplement_file(trajectory for _, trajectory in selection.items) as supplement,
         progress_bar(notes) as progress,
     ):
-        summary = make_twins(
+        make: Callable[..., TwinSummary | FinalTaskSummary] = make_final_tasks
+        if not final_tasks:
+            make = partial(
+                make_twins, score=partial(score, scorer="strict"), per_trajectory=per_trajectory
+            )
+        summary = make(
             selection,
             launch.unity_launch() if unity else launch.embedded_launch(None, supplement),
             out,
             settings,
-            partial(score, scorer="strict"),
-            per_trajectory=per_trajectory,
             worker_settings=worker_settings,
             progress=PacedBar(progress, "twins", len(selection.items)).advance,
             say=notes.print,
@@ -199,28 +213,32 @@ def twins(
     context.exit(1 if summary.failures else 0)
 
 
-def _parse_kinds(names: str | None) -> tuple[str, ...]:
+def _parse_kinds(names: str | None, final_tasks: bool) -> tuple[str, ...]:
     """Return the names of kinds that an option gives; an unknown one is an error."""
+    from infthor_eval.generation.twins.final_tasks import MOVING_KINDS
     from infthor_eval.generation.twins.kinds import KINDS, EditKind
 
     if names is None:
-        return KINDS.names
+        return MOVING_KINDS if final_tasks else KINDS.names
     wanted = tuple(dict.fromkeys(name.strip() for name in names.split(",")))
     for name in wanted:
         KINDS.load(name, EditKind)
     return wanted
 
 
-def _print(summary: TwinSummary, output: Console) -> None:
+def _print(summary: TwinSummary | FinalTaskSummary, output: Console) -> None:
+    from infthor_eval.generation.twins.twin_set import TwinSummary
+
+    if isinstance(summary, TwinSummary):
+        found = f"{summary.pairs} paired questions of {summary.found} on {summary.facts} facts"
+        tables = [("by kind", summary.by_kind), ("by form", summary.by_form)]
+    else:
+        found = f"{summary.pairs} pairs of final tasks"
+        tables = [("by kind", summary.kept)]
     output.print(
         f"{summary.trajectories} trajectories ({summary.resumed} of earlier runs): "
         f"{sum(summary.kept.values())} of {sum(summary.proposed.values())} edits kept; "
-        f"{summary.pairs} paired questions of {summary.found} on {summary.facts} facts, "
-        f"{summary.seconds} s"
+        f"{found}, {summary.seconds} s"
     )
-    for title, counts in (
-        ("by kind", summary.by_kind),
-        ("by form", summary.by_form),
-        ("rejected", summary.rejected),
-    ):
+    for title, counts in (*tables, ("rejected", summary.rejected)):
         output.print(f"{title}: {', '.join(f'{name} {count}' for name, count in counts.items())}")

@@ -28,7 +28,7 @@ from infthor_eval.storage.files import write_atomically
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["TwinDraft", "TwinSettings", "draft_twins", "is_flipped", "name_worlds"]
+__all__ = ["Replays", "TwinDraft", "TwinSettings", "draft_twins", "is_flipped", "name_worlds"]
 
 _WORLD = "twin"  # what a world is called while it is replayed
 _COPIED = ("metadata.json", "traj.txt", "state_summary.json")
@@ -94,29 +94,29 @@ def draft_twins(
     draft = TwinDraft(base, settings, trajectory.scene.floor_plan)
     episode = read_episode(trajectory, simulator)
     with ExitStack() as stack:
-        maker = _Maker(draft, episode, score, _Replays(simulator, stack), out)
+        maker = _Maker(draft, episode, score, Replays(simulator, stack), out)
         for name in settings.kinds:
             maker.try_kind(name)
     return draft
 
 
 @dataclass(frozen=True)
-class _Replayed:
+class Replayed:
     """A replayed world and the folder of its files."""
 
     world: World
     folder: Path
 
 
-class _Replays:
+class Replays:
     """Replays worlds, each once, whatever edits it is of."""
 
     def __init__(self, simulator: Simulator, stack: ExitStack) -> None:
         self.simulator = simulator
         self._stack = stack
-        self._replayed: dict[str, _Replayed | str] = {}
+        self._replayed: dict[str, Replayed | str] = {}
 
-    def replayed(self, world: Trajectory) -> _Replayed:
+    def replayed(self, world: Trajectory) -> Replayed:
         """Return the replay of a world.
 
         Raises:
@@ -130,7 +130,7 @@ class _Replays:
             raise Difference(result)
         return result
 
-    def _replay(self, world: Trajectory) -> _Replayed | str:
+    def _replay(self, world: Trajectory) -> Replayed | str:
         folder = self._stack.enter_context(ScratchFolder()) / _WORLD
         folder.mkdir()
         report = replay(world, self.simulator, folder, "")
@@ -140,14 +140,14 @@ class _Replays:
             return f"{report.refusals[0].action.partition(' ')[0]} is refused"
         steps = read_steps(folder)
         files = [folder / "img" / step.img_filename for step in steps]
-        return _Replayed(World(steps, [digest_of_file(file) for file in files], files), folder)
+        return Replayed(World(steps, [digest_of_file(file) for file in files], files), folder)
 
 
 class _Maker:
     """Fills the draft of a trajectory."""
 
     def __init__(
-        self, draft: TwinDraft, episode: Episode, score: ScoreReply, replays: _Replays, out: Path
+        self, draft: TwinDraft, episode: Episode, score: ScoreReply, replays: Replays, out: Path
     ) -> None:
         self._draft = draft
         self._episode = episode
@@ -218,7 +218,7 @@ class _Maker:
             self._write(worlds, pair, replays)
         return pair
 
-    def _write(self, worlds: Worlds, pair: TwinPair, replays: Sequence[_Replayed]) -> None:
+    def _write(self, worlds: Worlds, pair: TwinPair, replays: Sequence[Replayed]) -> None:
         first, second = (replayed.world.files for replayed in replays)
         # What counts as equal is one picture, so that no noise tells the worlds apart.
         shared = [

@@ -1,4 +1,4 @@
-"""Baselines that see no frame: expert, chance, a script for a plan's words, experts' habits.
+"""Baselines that see no frame: the expert, chance, a script, habits of experts, recall of the log.
 
 To add a baseline of agents: a class in `BASELINES` here, and its name in `infthor_eval/suites.py`.
 """
@@ -11,8 +11,10 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.plans.actors.habits import Habits
 from infthor_eval.plans.actors.protocols import Act, PlanActor, PlanBaseline, PlanSituation
+from infthor_eval.plans.actors.recall import way_by_memory
 from infthor_eval.plans.actors.script import scripted_action
 from infthor_eval.plans.environment import StepOutcome
+from infthor_eval.plans.history.clue_steps import object_logs
 from infthor_eval.runs.suite import BaselineSubject
 from infthor_eval.thor.actions import applicable_calls
 from model_adapters import Capabilities
@@ -76,6 +78,20 @@ class _HabitualActor(_BlindActor):
         return Act(self._habits.next_action(self._situation.plan.text, self._done))
 
 
+class _RecallingActor(_BlindActor):
+    def begin(self, situation: PlanSituation) -> None:
+        super().begin(situation)
+        environment = situation.environment
+        logs = object_logs(environment.trajectory)[: situation.plan.low[0] + 1]
+        self._way = way_by_memory(situation.plan.text, environment, self._view, logs)
+
+    def act(self) -> Act:
+        n_done = len(self._done)
+        if n_done < len(self._way):
+            return Act(self._way[n_done])
+        return Act(scripted_action(self._situation.plan.text, self._done[len(self._way) :]))
+
+
 class PlannerAgent(_PlanBaseline):
     """Repeats the expert's actions: the upper bound."""
 
@@ -113,7 +129,14 @@ class HabitualAgent(_PlanBaseline):
         return _HabitualActor(Habits(elsewhere, words))
 
 
+class RecallingAgent(_PlanBaseline):
+    """Goes where the trajectory's log last had the plan's object, then is scripted (`recall`)."""
+
+    name = "recall"
+    _actor = _RecallingActor
+
+
 BASELINES: Mapping[str, Callable[[int], PlanBaseline]] = {
     baseline.name: baseline
-    for baseline in (PlannerAgent, RandomAgent, ScriptedAgent, HabitualAgent)
+    for baseline in (PlannerAgent, RandomAgent, ScriptedAgent, HabitualAgent, RecallingAgent)
 }

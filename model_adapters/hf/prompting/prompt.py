@@ -7,7 +7,7 @@ little as a short text even if frames take 100,000 tokens.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -146,6 +146,9 @@ class Prompter:
             if size not in self._ids:
                 self._ids[size] = self._family.frame_ids(size)
             frame = self._frames[ref.digest] = Frame(ref.digest, size, self._ids[size], ref)
+        elif frame.ref != ref:
+            # Twins have the same pictures in folders of their own, and the earlier one may be gone.
+            frame = self._frames[ref.digest] = replace(frame, ref=ref)
         return frame
 
     def _clips(self, video: Video, converter: VideoInput) -> list[Clip]:

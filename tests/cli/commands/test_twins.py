@@ -94,3 +94,13 @@ def test_the_same_command_with_unity(data, tmp_path, run_cli, monkeypatch):
     assert code == 0
     assert read_pairs(tmp_path)
     assert json.loads((tmp_path / "set.json").read_text())["simulator"] == "unity"
+
+
+def test_twins_with_final_tasks_print_their_numbers(data, tmp_path, run_cli):
+    # Two short trajectories, after which there is no room for a history of 40 actions.
+    code, out, _ = run_cli("twins", data, "--out", tmp_path / "agents", "--final-tasks")
+    assert code == 0
+    assert "2 trajectories (0 of earlier runs): 0 of 0 edits kept; 0 pairs of final tasks" in out
+    code, out, _ = run_cli("twins", data, "--out", tmp_path / "agents", "--final-tasks", "--json")
+    summary = json.loads(out)
+    assert (code, summary["resumed"], summary["pairs"]) == (0, 2, 0)

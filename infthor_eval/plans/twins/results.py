@@ -1,0 +1,143 @@
+"""Results of pairs of twins: a pair counts only if both worlds are right."""
+
+from collections.abc import Callable, Sequence
+
+import msgspec
+from msgspec import UNSET, UnsetType
+
+from infthor_eval.household.first_place import FirstPlace
+from infthor_eval.plans.records import PlanRecord, TwinRecord
+from infthor_eval.rates import Rate, clustered_rate, paired_rate
+from infthor_eval.runs import UnitRecord
+
+__all__ = ["TwinResults", "first_place_score", "twin_results"]
+
+Record = UnitRecord[PlanRecord]
+_World = tuple[Record, ...]  # the plans of one final task, in order; the first finds the object
+
+
+class TwinResults(msgspec.Struct, frozen=True):
+    """Results of the pairs of a task; intervals are clustered by what pairs were made of.
+
+    Attributes:
+        n_pairs: pairs of which both worlds count.
+        n_incomplete: pairs of which one does not, as it is excluded or left out.
+        pair_accuracy: share of pairs in which the place looked at first is right in both worlds.
+        pair_success: share of pairs whose final task was carried out in both worlds.
+        accuracy: share of worlds in which the place looked at first is right.
+        one_of_two: share of pairs in which it is right in one world alone.
+        same_place: share of pairs in which the same place was looked at first in both worlds:
+            whoever does not tell the worlds apart.
+        nowhere: share of worlds in which no place was looked at.
+        opened: containers opened in vain, mean over worlds.
+        excess: actions more than the planner's until the object is found, mean over worlds in which
+            it is.
+    """
+
+    n_pairs: int
+    n_incomplete: int
+    pair_accuracy: Rate | None
+    pair_success: Rate | None
+    accuracy: Rate | None
+    one_of_two: Rate | None
+    same_place: Rate | None
+    nowhere: Rate | None
+    opened: Rate | None
+    excess: Rate | None
+
+
+def first_place_score(plan: PlanRecord) -> dict[str, float]:
+    """Return the score of the place that was looked at first; none of plans that find nothing."""
+    if plan.twin is None or not plan.twin.finds:
+        return {}
+    return {"first_place": float(plan.twin.first == FirstPlace.OWN)}
+
+
+def twin_results(records: Sequence[Record]) -> TwinResults | UnsetType:
+    """Return the results of a task's pairs; UNSET if its trajectories are no twins."""
+    worlds: dict[str, list[Record]] = {}
+    for record in sorted(records, key=lambda record: record.payload.index):
+        if record.payload.twin is not None:
+            worlds.setdefault(record.cluster, []).append(record)
+    pairs: dict[str, list[_World]] = {}
+    for world in worlds.values():
+        twin = world[0].payload.twin
+        assert twin is not None
+        group = pairs.setdefault(twin.pair, [])
+        if all(record.excluded is None for record in world):
+            group.append(tuple(world))
+    if not pairs:
+        return UNSET
+    whole = [(worlds[0], worlds[1]) for _, worlds in sorted(pairs.items()) if len(worlds) == 2]
+    return _Pairs(whole).results(len(pairs) - len(whole))
+
+
+class _Pairs:
+    """Pairs of which both worlds count."""
+
+    def __init__(self, pairs: Sequence[tuple[_World, _World]]) -> None:
+        self._pairs = pairs
+
+    def results(self, n_incomplete: int) -> TwinResults:
+        return TwinResults(
+            n_pairs=len(self._pairs),
+            n_incomplete=n_incomplete,
+            pair_accuracy=self._share(lambda one, other: _is_right(one) and _is_right(other)),
+            pair_success=self._share(lambda one, other: _is_done(one) and _is_done(other)),
+            accuracy=self._share_of_worlds(_is_right),
+            one_of_two=self._share(lambda one, other: _is_right(one) != _is_right(other)),
+            same_place=self._share(_went_to_the_same),
+            nowhere=self._share_of_worlds(lambda world: _first(world) is None),
+            opened=self._mean_opened(),
+            excess=self._mean_excess(),
+        )
+
+    def _share(self, holds: Callable[[_World, _World], bool]) -> Rate | None:
+        values = [float(holds(one, other)) for one, other in self._pairs]
+        return clustered_rate(values, [_base(one) for one, _ in self._pairs])
+
+    def _share_of_worlds(self, holds: Callable[[_World], bool]) -> Rate | None:
+        values = [float(holds(world)) for world in self._worlds]
+        return clustered_rate(values, [_base(world) for world in self._worlds])
+
+    def _mean_opened(self) -> Rate | None:
+        counts = [float(_twin(world).n_opened) for world in self._worlds]
+        # Differences from 0: counts are no shares, also where none is above 1.
+        return paired_rate([0.0] * len(counts), counts, [_base(world) for world in self._worlds])
+
+    def _mean_excess(self) -> Rate | None:
+        found = [world for world in self._worlds if world[0].payload.done]
+        own = [float(len(world[0].payload.steps)) for world in found]
+        expert = [float(world[0].payload.n_expert_steps) for world in found]
+        return paired_rate(expert, own, [_base(world) for world in found])
+
+    @property
+    def _worlds(self) -> list[_World]:
+        return [world for pair in self._pairs for world in pair]
+
+
+def _twin(world: _World) -> TwinRecord:
+    twin = world[0].payload.twin
+    assert twin is not None
+    return twin
+
+
+def _base(world: _World) -> str:
+    return _twin(world).base
+
+
+def _first(world: _World) -> FirstPlace | None:
+    return _twin(world).first
+
+
+def _is_right(world: _World) -> bool:
+    return _first(world) == FirstPlace.OWN
+
+
+def _is_done(world: _World) -> bool:
+    return all(record.payload.done for record in world)
+
+
+def _went_to_the_same(one: _World, other: _World) -> bool:
+    """Return True if one of the two places was looked at first in both worlds."""
+    return {_first(one), _first(other)} == {FirstPlace.OWN, FirstPlace.TWIN}
