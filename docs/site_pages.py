@@ -30,6 +30,7 @@ _OUTSIDE = {  # where a file lies in the repository: where its page stands in th
     "benchmarks/simulator.md": "benchmarks/simulator.md",
     "benchmarks/speed.md": "benchmarks/speed.md",
     "benchmarks/twins.md": "benchmarks/twins.md",
+    "benchmarks/twins_agents.md": "benchmarks/twins_agents.md",
     "examples/sums/README.md": "examples/sums/README.md",
     "examples/thumbnails/README.md": "examples/thumbnails/README.md",
     "infthor_sim/README.md": "infthor_sim/README.md",

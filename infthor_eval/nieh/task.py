@@ -30,7 +30,7 @@ from model_adapters import Decoding, cut_at_stop
 __all__ = ["NiehTask", "PreparedTask", "check_task_file"]
 
 # Keys of `dataset_kwargs` beside the settings of contexts.
-_OF_SETS = ("context", "data", "bundled")
+_OF_SETS = ("context", "leaves_open", "data", "bundled")
 _NEEDED = (
     "custom_dataset",
     "dataset_kwargs",
@@ -84,7 +84,7 @@ class NiehTask:
         check_task_file(file)
         self.name = file.name
         own = file.settings["dataset_kwargs"]
-        self.takes_context = "context" not in own
+        self.takes_context = _leaves_context_open(own)
         if self.takes_context:
             own = _context_of(request.options) | own
         self.settings: Mapping[str, Any] = {**file.settings, "dataset_kwargs": own}
@@ -176,8 +176,13 @@ def check_task_file(file: TaskFile) -> None:
     file.require("dataset_kwargs")
     location = f"{file.path}: dataset_kwargs"
     raw = file.settings["dataset_kwargs"]
-    if not isinstance(raw, Mapping):
-        raise DataError(f"{location} must be a mapping of names to values")
+    if not isinstance(raw, Mapping) or not (
+        isinstance(raw.get("context"), str) or _leaves_context_open(raw)
+    ):
+        raise DataError(
+            f"{location} must be a mapping with the name of a context (context: NAME, or "
+            "leaves_open: context)"
+        )
     known = (*_OF_SETS, *(setting.name for setting in fields(ContextSettings)))
     for key in raw:
         if key not in known:
@@ -195,6 +200,11 @@ def check_task_file(file: TaskFile) -> None:
             packaged_folder(f"sets/{raw['bundled']}")
         except DataError as error:
             raise DataError(f"{location}: bundled is {raw['bundled']!r:.60}: {error}") from error
+
+
+def _leaves_context_open(dataset_kwargs: Mapping[str, Any]) -> bool:
+    """Return True for a task whose context the run names."""
+    return "context" not in dataset_kwargs and dataset_kwargs.get("leaves_open") == "context"
 
 
 def _check_context(name: str, settings: ContextSettings, location: str) -> None:

@@ -68,6 +68,7 @@ def make_twins(
             answers=(other,),
             n_frames=n_frames,
             n_differing=1,
+            n_after_clues=n_frames - 1,
             n_since_change=None,
         )
         clues = ShownClues(n_shown=1, n_clues=1, n_after=n_after)
