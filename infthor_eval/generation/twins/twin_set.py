@@ -17,20 +17,24 @@ from msgspec.structs import replace
 from infthor_eval.errors import DataError, InfthorError
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
-from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.set_info import claim_for_simulator
-from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, folder_name
 from infthor_eval.formats.twins import TwinPair, write_pairs
-from infthor_eval.generation.replay_set import Selection, wrap_malformed
+from infthor_eval.generation.replay_set import Selection
 from infthor_eval.generation.simulator_jobs import (
     SimulatorWorker,
     collect_outcomes,
-    freeze_existing_objects,
 )
 from infthor_eval.generation.twins.choosing import ChosenQuestion, choose_pairs
+from infthor_eval.generation.twins.draft_files import (
+    DRAFTS,
+    DraftOutcome,
+    Item,
+    count_edits,
+    draft_item,
+    failure_line,
+)
 from infthor_eval.generation.twins.drafting import TwinDraft, TwinSettings, draft_twins
 from infthor_eval.generation.twins.pairing import ScoreReply
-from infthor_eval.storage.files import write_atomically
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings, run_jobs
@@ -38,9 +42,6 @@ from infthor_eval.workers import WorkerSettings, run_jobs
 __all__ = ["TwinSummary", "make_twins"]
 
 _QUESTIONS = "qa_set_twins.csv"
-_DRAFTS = "drafts"
-_HINT = "remove it, or choose another --out"
-_Item = tuple[TrajectorySource, Trajectory]
 
 
 class TwinSummary(msgspec.Struct):
@@ -75,15 +76,6 @@ class TwinSummary(msgspec.Struct):
     seconds: float
 
 
-@dataclass(frozen=True)
-class _DraftOutcome:
-    """The outcome of one trajectory: its draft, or why there is none."""
-
-    draft: TwinDraft | None = None
-    is_resumed: bool = False
-    failure: str = ""
-
-
 def make_twins(
     selection: Selection,
     launch: Launch,
@@ -113,15 +105,15 @@ def make_twins(
         DataError: the set is another simulator's, or two worlds have one name.
     """
     started = time.monotonic()
-    for name in ("metadata", _DRAFTS):
+    for name in ("metadata", DRAFTS):
         (out / name).mkdir(parents=True, exist_ok=True)
     claim_for_simulator(out, launch.label)
     run_job = partial(_draft_one, out=out, settings=settings, score=score)
     start = partial(SimulatorWorker, partial(Simulator, launch), run_job)
     items = selection.items
 
-    def failed(number: int, error: InfthorError) -> _DraftOutcome:
-        return _DraftOutcome(failure=_line(items[number], error))
+    def failed(number: int, error: InfthorError) -> DraftOutcome[TwinDraft]:
+        return DraftOutcome[TwinDraft](failure=failure_line(items[number], error))
 
     outcomes = collect_outcomes(run_jobs(start, items, worker_settings, say), failed, progress)
     drafts = [outcome.draft for outcome in outcomes if outcome.draft is not None]
@@ -136,36 +128,11 @@ def make_twins(
 
 
 def _draft_one(
-    item: _Item, simulator: Simulator, out: Path, settings: TwinSettings, score: ScoreReply
-) -> _DraftOutcome:
+    item: Item, simulator: Simulator, out: Path, settings: TwinSettings, score: ScoreReply
+) -> DraftOutcome[TwinDraft]:
     source, trajectory = item
-    # Not `.json`, so that the set may be read as a folder of trajectories.
-    file = out / _DRAFTS / f"{folder_name(trajectory.traj_id)}.draft"
-    try:
-        if file.exists():
-            return _DraftOutcome(_read_draft(file, source.digest, settings), is_resumed=True)
-        with freeze_existing_objects(), wrap_malformed():
-            draft = draft_twins(trajectory, source.digest, settings, score, simulator, out)
-        with write_atomically(file) as partial_file:
-            partial_file.write_bytes(msgspec.json.encode(draft) + b"\n")
-    except InfthorError as error:
-        return _DraftOutcome(failure=_line(item, error))
-    return _DraftOutcome(draft)
-
-
-def _read_draft(file: Path, base: str, settings: TwinSettings) -> TwinDraft:
-    """Return the draft of an earlier run, if it is of the same trajectory and settings."""
-    draft = read_json(file, _HINT, TwinDraft)
-    if draft.digest != base:
-        raise DataError(f"{file}: made of another trajectory of this name; {_HINT}")
-    if draft.settings != settings:
-        raise DataError(f"{file}: made with other kinds, seed or --per-kind; {_HINT}")
-    return draft
-
-
-def _line(item: _Item, error: InfthorError) -> str:
-    source, trajectory = item
-    return f"{source.place}: {trajectory.traj_id}: {error}"
+    make = partial(draft_twins, trajectory, source.digest, settings, score, simulator, out)
+    return draft_item(item, out, settings, TwinDraft, make)
 
 
 def _require_distinct(drafts: Iterable[TwinDraft]) -> None:
@@ -214,22 +181,14 @@ class _Numbers:
 
     def summary(self, n_resumed: int, failures: list[str], seconds: float) -> TwinSummary:
         """Return the numbers of the set."""
-        proposed = Counter[str]()
-        kept = Counter[str]()
-        reasons = Counter[str]()
-        for draft in self.drafts:
-            proposed.update(draft.proposed)
-            kept.update(draft.proposed)
-            for kind, rejected in draft.rejected.items():
-                kept[kind] -= sum(rejected.values())
-                reasons.update(rejected)
+        proposed, kept, rejected = count_edits(self.drafts)
         found = (len(pair.questions) for draft in self.drafts for pair in draft.pairs)
         return TwinSummary(
             trajectories=len(self.drafts),
             resumed=n_resumed,
-            proposed=dict(sorted(proposed.items())),
-            kept=dict(sorted(kept.items())),
-            rejected=dict(reasons.most_common()),
+            proposed=proposed,
+            kept=kept,
+            rejected=rejected,
             found=sum(found),
             pairs=len(self.chosen),
             facts=len({one.fact for one in self.chosen}),
