@@ -25,10 +25,10 @@ from infthor_eval.generation.statistics import AttemptStatistics, RollBack
 from infthor_eval.generation.trace import RolloutError, Trace
 from infthor_eval.generation.walking import Walker
 from infthor_eval.household.affordances import MAX_PLAN_STEPS
-from infthor_eval.household.goals import goal_holds, is_achieved
+from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.pddl import problem
-from infthor_eval.household.planner import is_feasible, plan
-from infthor_eval.household.possible_tasks import tasks_of
+from infthor_eval.household.planner import plan
+from infthor_eval.household.possible_tasks import open_tasks
 from infthor_eval.household.scout import reachable_grid
 from infthor_eval.household.symbolic import Operator, SymbolicRoom
 from infthor_eval.household.tasks import Task, TaskType, sub_task
@@ -278,12 +278,7 @@ class _Factory:
     def _candidates(self, room: SymbolicRoom) -> list[Task]:
         """Return the tasks that are possible now, not with what is known to be full or far."""
         types = {one.object_type for one in self._simulator.view.objects.values()}
-        tasks = [task for task in tasks_of(room, types) if task.task_type in self._task_types]
-        return [
-            task
-            for task in tasks
-            if is_feasible(task, room) and not is_achieved(task, room, room.start)
-        ]
+        return open_tasks(room, types, self._task_types)
 
     def _try(self, task: Task, room: SymbolicRoom, is_last: bool = False) -> _Outcome:
         """Plan a task, rehearse it and carry it out; after a failure everything is as before."""

@@ -1,7 +1,7 @@
 """The tasks that are possible with the objects of a room, and those that its type usually has."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 from infthor_eval.household import affordances
 from infthor_eval.household.affordances import (
@@ -13,11 +13,13 @@ from infthor_eval.household.affordances import (
     STOWABLE,
     goes_into,
 )
+from infthor_eval.household.goals import is_achieved
+from infthor_eval.household.planner import is_feasible
 from infthor_eval.household.symbolic import ABSENT, SymbolicRoom
 from infthor_eval.household.tasks import SAMPLED, Task, TaskType
 from infthor_eval.scene_types import scene_type
 
-__all__ = ["tasks_of", "usual_tasks"]
+__all__ = ["open_tasks", "tasks_of", "usual_tasks"]
 
 _TREATED = {
     TaskType.CLEAN: affordances.CLEANABLE,
@@ -35,6 +37,21 @@ def usual_tasks(scene: str) -> frozenset[TaskType]:
     """Return the task types drawn from in a scene's room type, or all if that is unknown."""
     room = scene_type(scene)
     return frozenset(name for name in SAMPLED if room is None or room in GOALS_BY_ROOM[name])
+
+
+def open_tasks(
+    room: SymbolicRoom, extra_types: Iterable[str], task_types: Collection[TaskType]
+) -> list[Task]:
+    """Return the tasks of some types that a next task is drawn from: possible, and not done yet.
+
+    The order and `extra_types` are those of `tasks_of`.
+    """
+    tasks = (task for task in tasks_of(room, extra_types) if task.task_type in task_types)
+    return [
+        task
+        for task in tasks
+        if is_feasible(task, room) and not is_achieved(task, room, room.start)
+    ]
 
 
 def tasks_of(room: SymbolicRoom, extra_types: Iterable[str] = ()) -> list[Task]:

@@ -13,9 +13,10 @@ from infthor_eval.generation.questions.candidates import (
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.questions.readings import is_plain, minimal_cover
 
-__all__ = ["QUESTION_TYPE", "final_states"]
+__all__ = ["COUNT_FORM", "QUESTION_TYPE", "final_states"]
 
 QUESTION_TYPE = "final_state"
+COUNT_FORM = "How many objects were {}?"
 
 
 def final_states(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -73,9 +74,8 @@ def _what(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
     types = sorted(states[key].type for key in inside)
     where = (in_or_on(receptacle_type),)
     if _can_be_counted(history, clues, inside):
-        form = "How many objects were {}?"
         count = str(len(inside))
-        yield Candidate(QUESTION_TYPE, form, where, clues, (count,), (receptacle_type, "#"))
+        yield Candidate(QUESTION_TYPE, COUNT_FORM, where, clues, (count,), (receptacle_type, "#"))
     form = "What objects are {}?"
     yield from type_question(QUESTION_TYPE, form, where, clues, types, (receptacle_type,))
 

@@ -1,5 +1,6 @@
 """An episode that twins are made of: a trajectory, its restored start, and what happened in it."""
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +13,7 @@ from infthor_eval.generation.questions import open_state
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
 from infthor_eval.generation.replay import replay
 from infthor_eval.generation.twins.rewriting import whole_of
+from infthor_eval.generation.twins.task_shares import task_shares
 from infthor_eval.household.containment import logged_parent
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.storage.scratch import ScratchFolder
@@ -62,6 +64,11 @@ class Episode:
             for key in history.objects_in_frame(frame)
             if history.shows(frame, key)
         )
+
+    @cached_property
+    def task_shares(self) -> Counter[str]:
+        """How often a task that is drawn at the start names each type of object."""
+        return task_shares(self.start, self.trajectory.scene.floor_plan)
 
     @cached_property
     def put_targets(self) -> frozenset[str]:

@@ -149,6 +149,11 @@ class Swap(ExchangeKind):
         """See the base."""
         return bool(first) != bool(second) and first | second <= _CARRYING
 
+    def _may_exchange(self, episode: Episode, one: ThorObject, other: ThorObject) -> bool:
+        """Return True if each could as well be where the other is, and be what is carried."""
+        shares = sorted(episode.task_shares[obj.object_type] for obj in (one, other))
+        return shares[0] >= shares[1] / 2 > 0 and super()._may_exchange(episode, one, other)
+
 
 class SwapTask(ExchangeKind):
     """Two that are carried exchange places and tasks, and so their order."""

@@ -13,7 +13,7 @@ from functools import cached_property
 from infthor_eval.formats.question import Answer
 from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.twins import PairedQuestion
-from infthor_eval.generation.questions import counting, order, presence
+from infthor_eval.generation.questions import counting, final_state, order, presence
 from infthor_eval.generation.questions.candidates import (
     MANY,
     Candidate,
@@ -74,6 +74,23 @@ class AskedWorld:
                 if clearest is not None:
                     yield clearest
 
+    def says_when(self, candidate: Candidate) -> bool:
+        """Return False if "how many were" could be of two moments, since something was taken away.
+
+        The other world's frames are shown, too, so that either moment may be seen.
+        """
+        if candidate.form != final_state.COUNT_FORM:
+            return True
+        history = self.history
+        last = len(history) - 1
+        place = canonical_type(candidate.subjects[0])
+        return all(
+            history.contents(frame, key) <= history.contents(last, key)
+            for key, state in history.states(last).items()
+            if canonical_type(state.type) == place
+            for frame in range(last)
+        )
+
     def gives(self, candidate: Candidate, clues: Sequence[int]) -> bool:
         """Return True if both the whole log and these frames give a question's answer."""
         gold = sorted(map(str, candidate.answers))
@@ -98,6 +115,8 @@ def pair_questions(
     for text in sorted(asked[0].keys() | asked[1].keys()):
         sides = _both_sides(worlds, asked[0].get(text), asked[1].get(text), vocabulary)
         if sides is None or not _is_about(*sides, type_names):
+            continue
+        if not all(world.says_when(side) for world, side in zip(worlds, sides, strict=True)):
             continue
         first, second = sides
         overlap = score(_reply(first), second.answers), score(_reply(second), first.answers)

@@ -76,6 +76,18 @@ def test_a_count_of_all_objects_is_about_no_type():
     assert paired(*worlds, "Mug", "Book", counting.ALL)[text].answers == (("1",), ("2",))
 
 
+@pytest.mark.parametrize("taken", [False, True])
+def test_how_many_things_there_were_is_not_asked_where_one_was_taken_away(taken):
+    start = {**PLACES, MUG: state(MUG, TABLE), APPLE: state(APPLE, DESK if taken else TABLE)}
+    apple = moved(APPLE, DESK, TABLE) if taken else moved(APPLE, TABLE, FRIDGE)
+    done = (*apple, *moved(MUG, TABLE, DESK))
+    first = history({**start, BOOK: state(BOOK, DESK)}, *done)
+    second = history({**start, BOOK: state(BOOK, TABLE)}, *done)
+    pairs = paired(first, second, "Book", "Desk")
+    assert ("How many objects were on the desk?" in pairs) == (not taken)
+    assert "What objects are on the desk?" in pairs
+
+
 def test_equal_answers_are_no_pair():
     assert not paired(put(MUG, DESK), put(MUG, DESK), "Mug")
 
