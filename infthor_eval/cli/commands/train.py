@@ -122,8 +122,7 @@ def command(
     questions, and tiny, which trains a small model from scratch. Others are YAML files of the same
     form.
 
-    If it is stopped, the same command continues; tiny keeps its data and restarts the training.
-    Workers share the generation of its data. Several processes: torchrun --nproc-per-node N
+    If it is stopped, the same command continues. Workers share the generation of tiny's data. Several processes: torchrun --nproc-per-node N
     --no-python infthor-eval train ...
     """
     from infthor_eval.training.nano.settings import NanoRecipe
@@ -230,7 +229,7 @@ def _train_small_model(
         def observe(step: NanoProgress) -> None:
             bars.advance(_STAGES[step.stage], step.step, step.n_steps, f"loss {step.loss:.3f}")
 
-        loaded = train_small_model(recipe, sets, observe, print_note)
+        loaded = train_small_model(recipe, sets, out / "states", observe, print_note)
     export(loaded, out / "checkpoint", title=recipe.title, words=recipe.words)
     console().print(f"{out / 'checkpoint'}")
 

@@ -13,6 +13,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.step_log import ObjectInFrame, Step, read_steps
+from infthor_eval.storage.digests import fingerprint
 from infthor_eval.training.data import trajectory_names
 from infthor_eval.training.nano.architecture import GRID, PATCHES, TOKENS
 
@@ -48,6 +49,11 @@ class FrameDataset:
     cells: Tensor
     visible: Tensor
     present: Tensor
+
+    def identity(self) -> str:
+        """Return the hash of the frames in their order, and of the types."""
+        digests = [frame.digest for frame in self.frames]
+        return fingerprint({"frames": digests, "types": list(self.types)})
 
     def index_by_digest(self) -> dict[str, int]:
         """Return the index of each frame by the digest of its file."""

@@ -89,6 +89,7 @@ class SequenceSampler:
         self._dataset = dataset
         self._limit = window_tokens
         self._words = words
+        self._seed = seed
         self._rng = random.Random(seed)
         self._questions: list[TrainingSequence] = []
         self._samples: list[tuple[NiehSet, Sample]] = []  # of the questions on their clue frames
@@ -146,6 +147,10 @@ class SequenceSampler:
                 yield sequence
             else:
                 self.skipped.append(sequence)
+
+    def begin_step(self, stage: str, number: int) -> None:
+        """Let what is drawn from here on follow from the seed and the step alone."""
+        self._rng = random.Random(f"{self._seed}/{stage}/{number}")
 
     def questions(
         self, n: int, synthetic_share: float, recalled_share: float, n_others: int

@@ -5,11 +5,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import torch
 from torch import Tensor
 
 from infthor_eval.reasons import count_reasons
+from infthor_eval.storage.digests import fingerprint
 from infthor_eval.training.batches import collate, n_labels
+from infthor_eval.training.checkpoints import Checkpoints
 from infthor_eval.training.encoding import Encoder, TrainingSequence
 from infthor_eval.training.nano.architecture import build_untrained, image_processor
 from infthor_eval.training.nano.frame_dataset import read_frame_dataset
@@ -27,6 +30,7 @@ _BETAS = (0.9, 0.98)
 _CLIP = 1.0
 _BATCHES = 4  # that the sequences of a step are computed in
 _TEXT_STAGE_FRAMES = 16  # frames for the vision loss in each step of the text stage
+_STEPS_PER_STATE = 100  # a state is written, from which a stopped training continues
 
 
 @dataclass(frozen=True)
@@ -51,14 +55,18 @@ class NanoProgress:
 def train_small_model(
     recipe: NanoRecipe,
     folders: Sequence[Path],
+    states: Path,
     on_step: Callable[[NanoProgress], None],
     print_note: Callable[[str], None] = lambda _: None,
 ) -> LoadedCheckpoint:
-    """Train the small model on replayed sets.
+    """Train the small model on replayed sets, from the last state if there is one.
+
+    A training that was stopped and continued gives the weights of one that was not.
 
     Args:
         recipe: recipe of the training.
         folders: folders of the sets, with trajectories and questions.
+        states: folder of the states.
         on_step: called after every step.
         print_note: called with a line for each reason for which items were skipped.
 
@@ -66,7 +74,9 @@ def train_small_model(
         The trained model with weights rounded to bfloat16.
 
     Raises:
-        DataError: a set cannot be read, or has no data for one of the stages.
+        DataError: a set cannot be read, or has no data for one of the stages; or a state is damaged
+            or cannot be written.
+        UsageError: the states are of another recipe or other data.
     """
     torch.set_num_threads(recipe.threads)
     torch.manual_seed(recipe.seed)
@@ -83,7 +93,8 @@ def train_small_model(
     )
     for _, reason, n in count_reasons(("", skipped.reason) for skipped in sampler.skipped):
         print_note(f"{n} skipped: {reason}")
-    trainer = _StageTrainer(recipe, network, sampler, on_step)
+    about = {"recipe": fingerprint(msgspec.to_builtins(recipe)), "data": dataset.identity()}
+    trainer = _StageTrainer(recipe, network, sampler, Checkpoints(states, about), on_step)
     network.train()
     trainer.run("vision", recipe.vision_steps, trainer.vision_step)
     network.cache_features()
@@ -96,13 +107,17 @@ def train_small_model(
 
 
 class _StageTrainer:
-    """Steps of all stages, with one optimizer."""
+    """Steps of all stages, with one optimizer.
+
+    Steps that the last state has already are not done again.
+    """
 
     def __init__(
         self,
         recipe: NanoRecipe,
         network: NanoNetwork,
         sampler: SequenceSampler,
+        checkpoints: Checkpoints,
         on_step: Callable[[NanoProgress], None],
     ) -> None:
         self._recipe = recipe
@@ -112,6 +127,9 @@ class _StageTrainer:
         self._parameters = list(network.parameters())
         groups = decay_groups(self._parameters, recipe.weight_decay)
         self._optimizer = torch.optim.AdamW(groups, lr=recipe.lr, betas=_BETAS)
+        self._checkpoints = checkpoints
+        self._n_restored = checkpoints.restore(network, self._optimizer)
+        self._n_before = 0  # steps of the stages before
 
     def run(self, stage: str, n_steps: int, compute: Callable[[], tuple[Tensor, Tensor]]) -> None:
         """Run the steps of one stage with a linear warm-up and a cosine decay of the learning rate.
@@ -121,7 +139,8 @@ class _StageTrainer:
             n_steps: steps of the stage.
             compute: computes the loss of a step, and the part of it to report.
         """
-        for number in range(n_steps):
+        for number in range(max(0, self._n_restored - self._n_before), n_steps):
+            self._sampler.begin_step(stage, number)
             warm_up = min(1.0, (number + 1) / _WARM_UP)
             decay = _LOWEST + (1 - _LOWEST) * 0.5 * (1 + math.cos(math.pi * number / n_steps))
             for group in self._optimizer.param_groups:
@@ -131,7 +150,11 @@ class _StageTrainer:
             loss.backward()
             torch.nn.utils.clip_grad_norm_(self._parameters, _CLIP)
             self._optimizer.step()
+            n_done = self._n_before + number + 1
+            if n_done % _STEPS_PER_STATE == 0:
+                self._checkpoints.save(n_done, self._network, self._optimizer)
             self._on_step(NanoProgress(stage, number + 1, n_steps, reported.item()))
+        self._n_before += n_steps
 
     def vision_step(self) -> tuple[Tensor, Tensor]:
         """Return the vision loss of some frames."""

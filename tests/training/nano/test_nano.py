@@ -9,7 +9,7 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
@@ -17,6 +17,7 @@ from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.step_log import ObjectInFrame, read_steps
 from infthor_eval.training.encoding import Encoder
 from infthor_eval.training.export import export
+from infthor_eval.training.nano import stages
 from infthor_eval.training.nano.architecture import TOKENS, build_untrained, image_processor
 from infthor_eval.training.nano.frame_dataset import _cell_coverage, _type, read_frame_dataset
 from infthor_eval.training.nano.network import NanoNetwork, spellings
@@ -275,6 +276,7 @@ def test_what_cannot_be_read_is_skipped_and_reported(small_set, tmp_path):
     train_small_model(
         msgspec.structs.replace(SMALL, vision_steps=1, text_steps=1, joint_steps=1),
         [tmp_path / "set"],
+        tmp_path / "states",
         lambda _: None,
         notes.append,
     )
@@ -286,14 +288,14 @@ def test_a_set_without_questions_is_refused(small_set, tmp_path):
     (tmp_path / "set/qa_set_small.csv").unlink()
     write_questions(tmp_path / "set/qa_set_none.csv", [])
     with pytest.raises(DataError, match="no question"):
-        train_small_model(SMALL, [tmp_path / "set"], lambda _: None)
+        train_small_model(SMALL, [tmp_path / "set"], tmp_path / "states", lambda _: None)
 
 
 def test_training_is_the_same_for_a_seed_and_lowers_the_loss(small_set, tmp_path):
     losses = []
     for name in ("a", "b"):
         steps = []
-        model = train_small_model(SMALL, [small_set], steps.append)
+        model = train_small_model(SMALL, [small_set], tmp_path / f"states {name}", steps.append)
         export(model, tmp_path / name, title=SMALL.title, words=SMALL.words)
         losses.append([step.loss for step in steps])
         assert [step.stage for step in steps] == ["vision"] * 20 + ["text"] * 3 + ["joint"] * 6
@@ -304,3 +306,37 @@ def test_training_is_the_same_for_a_seed_and_lowers_the_loss(small_set, tmp_path
     options = {"pretrained": str(tmp_path / "a"), "dtype": "float32"}
     check_adapter(load("qwen2.5-vl-nano", options, seed=0))
     check_adapter(load("qwen2.5-vl", options, seed=0))
+
+
+class Stopped(Exception):
+    """Stands for a machine that goes down."""
+
+
+@pytest.mark.parametrize("stopped_in", ["vision", "joint"])
+def test_a_stopped_training_continues_to_the_same_weights(
+    stopped_in, small_set, tmp_path, monkeypatch
+):
+    recipe = msgspec.structs.replace(SMALL, vision_steps=4, text_steps=2, joint_steps=4)
+    monkeypatch.setattr(stages, "_STEPS_PER_STATE", 3)
+    whole = train_small_model(recipe, [small_set], tmp_path / "whole", lambda _: None)
+
+    def stop(step):
+        if (step.stage, step.step) == (stopped_in, 4):
+            raise Stopped
+
+    steps = []
+    with pytest.raises(Stopped):
+        train_small_model(recipe, [small_set], tmp_path / "states", stop)
+    continued = train_small_model(recipe, [small_set], tmp_path / "states", steps.append)
+    assert 0 < len(steps) < 10
+    first, second = whole.model.state_dict(), continued.model.state_dict()
+    assert all(first[name].equal(second[name]) for name in first)
+
+
+def test_states_of_another_recipe_are_refused(small_set, tmp_path, monkeypatch):
+    recipe = msgspec.structs.replace(SMALL, vision_steps=1, text_steps=1, joint_steps=1)
+    monkeypatch.setattr(stages, "_STEPS_PER_STATE", 1)
+    train_small_model(recipe, [small_set], tmp_path, lambda _: None)
+    other = msgspec.structs.replace(recipe, lr=1e-4)
+    with pytest.raises(UsageError, match="recipe"):
+        train_small_model(other, [small_set], tmp_path, lambda _: None)
