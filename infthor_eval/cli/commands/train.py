@@ -122,8 +122,8 @@ def command(
     questions, and tiny, which trains a small model from scratch. Others are YAML files of the same
     form.
 
-    If it is stopped, the same command continues. Workers share the generation of tiny's data. Several processes: torchrun --nproc-per-node N
-    --no-python infthor-eval train ...
+    If it is stopped, the same command continues. Workers share the generation of the data of tiny.
+    Several processes: torchrun --nproc-per-node N --no-python infthor-eval train ...
     """
     from infthor_eval.training.nano.settings import NanoRecipe
     from infthor_eval.training.recipe import read_recipe
