@@ -9,7 +9,7 @@ from torch.nn.utils.rnn import pad_sequence
 from infthor_eval.errors import DataError
 from infthor_eval.training.encoding import TrainingSequence
 from model_adapters.hf.family import Family
-from model_adapters.hf.prompting.prompt import Frame, token_ids
+from model_adapters.hf.prompting.prompt import Frame, n_tokens, token_ids
 
 __all__ = ["IGNORED", "Batch", "collate", "n_labels"]
 
@@ -25,7 +25,7 @@ class Batch(TypedDict):
             axes.
         attention_mask: 0 for padding and 1 for tokens, (batch, tokens). None without padding,
             because attention kernels with a built-in causal mask are faster than those that read
-            one.
+            one. With branches, true where a token sees another, (batch, 1, tokens, tokens).
         labels: the token where loss is computed on it, else -100, (batch, tokens).
         slots: true for slots of frames' features, (batch, tokens).
         frames: frames of the whole batch, in the order of their slots.
@@ -48,11 +48,10 @@ def collate(sequences: Sequence[TrainingSequence], family: Family, pad_id: int) 
     """
     ids = [torch.tensor(list(token_ids(sequence.pieces))) for sequence in sequences]
     labels = [_labels(sequence, own) for sequence, own in zip(sequences, ids, strict=True)]
-    masks = pad_sequence([torch.ones_like(own) for own in ids], batch_first=True)
     return Batch(
         input_ids=pad_sequence(ids, batch_first=True, padding_value=pad_id),
-        position_ids=_positions(sequences, ids, family),
-        attention_mask=None if bool(masks.all()) else masks,
+        position_ids=_positions(sequences, family),
+        attention_mask=_attention_mask(sequences, ids),
         labels=pad_sequence(labels, batch_first=True, padding_value=IGNORED),
         slots=pad_sequence(
             [_slots(sequence, family.slot_id) for sequence in sequences], batch_first=True
@@ -66,6 +65,27 @@ def n_labels(batch: Batch) -> int:
     return int((batch["labels"] != IGNORED).sum())
 
 
+def _attention_mask(
+    sequences: Sequence[TrainingSequence], ids: Sequence[torch.Tensor]
+) -> torch.Tensor | None:
+    if not any(sequence.branches for sequence in sequences):
+        masks = pad_sequence([torch.ones_like(own) for own in ids], batch_first=True)
+        return None if bool(masks.all()) else masks
+    spans = pad_sequence(
+        [_span_numbers(sequence) for sequence in sequences], batch_first=True, padding_value=-1
+    )
+    of_query, of_key = spans[:, :, None], spans[:, None, :]
+    is_seen = ((of_key == 0) | (of_key == of_query)).tril()
+    # A row that sees nothing has no softmax; padding sees other padding.
+    return is_seen[:, None]
+
+
+def _span_numbers(sequence: TrainingSequence) -> torch.Tensor:
+    """Return 0 for tokens before all branches, and the number of its branch for each other."""
+    sizes = [n_tokens(sequence.pieces[span]) for span in sequence.spans]
+    return torch.arange(len(sizes)).repeat_interleave(torch.tensor(sizes))
+
+
 def _labels(sequence: TrainingSequence, ids: torch.Tensor) -> torch.Tensor:
     flags: list[bool] = []
     for piece, has_loss in zip(sequence.pieces, sequence.has_loss, strict=True):
@@ -77,17 +97,25 @@ def _labels(sequence: TrainingSequence, ids: torch.Tensor) -> torch.Tensor:
     return ids.where(mask, IGNORED)
 
 
-def _positions(
-    sequences: Sequence[TrainingSequence], ids: Sequence[torch.Tensor], family: Family
-) -> torch.Tensor:
-    """Return the positions of sequences, each from 0; padding has 0, which never lengthens RoPE."""
-    rows = []
-    for sequence, own in zip(sequences, ids, strict=True):
-        sizes = [frame.size for frame in sequence.frames]
-        rows.append(family.positions(own, sizes, 0))
-    longest = max(len(own) for own in ids)
+def _positions(sequences: Sequence[TrainingSequence], family: Family) -> torch.Tensor:
+    """Return the positions of sequences, each from 0; padding has 0, which never lengthens RoPE.
+
+    Each branch goes on where what is before all branches ends.
+    """
+    rows = [_row_of_positions(sequence, family) for sequence in sequences]
+    longest = max(row.shape[-1] for row in rows)
     padded = [torch.nn.functional.pad(row, (0, longest - row.shape[-1])) for row in rows]
     return torch.cat(padded, dim=-2)
+
+
+def _row_of_positions(sequence: TrainingSequence, family: Family) -> torch.Tensor:
+    parts: list[torch.Tensor] = []
+    for span in sequence.spans:
+        pieces = sequence.pieces[span]
+        sizes = [piece.size for piece in pieces if isinstance(piece, Frame)]
+        start = int(parts[0].max()) + 1 if parts else 0
+        parts.append(family.positions(torch.tensor(list(token_ids(pieces))), sizes, start))
+    return torch.cat(parts, dim=-1)
 
 
 def _slots(sequence: TrainingSequence, slot_id: int) -> torch.Tensor:

@@ -6,6 +6,7 @@ the same prompts.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 from typing import Any
 
 from infthor_eval.errors import DataError
@@ -14,9 +15,9 @@ from infthor_eval.household.sequence_text import ACT, action_part, plan_part
 from infthor_eval.plans.history.segments import PlanSegment, segment_parts
 from model_adapters import Part, Turn
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
-from model_adapters.hf.prompting.prompt import Frame, Piece, Prompter, n_tokens
+from model_adapters.hf.prompting.prompt import Frame, Piece, Prompter, n_common, n_tokens
 
-__all__ = ["Encoder", "SkippedSequence", "TrainingSequence", "within"]
+__all__ = ["Encoder", "SkippedSequence", "TrainingSequence", "join_branches", "within"]
 
 
 @dataclass(frozen=True)
@@ -27,11 +28,20 @@ class TrainingSequence:
         name: source of the sequence ("traj_a, plans 3 to 9"), for messages.
         pieces: token ids and frames.
         has_loss: for each piece, true if loss is computed on it; always false for frames.
+        branches: numbers of pieces of its branches, if the sequence ends in several: each of them
+            follows what is before the first one, and sees none of the others.
     """
 
     name: str
     pieces: tuple[Piece, ...]
     has_loss: tuple[bool, ...]
+    branches: tuple[int, ...] = ()
+
+    @property
+    def spans(self) -> list[slice]:
+        """Places of the pieces before all branches, and of each branch."""
+        ends = list(accumulate(self.branches, initial=len(self.pieces) - sum(self.branches)))
+        return [slice(start, end) for start, end in pairwise([0, *ends])]
 
     @property
     def n_tokens(self) -> int:
@@ -60,6 +70,29 @@ class SkippedSequence:
 
     name: str
     reason: str
+
+
+def join_branches(name: str, sequences: Sequence[TrainingSequence]) -> TrainingSequence:
+    """Return sequences that begin alike as one, which has the beginning once.
+
+    Its loss is the sum of theirs, at the price of one context: a trajectory takes most of the
+    tokens of each question on it.
+
+    Args:
+        name: source of the sequence.
+        sequences: sequences without branches; the first piece of each has no loss.
+    """
+    # The piece before the first with loss is part of the branch: the loss is computed there.
+    firsts = [sequence.has_loss.index(True) - 1 for sequence in sequences]
+    n = min(n_common([sequence.pieces for sequence in sequences]), *firsts)
+    tails = [(sequence.pieces[n:], sequence.has_loss[n:]) for sequence in sequences]
+    first = sequences[0]
+    return TrainingSequence(
+        name,
+        (*first.pieces[:n], *(piece for pieces, _ in tails for piece in pieces)),
+        (*first.has_loss[:n], *(flag for _, flags in tails for flag in flags)),
+        tuple(len(pieces) for pieces, _ in tails),
+    )
 
 
 def within(sequence: TrainingSequence, limit: int) -> TrainingSequence | SkippedSequence:
