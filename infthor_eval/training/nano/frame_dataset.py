@@ -59,11 +59,6 @@ class FrameDataset:
         """Return the index of each frame by the digest of its file."""
         return {frame.digest: index for index, frame in enumerate(self.frames)}
 
-    def tower_inputs(self, indices: Sequence[int]) -> Tensor:
-        """Return the vision tower's inputs for some frames, (frames x patches, values)."""
-        pixels = self.pixels[list(indices)].float().reshape(len(indices) * PATCHES, 3, 1, -1)
-        return pixels.expand(-1, -1, 2, -1).reshape(len(indices) * PATCHES, -1)
-
 
 def read_frame_dataset(folders: Iterable[Path], image_processor: Any) -> FrameDataset:
     """Read all frames of the folders of replayed sets.

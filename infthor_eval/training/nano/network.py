@@ -13,8 +13,8 @@ from torch.nn.functional import binary_cross_entropy_with_logits
 
 from infthor_eval.household.wording import compact_name, noun
 from infthor_eval.training.encoding import TrainingSequence
-from infthor_eval.training.nano.architecture import TOKENS
 from infthor_eval.training.nano.frame_dataset import FrameDataset
+from infthor_eval.training.nano.tower import tower_features
 from infthor_eval.training.network import SequenceModel
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.prompt import Frame
@@ -90,11 +90,8 @@ class NanoNetwork(SequenceModel):
         """Return the features of frames of the dataset, (frames, tokens, hidden)."""
         if self._cached_features is not None:
             return self._cached_features[list(indices)]
-        grid = torch.tensor([[1, *([int(self._dataset.pixels.shape[1] ** 0.5)] * 2)]]).expand(
-            len(indices), 3
-        )
-        output = self.model.model.visual(self._dataset.tower_inputs(indices), grid_thw=grid)
-        return output.pooler_output.reshape(len(indices), TOKENS, -1)
+        pixels = self._dataset.pixels[list(indices)].float()
+        return tower_features(self.model.model.visual, pixels)
 
     def vision_loss(self, features: Tensor, indices: Sequence[int], spelling: int) -> Tensor:
         """Return the loss of recognising objects by the features, a scalar.
