@@ -3,20 +3,11 @@
 import random
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.object_ids import Words
-from infthor_eval.formats.question import Question
 from infthor_eval.household.sequence_text import MARKS
-from infthor_eval.household.wording import noun, with_article
-from infthor_eval.nieh.contexts import CONTEXTS, MEMORY, Sample
-from infthor_eval.nieh.contexts.video import as_images
-from infthor_eval.nieh.docs import doc_target
-from infthor_eval.nieh.prompts import question_text
-from infthor_eval.nieh.samples import find_samples
 from infthor_eval.plans.actors.habits import fill_action, open_action
 from infthor_eval.plans.actors.script import read_plan, replace_objects
 from infthor_eval.plans.history.segments import PlanSegment
@@ -25,18 +16,10 @@ from infthor_eval.training.data import read_history, trajectory_names
 from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
 from infthor_eval.training.nano.frame_dataset import FrameDataset
 from infthor_eval.training.nano.network import spellings
-from infthor_eval.training.question_sequences import question_sequences
+from infthor_eval.training.nano.question_sampler import QuestionSampler, question_intro
+from infthor_eval.training.nano.settings import NanoRecipe
 
-__all__ = ["SequenceSampler", "SyntheticPlans", "corpus_texts", "question_intro"]
-
-_LEAST_FRAMES = 20  # frames that have to show a type before synthetic questions ask for it
-_QUESTIONS = ("Have you seen {0}?", "Is there any {1} in this room?")
-_MAX_TRIES = 200
-
-
-def question_intro() -> str:
-    """Return the text that precedes every question on clue frames."""
-    return question_text(CONTEXTS["clues"].intro, Question("", "", (), ())).rstrip()
+__all__ = ["SequenceSampler", "SyntheticPlans", "corpus_texts"]
 
 
 def corpus_texts(folders: Sequence[Path], types: Sequence[str]) -> Iterator[str]:
@@ -58,15 +41,13 @@ def corpus_texts(folders: Sequence[Path], types: Sequence[str]) -> Iterator[str]
 
 
 class SequenceSampler:
-    """Random training sequences: recorded and synthetic questions, histories, and synthetic plans.
+    """Random training sequences: questions, histories, and synthetic plans.
 
     Args:
         encoder: builds the sequences.
         folders: folders of replayed sets with questions.
         dataset: all frames of the sets.
-        window_tokens: most tokens of a history.
-        words: words of plans and actions.
-        seed: seed of the samples.
+        recipe: recipe of the training.
 
     Attributes:
         skipped: items that could not become a sequence.
@@ -80,43 +61,27 @@ class SequenceSampler:
         encoder: Encoder,
         folders: Sequence[Path],
         dataset: FrameDataset,
-        *,
-        window_tokens: int,
-        words: Words,
-        seed: int,
+        recipe: NanoRecipe,
     ) -> None:
         self._encoder = encoder
         self._dataset = dataset
-        self._limit = window_tokens
-        self._words = words
-        self._seed = seed
-        self._rng = random.Random(seed)
-        self._questions: list[TrainingSequence] = []
-        self._samples: list[tuple[NiehSet, Sample]] = []  # of the questions on their clue frames
+        self._limit = recipe.window_tokens
+        self._words = recipe.words
+        self._seed = recipe.seed
+        self._rng = random.Random(recipe.seed)
+        self._questions = QuestionSampler(
+            encoder, folders, dataset, recipe.questions, recipe.window_tokens
+        )
         self._windows: list[TrainingSequence] = []
         self._single_plans: list[TrainingSequence] = []
-        self.skipped: list[SkippedSequence] = []
+        self.skipped: list[SkippedSequence] = [*self._questions.skipped]
         recorded: list[tuple[str, list[str]]] = []
         for folder in folders:
-            self._read_questions(folder)
             for segments in self._read_histories(NiehSet(folder)):
                 for segment in segments:
                     recorded.append((segment.plan, [action for action, _ in segment.steps]))
         self._synthetic = SyntheticPlans(recorded)
         self._require_all_kinds(folders)
-        counts = dataset.visible.sum(0).tolist()
-        frequent = {
-            name: count
-            for name, count in zip(dataset.types, counts, strict=True)
-            if count >= _LEAST_FRAMES
-        }
-        self._names, self._weights = list(frequent), list(frequent.values())
-
-    def _read_questions(self, folder: Path) -> None:
-        samples = find_samples({"data": str(folder), "context": "clues"})
-        sequences = question_sequences(self._encoder, samples, self._limit)
-        self._questions += self._without_skipped(sequences)
-        self._samples += [(samples.data, sample) for sample in samples.samples]
 
     def _require_all_kinds(self, folders: Sequence[Path]) -> None:
         kinds = {"question": self._questions, "history": self._windows, "plan": self._synthetic}
@@ -152,42 +117,9 @@ class SequenceSampler:
         """Let what is drawn from here on follow from the seed and the step alone."""
         self._rng = random.Random(f"{self._seed}/{stage}/{number}")
 
-    def questions(
-        self, n: int, synthetic_share: float, recalled_share: float, n_others: int
-    ) -> list[TrainingSequence]:
-        """Return random questions with their answers.
-
-        Args:
-            n: number of questions.
-            synthetic_share: probability of a synthetic one.
-            recalled_share: probability of another one to be asked as behind a memory instead of on
-                its clue frames.
-            n_others: most frames that do not matter among those that a memory recalls.
-        """
-        return [self._question(synthetic_share, recalled_share, n_others) for _ in range(n)]
-
-    def _question(
-        self, synthetic_share: float, recalled_share: float, n_others: int
-    ) -> TrainingSequence:
-        if self._rng.random() < synthetic_share:
-            return self._presence_question()
-        if self._rng.random() < recalled_share:
-            return self._recalled_question(n_others)
-        return self._rng.choice(self._questions)
-
-    def _recalled_question(self, n_others: int) -> TrainingSequence:
-        """Return a question on its clue frames among others, and the last view, as the evaluation
-        of memories asks."""
-        data, sample = self._rng.choice(self._samples)
-        last = len(data.frames(sample.question.traj_id)) - 1
-        clues = set() if sample.question.absence else set(sample.frames)
-        others = self._rng.sample(range(last), min(self._rng.randint(0, n_others), last))
-        recalled = tuple(sorted((clues | set(others)) - {last}))
-        remembered = replace(sample, frames=(*recalled, last), recalled=recalled)
-        context, text = CONTEXTS[MEMORY].request(data, remembered)
-        return self._encoder.answer(
-            "recalled", [*as_images(context), text], doc_target(sample.question)
-        )
+    def questions(self, progress: float) -> list[TrainingSequence]:
+        """Return random questions with their answers; see `QuestionSampler.draw`."""
+        return self._questions.draw(self._rng, progress)
 
     def histories(
         self, n_windows: int, n_plans: int, single_plan_share: float
@@ -217,25 +149,6 @@ class SequenceSampler:
     def spelling(self, n_spellings: int) -> int:
         """Return the index of a random spelling of names."""
         return self._rng.randrange(n_spellings)
-
-    def _presence_question(self) -> TrainingSequence:
-        """Return a question for the presence of an object in one frame.
-
-        Names are sampled by the number of frames that show them, for "yes" as for "no", so that the
-        name does not give away the answer.
-        """
-        is_present = self._rng.random() < 0.5
-        for _ in range(_MAX_TRIES):
-            (name,) = self._rng.choices(self._names, self._weights)
-            index = self._rng.randrange(len(self._dataset.frames))
-            column = self._dataset.types.index(name)
-            if (self._dataset.visible if is_present else 1 - self._dataset.present)[index, column]:
-                break
-        words = noun(name)
-        text = self._rng.choice(_QUESTIONS).format(with_article(words), words)
-        prompt = question_text(CONTEXTS["clues"].intro, Question("", text, (), ()))
-        answer = "yes" if self._dataset.visible[index, column] else "no"
-        return self._encoder.answer("synthetic", [self._dataset.frames[index], prompt], answer)
 
 
 class SyntheticPlans:

@@ -1,10 +1,12 @@
 """Recipe of the small model."""
 
+from collections.abc import Iterable
+
 import msgspec
 
 from infthor_eval.formats.object_ids import Words
 
-__all__ = ["NanoRecipe", "SceneSettings"]
+__all__ = ["NanoRecipe", "QuestionSettings", "SceneSettings"]
 
 _COUNTS = (
     "vision_steps",
@@ -12,12 +14,22 @@ _COUNTS = (
     "joint_steps",
     "frames_per_step",
     "text_plans_per_step",
-    "questions_per_step",
-    "recalled_frames",
     "windows_per_step",
     "plans_per_step",
     "joint_text_plans_per_step",
 )
+
+
+def _require_counts(settings: msgspec.Struct, names: Iterable[str]) -> None:
+    for name in names:
+        if getattr(settings, name) < 1:
+            raise ValueError(f"{name} is {getattr(settings, name)}; use 1 or more")
+
+
+def _require_shares(settings: msgspec.Struct, names: Iterable[str]) -> None:
+    for name in names:
+        if not 0 <= getattr(settings, name) <= 1:
+            raise ValueError(f"{name} is {getattr(settings, name)}; use a number between 0 and 1")
 
 
 class SceneSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -42,6 +54,41 @@ class SceneSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         return tuple(f"{kind}-{self.first + at}" for kind in self.kinds for at in range(self.count))
 
 
+class QuestionSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Questions in the steps of the third stage.
+
+    Attributes:
+        per_step: questions in a step.
+        synthetic: share of these that are synthetic questions for the presence of an object in any
+            frame.
+        paired: share of the others that are asked in both worlds of twins, if there are any.
+        recalled: share of all but the synthetic ones that are asked as behind a memory: the clue
+            frames among frames that do not matter, and the last view.
+        recalled_frames: most frames among those that do not matter.
+        whole: share of the steps with questions on one whole trajectory, of twins on both, instead.
+        per_trajectory: most questions in such a step.
+        ramp: share of the stage in which `recalled_frames` and `whole` grow from nothing.
+    """
+
+    per_step: int = 40
+    synthetic: float = 0.4
+    paired: float = 0.0
+    recalled: float = 0.5
+    recalled_frames: int = 12
+    whole: float = 0.0
+    per_trajectory: int = 40
+    ramp: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the ranges of all settings.
+
+        Raises:
+            ValueError: a value is out of its range; the message names the setting.
+        """
+        _require_counts(self, ("per_step", "recalled_frames", "per_trajectory"))
+        _require_shares(self, ("synthetic", "paired", "recalled", "whole", "ramp"))
+
+
 class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Training of the small model in three stages: vision, then text, then both together.
 
@@ -59,12 +106,7 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
             to act.
         frames_per_step: frames in each step of the first stage.
         text_plans_per_step: synthetic plans in each step of the second stage.
-        questions_per_step: questions in each step of the third stage.
-        synthetic_questions: share of these that are synthetic questions for the presence of an
-            object in any frame.
-        recalled_questions: share of the others that are asked as behind a memory: the clue frames
-            among frames that do not matter, and the last view.
-        recalled_frames: most frames among those that do not matter.
+        questions: questions in each step of the third stage.
         windows_per_step: windows of histories in a step of the third stage.
         window_tokens: most tokens of a window.
         single_plan_share: share of the steps of the third stage with single plans of histories
@@ -90,10 +132,7 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     joint_steps: int = 800
     frames_per_step: int = 64
     text_plans_per_step: int = 96
-    questions_per_step: int = 40
-    synthetic_questions: float = 0.4
-    recalled_questions: float = 0.5
-    recalled_frames: int = 12
+    questions: QuestionSettings = QuestionSettings()
     windows_per_step: int = 1
     window_tokens: int = 2048
     single_plan_share: float = 0.5
@@ -113,11 +152,7 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         Raises:
             ValueError: a value is out of its range; the message names the setting.
         """
-        for name in _COUNTS:
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} is {getattr(self, name)}; use 1 or more")
+        _require_counts(self, _COUNTS)
         if self.hidden % 32:
             raise ValueError(f"hidden is {self.hidden}; use a multiple of 32")
-        for name in ("synthetic_questions", "recalled_questions", "single_plan_share"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ValueError(f"{name} is {getattr(self, name)}; use a number between 0 and 1")
+        _require_shares(self, ("single_plan_share",))

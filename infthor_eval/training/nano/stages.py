@@ -17,7 +17,8 @@ from infthor_eval.training.encoding import Encoder, TrainingSequence
 from infthor_eval.training.nano.architecture import build_untrained, image_processor
 from infthor_eval.training.nano.frame_dataset import read_frame_dataset
 from infthor_eval.training.nano.network import NanoNetwork
-from infthor_eval.training.nano.sampler import SequenceSampler, corpus_texts, question_intro
+from infthor_eval.training.nano.question_sampler import question_intro
+from infthor_eval.training.nano.sampler import SequenceSampler, corpus_texts
 from infthor_eval.training.nano.settings import NanoRecipe
 from infthor_eval.training.network import decay_groups
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
@@ -83,14 +84,7 @@ def train_small_model(
     dataset = read_frame_dataset(folders, image_processor())
     loaded = build_untrained(recipe, corpus_texts(folders, dataset.types), [question_intro()])
     network = NanoNetwork(loaded, dataset)
-    sampler = SequenceSampler(
-        Encoder(loaded),
-        folders,
-        dataset,
-        window_tokens=recipe.window_tokens,
-        words=recipe.words,
-        seed=recipe.seed,
-    )
+    sampler = SequenceSampler(Encoder(loaded), folders, dataset, recipe)
     for _, reason, n in count_reasons(("", skipped.reason) for skipped in sampler.skipped):
         print_note(f"{n} skipped: {reason}")
     about = {"recipe": fingerprint(msgspec.to_builtins(recipe)), "data": dataset.identity()}
@@ -131,13 +125,16 @@ class _StageTrainer:
         self._n_restored = checkpoints.restore(network, self._optimizer)
         self._n_before = 0  # steps of the stages before
 
-    def run(self, stage: str, n_steps: int, compute: Callable[[], tuple[Tensor, Tensor]]) -> None:
+    def run(
+        self, stage: str, n_steps: int, compute: Callable[[float], tuple[Tensor, Tensor]]
+    ) -> None:
         """Run the steps of one stage with a linear warm-up and a cosine decay of the learning rate.
 
         Args:
             stage: name of the stage.
             n_steps: steps of the stage.
-            compute: computes the loss of a step, and the part of it to report.
+            compute: computes the loss of a step, and the part of it to report, by the share of the
+                stage's steps that is done.
         """
         for number in range(max(0, self._n_restored - self._n_before), n_steps):
             self._sampler.begin_step(stage, number)
@@ -145,7 +142,7 @@ class _StageTrainer:
             decay = _LOWEST + (1 - _LOWEST) * 0.5 * (1 + math.cos(math.pi * number / n_steps))
             for group in self._optimizer.param_groups:
                 group["lr"] = self._recipe.lr * warm_up * decay
-            loss, reported = compute()
+            loss, reported = compute(number / n_steps)
             self._optimizer.zero_grad()
             loss.backward()
             torch.nn.utils.clip_grad_norm_(self._parameters, _CLIP)
@@ -156,13 +153,13 @@ class _StageTrainer:
             self._on_step(NanoProgress(stage, number + 1, n_steps, reported.item()))
         self._n_before += n_steps
 
-    def vision_step(self) -> tuple[Tensor, Tensor]:
+    def vision_step(self, _progress: float) -> tuple[Tensor, Tensor]:
         """Return the vision loss of some frames."""
         indices = self._sampler.frames(self._recipe.frames_per_step)
         loss = self._vision_loss(self._network.frame_features(indices), indices)
         return loss, loss.detach()
 
-    def text_step(self) -> tuple[Tensor, Tensor]:
+    def text_step(self, _progress: float) -> tuple[Tensor, Tensor]:
         """Return the loss of synthetic plans, plus that of some frames.
 
         The embeddings of names change in this stage; the vision loss keeps them close to the
@@ -174,18 +171,13 @@ class _StageTrainer:
         vision_loss = self._vision_loss(self._network.frame_features(indices), indices)
         return loss + recipe.vision_weight * vision_loss, loss.detach()
 
-    def joint_step(self) -> tuple[Tensor, Tensor]:
+    def joint_step(self, progress: float) -> tuple[Tensor, Tensor]:
         """Return the loss of questions, histories, synthetic plans, and of the questions' frames.
 
         Answers and actions have the same weight, though most tokens are actions.
         """
         recipe = self._recipe
-        questions = self._sampler.questions(
-            recipe.questions_per_step,
-            recipe.synthetic_questions,
-            recipe.recalled_questions,
-            recipe.recalled_frames,
-        )
+        questions = self._sampler.questions(progress)
         answers = self._token_loss(questions)
         indices, features = self._network.frames_of(questions)
         histories = self._sampler.histories(

@@ -2,7 +2,6 @@
 
 import random
 import shutil
-from collections import defaultdict
 
 import msgspec
 import pytest
@@ -12,7 +11,6 @@ from safetensors.torch import load_file
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.step_log import ObjectInFrame, read_steps
 from infthor_eval.training.encoding import Encoder
@@ -21,13 +19,9 @@ from infthor_eval.training.nano import stages
 from infthor_eval.training.nano.architecture import TOKENS, build_untrained, image_processor
 from infthor_eval.training.nano.frame_dataset import _cell_coverage, _type, read_frame_dataset
 from infthor_eval.training.nano.network import NanoNetwork, spellings
-from infthor_eval.training.nano.sampler import (
-    SequenceSampler,
-    SyntheticPlans,
-    corpus_texts,
-    question_intro,
-)
-from infthor_eval.training.nano.settings import NanoRecipe
+from infthor_eval.training.nano.question_sampler import question_intro
+from infthor_eval.training.nano.sampler import SequenceSampler, SyntheticPlans, corpus_texts
+from infthor_eval.training.nano.settings import NanoRecipe, QuestionSettings
 from infthor_eval.training.nano.stages import train_small_model
 from model_adapters import check_adapter, load
 
@@ -41,26 +35,12 @@ SMALL = NanoRecipe(
     text_steps=3,
     joint_steps=6,
     frames_per_step=16,
-    questions_per_step=8,
+    questions=QuestionSettings(per_step=8),
     windows_per_step=1,
     window_tokens=600,
     lr=1e-2,
     threads=1,
 )
-
-
-@pytest.fixture(scope="module")
-def small_set(bundled_set, tmp_path_factory):
-    """Two trajectories of the bundled set, and the questions on them."""
-    root, names = (
-        tmp_path_factory.mktemp("small"),
-        (bundled_name("bedroom-1"), bundled_name("kitchen-2")),
-    )
-    for name in names:
-        shutil.copytree(bundled_set / "metadata" / name, root / "metadata" / name)
-    questions = [item for item in NiehSet(bundled_set).questions if item.traj_id in names]
-    write_questions(root / "qa_set_small.csv", questions)
-    return root
 
 
 @pytest.fixture(scope="module")
@@ -143,57 +123,6 @@ def test_words_are_tokens(blank):
     assert sum(lengths) / len(lengths) < 1.6
 
 
-def test_synthetic_questions_are_true_and_their_names_do_not_give_away_the_answer(small_set, blank):
-    loaded, dataset = blank
-    sampler = SequenceSampler(
-        Encoder(loaded), [small_set], dataset, window_tokens=2048, words=Words.PUBLISHED, seed=0
-    )
-    index, counts = dataset.index_by_digest(), {"yes": 0, "no": 0}
-    from infthor_eval.household.wording import noun
-
-    words = {noun(name): at for at, name in enumerate(dataset.types)}
-    for sequence in sampler.questions(200, synthetic_share=1.0, recalled_share=0.0, n_others=0):
-        (frame,) = sequence.frames
-        text = loaded.tokenizer.decode(
-            [piece for piece in sequence.pieces if isinstance(piece, int)]
-        )
-        answer = text.rpartition("?")[2].removesuffix("<|im_end|>")
-        about = max((name for name in words if f" {name}" in text), key=len)
-        counts[answer] += 1
-        here = index[frame.digest]
-        assert bool(dataset.visible[here, words[about]]) == (answer == "yes")
-        assert answer == "yes" or not dataset.present[here, words[about]]
-    assert min(counts.values()) > 70
-
-
-def test_recalled_questions_have_their_clues_among_other_frames_and_end_with_the_last_view(
-    small_set, blank
-):
-    loaded, dataset = blank
-    sampler = SequenceSampler(
-        Encoder(loaded), [small_set], dataset, window_tokens=2048, words=Words.PUBLISHED, seed=0
-    )
-    data = NiehSet(small_set)
-    clues = defaultdict(list)  # by text, which questions on two trajectories may share
-    for question in data.questions:
-        clues[question.text].append({frame.digest for frame in data.clue_frames(question)})
-    absences = {question.text for question in data.questions if question.absence}
-    lasts = {data.frames(question.traj_id)[-1].digest for question in data.questions}
-    n_others = set()
-    for sequence in sampler.questions(60, synthetic_share=0.0, recalled_share=1.0, n_others=4):
-        digests = [frame.digest for frame in sequence.frames]
-        text = loaded.tokenizer.decode(
-            [piece for piece in sequence.pieces if isinstance(piece, int)]
-        )
-        question_text = max((known for known in clues if known in text), key=len)
-        assert digests[-1] in lasts
-        if question_text not in absences:
-            own = next(frames for frames in clues[question_text] if frames <= set(digests))
-            n_others.add(len(set(digests) - own - lasts))
-    assert n_others <= set(range(5))
-    assert len(n_others) > 2
-
-
 def test_synthetic_plans_replace_objects_in_plan_and_actions():
     recorded = [
         ("pick up the mug", ["PickupObject Mug"]),
@@ -244,9 +173,7 @@ def test_synthetic_plans_replace_objects_in_plan_and_actions():
 
 def test_synthetic_plans_have_no_frame_and_loss_on_their_actions(small_set, blank):
     loaded, dataset = blank
-    sampler = SequenceSampler(
-        Encoder(loaded), [small_set], dataset, window_tokens=600, words=Words.PUBLISHED, seed=0
-    )
+    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, SMALL)
     for plan in sampler.synthetic_plans(20):
         assert not plan.frames
         ends = [
@@ -259,9 +186,7 @@ def test_synthetic_plans_have_no_frame_and_loss_on_their_actions(small_set, blan
 
 def test_histories_are_windows_or_single_plans(small_set, blank):
     loaded, dataset = blank
-    sampler = SequenceSampler(
-        Encoder(loaded), [small_set], dataset, window_tokens=600, words=Words.PUBLISHED, seed=0
-    )
+    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, SMALL)
     assert len(sampler.histories(2, 5, single_plan_share=0.0)) == 2
     plans = sampler.histories(2, 5, single_plan_share=1.0)
     assert len(plans) == 5
