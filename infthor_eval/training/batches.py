@@ -50,7 +50,7 @@ def collate(sequences: Sequence[TrainingSequence], family: Family, pad_id: int) 
     labels = [_labels(sequence, own) for sequence, own in zip(sequences, ids, strict=True)]
     return Batch(
         input_ids=pad_sequence(ids, batch_first=True, padding_value=pad_id),
-        position_ids=_positions(sequences, family),
+        position_ids=_positions(sequences, ids, family),
         attention_mask=_attention_mask(sequences, ids),
         labels=pad_sequence(labels, batch_first=True, padding_value=IGNORED),
         slots=pad_sequence(
@@ -82,8 +82,12 @@ def _attention_mask(
 
 def _span_numbers(sequence: TrainingSequence) -> torch.Tensor:
     """Return 0 for tokens before all branches, and the number of its branch for each other."""
-    sizes = [n_tokens(sequence.pieces[span]) for span in sequence.spans]
+    sizes = _span_sizes(sequence)
     return torch.arange(len(sizes)).repeat_interleave(torch.tensor(sizes))
+
+
+def _span_sizes(sequence: TrainingSequence) -> list[int]:
+    return [n_tokens(sequence.pieces[span]) for span in sequence.spans]
 
 
 def _labels(sequence: TrainingSequence, ids: torch.Tensor) -> torch.Tensor:
@@ -97,24 +101,30 @@ def _labels(sequence: TrainingSequence, ids: torch.Tensor) -> torch.Tensor:
     return ids.where(mask, IGNORED)
 
 
-def _positions(sequences: Sequence[TrainingSequence], family: Family) -> torch.Tensor:
+def _positions(
+    sequences: Sequence[TrainingSequence], ids: Sequence[torch.Tensor], family: Family
+) -> torch.Tensor:
     """Return the positions of sequences, each from 0; padding has 0, which never lengthens RoPE.
 
     Each branch goes on where what is before all branches ends.
     """
-    rows = [_row_of_positions(sequence, family) for sequence in sequences]
+    rows = [
+        _row_of_positions(sequence, own, family)
+        for sequence, own in zip(sequences, ids, strict=True)
+    ]
     longest = max(row.shape[-1] for row in rows)
     padded = [torch.nn.functional.pad(row, (0, longest - row.shape[-1])) for row in rows]
     return torch.cat(padded, dim=-2)
 
 
-def _row_of_positions(sequence: TrainingSequence, family: Family) -> torch.Tensor:
+def _row_of_positions(
+    sequence: TrainingSequence, ids: torch.Tensor, family: Family
+) -> torch.Tensor:
     parts: list[torch.Tensor] = []
-    for span in sequence.spans:
-        pieces = sequence.pieces[span]
-        sizes = [piece.size for piece in pieces if isinstance(piece, Frame)]
+    for span, own in zip(sequence.spans, ids.split(_span_sizes(sequence)), strict=True):
+        sizes = [piece.size for piece in sequence.pieces[span] if isinstance(piece, Frame)]
         start = int(parts[0].max()) + 1 if parts else 0
-        parts.append(family.positions(torch.tensor(list(token_ids(pieces))), sizes, start))
+        parts.append(family.positions(own, sizes, start))
     return torch.cat(parts, dim=-1)
 
 

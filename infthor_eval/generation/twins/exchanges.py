@@ -151,8 +151,10 @@ class Swap(ExchangeKind):
 
     def _may_exchange(self, episode: Episode, one: ThorObject, other: ThorObject) -> bool:
         """Return True if each could as well be where the other is, and be what is carried."""
-        shares = sorted(episode.task_shares[obj.object_type] for obj in (one, other))
-        return shares[0] >= shares[1] / 2 > 0 and super()._may_exchange(episode, one, other)
+        if not super()._may_exchange(episode, one, other):
+            return False
+        low, high = sorted(episode.task_shares[obj.object_type] for obj in (one, other))
+        return low >= high / 2 > 0
 
 
 class SwapTask(ExchangeKind):

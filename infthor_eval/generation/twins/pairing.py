@@ -84,11 +84,14 @@ class AskedWorld:
         history = self.history
         last = len(history) - 1
         place = canonical_type(candidate.subjects[0])
-        return all(
-            history.contents(frame, key) <= history.contents(last, key)
+        there = [
+            key
             for key, state in history.states(last).items()
             if canonical_type(state.type) == place
-            for frame in range(last)
+        ]
+        left = {key: history.contents(last, key) for key in there}
+        return all(
+            history.contents(frame, key) <= left[key] for key in there for frame in range(last)
         )
 
     def gives(self, candidate: Candidate, clues: Sequence[int]) -> bool:

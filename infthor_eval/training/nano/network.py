@@ -79,7 +79,7 @@ class NanoNetwork(SequenceModel):
         """Compute the features of all frames once, for all later sequences; the tower is not
         trained any more.
 
-        The tower takes four fifths of a step's time.
+        The tower takes most of a step's time.
         """
         indices = range(len(self._dataset.frames))
         with torch.no_grad():

@@ -7,8 +7,9 @@ between the two worlds is then all that there is to learn from them.
 import random
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
@@ -27,19 +28,37 @@ from infthor_eval.training.encoding import (
 from infthor_eval.training.nano.frame_dataset import FrameDataset
 from infthor_eval.training.nano.settings import QuestionSettings
 from infthor_eval.training.question_sequences import question_sequences
-from model_adapters import Part
 
 __all__ = ["QuestionSampler", "question_intro"]
 
 _LEAST_FRAMES = 20  # frames that have to show a type before synthetic questions ask for it
 _PRESENCE = ("Have you seen {0}?", "Is there any {1} in this room?")
 _MAX_TRIES = 200
-_Asked = tuple[NiehSet, Sample]  # a question on its clue frames, with its set
+_N_WORLDS = 2
 
 
 def question_intro() -> str:
     """Return the text that precedes every question on clue frames."""
     return question_text(CONTEXTS["clues"].intro, Question("", "", (), ())).rstrip()
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A question of a set, with the sequence that asks it on its clue frames."""
+
+    data: NiehSet
+    sample: Sample
+    on_clues: TrainingSequence
+
+    @property
+    def traj_id(self) -> str:
+        """Its trajectory."""
+        return self.sample.question.traj_id
+
+    @property
+    def last_view(self) -> int:
+        """Place of the last frame of its trajectory."""
+        return len(self.data.frames(self.traj_id)) - 1
 
 
 class QuestionSampler:
@@ -68,8 +87,7 @@ class QuestionSampler:
         self._dataset = dataset
         self._settings = settings
         self.skipped: list[SkippedSequence] = []
-        self._on_clues: list[TrainingSequence] = []
-        self._asked: list[_Asked] = []
+        self._singles: list[_Asked] = []
         self._pairs: list[tuple[_Asked, ...]] = []
         for folder in folders:
             self._read(folder, limit)
@@ -80,30 +98,30 @@ class QuestionSampler:
 
     def __bool__(self) -> bool:
         """Return True if there is any recorded question."""
-        return bool(self._on_clues)
+        return bool(self._singles or self._pairs)
 
     def _read(self, folder: Path, limit: int) -> None:
+        """Read the questions of a set; of twins, those that can be asked in both worlds."""
         samples = find_samples({"data": str(folder), "context": "clues"})
+        encoded = list(question_sequences(self._encoder, samples, limit))
         by_pair: dict[str, list[_Asked]] = defaultdict(list)
-        for sample in samples.samples:
+        # What the context itself skips comes first.
+        for sample, sequence in zip(samples.samples, encoded[len(samples.skipped) :], strict=True):
+            if isinstance(sequence, SkippedSequence):
+                continue
+            asked = _Asked(samples.data, sample, sequence)
             if sample.question.pair:
-                by_pair[sample.question.pair].append((samples.data, sample))
+                by_pair[sample.question.pair].append(asked)
             else:
-                self._asked.append((samples.data, sample))
-        self._pairs += [tuple(both) for both in by_pair.values()]
-        for encoded in question_sequences(self._encoder, samples, limit):
-            if isinstance(encoded, TrainingSequence):
-                self._on_clues.append(encoded)
-            else:
-                self.skipped.append(encoded)
+                self._singles.append(asked)
+        self._pairs += [tuple(both) for both in by_pair.values() if len(both) == _N_WORLDS]
+        self.skipped += [one for one in encoded if isinstance(one, SkippedSequence)]
 
-    def _group_by_episode(self) -> list[list[list[_Asked]]]:
+    def _group_by_episode(self) -> list[list[Sequence[_Asked]]]:
         """Return the questions of each trajectory, or of both worlds of each twin."""
-        episodes: dict[str, list[list[_Asked]]] = defaultdict(list)
-        for one in self._asked:
-            episodes[one[1].question.traj_id].append([one])
-        for both in self._pairs:
-            episodes[" ".join(sample.question.traj_id for _, sample in both)].append([*both])
+        episodes: dict[str, list[Sequence[_Asked]]] = defaultdict(list)
+        for questions in (*((one,) for one in self._singles), *self._pairs):
+            episodes[" ".join(asked.traj_id for asked in questions)].append(questions)
         return list(episodes.values())
 
     def draw(self, rng: random.Random, progress: float) -> list[TrainingSequence]:
@@ -129,33 +147,22 @@ class QuestionSampler:
         if rng.random() < settings.synthetic:
             return [self._presence(rng)]
         is_recalled = rng.random() < settings.recalled
-        if self._pairs and rng.random() < settings.paired:
-            both = rng.choice(self._pairs)
-            others = self._draw_others(rng, both[0], n_others) if is_recalled else None
-            return [self._encode(asked, others) for asked in both]
+        is_paired = bool(self._pairs) and (not self._singles or rng.random() < settings.paired)
+        questions = rng.choice(self._pairs) if is_paired else (rng.choice(self._singles),)
         if not is_recalled:
-            return [rng.choice(self._on_clues)]
-        asked = rng.choice(self._asked)
-        return [self._encode(asked, self._draw_others(rng, asked, n_others))]
+            return [asked.on_clues for asked in questions]
+        # Frames that do not matter, the same in both worlds, of those before the last view.
+        last = questions[0].last_view
+        others = set(rng.sample(range(last), min(rng.randint(0, n_others), last)))
+        return [self._recalled(asked, others) for asked in questions]
 
-    def _draw_others(self, rng: random.Random, asked: _Asked, most: int) -> set[int]:
-        """Return frames that do not matter, of those before the last view."""
-        data, sample = asked
-        last = len(data.frames(sample.question.traj_id)) - 1
-        return set(rng.sample(range(last), min(rng.randint(0, most), last)))
-
-    def _encode(self, asked: _Asked, others: set[int] | None) -> TrainingSequence:
-        """Return a question on its clue frames, or as behind a memory that recalls others, too."""
-        data, sample = asked
-        if others is None:
-            context, text = CONTEXTS["clues"].request(data, sample)
-            return self._answer([*as_images(context), text], sample)
-        last = len(data.frames(sample.question.traj_id)) - 1
+    def _recalled(self, asked: _Asked, others: set[int]) -> TrainingSequence:
+        """Return a question as behind a memory that recalls its clue frames and others."""
+        sample = asked.sample
+        last = asked.last_view
         clues = set(sample.frames) if sample.question.has_evidence else set()
         recalled = tuple(sorted((clues | others) - {last}))
-        remembered = replace(sample, frames=(*recalled, last), recalled=recalled)
-        context, text = CONTEXTS[MEMORY].request(data, remembered)
-        return self._answer([*as_images(context), text], sample)
+        return self._encode(MEMORY, asked, frames=(*recalled, last), recalled=recalled)
 
     def _on_trajectories(self, rng: random.Random) -> list[TrainingSequence]:
         """Return questions on a whole trajectory as one sequence; of twins, one of each world."""
@@ -165,15 +172,15 @@ class QuestionSampler:
         return [join_branches("trajectory", [*map(self._encode_whole, asked)]) for asked in worlds]
 
     def _encode_whole(self, asked: _Asked) -> TrainingSequence:
-        data, sample = asked
-        n_frames = len(data.frames(sample.question.traj_id))
-        context, text = CONTEXTS["trajectory"].request(
-            data, replace(sample, frames=tuple(range(n_frames)))
-        )
-        return self._answer([*as_images(context), text], sample)
+        return self._encode("trajectory", asked, frames=tuple(range(asked.last_view + 1)))
 
-    def _answer(self, parts: Sequence[Part], sample: Sample) -> TrainingSequence:
-        return self._encoder.answer("question", parts, doc_target(sample.question))
+    def _encode(self, context_name: str, asked: _Asked, **shown: Any) -> TrainingSequence:
+        """Return a question in a context, with what that shows as fields of its sample."""
+        sample = replace(asked.sample, **shown)
+        context, text = CONTEXTS[context_name].request(asked.data, sample)
+        return self._encoder.answer(
+            "question", [*as_images(context), text], doc_target(sample.question)
+        )
 
     def _presence(self, rng: random.Random) -> TrainingSequence:
         """Return a question for the presence of an object in one frame.

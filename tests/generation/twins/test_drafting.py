@@ -23,15 +23,9 @@ from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Wo
 from infthor_eval.generation.twins.rewriting import in_world, without_traces
 from infthor_eval.nieh.scoring import score
 
-from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
+from ...helpers.trajectories import FORK
 
 STRICT = partial(score, scorer="strict")
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory):
-    folder = write_trajectories(tmp_path_factory.mktemp("data") / "one", cut_trajectory(FORK, 8))
-    return next(folder.iterdir())
 
 
 @pytest.fixture(scope="module")

@@ -12,13 +12,10 @@ from infthor_eval.generation.twins.exchanges import Swap
 from infthor_eval.generation.twins.task_shares import task_shares
 from infthor_eval.thor.restore import restore
 
-from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
-
 
 @pytest.fixture(scope="module")
-def trajectory(tmp_path_factory):
-    folder = write_trajectories(tmp_path_factory.mktemp("data") / "one", cut_trajectory(FORK, 8))
-    return next(iter_trajectories(next(folder.iterdir())))
+def trajectory(file):
+    return next(iter_trajectories(file))
 
 
 @pytest.fixture(scope="module")

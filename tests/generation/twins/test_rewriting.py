@@ -1,7 +1,5 @@
 """Trajectories written for another world."""
 
-from pathlib import Path
-
 import pytest
 
 from infthor_eval.formats.trajectory import (
@@ -18,13 +16,7 @@ from infthor_eval.generation.twins.rewriting import (
     without_traces,
 )
 
-from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory) -> Path:
-    folder = write_trajectories(tmp_path_factory.mktemp("data") / "one", cut_trajectory(FORK, 8))
-    return next(folder.iterdir())
+from ...helpers.trajectories import FORK
 
 
 @pytest.fixture
