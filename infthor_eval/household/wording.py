@@ -6,7 +6,19 @@ type can be recovered by joining the words.
 
 import re
 
-__all__ = ["canonical_type", "compact_name", "noun", "object_type", "plural", "with_article"]
+from infthor_eval.household.affordances import preposition
+
+__all__ = [
+    "answer_of",
+    "canonical_type",
+    "compact_name",
+    "in_or_on",
+    "noun",
+    "object_type",
+    "plural",
+    "with_article",
+    "with_the",
+]
 
 _VOWEL_SOUND = re.compile(r"^(?:[aeio]|u(?!se|ni))", re.IGNORECASE)
 _WHOLE = {"SinkBasin": "Sink", "BathtubBasin": "Bathtub"}
@@ -64,3 +76,18 @@ def plural(words: str) -> str:
 def compact_name(object_type: str) -> str:
     """Return an object type as the published data write it: lower case, a word ("coffeetable")."""
     return object_type.lower()
+
+
+def with_the(object_type: str) -> str:
+    """Return an object type in words with "the" ("the coffee table")."""
+    return f"the {noun(canonical_type(object_type))}"
+
+
+def in_or_on(object_type: str) -> str:
+    """Return a receptacle type with its preposition ("on the coffee table", "in the fridge")."""
+    return f"{preposition(object_type)} {with_the(object_type)}"
+
+
+def answer_of(object_type: str) -> str:
+    """Return an object type as a gold answer, in the published form ("coffeetable")."""
+    return compact_name(canonical_type(object_type))

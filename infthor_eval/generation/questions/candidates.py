@@ -5,19 +5,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from infthor_eval.formats.question import Answer, Question
-from infthor_eval.household.affordances import preposition
-from infthor_eval.household.wording import canonical_type, compact_name, noun
+from infthor_eval.household.wording import answer_of, canonical_type
 
 __all__ = [
     "MANY",
     "Candidate",
-    "answer_of",
     "are_distinguishable",
     "further_type",
-    "in_or_on",
     "listing_question",
     "type_question",
-    "with_the",
 ]
 
 MANY = 6  # maximum number of gold answers; longer lists would test writing, not seeing
@@ -74,21 +70,6 @@ class Candidate:
 def further_type(question_type: str) -> str:
     """Return the question type of our forms that belongs to a type of Table 3."""
     return f"{question_type}_further"
-
-
-def with_the(object_type: str) -> str:
-    """Return an object type in words with "the" ("the coffee table")."""
-    return f"the {noun(canonical_type(object_type))}"
-
-
-def in_or_on(object_type: str) -> str:
-    """Return a receptacle type with its preposition ("on the coffee table", "in the fridge")."""
-    return f"{preposition(object_type)} {with_the(object_type)}"
-
-
-def answer_of(object_type: str) -> str:
-    """Return an object type as a gold answer, in the published form ("coffeetable")."""
-    return compact_name(canonical_type(object_type))
 
 
 def are_distinguishable(object_types: Sequence[str]) -> bool:

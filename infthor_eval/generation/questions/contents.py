@@ -8,16 +8,10 @@ picked up and are directly there.
 from collections import Counter
 from collections.abc import Iterator
 
-from infthor_eval.generation.questions.candidates import (
-    Candidate,
-    further_type,
-    in_or_on,
-    type_question,
-    with_the,
-)
+from infthor_eval.generation.questions.candidates import Candidate, further_type, type_question
 from infthor_eval.generation.questions.history import Event, TrajectoryHistory, is_same_object
 from infthor_eval.generation.questions.readings import can_be_picked_up, is_plain, minimal_cover
-from infthor_eval.household.wording import canonical_type
+from infthor_eval.household.wording import canonical_type, in_or_on, with_the
 
 __all__ = [
     "CONTENT",

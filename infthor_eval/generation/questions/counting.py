@@ -11,9 +11,9 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from infthor_eval.generation.questions.candidates import Candidate, further_type, in_or_on, with_the
+from infthor_eval.generation.questions.candidates import Candidate, further_type
 from infthor_eval.generation.questions.history import Event, ObjectMove, TrajectoryHistory
-from infthor_eval.household.wording import noun, with_article
+from infthor_eval.household.wording import in_or_on, noun, with_article, with_the
 
 __all__ = ["ALL", "FURTHER", "QUESTION_TYPE", "counts", "further_counts"]
 

@@ -3,15 +3,10 @@
 from collections.abc import Iterator
 from itertools import combinations
 
-from infthor_eval.generation.questions.candidates import (
-    MANY,
-    Candidate,
-    in_or_on,
-    type_question,
-    with_the,
-)
+from infthor_eval.generation.questions.candidates import MANY, Candidate, type_question
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.questions.readings import is_plain, minimal_cover
+from infthor_eval.household.wording import in_or_on, with_the
 
 __all__ = ["COUNT_FORM", "QUESTION_TYPE", "final_states"]
 

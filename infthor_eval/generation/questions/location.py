@@ -7,9 +7,9 @@ picked up twice.
 from collections.abc import Iterator, Sequence
 
 from infthor_eval.generation.questions import candidates
-from infthor_eval.generation.questions.candidates import Candidate, in_or_on, with_the
+from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
-from infthor_eval.household.wording import canonical_type
+from infthor_eval.household.wording import answer_of, canonical_type, in_or_on, with_the
 
 __all__ = ["FURTHER", "QUESTION_TYPE", "further_locations", "locations"]
 
@@ -163,5 +163,5 @@ def _candidate(
     names = [with_the(object_type)]
     if named is not None:
         names.append(named)
-    answers = tuple(map(candidates.answer_of, types))
+    answers = tuple(map(answer_of, types))
     return Candidate(question_type, form, tuple(names), clues, answers, (object_type, *types))

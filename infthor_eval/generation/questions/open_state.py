@@ -3,14 +3,9 @@
 from collections import Counter
 from collections.abc import Iterator
 
-from infthor_eval.generation.questions.candidates import (
-    Candidate,
-    further_type,
-    in_or_on,
-    listing_question,
-    with_the,
-)
+from infthor_eval.generation.questions.candidates import Candidate, further_type, listing_question
 from infthor_eval.generation.questions.history import Event, TrajectoryHistory
+from infthor_eval.household.wording import in_or_on, with_the
 
 __all__ = ["CONTAINERS", "FURTHER", "QUESTION_TYPE", "further_open_states", "open_states"]
 

@@ -7,9 +7,9 @@ objects have each other's tasks, only what was seen tells it.
 from collections.abc import Iterator
 from itertools import permutations
 
-from infthor_eval.generation.questions.candidates import Candidate, further_type, with_the
+from infthor_eval.generation.questions.candidates import Candidate, further_type
 from infthor_eval.generation.questions.history import Event, TrajectoryHistory
-from infthor_eval.household.wording import canonical_type
+from infthor_eval.household.wording import canonical_type, with_the
 
 __all__ = ["QUESTION_TYPE", "orders"]
 

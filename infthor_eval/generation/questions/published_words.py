@@ -9,9 +9,9 @@ names.
 import re
 
 from infthor_eval.formats.question import Answer, Question
-from infthor_eval.generation.questions.candidates import Candidate, answer_of
+from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.household.affordances import preposition
-from infthor_eval.household.wording import canonical_type, object_type
+from infthor_eval.household.wording import answer_of, canonical_type, object_type
 
 __all__ = ["in_published_words"]
 

@@ -7,8 +7,9 @@ where it was put.
 from collections.abc import Iterator, Sequence
 
 from infthor_eval.generation.questions import candidates
-from infthor_eval.generation.questions.candidates import Candidate, in_or_on, type_question
+from infthor_eval.generation.questions.candidates import Candidate, type_question
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
+from infthor_eval.household.wording import in_or_on
 
 __all__ = ["FURTHER", "QUESTION_TYPE", "further_puts", "puts"]
 

@@ -14,16 +14,11 @@ from infthor_eval.formats.question import Answer
 from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.twins import PairedQuestion
 from infthor_eval.generation.questions import counting, final_state, order, presence
-from infthor_eval.generation.questions.candidates import (
-    MANY,
-    Candidate,
-    answer_of,
-    are_distinguishable,
-)
+from infthor_eval.generation.questions.candidates import MANY, Candidate, are_distinguishable
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.generate import candidates_of, further_candidates_of
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
-from infthor_eval.household.wording import canonical_type
+from infthor_eval.household.wording import answer_of, canonical_type
 
 __all__ = ["AskedWorld", "ScoreReply", "pair_questions"]
 

@@ -1,8 +1,8 @@
 """The untrained small model: Qwen2.5-VL with random weights, and a tokenizer for household words.
 
-A frame is 112 x 112 pixels and takes 16 tokens. Words are single tokens. So is the introduction of
-every question of the published evaluation, which would otherwise be three quarters of a question's
-tokens.
+A frame is 112 x 112 pixels, which are eight by eight patches. Words are single tokens. So is the
+introduction of every question of the published evaluation, which would otherwise be three quarters
+of a question's tokens.
 """
 
 from collections.abc import Iterable
@@ -22,11 +22,10 @@ from model_adapters.tiny.qwen2_5_vl import SPECIAL
 from model_adapters.tiny.tokenizer import train_tokenizer
 from model_adapters.tiny.twin import draw_model, token_ids
 
-__all__ = ["GRID", "PATCHES", "TOKENS", "build_untrained", "image_processor"]
+__all__ = ["PATCHES", "build_untrained", "image_processor"]
 
-GRID = 4  # tokens along each side of a frame
-TOKENS = GRID**2
-PATCHES = 4 * TOKENS  # a token merges two by two patches
+_PATCH_GRID = 8  # patches along each side of a frame
+PATCHES = _PATCH_GRID**2
 _SIDE = 14  # pixels of a patch
 _HEADS = 4
 # The processor rounds this to 112 x 112 pixels; with a limit of exactly 112 * 112 it would round
@@ -35,9 +34,11 @@ _PIXELS = 12_600
 _N_MERGED = 3000  # more than the number of words, so that every word is a token
 
 
-def image_processor() -> Any:
-    """Return the image processor."""
-    return Qwen2VLImageProcessorPil(min_pixels=_PIXELS, max_pixels=_PIXELS)
+def image_processor(grid: int) -> Any:
+    """Return the image processor, for frames of as many tokens along each side."""
+    return Qwen2VLImageProcessorPil(
+        min_pixels=_PIXELS, max_pixels=_PIXELS, merge_size=_PATCH_GRID // grid
+    )
 
 
 def build_untrained(
@@ -63,7 +64,7 @@ def build_untrained(
     model = draw_model(
         _config(recipe, ids, len(tokenizer)), recipe.seed, ids["<|im_end|>"], ids["<|endoftext|>"]
     )
-    processor = image_processor()
+    processor = image_processor(recipe.vision.grid)
     family = Qwen25VLFamily(model, processor, tokenizer)
     family.video = None  # it is trained on no film
     return assemble(
@@ -78,8 +79,7 @@ def build_untrained(
 
 
 def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
-    width = recipe.hidden
-    layers = recipe.layers
+    width, vision = recipe.hidden, recipe.vision
     return Qwen2_5_VLConfig(
         image_token_id=ids["<|image_pad|>"],
         video_token_id=ids["<|video_pad|>"],
@@ -90,7 +90,7 @@ def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
             "vocab_size": vocab_size,
             "hidden_size": width,
             "intermediate_size": 3 * width,
-            "num_hidden_layers": layers,
+            "num_hidden_layers": recipe.layers,
             "num_attention_heads": _HEADS,
             "num_key_value_heads": _HEADS,
             "max_position_embeddings": 32_768,
@@ -105,14 +105,15 @@ def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
             },
         },
         vision_config={
-            "depth": layers,
-            "hidden_size": width,
-            "intermediate_size": 2 * width,
+            "depth": vision.layers,
+            "hidden_size": vision.hidden,
+            "intermediate_size": 2 * vision.hidden,
             "num_heads": _HEADS,
             "out_hidden_size": width,
             "patch_size": _SIDE,
-            "window_size": 2 * GRID * _SIDE,  # the whole frame
-            "fullatt_block_indexes": list(range(layers)),
+            "spatial_merge_size": _PATCH_GRID // vision.grid,
+            "window_size": _PATCH_GRID * _SIDE,  # the whole frame
+            "fullatt_block_indexes": list(range(vision.layers)),
         },
     )
 

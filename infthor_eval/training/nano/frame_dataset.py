@@ -1,6 +1,7 @@
-"""Frames of the training data as inputs of the vision tower, with labels of the objects in them."""
+"""Frames of the training data as inputs of the vision tower, with labels of what they show."""
 
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,86 +12,110 @@ from torch import Tensor
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.step_log import ObjectInFrame, Step, read_steps
 from infthor_eval.storage.digests import fingerprint
-from infthor_eval.training.data import trajectory_names
-from infthor_eval.training.nano.architecture import GRID, PATCHES, TOKENS
+from infthor_eval.training.nano.architecture import PATCHES
+from infthor_eval.training.nano.seen_objects import SeenFrame, SeenObject, read_seen_frames
 
-__all__ = ["FrameDataset", "read_frame_dataset"]
+__all__ = ["CellLabels", "FrameDataset", "cell_coverage", "read_frame_dataset"]
 
 _READER_THREADS = 2
-# smallest object that counts as shown: a thousandth of a 300 x 300 frame, as in the questions
-_LEAST_PIXELS = 90
-# An object is in a cell if its box covers this share of the cell, or has this share of its own area
-# in the cell.
+# An object is in a cell if its box covers this share of the cell, or has there this share of what
+# it has in the cell with most of it.
 _OF_CELL = 0.4
-_OF_OBJECT = 0.5
+_OF_LARGEST = 0.5
+_LEAST_RELATIONS = 10  # frames that have to show a type in a receptacle before it is a label
+
+
+@dataclass(frozen=True)
+class CellLabels:
+    """What each token's part of a frame shows; labels are True or False.
+
+    Attributes:
+        types: types of the objects there, (frames, tokens, types).
+        held: types of those in the agent's hand, (frames, tokens, types).
+        opened: types of those that are open, (frames, tokens, types).
+        related: type and receptacle of the objects there, (frames, tokens, relations).
+    """
+
+    types: Tensor
+    held: Tensor
+    opened: Tensor
+    related: Tensor
 
 
 @dataclass(frozen=True)
 class FrameDataset:
-    """Frames with labels; labels are 0 or 1.
+    """Frames with labels.
 
     Attributes:
-        frames: distinct frames.
+        seen: distinct frames with the objects in them.
         types: object types, sorted.
+        relations: frequent pairs of a type and the type of the receptacle it is in, sorted.
         pixels: patches of each frame, (frames, patches, values), in float16. The tower reads each
             frame twice, as two time steps of a video; this has one of them.
-        cells: types in each token's part of the frame, (frames, tokens, types).
-        visible: types that the frame shows near enough to be visible in AI2-THOR's sense, (frames,
-            types).
-        present: types with any pixel in the frame, (frames, types).
+        cells: labels of each token's part of the frame.
+        shown: types that the frame shows near enough to be visible in AI2-THOR's sense, (frames,
+            types), True or False.
+        present: types with any pixel in the frame, (frames, types), True or False.
     """
 
-    frames: tuple[FrameRef, ...]
+    seen: tuple[SeenFrame, ...]
     types: tuple[str, ...]
+    relations: tuple[tuple[str, str], ...]
     pixels: Tensor
-    cells: Tensor
-    visible: Tensor
+    cells: CellLabels
+    shown: Tensor
     present: Tensor
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.seen)
 
     def identity(self) -> str:
         """Return the hash of the frames in their order, and of the types."""
-        digests = [frame.digest for frame in self.frames]
+        digests = [frame.digest for frame, _ in self.seen]
         return fingerprint({"frames": digests, "types": list(self.types)})
 
     def index_by_digest(self) -> dict[str, int]:
         """Return the index of each frame by the digest of its file."""
-        return {frame.digest: index for index, frame in enumerate(self.frames)}
+        return {frame.digest: index for index, (frame, _) in enumerate(self.seen)}
 
 
-def read_frame_dataset(folders: Iterable[Path], image_processor: Any) -> FrameDataset:
+def read_frame_dataset(folders: Iterable[Path], image_processor: Any, grid: int) -> FrameDataset:
     """Read all frames of the folders of replayed sets.
+
+    Args:
+        folders: folders of the sets.
+        image_processor: makes the inputs of the tower.
+        grid: tokens along each side of a frame.
 
     Raises:
         DataError: a set cannot be read, or its step log does not list the objects in frames.
     """
-    frames: dict[str, tuple[FrameRef, Step]] = {}
-    for folder in folders:
-        data = NiehSet(folder)
-        for name in trajectory_names(data):
-            folder_of_steps = data.folder(name)
-            steps = sorted(read_steps(folder_of_steps), key=lambda step: step.img_idx)
-            if any(step.seen is None for step in steps):
-                raise DataError(
-                    f"{folder_of_steps}: does not list the objects in its frames; replay the "
-                    "trajectory"
-                )
-            for frame, step in zip(data.frames(name), steps, strict=True):
-                frames.setdefault(frame.digest, (frame, step))
-    entries = list(frames.values())
-    types = sorted({_type(key) for _, step in entries for key in step.seen or ()})
-    labels = [_labels(step.seen or {}, types, frame.size) for frame, step in entries]
-    cells, visible, present = map(torch.stack, zip(*labels, strict=True))
+    seen = read_seen_frames(folders)
+    objects = [one for _, in_frame in seen for one in in_frame]
+    types = sorted({one.type for one in objects})
+    pairs = Counter((one.type, one.parent) for one in objects)
+    relations = sorted(
+        (name, parent)
+        for (name, parent), n in pairs.items()
+        if parent is not None and n >= _LEAST_RELATIONS
+    )
+    rows = torch.tensor([row for row, (_, in_frame) in enumerate(seen) for _ in in_frame])
     # Decoding and resizing release the interpreter lock.
     with ThreadPoolExecutor(_READER_THREADS) as readers:
         pixels = torch.stack(
-            list(readers.map(lambda entry: _patches(entry[0], image_processor), entries))
+            list(readers.map(lambda entry: _patches(entry.frame, image_processor), seen))
         )
-    return FrameDataset(
-        tuple(frame for frame, _ in entries), tuple(types), pixels, cells, visible, present
-    )
+    shown, present = torch.zeros(2, len(seen), len(types), dtype=torch.bool)
+    columns = _columns(types, (one.type for one in objects))
+    present[rows, columns] = True
+    is_shown = torch.tensor([one.is_shown for one in objects])
+    shown[rows[is_shown], columns[is_shown]] = True
+    sizes = torch.tensor([frame.size for frame, in_frame in seen for _ in in_frame])
+    coverage = cell_coverage(torch.tensor([one.box for one in objects]), sizes, grid)
+    cells = _Cells(len(seen), rows, coverage).labels(types, relations, objects)
+    return FrameDataset(tuple(seen), tuple(types), tuple(relations), pixels, cells, shown, present)
 
 
 def _patches(frame: FrameRef, image_processor: Any) -> Tensor:
@@ -100,39 +125,68 @@ def _patches(frame: FrameRef, image_processor: Any) -> Tensor:
     return pixels.reshape(PATCHES, 3, 2, -1)[:, :, 0].reshape(PATCHES, -1).half()
 
 
-def _type(key: str) -> str:
-    """Return the type in an object's id; that of the part or slice for "...|SinkBasin" and
-    "...|AppleSliced_1"."""
-    first, *_, last = key.split("|")
-    return last.partition("_")[0] if last[:1].isalpha() else first
+def _columns(names: Sequence[Any], chosen: Iterable[Any]) -> Tensor:
+    """Return the place of each of the chosen among the names, or -1."""
+    places: Mapping[Any, int] = {name: place for place, name in enumerate(names)}
+    return torch.tensor([places.get(one, -1) for one in chosen])
 
 
-def _labels(
-    seen: dict[str, ObjectInFrame], types: Sequence[str], size: tuple[int, int]
-) -> tuple[Tensor, Tensor, Tensor]:
-    cells = torch.zeros(TOKENS, len(types))
-    visible = torch.zeros(len(types))
-    present = torch.zeros(len(types))
-    coverage = _cell_coverage(
-        torch.tensor([instance.box for instance in seen.values()]).reshape(-1, 4), size
-    )
-    for (key, instance), in_cells in zip(seen.items(), coverage, strict=True):
-        column = types.index(_type(key))
-        present[column] = 1
-        if instance.visible and instance.pixels >= _LEAST_PIXELS:
-            visible[column] = 1
-        cells[:, column] = torch.maximum(cells[:, column], in_cells)
-    return cells, visible, present
+@dataclass(frozen=True)
+class _Cells:
+    """Where the objects of all frames are.
+
+    Attributes:
+        n_frames: number of frames.
+        rows: each object's frame.
+        coverage: the cells that each object is in, (objects, tokens), True or False.
+    """
+
+    n_frames: int
+    rows: Tensor
+    coverage: Tensor
+
+    def labels(
+        self,
+        types: Sequence[str],
+        relations: Sequence[tuple[str, str]],
+        objects: Sequence[SeenObject],
+    ) -> CellLabels:
+        """Return the labels of all cells."""
+        columns = _columns(types, (one.type for one in objects))
+        is_held = torch.tensor([one.is_held for one in objects])
+        is_open = torch.tensor([bool(one.is_open) for one in objects])
+        related = _columns(relations, ((one.type, one.parent) for one in objects))
+        return CellLabels(
+            types=self._mark(columns, len(types)),
+            held=self._mark(columns.where(is_held, -1), len(types)),
+            opened=self._mark(columns.where(is_open, -1), len(types)),
+            related=self._mark(related, len(relations)),
+        )
+
+    def _mark(self, columns: Tensor, n_columns: int) -> Tensor:
+        """Return labels, (frames, tokens, columns), that are True where objects have the column."""
+        marked = torch.zeros(self.n_frames, self.coverage.shape[1], n_columns, dtype=torch.bool)
+        which, cells = (self.coverage & (columns >= 0)[:, None]).nonzero(as_tuple=True)
+        marked[self.rows[which], cells, columns[which]] = True
+        return marked
 
 
-def _cell_coverage(boxes: Tensor, size: tuple[int, int]) -> Tensor:
-    """Return the cells of a frame that boxes are in, (boxes, tokens), row by row, as 0 or 1."""
+def cell_coverage(boxes: Tensor, sizes: Tensor, grid: int) -> Tensor:
+    """Return the cells of a frame that boxes are in, (boxes, tokens), row by row, as True or False.
+
+    Args:
+        boxes: left, top, right and bottom in pixels, both ends inclusive, (boxes, 4).
+        sizes: width and height of each box's frame in pixels, (boxes, 2).
+        grid: cells along each side.
+    """
     left, top, right, bottom = boxes.T
+    width, height = sizes.T
     spans = []
-    for low, high, extent in ((top, bottom + 1, size[1]), (left, right + 1, size[0])):
-        edges = torch.arange(GRID + 1) * (extent / GRID)
-        overlap = torch.minimum(edges[1:], high[:, None]) - torch.maximum(edges[:-1], low[:, None])
-        spans.append(overlap.clamp(min=0) / (extent / GRID))
-    area = spans[0][:, :, None] * spans[1][:, None, :]  # in units of cells
-    box_area = (right + 1 - left) * (bottom + 1 - top) / (size[0] * size[1]) * TOKENS
-    return ((area >= _OF_CELL) | (area >= _OF_OBJECT * box_area[:, None, None])).float().flatten(1)
+    for low, high, extent in ((top, bottom + 1, height), (left, right + 1, width)):
+        edges = torch.arange(grid + 1) * (extent[:, None] / grid)
+        overlap = torch.minimum(edges[:, 1:], high[:, None]) - torch.maximum(
+            edges[:, :-1], low[:, None]
+        )
+        spans.append(overlap.clamp(min=0) / (extent[:, None] / grid))
+    area = (spans[0][:, :, None] * spans[1][:, None, :]).flatten(1)  # in units of cells
+    return (area >= _OF_CELL) | (area >= _OF_LARGEST * area.amax(1, keepdim=True))

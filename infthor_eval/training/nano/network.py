@@ -1,7 +1,9 @@
-"""The small model, with two losses: of sequences, and of the objects in each part of a frame.
+"""The small model, with two losses: of sequences, and of what each part of a frame shows.
 
 The vision loss compares the tower's features with the embeddings of the objects' names, in all
 spellings that occur in texts. So words and images share one space before the decoder is trained.
+What is held, what is open, and what is in which receptacle is read off the features by linear
+layers, which are not part of the model.
 """
 
 from collections.abc import Sequence
@@ -25,6 +27,7 @@ _BATCH = 256  # frames in the tower at once
 # initial scale and bias of similarities, which are trained
 _SCALE = 8.0
 _BIAS = -4.0
+_STATE_WEIGHT = 2.0  # of the losses of what is held, open and in a receptacle: they are rare
 
 
 def spellings(object_type: str) -> tuple[str, ...]:
@@ -47,6 +50,7 @@ class NanoNetwork(SequenceModel):
     Attributes:
         scale: scale of the similarities of features and names.
         bias: bias of these, one for each type.
+        states: layers that read off the features what is held, open and in which receptacle.
     """
 
     def __init__(self, loaded: LoadedCheckpoint, dataset: FrameDataset) -> None:
@@ -59,6 +63,11 @@ class NanoNetwork(SequenceModel):
         ]
         self.scale = torch.nn.Parameter(torch.tensor(_SCALE))
         self.bias = torch.nn.Parameter(torch.full((len(dataset.types),), _BIAS))
+        cells = dataset.cells
+        self.states = torch.nn.ModuleList(
+            _state_layer(loaded.model.config.text_config.hidden_size, labels.shape[-1])
+            for labels in (cells.held, cells.opened, cells.related)
+        )
 
     def features(self, frames: Sequence[Frame]) -> list[Tensor]:
         """Return features of each frame; see `SequenceModel`."""
@@ -81,7 +90,7 @@ class NanoNetwork(SequenceModel):
 
         The tower takes most of a step's time.
         """
-        indices = range(len(self._dataset.frames))
+        indices = range(len(self._dataset))
         with torch.no_grad():
             batches = [self.frame_features(indices[at : at + _BATCH]) for at in indices[::_BATCH]]
         self._cached_features = torch.cat(batches)
@@ -93,8 +102,8 @@ class NanoNetwork(SequenceModel):
         pixels = self._dataset.pixels[list(indices)].float()
         return tower_features(self.model.model.visual, pixels)
 
-    def vision_loss(self, features: Tensor, indices: Sequence[int], spelling: int) -> Tensor:
-        """Return the loss of recognising objects by the features, a scalar.
+    def naming_loss(self, features: Tensor, indices: Sequence[int], spelling: int) -> Tensor:
+        """Return the loss of naming objects by the features, a scalar.
 
         It is the sum of a loss for the types in each part of a frame and one for the types that the
         whole frame shows. The latter ignores types that are present but too far away to count as
@@ -108,23 +117,46 @@ class NanoNetwork(SequenceModel):
         rows = list(indices)
         names = self._names[spelling] @ self.model.get_input_embeddings().weight
         logits = self.scale * (features @ names.T) + self.bias
-        cell_loss = binary_cross_entropy_with_logits(
-            logits, self._dataset.cells[rows], reduction="none"
-        )
-        visible = self._dataset.visible[rows]
-        present = self._dataset.present[rows]
+        shown = self._dataset.shown[rows].float()
+        is_clear = (shown > 0) | ~self._dataset.present[rows]
         frame_loss = binary_cross_entropy_with_logits(
-            torch.logsumexp(logits, 1), visible, reduction="none"
+            torch.logsumexp(logits, 1), shown, reduction="none"
         )
-        return (
-            cell_loss.sum(-1).mean()
-            + (frame_loss * (1 - present + visible).clamp(max=1)).sum(-1).mean()
-        )
+        cell_loss = _cell_loss(logits, self._dataset.cells.types[rows])
+        return cell_loss + (frame_loss * is_clear).sum(-1).mean()
+
+    def state_loss(self, features: Tensor, indices: Sequence[int]) -> Tensor:
+        """Return the loss of what is held, open and in which receptacle by the features, a scalar.
+
+        Args:
+            features: features of frames, (frames, tokens, hidden).
+            indices: indices of these frames in the dataset.
+        """
+        cells = self._dataset.cells
+        losses = [
+            _cell_loss(layer(features), labels[list(indices)])
+            for layer, labels in zip(
+                self.states, (cells.held, cells.opened, cells.related), strict=True
+            )
+        ]
+        return _STATE_WEIGHT * torch.stack(losses).sum()
 
     @property
     def n_spellings(self) -> int:
         """Number of spellings of a name."""
         return len(self._names)
+
+
+def _state_layer(hidden: int, n_labels: int) -> torch.nn.Linear:
+    layer = torch.nn.Linear(hidden, n_labels)
+    torch.nn.init.constant_(layer.bias, _BIAS)
+    return layer
+
+
+def _cell_loss(logits: Tensor, labels: Tensor) -> Tensor:
+    """Return the loss of the labels of a cell, summed over its labels, averaged over cells."""
+    losses = binary_cross_entropy_with_logits(logits, labels.float(), reduction="none")
+    return losses.sum(-1).mean()
 
 
 def _token_means(tokenizer: Any, types: Sequence[str], spelling: int) -> Tensor:

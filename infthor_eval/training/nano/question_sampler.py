@@ -1,21 +1,20 @@
 """Random questions for the small model: on their clue frames, behind memories, on trajectories.
 
-Both questions of a pair of twins are in one step, with the same frames by number: what differs
-between the two worlds is then all that there is to learn from them.
+Questions on the same frames are branches of one sequence. Both questions of a pair of twins are in
+one step, with the same frames by number: what differs between the two worlds is then all that there
+is to learn from them.
 """
 
 import random
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
+from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
-from infthor_eval.household.wording import noun, with_article
-from infthor_eval.nieh.contexts import CONTEXTS, MEMORY, Sample
-from infthor_eval.nieh.contexts.video import as_images
+from infthor_eval.nieh.contexts import CONTEXTS, Sample
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.prompts import question_text
 from infthor_eval.nieh.samples import find_samples
@@ -24,41 +23,45 @@ from infthor_eval.training.encoding import (
     SkippedSequence,
     TrainingSequence,
     join_branches,
+    within,
 )
 from infthor_eval.training.nano.frame_dataset import FrameDataset
 from infthor_eval.training.nano.settings import QuestionSettings
-from infthor_eval.training.question_sequences import question_sequences
+from infthor_eval.training.nano.synthetic_questions import AskedText, SyntheticQuestions
+from model_adapters.hf.prompting.prompt import Frame
 
 __all__ = ["QuestionSampler", "question_intro"]
 
-_LEAST_FRAMES = 20  # frames that have to show a type before synthetic questions ask for it
-_PRESENCE = ("Have you seen {0}?", "Is there any {1} in this room?")
-_MAX_TRIES = 200
 _N_WORLDS = 2
+_Worlds = tuple[Sample, ...]
+"""A question in its world, or in both worlds of twins."""
 
 
 def question_intro() -> str:
-    """Return the text that precedes every question on clue frames."""
+    """Return the text that precedes every question, on clue frames as behind a memory."""
     return question_text(CONTEXTS["clues"].intro, Question("", "", (), ())).rstrip()
 
 
-@dataclass(frozen=True)
-class _Asked:
-    """A question of a set, with the sequence that asks it on its clue frames."""
+@dataclass
+class _Episode:
+    """An episode, or the same episode in both worlds of twins.
 
-    data: NiehSet
-    sample: Sample
-    on_clues: TrainingSequence
+    Attributes:
+        views: frames of each world.
+        questions: its questions.
+    """
 
-    @property
-    def traj_id(self) -> str:
-        """Its trajectory."""
-        return self.sample.question.traj_id
+    views: tuple[tuple[FrameRef, ...], ...]
+    questions: list[_Worlds] = field(default_factory=list)
 
     @property
     def last_view(self) -> int:
-        """Place of the last frame of its trajectory."""
-        return len(self.data.frames(self.traj_id)) - 1
+        """Place of the last frame."""
+        return len(self.views[0]) - 1
+
+    def answerable(self, shown: set[int]) -> list[_Worlds]:
+        """Return the questions whose clue frames are all among the shown ones."""
+        return [worlds for worlds in self.questions if _clues(worlds[0]) <= shown]
 
 
 class QuestionSampler:
@@ -86,43 +89,43 @@ class QuestionSampler:
         self._encoder = encoder
         self._dataset = dataset
         self._settings = settings
+        self._index_by_digest = dataset.index_by_digest()
+        self._synthetic_questions = SyntheticQuestions(dataset.seen)
+        self._tails: dict[AskedText, TrainingSequence] = {}
         self.skipped: list[SkippedSequence] = []
-        self._singles: list[_Asked] = []
-        self._pairs: list[tuple[_Asked, ...]] = []
+        self._episodes: dict[tuple[str, ...], _Episode] = {}
         for folder in folders:
             self._read(folder, limit)
-        self._episodes = self._group_by_episode()
-        counts = dict(zip(dataset.types, dataset.visible.sum(0).tolist(), strict=True))
-        frequent = {name: count for name, count in counts.items() if count >= _LEAST_FRAMES}
-        self._names, self._weights = list(frequent), list(frequent.values())
+        by_worlds: dict[int, list[tuple[_Episode, _Worlds]]] = defaultdict(list)
+        for episode in self._episodes.values():
+            by_worlds[len(episode.views)] += [(episode, worlds) for worlds in episode.questions]
+        self._singles, self._pairs = by_worlds[1], by_worlds[_N_WORLDS]
 
     def __bool__(self) -> bool:
         """Return True if there is any recorded question."""
-        return bool(self._singles or self._pairs)
+        return bool(self._episodes)
 
     def _read(self, folder: Path, limit: int) -> None:
         """Read the questions of a set; of twins, those that can be asked in both worlds."""
         samples = find_samples({"data": str(folder), "context": "clues"})
-        encoded = list(question_sequences(self._encoder, samples, limit))
-        by_pair: dict[str, list[_Asked]] = defaultdict(list)
-        # What the context itself skips comes first.
-        for sample, sequence in zip(samples.samples, encoded[len(samples.skipped) :], strict=True):
-            if isinstance(sequence, SkippedSequence):
-                continue
-            asked = _Asked(samples.data, sample, sequence)
-            if sample.question.pair:
-                by_pair[sample.question.pair].append(asked)
+        for skipped in samples.skipped:
+            self.skipped.append(SkippedSequence(skipped.question.id, skipped.reason))
+        by_pair: dict[str, list[Sample]] = defaultdict(list)
+        for sample in samples.samples:
+            on_clues = within(self._ask(_frames(samples.data, sample), [_asked(sample)]), limit)
+            if isinstance(on_clues, SkippedSequence):
+                self.skipped.append(SkippedSequence(sample.question.id, on_clues.reason))
             else:
-                self._singles.append(asked)
-        self._pairs += [tuple(both) for both in by_pair.values() if len(both) == _N_WORLDS]
-        self.skipped += [one for one in encoded if isinstance(one, SkippedSequence)]
+                by_pair[sample.question.pair or sample.question.id].append(sample)
+        for worlds in by_pair.values():
+            if len(worlds) == (_N_WORLDS if worlds[0].question.pair else 1):
+                self._add(samples.data, tuple(worlds))
 
-    def _group_by_episode(self) -> list[list[Sequence[_Asked]]]:
-        """Return the questions of each trajectory, or of both worlds of each twin."""
-        episodes: dict[str, list[Sequence[_Asked]]] = defaultdict(list)
-        for questions in (*((one,) for one in self._singles), *self._pairs):
-            episodes[" ".join(asked.traj_id for asked in questions)].append(questions)
-        return list(episodes.values())
+    def _add(self, data: NiehSet, worlds: _Worlds) -> None:
+        names = tuple(sample.question.traj_id for sample in worlds)
+        if names not in self._episodes:
+            self._episodes[names] = _Episode(tuple(data.frames(name) for name in names))
+        self._episodes[names].questions.append(worlds)
 
     def draw(self, rng: random.Random, progress: float) -> list[TrainingSequence]:
         """Return the questions of a step, with their answers.
@@ -134,72 +137,95 @@ class QuestionSampler:
         settings = self._settings
         grown = min(1.0, progress / settings.ramp) if settings.ramp else 1.0
         if rng.random() < settings.whole * grown:
-            return self._on_trajectories(rng)
-        n_others = round(settings.recalled_frames * grown)
+            return self._on_trajectory(rng)
         drawn: list[TrainingSequence] = []
-        while len(drawn) < settings.per_step:
-            drawn += self._some(rng, n_others)
+        while sum(len(one.branches) for one in drawn) < settings.per_step:
+            is_synthetic = rng.random() < settings.synthetic
+            drawn += self._synthetic(rng, grown) if is_synthetic else self._recorded(rng, grown)
         return drawn
 
-    def _some(self, rng: random.Random, n_others: int) -> list[TrainingSequence]:
-        """Return one question, or both of a pair."""
-        settings = self._settings
-        if rng.random() < settings.synthetic:
-            return [self._presence(rng)]
-        is_recalled = rng.random() < settings.recalled
-        is_paired = bool(self._pairs) and (not self._singles or rng.random() < settings.paired)
-        questions = rng.choice(self._pairs) if is_paired else (rng.choice(self._singles),)
-        if not is_recalled:
-            return [asked.on_clues for asked in questions]
-        # Frames that do not matter, the same in both worlds, of those before the last view.
-        last = questions[0].last_view
-        others = set(rng.sample(range(last), min(rng.randint(0, n_others), last)))
-        return [self._recalled(asked, others) for asked in questions]
+    def _synthetic(self, rng: random.Random, grown: float) -> list[TrainingSequence]:
+        """Return synthetic questions on some frames of an episode; few frames are the most likely.
 
-    def _recalled(self, asked: _Asked, others: set[int]) -> TrainingSequence:
-        """Return a question as behind a memory that recalls its clue frames and others."""
-        sample = asked.sample
-        last = asked.last_view
-        clues = set(sample.frames) if sample.question.has_evidence else set()
-        recalled = tuple(sorted((clues | others) - {last}))
-        return self._encode(MEMORY, asked, frames=(*recalled, last), recalled=recalled)
-
-    def _on_trajectories(self, rng: random.Random) -> list[TrainingSequence]:
-        """Return questions on a whole trajectory as one sequence; of twins, one of each world."""
-        questions = rng.choice(self._episodes)
-        n = min(len(questions), self._settings.per_trajectory)
-        worlds = zip(*rng.sample(questions, n), strict=True)
-        return [join_branches("trajectory", [*map(self._encode_whole, asked)]) for asked in worlds]
-
-    def _encode_whole(self, asked: _Asked) -> TrainingSequence:
-        return self._encode("trajectory", asked, frames=tuple(range(asked.last_view + 1)))
-
-    def _encode(self, context_name: str, asked: _Asked, **shown: Any) -> TrainingSequence:
-        """Return a question in a context, with what that shows as fields of its sample."""
-        sample = replace(asked.sample, **shown)
-        context, text = CONTEXTS[context_name].request(asked.data, sample)
-        return self._encoder.answer(
-            "question", [*as_images(context), text], doc_target(sample.question)
-        )
-
-    def _presence(self, rng: random.Random) -> TrainingSequence:
-        """Return a question for the presence of an object in one frame.
-
-        Names are sampled by the number of frames that show them, for "yes" as for "no", so that the
-        name does not give away the answer.
+        There are none if the frames show nothing to ask for.
         """
-        is_present = rng.random() < 0.5
-        for name, index in self._draw_names(rng):
-            column = self._dataset.types.index(name)
-            if (self._dataset.visible if is_present else 1 - self._dataset.present)[index, column]:
-                break
-        words = noun(name)
-        text = rng.choice(_PRESENCE).format(with_article(words), words)
-        prompt = question_text(CONTEXTS["clues"].intro, Question("", text, (), ()))
-        answer = "yes" if self._dataset.visible[index, column] else "no"
-        return self._encoder.answer("synthetic", [self._dataset.frames[index], prompt], answer)
+        view = rng.choice(rng.choice([*self._episodes.values()]).views)
+        most = 1 + round(rng.random() ** 2 * (self._settings.synthetic_frames - 1) * grown)
+        frames = [view[at] for at in sorted(rng.sample(range(len(view)), min(most, len(view))))]
+        seen = [self._dataset.seen[self._index_by_digest[frame.digest]] for frame in frames]
+        asked = self._synthetic_questions.ask(seen, self._settings.together, rng)
+        return [self._ask(frames, asked)] if asked else []
 
-    def _draw_names(self, rng: random.Random) -> Iterator[tuple[str, int]]:
-        for _ in range(_MAX_TRIES):
-            (name,) = rng.choices(self._names, self._weights)
-            yield name, rng.randrange(len(self._dataset.frames))
+    def _recorded(self, rng: random.Random, grown: float) -> list[TrainingSequence]:
+        """Return a question and others that its frames answer; of twins, in both worlds."""
+        settings = self._settings
+        is_paired = bool(self._pairs) and (not self._singles or rng.random() < settings.paired)
+        episode, first = rng.choice(self._pairs if is_paired else self._singles)
+        shown = set(first[0].frames)
+        if rng.random() < settings.recalled:
+            # Frames that do not matter, the same in both worlds, and the last view.
+            last = episode.last_view
+            n_others = rng.randint(0, round(settings.recalled_frames * grown))
+            shown = _clues(first[0]) | {last, *rng.sample(range(last), min(n_others, last))}
+        others = [worlds for worlds in episode.answerable(shown) if worlds is not first]
+        others = rng.sample(others, min(len(others), settings.together - 1))
+        return self._in_all_worlds(episode, sorted(shown), [first, *others])
+
+    def _on_trajectory(self, rng: random.Random) -> list[TrainingSequence]:
+        """Return questions on a whole trajectory; of twins, in both worlds."""
+        episode = rng.choice([*self._episodes.values()])
+        n = min(len(episode.questions), self._settings.per_trajectory)
+        questions = rng.sample(episode.questions, n)
+        return self._in_all_worlds(episode, range(episode.last_view + 1), questions)
+
+    def _in_all_worlds(
+        self, episode: _Episode, shown: Iterable[int], questions: Sequence[_Worlds]
+    ) -> list[TrainingSequence]:
+        """Return a sequence for each world of an episode, on the same frames by number."""
+        places = [*shown]
+        return [
+            self._ask([view[at] for at in places], [*map(_asked, samples)])
+            for view, samples in zip(episode.views, zip(*questions, strict=True), strict=True)
+        ]
+
+    def _ask(self, frames: Sequence[FrameRef], asked: Sequence[AskedText]) -> TrainingSequence:
+        """Return questions on frames as branches of one sequence."""
+        tails = [self._tail(one, frames[0]) for one in asked]
+        head = self._encoder.pieces([*frames, ""])
+        head = head[: _n_with_frames(head)]
+        whole = [
+            TrainingSequence(
+                "question", (*head, *tail.pieces), (False,) * len(head) + tail.has_loss
+            )
+            for tail in tails
+        ]
+        return join_branches("questions", whole)
+
+    def _tail(self, asked: AskedText, any_frame: FrameRef) -> TrainingSequence:
+        """Return what follows the last frame, which does not depend on the frames."""
+        if asked not in self._tails:
+            text, answer = asked
+            prompt = question_text(CONTEXTS["clues"].intro, Question("", text, (), ()))
+            whole = self._encoder.answer("question", [any_frame, prompt], answer)
+            n = _n_with_frames(whole.pieces)
+            self._tails[asked] = TrainingSequence("question", whole.pieces[n:], whole.has_loss[n:])
+        return self._tails[asked]
+
+
+def _asked(sample: Sample) -> AskedText:
+    return sample.question.text, doc_target(sample.question)
+
+
+def _frames(data: NiehSet, sample: Sample) -> list[FrameRef]:
+    view = data.frames(sample.question.traj_id)
+    return [view[at] for at in sample.frames]
+
+
+def _clues(sample: Sample) -> set[int]:
+    """Return the places of the clue frames; what is absent has none, and is absent everywhere."""
+    return set(sample.frames) if sample.question.has_evidence else set()
+
+
+def _n_with_frames(pieces: Sequence[object]) -> int:
+    """Return the number of pieces up to the last frame."""
+    return max(at for at, piece in enumerate(pieces) if isinstance(piece, Frame)) + 1

@@ -144,7 +144,7 @@ class SequenceSampler:
 
     def frames(self, n: int) -> list[int]:
         """Return the indices of random frames in the dataset."""
-        return self._rng.sample(range(len(self._dataset.frames)), min(n, len(self._dataset.frames)))
+        return self._rng.sample(range(len(self._dataset)), min(n, len(self._dataset)))
 
     def spelling(self, n_spellings: int) -> int:
         """Return the index of a random spelling of names."""

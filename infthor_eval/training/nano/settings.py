@@ -6,18 +6,19 @@ import msgspec
 
 from infthor_eval.formats.object_ids import Words
 
-__all__ = ["NanoRecipe", "QuestionSettings", "SceneSettings"]
+__all__ = ["NanoRecipe", "QuestionSettings", "SceneSettings", "VisionSettings"]
 
 _COUNTS = (
-    "vision_steps",
     "text_steps",
     "joint_steps",
-    "frames_per_step",
     "text_plans_per_step",
     "windows_per_step",
     "plans_per_step",
     "joint_text_plans_per_step",
 )
+
+
+_GRIDS = (2, 4)
 
 
 def _require_counts(settings: msgspec.Struct, names: Iterable[str]) -> None:
@@ -30,6 +31,11 @@ def _require_shares(settings: msgspec.Struct, names: Iterable[str]) -> None:
     for name in names:
         if not 0 <= getattr(settings, name) <= 1:
             raise ValueError(f"{name} is {getattr(settings, name)}; use a number between 0 and 1")
+
+
+def _require_width(settings: "NanoRecipe | VisionSettings") -> None:
+    if settings.hidden < 1 or settings.hidden % 32:
+        raise ValueError(f"hidden is {settings.hidden}; use a multiple of 32")
 
 
 class SceneSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -54,24 +60,61 @@ class SceneSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         return tuple(f"{kind}-{self.first + at}" for kind in self.kinds for at in range(self.count))
 
 
+class VisionSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The vision tower and the first stage, in which it learns which objects frames show where.
+
+    Attributes:
+        hidden: width of the tower.
+        layers: layers of the tower.
+        grid: tokens along each side of a frame, 2 or 4: a token merges four by four or two by two
+            patches.
+        steps: steps of the first stage.
+        frames_per_step: frames in each of these.
+        lr: highest learning rate in these.
+        weight: weight of the loss of naming objects in the other stages.
+    """
+
+    hidden: int = 128
+    layers: int = 4
+    grid: int = 4
+    steps: int = 600
+    frames_per_step: int = 64
+    lr: float = 1.5e-3
+    weight: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Check the ranges of all settings.
+
+        Raises:
+            ValueError: a value is out of its range; the message names the setting.
+        """
+        _require_counts(self, ("layers", "steps", "frames_per_step"))
+        _require_width(self)
+        if self.grid not in _GRIDS:
+            raise ValueError(f"grid is {self.grid}; use one of {', '.join(map(str, _GRIDS))}")
+
+
 class QuestionSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Questions in the steps of the third stage.
 
     Attributes:
-        per_step: questions in a step.
-        synthetic: share of these that are synthetic questions for the presence of an object in any
-            frame.
+        per_step: fewest questions in a step.
+        together: most questions on the same frames.
+        synthetic: share of the frames with synthetic questions, by rules from what they show.
+        synthetic_frames: most frames of these.
         paired: share of the others that are asked in both worlds of twins, if there are any.
         recalled: share of all but the synthetic ones that are asked as behind a memory: the clue
             frames among frames that do not matter, and the last view.
         recalled_frames: most frames among those that do not matter.
         whole: share of the steps with questions on one whole trajectory, of twins on both, instead.
         per_trajectory: most questions in such a step.
-        ramp: share of the stage in which `recalled_frames` and `whole` grow from nothing.
+        ramp: share of the stage in which the numbers of frames and `whole` grow from nothing.
     """
 
-    per_step: int = 40
+    per_step: int = 100
+    together: int = 12
     synthetic: float = 0.4
+    synthetic_frames: int = 1
     paired: float = 0.0
     recalled: float = 0.5
     recalled_frames: int = 12
@@ -85,7 +128,8 @@ class QuestionSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
         Raises:
             ValueError: a value is out of its range; the message names the setting.
         """
-        _require_counts(self, ("per_step", "recalled_frames", "per_trajectory"))
+        counts = ("per_step", "together", "synthetic_frames", "recalled_frames", "per_trajectory")
+        _require_counts(self, counts)
         _require_shares(self, ("synthetic", "paired", "recalled", "whole", "ramp"))
 
 
@@ -96,15 +140,13 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         architecture: marks the recipe as one of the small model.
         title: description in one line.
         scenes: scenes to generate data in if no data are given.
-        hidden: width of vision tower and decoder.
-        layers: layers of each.
-        vision_steps: steps of the first stage, in which the tower learns which objects are in which
-            part of a frame, by the embeddings of their names.
+        vision: the vision tower and the first stage, in which it learns to see.
+        hidden: width of the decoder.
+        layers: layers of the decoder.
         text_steps: steps of the second stage, in which the decoder learns to act by the words of
             synthetic plans without frames. The tower is frozen from here on.
         joint_steps: steps of the third stage, in which the decoder learns to answer questions and
             to act.
-        frames_per_step: frames in each step of the first stage.
         text_plans_per_step: synthetic plans in each step of the second stage.
         questions: questions in each step of the third stage.
         windows_per_step: windows of histories in a step of the third stage.
@@ -114,9 +156,8 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         plans_per_step: single plans in such a step.
         joint_text_plans_per_step: synthetic plans in each step of the third stage.
         text_plans_weight: weight of the loss on these.
-        lr: highest learning rate.
+        lr: highest learning rate of the second and third stage.
         weight_decay: weight decay of AdamW.
-        vision_weight: weight of the first stage's loss in the other stages.
         words: words of plans and actions.
         threads: torch threads; another number rounds differently.
         seed: seed of everything that is random.
@@ -125,12 +166,11 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     architecture: str = "nano"
     title: str
     scenes: SceneSettings = SceneSettings()
+    vision: VisionSettings = VisionSettings()
     hidden: int = 128
     layers: int = 4
-    vision_steps: int = 600
     text_steps: int = 200
     joint_steps: int = 800
-    frames_per_step: int = 64
     text_plans_per_step: int = 96
     questions: QuestionSettings = QuestionSettings()
     windows_per_step: int = 1
@@ -141,7 +181,6 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     text_plans_weight: float = 0.5
     lr: float = 1.5e-3
     weight_decay: float = 0.05
-    vision_weight: float = 0.1
     words: Words = Words.PUBLISHED
     threads: int = 2
     seed: int = 0
@@ -153,6 +192,5 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
             ValueError: a value is out of its range; the message names the setting.
         """
         _require_counts(self, _COUNTS)
-        if self.hidden % 32:
-            raise ValueError(f"hidden is {self.hidden}; use a multiple of 32")
+        _require_width(self)
         _require_shares(self, ("single_plan_share",))

@@ -20,6 +20,7 @@ from infthor_eval.training.nano.network import NanoNetwork
 from infthor_eval.training.nano.question_sampler import question_intro
 from infthor_eval.training.nano.sampler import SequenceSampler, corpus_texts
 from infthor_eval.training.nano.settings import NanoRecipe
+from infthor_eval.training.nano.whitening import whiten_patches
 from infthor_eval.training.network import decay_groups
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
@@ -81,8 +82,9 @@ def train_small_model(
     """
     torch.set_num_threads(recipe.threads)
     torch.manual_seed(recipe.seed)
-    dataset = read_frame_dataset(folders, image_processor())
+    dataset = read_frame_dataset(folders, image_processor(recipe.vision.grid), recipe.vision.grid)
     loaded = build_untrained(recipe, corpus_texts(folders, dataset.types), [question_intro()])
+    whiten_patches(loaded.model.model.visual, dataset.pixels, recipe.seed)
     network = NanoNetwork(loaded, dataset)
     sampler = SequenceSampler(Encoder(loaded), folders, dataset, recipe)
     for _, reason, n in count_reasons(("", skipped.reason) for skipped in sampler.skipped):
@@ -90,10 +92,10 @@ def train_small_model(
     about = {"recipe": fingerprint(msgspec.to_builtins(recipe)), "data": dataset.identity()}
     trainer = _StageTrainer(recipe, network, sampler, Checkpoints(states, about), on_step)
     network.train()
-    trainer.run("vision", recipe.vision_steps, trainer.vision_step)
+    trainer.run("vision", recipe.vision.steps, recipe.vision.lr, trainer.vision_step)
     network.cache_features()
-    trainer.run("text", recipe.text_steps, trainer.text_step)
-    trainer.run("joint", recipe.joint_steps, trainer.joint_step)
+    trainer.run("text", recipe.text_steps, recipe.lr, trainer.text_step)
+    trainer.run("joint", recipe.joint_steps, recipe.lr, trainer.joint_step)
     network.eval()
     # Halves the file; no answer of the bundled model depends on the rounding.
     loaded.model.to(torch.bfloat16)
@@ -126,13 +128,14 @@ class _StageTrainer:
         self._n_before = 0  # steps of the stages before
 
     def run(
-        self, stage: str, n_steps: int, compute: Callable[[float], tuple[Tensor, Tensor]]
+        self, stage: str, n_steps: int, lr: float, compute: Callable[[float], tuple[Tensor, Tensor]]
     ) -> None:
         """Run the steps of one stage with a linear warm-up and a cosine decay of the learning rate.
 
         Args:
             stage: name of the stage.
             n_steps: steps of the stage.
+            lr: highest learning rate.
             compute: computes the loss of a step, and the part of it to report, by the share of the
                 stage's steps that is done.
         """
@@ -141,7 +144,7 @@ class _StageTrainer:
             warm_up = min(1.0, (number + 1) / _WARM_UP)
             decay = _LOWEST + (1 - _LOWEST) * 0.5 * (1 + math.cos(math.pi * number / n_steps))
             for group in self._optimizer.param_groups:
-                group["lr"] = self._recipe.lr * warm_up * decay
+                group["lr"] = lr * warm_up * decay
             loss, reported = compute(number / n_steps)
             self._optimizer.zero_grad()
             loss.backward()
@@ -154,22 +157,23 @@ class _StageTrainer:
         self._n_before += n_steps
 
     def vision_step(self, _progress: float) -> tuple[Tensor, Tensor]:
-        """Return the vision loss of some frames."""
-        indices = self._sampler.frames(self._recipe.frames_per_step)
-        loss = self._vision_loss(self._network.frame_features(indices), indices)
+        """Return the loss of what some frames show."""
+        indices = self._sampler.frames(self._recipe.vision.frames_per_step)
+        features = self._network.frame_features(indices)
+        loss = self._naming_loss(features, indices) + self._network.state_loss(features, indices)
         return loss, loss.detach()
 
     def text_step(self, _progress: float) -> tuple[Tensor, Tensor]:
         """Return the loss of synthetic plans, plus that of some frames.
 
-        The embeddings of names change in this stage; the vision loss keeps them close to the
+        The embeddings of names change in this stage; the loss of naming keeps them close to the
         features of the objects.
         """
         recipe = self._recipe
         indices = self._sampler.frames(_TEXT_STAGE_FRAMES)
         loss = self._token_loss(self._sampler.synthetic_plans(recipe.text_plans_per_step))
-        vision_loss = self._vision_loss(self._network.frame_features(indices), indices)
-        return loss + recipe.vision_weight * vision_loss, loss.detach()
+        naming_loss = self._naming_loss(self._network.frame_features(indices), indices)
+        return loss + recipe.vision.weight * naming_loss, loss.detach()
 
     def joint_step(self, progress: float) -> tuple[Tensor, Tensor]:
         """Return the loss of questions, histories, synthetic plans, and of the questions' frames.
@@ -188,10 +192,10 @@ class _StageTrainer:
             self._sampler.synthetic_plans(recipe.joint_text_plans_per_step)
         )
         loss = answers + actions + recipe.text_plans_weight * text_plans
-        return loss + recipe.vision_weight * self._vision_loss(features, indices), loss.detach()
+        return loss + recipe.vision.weight * self._naming_loss(features, indices), loss.detach()
 
-    def _vision_loss(self, features: Tensor, indices: Sequence[int]) -> Tensor:
-        return self._network.vision_loss(
+    def _naming_loss(self, features: Tensor, indices: Sequence[int]) -> Tensor:
+        return self._network.naming_loss(
             features, indices, self._sampler.spelling(self._network.n_spellings)
         )
 

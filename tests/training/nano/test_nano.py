@@ -1,5 +1,6 @@
 """Training of the small model on two scenes and a few steps: its data, and that the loss falls."""
 
+import copy
 import random
 import shutil
 
@@ -12,29 +13,30 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
-from infthor_eval.formats.step_log import ObjectInFrame, read_steps
+from infthor_eval.formats.step_log import iter_object_states, read_steps
 from infthor_eval.training.encoding import Encoder
 from infthor_eval.training.export import export
 from infthor_eval.training.nano import stages
-from infthor_eval.training.nano.architecture import TOKENS, build_untrained, image_processor
-from infthor_eval.training.nano.frame_dataset import _cell_coverage, _type, read_frame_dataset
+from infthor_eval.training.nano.architecture import build_untrained, image_processor
+from infthor_eval.training.nano.frame_dataset import cell_coverage, read_frame_dataset
 from infthor_eval.training.nano.network import NanoNetwork, spellings
 from infthor_eval.training.nano.question_sampler import question_intro
 from infthor_eval.training.nano.sampler import SequenceSampler, SyntheticPlans, corpus_texts
-from infthor_eval.training.nano.settings import NanoRecipe, QuestionSettings
+from infthor_eval.training.nano.seen_objects import object_type
+from infthor_eval.training.nano.settings import NanoRecipe, QuestionSettings, VisionSettings
 from infthor_eval.training.nano.stages import train_small_model
+from infthor_eval.training.nano.whitening import whiten_patches
 from model_adapters import check_adapter, load
 
 from ...helpers.bundled import bundled_name
 
 SMALL = NanoRecipe(
     title="small",
+    vision=VisionSettings(hidden=32, layers=2, grid=2, steps=20, frames_per_step=16, lr=1e-2),
     hidden=64,
     layers=2,
-    vision_steps=20,
     text_steps=3,
     joint_steps=6,
-    frames_per_step=16,
     questions=QuestionSettings(per_step=8),
     windows_per_step=1,
     window_tokens=600,
@@ -43,10 +45,20 @@ SMALL = NanoRecipe(
 )
 
 
+def _with_steps(vision, text, joint):
+    """Return the recipe with other numbers of steps."""
+    return msgspec.structs.replace(
+        SMALL,
+        vision=msgspec.structs.replace(SMALL.vision, steps=vision),
+        text_steps=text,
+        joint_steps=joint,
+    )
+
+
 @pytest.fixture(scope="module")
 def blank(small_set):
     """The untrained model and its frames."""
-    dataset = read_frame_dataset([small_set], image_processor())
+    dataset = read_frame_dataset([small_set], image_processor(grid=2), grid=2)
     return build_untrained(
         SMALL, corpus_texts([small_set], dataset.types), [question_intro()]
     ), dataset
@@ -67,22 +79,62 @@ def test_labels_of_frames_are_those_of_the_logs(small_set, blank):
                 if there
             }
             labels = {
-                name
-                for name, there in zip(dataset.types, dataset.visible[at], strict=True)
-                if there
+                name for name, there in zip(dataset.types, dataset.shown[at], strict=True) if there
             }
-            assert present == {_type(key) for key in step.seen}
+            assert present == {object_type(key) for key in step.seen}
             assert labels <= set(step.object_log.visible) | present
+
+
+def test_labels_of_cells_are_of_states_and_receptacles(small_set, blank):
+    _, dataset = blank
+    index = dataset.index_by_digest()
+    data = NiehSet(small_set)
+    n_held = n_open = n_related = 0
+    for folder in sorted((small_set / "metadata").iterdir()):
+        steps = read_steps(folder)
+        for frame, step, states in zip(
+            data.frames(folder.name), steps, iter_object_states(steps), strict=True
+        ):
+            at = index[frame.digest]
+            held = {object_type(key) for key in step.seen if states[key].held}
+            opened = {object_type(key) for key in step.seen if states[key].is_open}
+            inside = {
+                (object_type(key), object_type(states[key].parents[0]))
+                for key in step.seen
+                if states[key].parents
+            }
+            assert _labelled(dataset.types, dataset.cells.held[at]) == held
+            assert _labelled(dataset.types, dataset.cells.opened[at]) == opened
+            related = _labelled(dataset.relations, dataset.cells.related[at])
+            assert related == inside & set(dataset.relations)
+            n_held, n_open = n_held + len(held), n_open + len(opened)
+            n_related += len(related)
+    assert min(n_held, n_open, n_related) > 20
+
+
+def _labelled(names, labels):
+    """Return the names that any cell of a frame is labelled with."""
+    return {name for name, there in zip(names, labels.any(0), strict=True) if there}
+
+
+def test_whitened_filters_are_uncorrelated_on_the_frames(blank):
+    loaded, dataset = blank
+    tower = copy.deepcopy(loaded.model.model.visual)
+    whiten_patches(tower, dataset.pixels, seed=0)
+    filters = tower.patch_embed.proj.weight.sum(2).flatten(1)
+    outputs = dataset.pixels.flatten(0, 1).float() @ filters.T
+    moments = outputs.T @ outputs / len(outputs)
+    assert torch.allclose(moments, 0.25 * torch.eye(len(moments)), atol=0.01)
 
 
 def test_frames_are_what_the_familys_own_features_are_made_of(blank):
     loaded, dataset = blank
     network = NanoNetwork(loaded, dataset)
-    frames = [FrameRef(frame.path) for frame in dataset.frames[:5]]
+    frames = [FrameRef(seen.frame.path) for seen in dataset.seen[:5]]
     with torch.no_grad():
         theirs = torch.stack(loaded.family.features([frame.load() for frame in frames]))
         ours = network.frame_features(range(5))
-    assert ours.shape == (5, TOKENS, 64)
+    assert ours.shape == (5, 4, 64)
     assert torch.allclose(ours, theirs, atol=5e-3)  # pixels are kept in half precision
 
 
@@ -94,11 +146,16 @@ def test_frames_are_what_the_familys_own_features_are_made_of(blank):
         ((225, 225, 299, 299), {15}),
         ((100, 30, 110, 40), {1}),  # small, whole in one part
         ((70, 0, 80, 10), {0, 1}),  # small, half in each of two: of 11 columns 5 and 6
+        ((145, 145, 154, 154), {5, 6, 9, 10}),  # small, in the middle
     ],
 )
 def test_where_a_box_lies(box, cells):
     cells_of_box = {
-        at for at, there in enumerate(_cell_coverage(torch.tensor([box]), (300, 300))[0]) if there
+        at
+        for at, there in enumerate(
+            cell_coverage(torch.tensor([box]), torch.tensor([[300, 300]]), grid=4)[0]
+        )
+        if there
     }
     assert cells_of_box <= cells
     assert cells_of_box
@@ -110,8 +167,7 @@ def test_types_are_those_of_parts_and_slices():
         "Sink|-01.00|+00.50|+01.00|SinkBasin",
         "Apple|+1|+2|+3|AppleSliced_2",
     )
-    assert [_type(key) for key in ids] == ["Mug", "SinkBasin", "AppleSliced"]
-    assert ObjectInFrame(pixels=1, box=(0, 0, 1, 1)).visible is False
+    assert [object_type(key) for key in ids] == ["Mug", "SinkBasin", "AppleSliced"]
 
 
 def test_words_are_tokens(blank):
@@ -199,7 +255,7 @@ def test_what_cannot_be_read_is_skipped_and_reported(small_set, tmp_path):
     (tmp_path / "set/metadata" / bundled_name("kitchen-2") / "traj_data.json").unlink()
     notes = []
     train_small_model(
-        msgspec.structs.replace(SMALL, vision_steps=1, text_steps=1, joint_steps=1),
+        _with_steps(1, 1, 1),
         [tmp_path / "set"],
         tmp_path / "states",
         lambda _: None,
@@ -241,7 +297,7 @@ class Stopped(Exception):
 def test_a_stopped_training_continues_to_the_same_weights(
     stopped_in, small_set, tmp_path, monkeypatch
 ):
-    recipe = msgspec.structs.replace(SMALL, vision_steps=4, text_steps=2, joint_steps=4)
+    recipe = _with_steps(4, 2, 4)
     monkeypatch.setattr(stages, "_STEPS_PER_STATE", 3)
     whole = train_small_model(recipe, [small_set], tmp_path / "whole", lambda _: None)
 
@@ -259,7 +315,7 @@ def test_a_stopped_training_continues_to_the_same_weights(
 
 
 def test_states_of_another_recipe_are_refused(small_set, tmp_path, monkeypatch):
-    recipe = msgspec.structs.replace(SMALL, vision_steps=1, text_steps=1, joint_steps=1)
+    recipe = _with_steps(1, 1, 1)
     monkeypatch.setattr(stages, "_STEPS_PER_STATE", 1)
     train_small_model(recipe, [small_set], tmp_path, lambda _: None)
     other = msgspec.structs.replace(recipe, lr=1e-4)

@@ -2,17 +2,21 @@
 
 import random
 from collections import defaultdict
+from dataclasses import replace
 
 import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.household.wording import noun
+from infthor_eval.nieh.contexts import CONTEXTS
+from infthor_eval.nieh.docs import doc_target
+from infthor_eval.nieh.samples import find_samples
 from infthor_eval.training.encoding import Encoder
 from infthor_eval.training.nano.architecture import build_untrained, image_processor
 from infthor_eval.training.nano.frame_dataset import read_frame_dataset
 from infthor_eval.training.nano.question_sampler import QuestionSampler, question_intro
 from infthor_eval.training.nano.sampler import corpus_texts
 from infthor_eval.training.nano.settings import NanoRecipe, QuestionSettings
+from infthor_eval.training.question_sequences import question_sequences
 
 from ...helpers.twin_sets import CLUES, write_twin_set
 
@@ -22,7 +26,7 @@ LIMIT = 2048
 
 @pytest.fixture(scope="module")
 def dataset(small_set):
-    return read_frame_dataset([small_set], image_processor())
+    return read_frame_dataset([small_set], image_processor(RECIPE.vision.grid), RECIPE.vision.grid)
 
 
 @pytest.fixture(scope="module")
@@ -56,45 +60,47 @@ def read(loaded):
     return read_text
 
 
-def test_synthetic_questions_are_true_and_their_names_do_not_give_away_the_answer(
-    small_set, dataset, make, read
-):
-    sampler = make(small_set, per_step=200, synthetic=1.0)
-    index, counts = dataset.index_by_digest(), {"yes": 0, "no": 0}
-    words = {noun(name): at for at, name in enumerate(dataset.types)}
-    for sequence in sampler.draw(random.Random(0), 0.0):
-        (frame,) = sequence.frames
-        text = read(sequence.pieces)
-        answer = text.rpartition("?")[2].removesuffix("<|im_end|>")
-        about = max((name for name in words if f" {name}" in text), key=len)
-        counts[answer] += 1
-        here = index[frame.digest]
-        assert bool(dataset.visible[here, words[about]]) == (answer == "yes")
-        assert answer == "yes" or not dataset.present[here, words[about]]
-    assert min(counts.values()) > 70
+def test_a_question_has_the_prompt_of_evaluation(small_set, make, loaded):
+    sampler = make(small_set, synthetic=0.0, recalled=0.0, per_step=30, together=1)
+    task = find_samples({"data": str(small_set), "context": "clues"})
+    evaluated = {
+        sequence.pieces for sequence in question_sequences(Encoder(loaded), task, limit=LIMIT)
+    }
+    drawn = sampler.draw(random.Random(0), 0.0)
+    assert len(drawn) == 30
+    assert {sequence.pieces for sequence in drawn} <= evaluated
+    by_question = {sample.question: sample for sample in task.samples}
+    for sample in by_question.values():
+        last = len(task.data.frames(sample.question.traj_id)) - 1
+        shown = {"frames": (*sample.frames, last), "recalled": sample.frames}
+        recalled = replace(sample, **shown)
+        parts, text = CONTEXTS["memory"].request(task.data, recalled)
+        assert text == CONTEXTS["clues"].request(task.data, sample)[1]
+        assert len(parts) == len(recalled.frames)
 
 
-def test_recalled_questions_have_their_clues_among_other_frames_and_end_with_the_last_view(
-    small_set, make, read
-):
-    sampler = make(small_set, per_step=60, synthetic=0.0, recalled=1.0, recalled_frames=4)
+def test_recorded_questions_are_asked_on_frames_that_answer_them(small_set, make, read):
+    sampler = make(small_set, synthetic=0.0, recalled=1.0, recalled_frames=4, per_step=200)
     data = NiehSet(small_set)
-    clues = defaultdict(list)  # by text, which questions on two trajectories may share
+    clues = defaultdict(list)  # by text and answer, which two trajectories may share
     for question in data.questions:
-        clues[question.text].append({frame.digest for frame in data.clue_frames(question)})
-    absences = {question.text for question in data.questions if question.absence}
+        own = [data.frames(question.traj_id)[at].digest for at in data.clue_positions(question)]
+        evidence = set(own) if question.has_evidence else set()
+        clues[f"{question.text}{doc_target(question)}"].append(evidence)
     lasts = {data.frames(question.traj_id)[-1].digest for question in data.questions}
-    n_others = set()
+    n_asked, n_frames = [], set()
     for sequence in sampler.draw(random.Random(0), 0.0):
-        digests = [frame.digest for frame in sequence.frames]
-        text = read(sequence.pieces)
-        question_text = max((known for known in clues if known in text), key=len)
-        assert digests[-1] in lasts
-        if question_text not in absences:
-            own = next(frames for frames in clues[question_text] if frames <= set(digests))
-            n_others.add(len(set(digests) - own - lasts))
-    assert n_others <= set(range(5))
-    assert len(n_others) > 2
+        digests = {frame.digest for frame in sequence.frames}
+        assert sequence.frames[-1].digest in lasts
+        n_asked.append(len(sequence.branches))
+        n_frames.add(len(digests))
+        for span in sequence.spans[1:]:
+            pieces = (*sequence.pieces[sequence.spans[0]], *sequence.pieces[span])
+            text = read(pieces).removesuffix("<|im_end|>")
+            known = max((known for known in clues if text.endswith(known)), key=len)
+            assert any(evidence <= digests for evidence in clues[known])
+    assert max(n_asked) > 1
+    assert len(n_frames) > 2
 
 
 @pytest.mark.parametrize("recalled", [0.0, 1.0])
@@ -106,11 +112,12 @@ def test_both_of_a_pair_are_asked_on_the_same_frames_by_number(recalled, twin_se
         for name in {question.traj_id for question in data.questions}
     }
     drawn = sampler.draw(random.Random(0), 0.0)
-    assert len(drawn) == 8
     for first, second in zip(drawn[::2], drawn[1::2], strict=True):
-        texts = [read(one.pieces).split("?") for one in (first, second)]
-        assert texts[0][0] == texts[1][0]
-        assert texts[0][1] != texts[1][1]
+        both = zip(first.spans[1:], second.spans[1:], strict=True)
+        for one, other in both:
+            texts = [read(first.pieces[one]).split("?"), read(second.pieces[other]).split("?")]
+            assert texts[0][0] == texts[1][0]
+            assert texts[0][1] != texts[1][1]
         shown = [[frame.digest for frame in one.frames] for one in (first, second)]
         assert len(shown[0]) == len(shown[1])
         if not recalled:
@@ -131,14 +138,13 @@ def test_questions_on_whole_trajectories_are_branches_of_one_sequence_a_world(tw
 
 
 def test_the_curriculum_grows_from_nothing(small_set, make):
-    settings = {"synthetic": 0.0, "recalled": 1.0, "recalled_frames": 30, "ramp": 0.5}
-    sampler = make(small_set, per_step=30, whole=1.0, **settings)
+    settings = {"synthetic": 0.5, "synthetic_frames": 30, "recalled": 1.0, "ramp": 0.5}
+    sampler = make(small_set, whole=1.0, recalled_frames=30, **settings)
     at_first = sampler.draw(random.Random(0), 0.0)
-    assert len(at_first) == 30
-    assert not any(sequence.branches for sequence in at_first)
+    assert len(at_first) > 1
     (later,) = sampler.draw(random.Random(0), 0.5)
-    assert later.branches
-    apart = make(small_set, per_step=30, **settings)
+    assert len(later.branches) > 12
+    apart = make(small_set, recalled_frames=30, **settings)
     longest = [
         max(len(sequence.frames) for sequence in apart.draw(random.Random(0), progress))
         for progress in (0.0, 0.5)
