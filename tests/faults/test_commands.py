@@ -155,7 +155,7 @@ TYPED = [
     ),
     (
         ["train", "--recipe", "questions", "--data", "SET", "--out", "OUT", "--workers", 2],
-        "share the generation of data, which only the recipe tiny without --data does",
+        "share the generation of data, which only the recipes small and tiny without --data do",
     ),
     (
         ["train", *option_words(recipe="final_text", data="SET", out="OUT", set="prompt=plain")],

@@ -12,16 +12,15 @@ import click
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH, FiniteFloat, parse_model_args, parse_pairs
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
-from infthor_eval.cli.progress.bar import PacedBar, StepBars
+from infthor_eval.cli.progress.bar import StepBars
 from infthor_eval.cli.progress.notes import NOTES, print_note
-from infthor_eval.errors import DataError
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.terminal import console, progress_bar
 
 if TYPE_CHECKING:
     from infthor_eval.training.fine_tuning import TrainingRun
     from infthor_eval.training.loop import Progress
-    from infthor_eval.training.nano.settings import NanoRecipe, SceneSettings
+    from infthor_eval.training.nano.settings import NanoRecipe
     from infthor_eval.training.nano.stages import NanoProgress
     from infthor_eval.training.recipe import Recipe
     from infthor_eval.workers import WorkerSettings
@@ -30,7 +29,6 @@ __all__ = ["command"]
 
 _GPUS = 8
 _TFLOPS = 400.0
-_PER_TRAJECTORY = 500  # more than there are questions on a trajectory
 _STAGES = {
     "vision": "recognising objects",
     "text": "reading plans",
@@ -57,7 +55,7 @@ _STAGES = {
     type=PATH,
     metavar="SET",
     help="Replayed set (`replay`) to train on, with a question file if the recipe needs questions; "
-    "may be repeated. The recipe tiny generates its own by default.",
+    "may be repeated. The recipes tiny and small generate their own by default.",
 )
 @click.option(
     "--model", metavar="NAME", help="Model to use instead of the recipe's, without its options."
@@ -119,10 +117,11 @@ def command(
     """Fine-tune a model, and write a checkpoint that its family's adapter loads.
 
     Recipes of the package: infthor_32k, infthor_64k and infthor_130k (the paper's, Table 5),
-    questions, and tiny, which trains a small model from scratch. Others are YAML files of the same
-    form.
+    questions, and two that train the small model from scratch: small, as it is bundled, and tiny,
+    in a quarter of the time. Others are YAML files of the same form.
 
-    If it is stopped, the same command continues. Workers share the generation of the data of tiny.
+    If it is stopped, the same command continues. Workers share the generation of the data of small
+    and tiny.
     Several processes: torchrun --nproc-per-node N --no-python infthor-eval train ...
     """
     from infthor_eval.training.nano.settings import NanoRecipe
@@ -139,8 +138,9 @@ def command(
         raise click.UsageError("--gpus and --tflops are for --dry-run; add it, or leave them out")
     if not worker_settings.is_local and (folders or not isinstance(recipe, NanoRecipe)):
         raise click.UsageError(
-            "--workers and --ray-address share the generation of data, which only the recipe tiny "
-            "without --data does; leave them out, and train in several processes with torchrun"
+            "--workers and --ray-address share the generation of data, which only the recipes "
+            "small and tiny without --data do; leave them out, and train in several processes with "
+            "torchrun"
         )
     if isinstance(recipe, NanoRecipe):
         if model is not None or model_args is not None or dry_run:
@@ -215,14 +215,15 @@ def _train_small_model(
     recipe: NanoRecipe, folders: Sequence[Path], out: Path, worker_settings: WorkerSettings
 ) -> None:
     """Train the small model on replayed sets with questions; without any, generate one in `out`."""
+    from infthor_eval.cli.training_data import generate_training_data
     from infthor_eval.storage.files import prepare_folder
     from infthor_eval.training.export import export
     from infthor_eval.training.nano.stages import train_small_model
 
     prepare_folder(out)
-    sets = list(folders) or [
-        _generate_data(recipe.scenes, recipe.seed, out / "data", worker_settings)
-    ]
+    sets = list(folders) or generate_training_data(
+        recipe.scenes, recipe.seed, out / "data", worker_settings
+    )
     with progress_bar(NOTES) as progress:
         bars = StepBars(progress)
 
@@ -232,65 +233,3 @@ def _train_small_model(
         loaded = train_small_model(recipe, sets, out / "states", observe, print_note)
     export(loaded, out / "checkpoint", title=recipe.title, words=recipe.words)
     console().print(f"{out / 'checkpoint'}")
-
-
-def _generate_data(
-    scenes: SceneSettings, seed: int, out: Path, worker_settings: WorkerSettings
-) -> Path:
-    """Generate and replay trajectories, write every question on them, and return the set.
-
-    What is in the folder already is not generated again.
-
-    Raises:
-        DataError: a trajectory cannot be generated or replayed.
-    """
-    from infthor_eval.formats.qa_csv import write_questions
-    from infthor_eval.generation.generate_set import generate_with_workers
-    from infthor_eval.generation.jobs import trajectory_jobs
-    from infthor_eval.generation.questions.generate import generate_questions
-    from infthor_eval.generation.replay_set import replay_with_workers, select
-    from infthor_eval.storage.files import prepare_folder
-    from infthor_eval.thor.launch import embedded_launch
-
-    trajectories = prepare_folder(out / "trajectories")
-    replayed_set = prepare_folder(out / "set")
-    jobs = trajectory_jobs(
-        scenes.names,
-        seed=seed,
-        count=1,
-        min_steps=scenes.min_steps,
-        min_subgoals=1,
-        final_task=False,
-        max_fail=20,
-    )
-    with progress_bar(NOTES) as progress:
-        bar = PacedBar(progress, "trajectories", len(jobs))
-        generated = generate_with_workers(
-            jobs, embedded_launch(), trajectories, worker_settings, bar.advance, print_note
-        )
-        bar = PacedBar(progress, "frames", len(jobs))
-        selection = select([trajectories])
-        replayed = replay_with_workers(
-            selection,
-            embedded_launch(),
-            replayed_set,
-            worker_settings,
-            progress=bar.advance,
-            say=print_note,
-        )
-    failures = list(generated.failures)
-    failures += [f"{failure.place}: {failure.message}" for failure in replayed.failures]
-    if failures:
-        raise DataError(f"{out}: {failures[0]}; give other scenes")
-    questions = generate_questions(
-        replayed_set,
-        seed=seed,
-        per_trajectory=_PER_TRAJECTORY,
-        further=True,
-        by_subject=False,
-        worker_settings=worker_settings,
-        say=print_note,
-    )
-    write_questions(replayed_set / "qa_set_data.csv", questions.questions)
-    print_note(f"{len(jobs)} trajectories, {len(questions.questions):,} questions: {replayed_set}")
-    return replayed_set

@@ -47,17 +47,40 @@ class SceneSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
             numbers.
         count: scenes of each kind.
         min_steps: fewest steps of a trajectory.
+        twins: scenes of each kind, from the first one, whose trajectories also get twins: the same
+            episode with one thing changed. They take ten times as long to make.
+        twins_per_edit: twins of one kind of edit and trajectory, at most.
     """
 
     kinds: tuple[str, ...] = ("kitchen", "living-room", "bedroom", "bathroom")
     first: int = 101
     count: int = 24
     min_steps: int = 70
+    twins: int = 0
+    twins_per_edit: int = 1
+
+    def __post_init__(self) -> None:
+        """Check the ranges of all settings.
+
+        Raises:
+            ValueError: a value is out of its range; the message names the setting.
+        """
+        _require_counts(self, ("count", "min_steps", "twins_per_edit"))
+        if not 0 <= self.twins <= self.count:
+            raise ValueError(f"twins is {self.twins}; use 0 to count, which is {self.count}")
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all scenes."""
-        return tuple(f"{kind}-{self.first + at}" for kind in self.kinds for at in range(self.count))
+        return self._first_of_each(self.count)
+
+    @property
+    def names_with_twins(self) -> tuple[str, ...]:
+        """Names of the scenes whose trajectories get twins."""
+        return self._first_of_each(self.twins)
+
+    def _first_of_each(self, n: int) -> tuple[str, ...]:
+        return tuple(f"{kind}-{self.first + at}" for kind in self.kinds for at in range(n))
 
 
 class VisionSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
