@@ -165,7 +165,11 @@ class SyntheticPlans:
             templates = tuple(open_action(action, plan) for action in actions)
             if templates != tuple(actions):
                 kinds[read_plan(plan)[0], templates].append(plan)
-        self._kinds = [(templates, plans) for (_, templates), plans in kinds.items()]
+        self._kinds = [
+            (templates, plans[0], [*zip(*(read_plan(plan)[1] for plan in plans), strict=True)])
+            for (_, templates), plans in kinds.items()
+        ]
+        self._counts = [len(plans) for plans in kinds.values()]
 
     def __bool__(self) -> bool:
         """Return True if any plan can be sampled."""
@@ -173,7 +177,6 @@ class SyntheticPlans:
 
     def sample(self, rng: random.Random) -> tuple[str, list[str]]:
         """Return a plan and its actions; kinds are as frequent as in the recorded plans."""
-        ((templates, plans),) = rng.choices(self._kinds, [len(plans) for _, plans in self._kinds])
-        columns = zip(*(read_plan(plan)[1] for plan in plans), strict=True)
-        plan = replace_objects(plans[0], [rng.choice(column) for column in columns])
+        ((templates, first, columns),) = rng.choices(self._kinds, self._counts)
+        plan = replace_objects(first, [rng.choice(column) for column in columns])
         return plan, [fill_action(action, plan) for action in templates]
