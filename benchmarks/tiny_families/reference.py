@@ -1,0 +1,66 @@
+"""Replies of transformers' own processor and `generate`, in a process of its own.
+
+Many processors need torchvision, which is kept out of the environment: the caller puts it on the
+path of this process. Reads a JSON object from the standard input and writes one as its last line:
+the ids of each family's replies, the last of them on frames in reversed order, or one line of error.
+"""
+
+import json
+import sys
+from typing import Any
+
+from PIL import Image
+from transformers import AutoImageProcessor, AutoModelForImageTextToText, AutoProcessor
+from transformers.models.smolvlm import processing_smolvlm
+
+
+def main() -> None:
+    """Answer the questions that the standard input has."""
+    # SmolVLM's processor insists on a package that it writes videos' times with; here are none.
+    processing_smolvlm.num2words = processing_smolvlm.num2words or str
+    work = json.load(sys.stdin)
+    answers: dict[str, Any] = {}
+    for name, folder in work["folders"].items():
+        try:
+            answers[name] = _answer(folder, work["frames"], work["questions"], work["new_tokens"])
+        except Exception as error:  # noqa: BLE001 - one bad family never stops the others
+            answers[name] = " ".join(f"{type(error).__name__}: {error}".split())
+    print(json.dumps(answers))
+
+
+def _answer(
+    folder: str, paths: list[str], questions: list[str], new_tokens: int
+) -> list[list[int]]:
+    processor = AutoProcessor.from_pretrained(folder)
+    # As in the project: torchvision's resize gives other pixels.
+    processor.image_processor = AutoImageProcessor.from_pretrained(folder, backend="pil")
+    model = AutoModelForImageTextToText.from_pretrained(folder).eval()
+    frames = [Image.open(path) for path in paths]
+    asked = [(frames, question) for question in questions]
+    asked.append((frames[::-1], questions[0]))
+    return [_reply(processor, model, *each, new_tokens) for each in asked]
+
+
+def _reply(
+    processor: Any, model: Any, frames: list[Any], question: str, new_tokens: int
+) -> list[int]:
+    content = [*({"type": "image"} for _ in frames), {"type": "text", "text": question}]
+    text = processor.apply_chat_template(
+        [{"role": "user", "content": content}], add_generation_prompt=True
+    )
+    begin = processor.tokenizer.bos_token
+    inputs = processor(
+        text=[text],
+        images=frames,
+        add_special_tokens=begin is None or not text.startswith(begin),
+        return_tensors="pt",
+    )
+    inputs.pop("labels", None)  # PaliGemma's, for training
+    output = model.generate(**inputs, do_sample=False, max_new_tokens=new_tokens)
+    reply = output[0, inputs["input_ids"].shape[1] :].tolist()
+    ends = model.generation_config.eos_token_id
+    return reply[:-1] if reply and reply[-1] in ends else reply
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,45 @@
+"""Vision towers and image processors that several families share: images of 56 pixels in patches of
+14, 4 x 4 of them."""
+
+from typing import Any
+
+from model_adapters.tiny.twin import HIDDEN, SPREAD
+
+__all__ = ["GRID_TOWER", "PATCH", "SIDE", "SQUARE", "TOWER", "got_images", "siglip", "tower"]
+
+SIDE = 56
+PATCH = 14
+SQUARE = {"height": SIDE, "width": SIDE}
+TOWER = {
+    "hidden_size": 32,
+    "intermediate_size": 64,
+    "num_hidden_layers": 2,
+    "num_attention_heads": 2,
+    "image_size": SIDE,
+    "patch_size": PATCH,
+    "initializer_range": SPREAD,
+}
+# Of towers that take images of any size as a grid of patches.
+GRID_TOWER = {
+    "depth": 2,
+    "hidden_size": 32,
+    "intermediate_size": 64,
+    "num_heads": 2,
+    "out_hidden_size": HIDDEN,
+    "initializer_range": SPREAD,
+}
+
+
+def tower(model_type: str | None = None, **settings: Any) -> dict[str, Any]:
+    """Return the config of a tiny tower for images of one size."""
+    return TOWER | ({} if model_type is None else {"model_type": model_type}) | settings
+
+
+def siglip(**settings: Any) -> dict[str, Any]:
+    """Return the config of a tiny SigLIP tower."""
+    return tower("siglip_vision_model", vision_use_head=False, **settings)
+
+
+def got_images(**settings: Any) -> dict[str, Any]:
+    """Return the image processor of families that cut an image into tiles as GOT-OCR does."""
+    return {"image_processor_type": "GotOcr2ImageProcessor", "size": SQUARE, **settings}
