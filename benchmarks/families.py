@@ -8,9 +8,9 @@ Replies are compared with those of transformers' own processor and `generate`, g
     python benchmarks/families.py --families qwen3_vl,gemma3
     python benchmarks/families.py --torchvision         # as if torchvision were installed
 
-Many of transformers' own processors need torchvision, which has no build beside torch for CPUs. They
-run in a process of their own with the Python half of it that `make test` sets aside; without it, or
-where they fail, replies are compared with those without sharing.
+Many of transformers' own processors need torchvision, which has no build beside torch for CPUs.
+They run in a process of their own with the Python half of it that `make test` sets aside; without
+it, or where they fail, replies are compared with those without sharing.
 """
 
 import argparse
@@ -44,11 +44,39 @@ __all__ = ["FAMILIES", "Row", "main", "table", "try_families"]
 _ALL = {**GRIDS, **SQUARES}
 # In the order of those that people bring.
 _ORDER = (
-    "qwen2_vl qwen2_5_vl qwen3_vl qwen3_vl_moe qwen3_5 glm4v glm46v glm4v_moe ernie4_5_vl_moe "
-    "gemma3 gemma4 internvl llama4 mistral3 smolvlm idefics2 idefics3 llava llava_next vipllava "
-    "llava_onevision deepseek_vl aya_vision janus ovis2 mllama paligemma minicpmv4_6 molmo2 "
-    "cohere2_vision lfm2_vl video_llama_3"
-).split()
+    "qwen2_vl",
+    "qwen2_5_vl",
+    "qwen3_vl",
+    "qwen3_vl_moe",
+    "qwen3_5",
+    "glm4v",
+    "glm46v",
+    "glm4v_moe",
+    "ernie4_5_vl_moe",
+    "gemma3",
+    "gemma4",
+    "internvl",
+    "llama4",
+    "mistral3",
+    "smolvlm",
+    "idefics2",
+    "idefics3",
+    "llava",
+    "llava_next",
+    "vipllava",
+    "llava_onevision",
+    "deepseek_vl",
+    "aya_vision",
+    "janus",
+    "ovis2",
+    "mllama",
+    "paligemma",
+    "minicpmv4_6",
+    "molmo2",
+    "cohere2_vision",
+    "lfm2_vl",
+    "video_llama_3",
+)
 FAMILIES = {name: _ALL[name] for name in _ORDER}
 _QUESTIONS = (
     "Did you see a mug on the table?",
@@ -176,9 +204,9 @@ def _row(name: str, trial: Trial, reference: Replies | str) -> Row:
         notes.append(f"compared with unshared, as generate fails: {reference}")
         expected = trial.replies.get("unshared", [])
     else:
-        *expected, reversed_reply = reference
-        if reversed_reply == expected[0]:
-            notes.append("replies do not depend on the order of frames")
+        *expected, inverted = reference
+        if inverted == expected[0]:
+            notes.append("replies do not depend on the frames")
     return Row(
         name,
         loads=bool(trial.replies),

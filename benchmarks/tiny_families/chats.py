@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 __all__ = ["CHATML", "COHERE", "GEMMA3", "GEMMA4", "GLM", "MISTRAL", "VICUNA", "Chat", "headers"]
 
@@ -82,14 +83,11 @@ class Chat:
         return template
 
 
-def headers(head: str, tail: str, **settings: object) -> Chat:
-    """Return a chat whose turns differ by the role's name alone, which `{}` stands for in `head`."""
+def headers(head: str, tail: str, **settings: Any) -> Chat:
+    """Return a chat whose turns differ by the role's name alone, `{}` in `head`."""
     roles = ("system", "user", "assistant")
-    more = {
-        "heads": {role: head.format(role) for role in roles},
-        "tails": dict.fromkeys(roles, tail),
-    }
-    return Chat(**(more | settings))  # type: ignore[arg-type]
+    heads = {role: head.format(role) for role in roles}
+    return Chat(heads=heads, tails=dict.fromkeys(roles, tail), **settings)
 
 
 CHATML = headers(

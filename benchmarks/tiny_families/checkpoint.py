@@ -7,16 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from tiny_families.chats import Chat
 from transformers import AutoConfig
 
 from model_adapters.hf.global_settings import hide_transformers_output
 from model_adapters.tiny.tokenizer import train_tokenizer
 from model_adapters.tiny.twin import HEAD, SPREAD, draw_model, text_config, token_ids
+from tiny_families.chats import Chat
 
 __all__ = ["Family", "Vocabulary", "save"]
 
 _VIDEO_FILE = "video_preprocessor_config.json"
+_QUERY_NORMS = ("q_norm.weight", "q_layernorm.weight")
+_SHARPER = 4.0
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class Family:
         config: settings of the model's config, from the vocabulary.
         images: content of preprocessor_config.json.
         processor: content of processor_config.json.
-        video: class of the video processor, or None.
+        video: content of video_preprocessor_config.json, or None.
     """
 
     chat: Chat
@@ -69,13 +71,13 @@ class Family:
     config: Callable[[Vocabulary], dict[str, Any]]
     images: Mapping[str, Any]
     processor: Mapping[str, Any]
-    video: str | None = None
+    video: Mapping[str, Any] | None = None
 
     def files(self) -> dict[str, Mapping[str, Any]]:
         """Return the processors' files, name to JSON content."""
         files = {"preprocessor_config.json": self.images, "processor_config.json": self.processor}
         if self.video is not None:
-            files[_VIDEO_FILE] = {"video_processor_type": self.video}
+            files[_VIDEO_FILE] = self.video
         return files
 
 
@@ -96,17 +98,25 @@ def save(model_type: str, family: Family, folder: Path, seed: int = 0) -> None:
     with hide_transformers_output():
         tokenizer.save_pretrained(folder)
         model = draw_model(config, seed, vocabulary[chat.end], vocabulary[chat.pad])
-        _fill_zeros(model, seed)
+        _enliven(model, seed)
         model.save_pretrained(folder)
     for name, content in family.files().items():
         (folder / name).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 
 
 @torch.no_grad()
-def _fill_zeros(model: Any, seed: int) -> None:
-    """Draw the weights that begin as zeros, which would leave parts of a model without effect:
-    Gemma's projection of frames, the gates of Mllama's cross-attention."""
+def _enliven(model: Any, seed: int) -> None:
+    """Change weights with which no reply would depend on the frames.
+
+    Those that begin as zeros leave parts without effect (Gemma's projection of frames, the gates of
+    Mllama's cross-attention), normalised queries make attention even over a thousand tokens, and
+    embeddings that the model multiplies drown everything else.
+    """
     draw = torch.Generator().manual_seed(seed)
-    for weight in model.parameters():
+    for name, weight in model.named_parameters():
         if not weight.any():
             weight.normal_(std=SPREAD, generator=draw)
+        if name.endswith(_QUERY_NORMS):
+            weight.add_(_SHARPER)
+    embeddings = model.get_input_embeddings()
+    embeddings.weight.div_(getattr(embeddings, "scalar_embed_scale", 1.0))

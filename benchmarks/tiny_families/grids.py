@@ -3,11 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
+from model_adapters.tiny.twin import HIDDEN
 from tiny_families.chats import CHATML, GLM, MISTRAL, Chat, headers
 from tiny_families.checkpoint import Family, Vocabulary
-from tiny_families.towers import GRID_TOWER, PATCH, TOWER
-
-from model_adapters.tiny.twin import HIDDEN
+from tiny_families.towers import GRID_TOWER, PATCH, TOWER, video
 
 __all__ = ["GRIDS"]
 
@@ -29,7 +28,7 @@ def _three_axes(*sections: int, **settings: Any) -> dict[str, Any]:
 
 
 def _qwen(
-    text: Mapping[str, Any], vision: Mapping[str, Any], processor: str, video: str, patch: int = 16
+    text: Mapping[str, Any], vision: Mapping[str, Any], processor: str, videos: str, patch: int = 16
 ) -> Family:
     def config(vocabulary: Vocabulary) -> dict[str, Any]:
         return {
@@ -49,7 +48,7 @@ def _qwen(
             "size": _SMALL,
         },
         processor={"processor_class": processor},
-        video=video,
+        video=video(videos),
     )
 
 
@@ -102,7 +101,7 @@ def _glm(name: str, **text: Any) -> Family:
         config=config,
         images={"image_processor_type": f"{name}ImageProcessor", "size": _SMALL},
         processor={"processor_class": f"{name}Processor"},
-        video=f"{name}VideoProcessor",
+        video=video(f"{name}VideoProcessor"),
     )
 
 
@@ -252,7 +251,7 @@ GRIDS = {
         config=_ernie_config,
         images={"image_processor_type": "Ernie4_5_VLMoeImageProcessor", "size": _SMALL},
         processor={"processor_class": "Ernie4_5_VLMoeProcessor"},
-        video="Ernie4_5_VLMoeVideoProcessor",
+        video=video("Ernie4_5_VLMoeVideoProcessor", draw_on_frames=False),
     ),
     "mistral3": Family(
         chat=MISTRAL,
@@ -281,7 +280,7 @@ GRIDS = {
             "max_slice_nums": 4,
         },
         processor={"processor_class": "MiniCPMV4_6Processor"},
-        video="MiniCPMV4_6VideoProcessor",
+        video=video("MiniCPMV4_6VideoProcessor"),
     ),
     "lfm2_vl": Family(
         chat=_LFM2,
@@ -311,6 +310,6 @@ GRIDS = {
             "size": {"shortest_edge": 784, "longest_edge": 84 * 84},
         },
         processor={"processor_class": "VideoLlama3Processor"},
-        video="VideoLlama3VideoProcessor",
+        video=video("VideoLlama3VideoProcessor"),
     ),
 }

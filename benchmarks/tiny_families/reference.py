@@ -2,14 +2,14 @@
 
 Many processors need torchvision, which is kept out of the environment: the caller puts it on the
 path of this process. Reads a JSON object from the standard input and writes one as its last line:
-the ids of each family's replies, the last of them on frames in reversed order, or one line of error.
+the ids of each family's replies, the last of them on inverted frames, or one line of error.
 """
 
 import json
 import sys
 from typing import Any
 
-from PIL import Image
+from PIL import Image, ImageOps
 from transformers import AutoImageProcessor, AutoModelForImageTextToText, AutoProcessor
 from transformers.models.smolvlm import processing_smolvlm
 
@@ -37,7 +37,7 @@ def _answer(
     model = AutoModelForImageTextToText.from_pretrained(folder).eval()
     frames = [Image.open(path) for path in paths]
     asked = [(frames, question) for question in questions]
-    asked.append((frames[::-1], questions[0]))
+    asked.append(([ImageOps.invert(frame) for frame in frames], questions[0]))
     return [_reply(processor, model, *each, new_tokens) for each in asked]
 
 
@@ -56,7 +56,9 @@ def _reply(
         return_tensors="pt",
     )
     inputs.pop("labels", None)  # PaliGemma's, for training
-    output = model.generate(**inputs, do_sample=False, max_new_tokens=new_tokens)
+    output = model.generate(
+        **inputs.to(model.device, model.dtype), do_sample=False, max_new_tokens=new_tokens
+    )
     reply = output[0, inputs["input_ids"].shape[1] :].tolist()
     ends = model.generation_config.eos_token_id
     return reply[:-1] if reply and reply[-1] in ends else reply

@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from model_adapters.tiny.twin import HEAD, HIDDEN, SPREAD
 from tiny_families.chats import CHATML, COHERE, GEMMA3, GEMMA4, MISTRAL, VICUNA, Chat, headers
 from tiny_families.checkpoint import Family, Vocabulary
-from tiny_families.towers import PATCH, SIDE, SQUARE, TOWER, got_images, siglip, tower
-
-from model_adapters.tiny.twin import HEAD, HIDDEN, SPREAD
+from tiny_families.towers import PATCH, SIDE, SQUARE, got_images, siglip, tower, video
 
 __all__ = ["SQUARES"]
 
@@ -247,17 +246,18 @@ _IDEFICS = Chat(
 )
 
 
-def _idefics3_config(vocabulary: Vocabulary) -> dict[str, Any]:
-    return {
-        "image_token_id": vocabulary["<image>"],
-        "scale_factor": 2,
-        "pad_token_id": vocabulary["<|endoftext|>"],
-        "vision_config": TOWER,
-        "text_config": vocabulary.text("llama"),
-    }
+def _idefics3(name: str, side: int, patch: int, scale: int, **settings: Any) -> Family:
+    """Idefics3 and SmolVLM; each tile takes four tokens."""
 
+    def config(vocabulary: Vocabulary) -> dict[str, Any]:
+        return {
+            "image_token_id": vocabulary["<image>"],
+            "scale_factor": scale,
+            "pad_token_id": vocabulary["<|endoftext|>"],
+            "vision_config": tower(image_size=side, patch_size=patch),
+            "text_config": vocabulary.text("llama"),
+        }
 
-def _idefics3(name: str, video: str | None = None) -> Family:
     return Family(
         chat=_IDEFICS,
         image="<image>",
@@ -268,14 +268,14 @@ def _idefics3(name: str, video: str | None = None) -> Family:
             "global_image_token": "<global-img>",
         },
         special=_TILES,
-        config=_idefics3_config,
+        config=config,
         images={
             "image_processor_type": f"{name}ImageProcessor",
-            "size": {"longest_edge": 2 * SIDE},
-            "max_image_size": {"longest_edge": SIDE},
+            "size": {"longest_edge": 2 * side},
+            "max_image_size": {"longest_edge": side},
         },
         processor={"processor_class": f"{name}Processor", "image_seq_len": 4},
-        video=video,
+        **settings,
     )
 
 
@@ -437,7 +437,7 @@ SQUARES = {
             "vision_feature_select_strategy": "full",
             "vision_aspect_ratio": "anyres_max_9",
         },
-        video="LlavaOnevisionVideoProcessor",
+        video=video("LlavaOnevisionVideoProcessor"),
     ),
     "deepseek_vl": Family(
         chat=_DEEPSEEK_CHAT,
@@ -487,7 +487,7 @@ SQUARES = {
             "processor_class": "Gemma4Processor",
             "feature_extractor": {"feature_extractor_type": "Gemma4AudioFeatureExtractor"},
         },
-        video="Gemma4VideoProcessor",
+        video=video("Gemma4VideoProcessor"),
     ),
     "paligemma": Family(
         # There is no public template: this is the prompt that its processor makes by itself.
@@ -522,7 +522,7 @@ SQUARES = {
         config=_internvl_config,
         images=got_images(crop_to_patches=False),
         processor={"processor_class": "InternVLProcessor", "image_seq_length": 4},
-        video="InternVLVideoProcessor",
+        video=video("InternVLVideoProcessor"),
     ),
     "llama4": Family(
         chat=_LLAMA4,
@@ -579,8 +579,9 @@ SQUARES = {
         },
         processor={"processor_class": "Cohere2VisionProcessor"},
     ),
-    "idefics3": _idefics3("Idefics3"),
-    "smolvlm": _idefics3("SmolVLM", video="SmolVLMVideoProcessor"),
+    "idefics3": _idefics3("Idefics3", SIDE, PATCH, 2),
+    # Its model takes a size of patches that divides the tokens of a tile.
+    "smolvlm": _idefics3("SmolVLM", 32, 4, 4, video=video("SmolVLMVideoProcessor")),
     "idefics2": Family(
         chat=replace(
             _IDEFICS,
@@ -619,6 +620,6 @@ SQUARES = {
             "overlap_margins": [1, 1],
         },
         processor={"processor_class": "Molmo2Processor"},
-        video="Molmo2VideoProcessor",
+        video=video("Molmo2VideoProcessor"),
     ),
 }

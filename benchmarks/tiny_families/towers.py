@@ -5,7 +5,17 @@ from typing import Any
 
 from model_adapters.tiny.twin import HIDDEN, SPREAD
 
-__all__ = ["GRID_TOWER", "PATCH", "SIDE", "SQUARE", "TOWER", "got_images", "siglip", "tower"]
+__all__ = [
+    "GRID_TOWER",
+    "PATCH",
+    "SIDE",
+    "SQUARE",
+    "TOWER",
+    "got_images",
+    "siglip",
+    "tower",
+    "video",
+]
 
 SIDE = 56
 PATCH = 14
@@ -43,3 +53,8 @@ def siglip(**settings: Any) -> dict[str, Any]:
 def got_images(**settings: Any) -> dict[str, Any]:
     """Return the image processor of families that cut an image into tiles as GOT-OCR does."""
     return {"image_processor_type": "GotOcr2ImageProcessor", "size": SQUARE, **settings}
+
+
+def video(name: str, **settings: Any) -> dict[str, Any]:
+    """Return the video processor of this class."""
+    return {"video_processor_type": name, **settings}

@@ -95,7 +95,7 @@ def _ask_in(way: str, folder: Path, work: Work) -> Replies:
 
 def reference_replies(folders: Mapping[str, Path], work: Work) -> dict[str, Replies | str]:
     """Return the replies of transformers' own processor and `generate`, or one line of error, by
-    family; the last reply is that to the first question on frames in reversed order.
+    family; the last reply is that to the first question on inverted frames.
 
     torchvision is on the path if it was set aside for tests.
 
