@@ -115,7 +115,8 @@ def _enliven(model: Any, seed: int) -> None:
     draw = torch.Generator().manual_seed(seed)
     for name, weight in model.named_parameters():
         if not weight.any():
-            weight.normal_(std=SPREAD, generator=draw)
+            # A gate is a single number.
+            weight.normal_(std=1.0 if weight.numel() == 1 else SPREAD, generator=draw)
         if name.endswith(_QUERY_NORMS):
             weight.add_(_SHARPER)
     embeddings = model.get_input_embeddings()

@@ -1,0 +1,110 @@
+"""Tiny checkpoints of many families: replies of `hf-vlm` are those of transformers' own way."""
+
+import importlib
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from ..helpers.benchmarks import FOLDER
+
+# What an adapter learns to share is added here; nothing is taken away.
+SHARE = {
+    "qwen2_vl",
+    "qwen2_5_vl",
+    "llava_onevision",
+    "llava",
+    "llava_next",
+    "vipllava",
+    "deepseek_vl",
+    "idefics3",
+    "aya_vision",
+    "janus",
+}
+KNOWN_WRONG = {("janus", "unshared")}  # its `generate` drops the processor that makes a reply
+SIX = ("qwen2_vl", "qwen3_vl", "gemma3", "idefics3", "llava", "aya_vision")
+
+
+@pytest.fixture(scope="module")
+def families() -> Iterator[Any]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(FOLDER)
+        yield importlib.import_module("families")
+
+
+def require(rows) -> None:
+    """Nothing that replies is wrong, what shared before shares, and each family sees frames."""
+    assert [
+        row.name for row in rows if row.name in SHARE and not row.right("alone", "together")
+    ] == []
+    wrong = {
+        (row.name, way)
+        for row in rows
+        for way, n_equal in row.equal.items()
+        if n_equal not in (None, row.asked)
+    }
+    assert wrong <= KNOWN_WRONG
+    notes = " ".join(note for row in rows for note in row.notes)
+    assert not any(words in notes for words in ("not made", "a crash", "do not depend"))
+
+
+def test_six_families_reply_as_transformers_does(families, tmp_path):
+    require(families.try_families(SIX, tmp_path, n_frames=4, new_tokens=4))
+
+
+@pytest.mark.slow
+def test_all_families_reply_as_transformers_does(families, tmp_path):
+    assert len(families.FAMILIES) == 32
+    require(families.try_families(list(families.FAMILIES), tmp_path))
+
+
+def test_a_family_that_cannot_be_made_stops_no_other(families, tmp_path, monkeypatch):
+    def fail(vocabulary):
+        raise ValueError("no such\nlayer")
+
+    bad = replace(families.FAMILIES["llava"], config=fail)
+    monkeypatch.setitem(families.FAMILIES, "llava", bad)
+    replies = [(1,)] * 6
+    monkeypatch.setattr(
+        families, "reference_replies", lambda made, work: dict.fromkeys(made, replies)
+    )
+    monkeypatch.setattr(
+        families, "ask", lambda folder, work: families.Trial({"alone": replies[:5]})
+    )
+    bad_row, good_row = families.try_families(["llava", "vipllava"], tmp_path, n_frames=1)
+    assert bad_row.notes == ("not made: llava (no such layer); see its config",)
+    assert (bad_row.loads, good_row.loads) == (False, True)
+
+
+def test_the_table_has_a_row_for_each_and_the_totals(families):
+    ways = dict.fromkeys(families.WAYS, 5)
+    rows = [
+        families.Row("a", True, ways, 5, ()),
+        families.Row("b", True, {**ways, "alone": None, "together": None}, 5, ("a | b",)),
+        families.Row("c", True, {**ways, "together": 0}, 5, ()),
+        families.Row("d", False, dict.fromkeys(families.WAYS), 5, ("not made: no",)),
+    ]
+    table = families.table(rows)
+    assert "| a | yes | 5 of 5 | 5 of 5 | 5 of 5 |  |" in table
+    assert "| b | yes | - | - | 5 of 5 | a \\| b |" in table
+    assert "1 of 4 share" in table
+    assert "2 run only unshared" in table
+    assert "1 do not load" in table
+
+
+def test_replies_are_compared_with_unshared_where_generate_fails(families):
+    replies = [(number,) for number in range(5)]
+    trial = families.Trial({"alone": replies, "unshared": [*replies[:4], (9,)]}, {"together": "x"})
+    row = families._row("a", trial, "ImportError: none")
+    assert dict(row.equal) == {"alone": 4, "together": None, "unshared": 5}
+    assert row.notes == (
+        "x",
+        "compared with unshared, as generate fails: ImportError: no torchvision",
+    )
+
+
+def test_an_unknown_family_is_one_line(families, capsys):
+    with pytest.raises(SystemExit):
+        families.main(["--families", "llava,nobody"])
+    assert "nobody is not one of qwen2_vl" in capsys.readouterr().err
