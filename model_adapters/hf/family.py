@@ -2,10 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import torch
 from PIL import Image
+
+if TYPE_CHECKING:
+    from model_adapters.hf.prompting.embedding import Embed
 
 __all__ = ["ClipShape", "Family", "MakeFamily", "Shape", "Size", "VideoInput"]
 
@@ -78,6 +81,9 @@ class Family(Protocol):
 
         They carry gradients, for training; inference calls this under `torch.inference_mode`.
         """
+
+    def make_embed(self, max_bytes: int) -> "Embed":
+        """Return what prepares spans of prompts, with a cache of so many bytes of features."""
 
     def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
         """Return the position ids of a span of a sequence that cuts no frame and no clip.

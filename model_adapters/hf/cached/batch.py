@@ -8,18 +8,18 @@ import torch
 from model_adapters.hf.cached.branch_attention import BranchAttention
 from model_adapters.hf.cached.decoding import ReplyState, decode_replies
 from model_adapters.hf.cached.prefix import Prefix, chunks
-from model_adapters.hf.prompting.embedding import EmbeddedSpan, Embedder
+from model_adapters.hf.prompting.embedding import Embed, Span
 from model_adapters.hf.prompting.prompt import Piece
 
 __all__ = ["answer_together"]
 
-_Span = tuple[int, EmbeddedSpan]  # of a branch
+_Span = tuple[int, Span]  # of a branch
 
 
 class _Branches:
     """Continuations of a prefix, each with the positions that it has alone."""
 
-    def __init__(self, model: Any, embed: Embedder, prefix: Prefix, n_branches: int) -> None:
+    def __init__(self, model: Any, embed: Embed, prefix: Prefix, n_branches: int) -> None:
         self._model = model
         self._embed = embed
         self._prefix = prefix
@@ -45,14 +45,14 @@ class _Branches:
         n_tokens = 0
         for branch, pieces in enumerate(continuations):
             for chunk in chunks(pieces, chunk_tokens):
-                span = self._embed(chunk, self._ends[branch])
+                span = self._embed(chunk, self._ends[branch], ())
                 self._ends[branch] = span.end
-                if group and n_tokens + len(span.embeds) > chunk_tokens:
+                if group and n_tokens + span.n_tokens > chunk_tokens:
                     yield group
                     group = []
                     n_tokens = 0
                 group.append((branch, span))
-                n_tokens += len(span.embeds)
+                n_tokens += span.n_tokens
         yield group
 
     @torch.inference_mode()
@@ -61,20 +61,20 @@ class _Branches:
         span = self._embed.words(list(tokens.values()), [self._ends[branch] for branch in tokens])
         for branch in tokens:
             self._ends[branch] += 1
-        return self._logits(span.embeds, span.positions, list(tokens), slice(None))
+        return self._logits(span.inputs, span.positions, list(tokens), slice(None))
 
     def _forward(self, group: Sequence[_Span]) -> dict[int, torch.Tensor]:
         """Encode chunks of branches; return the logits behind each branch's last, (vocabulary,)."""
-        owners = [branch for branch, span in group for _ in span.embeds]
+        owners = [branch for branch, span in group for _ in range(span.n_tokens)]
         last = {branch: at for at, branch in enumerate(owners)}
         positions = torch.cat([span.positions for _, span in group], dim=-1)
-        embeds = torch.cat([span.embeds for _, span in group])
-        rows = self._logits(embeds, positions, owners, torch.tensor(list(last.values())))
+        inputs = self._embed.join([span for _, span in group])
+        rows = self._logits(inputs, positions, owners, torch.tensor(list(last.values())))
         return dict(zip(last, rows, strict=True))
 
     def _logits(
         self,
-        embeds: torch.Tensor,
+        inputs: Mapping[str, Any],
         positions: torch.Tensor,
         owners: Sequence[int],
         keep: slice | torch.Tensor,
@@ -86,7 +86,7 @@ class _Branches:
             self._lengths[branch] += 1
         with self._attention.appended(owners, n_before):
             output = self._model(
-                inputs_embeds=embeds[None],
+                **inputs,
                 position_ids=positions,
                 past_key_values=self._prefix.cache,
                 use_cache=True,
@@ -98,7 +98,7 @@ class _Branches:
 
 def answer_together(
     model: Any,
-    embed: Embedder,
+    embed: Embed,
     *,
     prefix: Prefix,
     prompts: Sequence[Sequence[Piece]],

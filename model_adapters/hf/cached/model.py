@@ -15,8 +15,6 @@ from model_adapters.hf.global_settings import torch_threads
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.loading.rope import take_length_rope
-from model_adapters.hf.prompting.embedding import Embedder
-from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.prompt import Piece, n_common, n_tokens, token_ids
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Decoding, Reply, Turn
@@ -35,8 +33,7 @@ class TransformersModel(HfModel):
     def __init__(self, name: str, loaded: LoadedCheckpoint, options: HfOptions) -> None:
         super().__init__(name, loaded, options)
         cache_bytes = options.feature_cache_mb * 2**20 if options.share_prefix else 0
-        self._features = FeatureCache(loaded.family, cache_bytes)
-        self._embed = Embedder(loaded.model, loaded.family, self._features)
+        self._embed = loaded.family.make_embed(cache_bytes)
         self._rope = take_length_rope(loaded.model)
         self._prefix = Prefix(
             loaded.model,
@@ -56,8 +53,7 @@ class TransformersModel(HfModel):
     def close(self) -> None:
         """Free the KV cache, the features and the weights."""
         self._prefix.reset()
-        self._features.clear()
-        del self._prefix, self._embed, self._features, self._rope
+        del self._prefix, self._embed, self._rope
         super().close()
 
     def encode(self, pieces: Sequence[Piece]) -> torch.Tensor:
@@ -94,7 +90,7 @@ class TransformersModel(HfModel):
         if not self._options.share_prefix:
             self._prefix.reset()
         replies = [begin_reply(self._loaded, decoding, token_ids(prompt)) for prompt in prompts]
-        decode = self._decode_one if len(prompts) == 1 else self._decode_branches
+        decode = self._decode_branches if self._can_branch(prompts) else self._decode_each
         try:
             with (
                 wrap_model_errors(self.name),
@@ -104,26 +100,37 @@ class TransformersModel(HfModel):
         except ModelError:
             # After running out of memory, the next request needs all of it.
             self._prefix.reset()
-            self._features.clear()
+            self._embed.clear()
             raise
         return [
             end_reply(self._loaded, reply, n_tokens(prompt), cached)
             for reply, prompt, cached in zip(replies, prompts, n_cached, strict=True)
         ]
 
-    def _decode_one(
+    def _can_branch(self, prompts: Sequence[Sequence[Piece]]) -> bool:
+        """Return whether replies to prompts can be decoded together."""
+        if len(prompts) == 1 or not self._embed.sees_ahead:
+            return len(prompts) > 1
+        common = n_common(prompts)
+        return all(isinstance(piece, int) for prompt in prompts for piece in prompt[common:])
+
+    def _decode_each(
         self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]
     ) -> list[int]:
-        """Decode a single reply; return how many tokens of the prompt were in the cache."""
-        (prompt,) = prompts
-        (reply,) = replies
+        """Decode replies one after the other; return how many tokens of each prompt were in the
+        cache."""
+        return [
+            self._decode_one(prompt, reply) for prompt, reply in zip(prompts, replies, strict=True)
+        ]
+
+    def _decode_one(self, prompt: Sequence[Piece], reply: ReplyState) -> int:
         shared = self._prefix.rewind_to(prompt)
         cached = self._prefix.n_tokens
         logits = self._prefix.feed(prompt[shared:], reserve=reply.decoding.max_new_tokens)
         decode_replies(
             logits[None], lambda tokens: self._prefix.feed(list(tokens.values()))[None], [reply]
         )
-        return [cached]
+        return cached
 
     def _decode_branches(
         self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]

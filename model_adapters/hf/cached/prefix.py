@@ -15,7 +15,7 @@ import torch
 from model_adapters.hf.cached.kv_cache import BufferedCache
 from model_adapters.hf.family import Family
 from model_adapters.hf.loading.rope import LengthRope
-from model_adapters.hf.prompting.embedding import Embedder
+from model_adapters.hf.prompting.embedding import Embed
 from model_adapters.hf.prompting.prompt import Piece, n_tokens, token_ids
 
 __all__ = ["Prefix", "chunks"]
@@ -25,10 +25,10 @@ class Prefix:
     """The one encoded sequence of a model.
 
     Args:
-        model: a transformers model that takes `inputs_embeds`, `position_ids` and
+        model: a transformers model that takes what `embed` makes, `position_ids` and
             `past_key_values`.
         family: family of the model.
-        embed: embeds spans of prompts.
+        embed: prepares spans of prompts.
         chunk_tokens: most tokens of one forward pass (a larger frame is a chunk alone).
         rope: rotary embeddings of the model if their frequencies depend on the prompt's length,
             else None.
@@ -39,7 +39,7 @@ class Prefix:
         self,
         model: Any,
         family: Family,
-        embed: Embedder,
+        embed: Embed,
         *,
         chunk_tokens: int,
         rope: LengthRope | None = None,
@@ -150,11 +150,11 @@ class Prefix:
 
     @torch.inference_mode()
     def _forward(self, chunk: list[Piece]) -> torch.Tensor:
-        span = self._embed(chunk, self._starts[-1])
+        span = self._embed(chunk, self._starts[-1], self._pieces)
         done = False
         try:
             output = self._model(
-                inputs_embeds=span.embeds[None],
+                **span.inputs,
                 position_ids=span.positions,
                 past_key_values=self._cache,
                 use_cache=True,

@@ -1,7 +1,8 @@
 """Any model of `AutoModelForImageTextToText` with a chat template, so that new models need no code.
 
 A model of a known family runs as that family. For others, the processor says what a frame's
-placeholder expands to, and the model's `get_image_features` computes what goes into the slots. When
+placeholder expands to, the model's `get_image_features` encodes it, and the model merges that into
+the prompt by itself. When
 such a model is loaded, token ids and logits of a sample are compared with those of the processor
 and the plain model: an architecture that works differently is refused instead of giving wrong
 results. With share_prefix=false it is run by its own processor and `generate`, and the sample shows
@@ -11,7 +12,7 @@ only that processor and model fit each other.
 import functools
 import inspect
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -30,7 +31,7 @@ from model_adapters.hf.families.llava_onevision import LlavaOnevisionFamily
 from model_adapters.hf.families.pixtral import PixtralFamily
 from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
-from model_adapters.hf.family import MakeFamily, Size
+from model_adapters.hf.family import ClipShape, MakeFamily, Shape, Size
 from model_adapters.hf.loading.checkpoint import (
     LocatedCheckpoint,
     load_checkpoint,
@@ -38,6 +39,9 @@ from model_adapters.hf.loading.checkpoint import (
     wrap_loading_errors,
 )
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.prompting.embedding import Embed
+from model_adapters.hf.prompting.features import FeatureCache
+from model_adapters.hf.prompting.native import EncodedImage, NativeEmbedder
 from model_adapters.hf.prompting.prompt import Piece, Prompter, token_ids
 from model_adapters.hf.uncached import UncachedModel, expand_image_token, image_token, process_turns
 from model_adapters.options.checkpoints import CheckpointReading
@@ -49,13 +53,15 @@ __all__ = ["HfVlm", "ProcessorFamily", "family_of", "load_processor", "require_s
 # Relative to the largest logit; more in half precision.
 _TOLERANCE = {torch.float32: 1e-3, torch.float64: 1e-3}
 _HALF_TOLERANCE = 0.1
+# Inputs that tell tokens of images from others, by models' and processors' names for them.
+_TYPE_INPUTS = ("token_type_ids", "mm_token_type_ids")
 _BLANK = (300, 300)  # width and height of a sample image
 
 R = TypeVar("R", bound=CheckpointReading)
 
 
 class ProcessorFamily(PlainFamily):
-    """A family whose processor expands frames and whose model has `get_image_features`.
+    """A family whose processor expands frames and whose model merges them into the prompt.
 
     Raises:
         ModelError: the processor names no image token.
@@ -65,10 +71,23 @@ class ProcessorFamily(PlainFamily):
         super().__init__(model, image_processor, tokenizer)
         self._processor = processor
         self.placeholder_id = tokenizer.convert_tokens_to_ids(image_token(processor))
+        self._expanded: dict[Size, Mapping[str, list[int]]] = {}
+        self._grids: dict[Size, torch.Tensor] = {}
+        self.type_input = _type_input(model)
+
+    def make_embed(self, max_bytes: int) -> Embed:
+        """Return what prepares spans of prompts, with a cache of so many bytes of features."""
+        return NativeEmbedder(self._model, self, FeatureCache(self.encode, max_bytes))
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
         """Return the ids that the processor expands the placeholder of one image to."""
-        return tuple(expand_image_token(self._processor, Image.new("RGB", size, "gray")))
+        return tuple(self._expand(size)["input_ids"])
+
+    def frame_types(self, size: Size) -> tuple[int, ...]:
+        """Return the types of these, 1 for those of the image."""
+        expanded = self._expand(size)
+        types = next((expanded[name] for name in _TYPE_INPUTS if name in expanded), None)
+        return tuple(types or (0,) * len(expanded["input_ids"]))
 
     def template_ids(self, placeholder_id: int) -> tuple[int, ...]:
         """Return the placeholder, between the config's markers unless the processor adds them."""
@@ -77,21 +96,73 @@ class ProcessorFamily(PlainFamily):
             return (placeholder_id,)
         return (markers[0], placeholder_id, markers[1])
 
-    def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Return the model's features of each image, (slots, hidden)."""
+    def encode(self, images: Sequence[Image.Image]) -> list[EncodedImage]:
+        """Return the model's features of each image."""
         compute = (
             getattr(self._model, "get_image_features", None) or self._model.model.get_image_features
         )
         parameters = inspect.signature(compute).parameters
-        features = []
+        encoded = []
         for image in images:
             inputs = {
                 name: value for name, value in self._inputs([image]).items() if name in parameters
             }
-            pooled = compute(**inputs, return_dict=True).pooler_output
+            encoded.append(EncodedImage.of(compute(**inputs, return_dict=True)))
+        return encoded
+
+    def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
+        """Return the embeddings for the slots of each image, (slots, hidden), for training."""
+        features = []
+        for image in self.encode(images):
+            pooled = image.output.pooler_output
             parts = pooled if isinstance(pooled, list | tuple) else [pooled]
             features.append(torch.cat([part.reshape(-1, part.shape[-1]) for part in parts]))
         return features
+
+    def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
+        """Return the positions that the model's own rule gives, shifted to the start.
+
+        A span that cuts no frame can be numbered alone: all positions shift with the first.
+        """
+        rule = getattr(self._model.model, "get_rope_index", None)
+        if rule is None:
+            return super().positions(ids, shapes, start)
+        if not shapes:
+            return torch.arange(start, start + len(ids)).expand(3, 1, -1)
+        positions, _ = rule(
+            ids[None],
+            mm_token_type_ids=(ids == self.slot_id).int()[None],
+            image_grid_thw=torch.cat(
+                [self._grid(shape) for shape in shapes if not isinstance(shape, ClipShape)]
+            ),
+        )
+        return positions + start
+
+    def _expand(self, size: Size) -> Mapping[str, list[int]]:
+        """Return ids and types of one image's tokens."""
+        if size not in self._expanded:
+            self._expanded[size] = expand_image_token(
+                self._processor, Image.new("RGB", size, "gray")
+            )
+        return self._expanded[size]
+
+    def _grid(self, size: Size) -> torch.Tensor:
+        """Return an image's patches along time, height and width, (1, 3), on the CPU."""
+        if size not in self._grids:
+            inputs = self._image_processor(images=[Image.new("RGB", size)], return_tensors="pt")
+            self._grids[size] = inputs["image_grid_thw"]
+        return self._grids[size]
+
+
+def _type_input(model: Any) -> str | None:
+    """Return the model's input of token types, if its attention depends on them.
+
+    With three-axis positions they are for the positions alone.
+    """
+    if hasattr(model.model, "get_rope_index"):
+        return None
+    parameters = inspect.signature(model.model.forward).parameters
+    return next((name for name in _TYPE_INPUTS if name in parameters), None)
 
 
 def _markers(config: Any) -> tuple[int, int] | None:

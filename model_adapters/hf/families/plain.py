@@ -7,6 +7,8 @@ import torch
 from PIL import Image
 
 from model_adapters.hf.family import Shape, Size, VideoInput
+from model_adapters.hf.prompting.embedding import Embed, Embedder
+from model_adapters.hf.prompting.features import FeatureCache
 
 __all__ = ["PlainFamily"]
 
@@ -38,6 +40,11 @@ class PlainFamily:
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Return the embeddings for the slots of each image, (slots, hidden)."""
         raise NotImplementedError
+
+    def make_embed(self, max_bytes: int) -> Embed:
+        """Return what embeds spans of prompts, with a cache of so many bytes of features."""
+        clips = None if self.video is None else self.video.features
+        return Embedder(self._model, self, FeatureCache(self.features, max_bytes, clips))
 
     def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
         """Return consecutive positions, (1, tokens)."""

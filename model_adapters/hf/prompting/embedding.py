@@ -1,8 +1,8 @@
-"""From pieces of a prompt to the embeddings and positions that a language model reads."""
+"""From pieces of a prompt to the inputs that a language model reads."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import torch
 
@@ -11,37 +11,100 @@ from model_adapters.hf.family import Family
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.prompt import Clip, Frame, Piece
 
-__all__ = ["EmbeddedSpan", "Embedder"]
+__all__ = ["Embed", "Embedder", "Span", "piece_starts"]
 
 
 @dataclass(frozen=True)
-class EmbeddedSpan:
-    """A span of a prompt as input of the language model.
+class Span:
+    """A span of a prompt as input of the model.
 
     Attributes:
-        embeds: embeddings, (tokens, hidden), on the embedding layer's device.
-        positions: position ids, (1, tokens) or (3, 1, tokens), on the same device.
+        inputs: the model's inputs but for positions and cache, with a batch axis of 1.
+        positions: position ids, (1, tokens) or (3, 1, tokens), on the weights' device.
         starts: position behind everything before each piece, which is that of the first token of a
             text or a frame.
         end: position of the token that follows the span.
     """
 
-    embeds: torch.Tensor
+    inputs: Mapping[str, Any]
     positions: torch.Tensor
     starts: tuple[int, ...]
     end: int
 
+    @property
+    def n_tokens(self) -> int:
+        """Tokens of the span."""
+        return self.positions.shape[-1]
+
+
+class Embed(Protocol):
+    """Prepares spans of prompts for one model."""
+
+    @property
+    def sees_ahead(self) -> bool:
+        """True if tokens of a frame attend to later ones of the same frame."""
+
+    def __call__(self, pieces: Sequence[Piece], start: int, before: Sequence[Piece]) -> Span:
+        """Prepare pieces that begin at the position `start`, behind the pieces `before` them.
+
+        Raises:
+            DataError: a frame cannot be read.
+            ModelError: processor and model disagree on the number of a frame's tokens.
+        """
+
+    def words(self, tokens: Sequence[int], starts: Sequence[int]) -> Span:
+        """Prepare tokens of text of different sequences, each at its own position."""
+
+    def join(self, spans: Sequence[Span]) -> Mapping[str, Any]:
+        """Return the inputs of several spans as those of one sequence."""
+
+    def clear(self) -> None:
+        """Free the memory of cached features."""
+
+
+def piece_starts(
+    pieces: Sequence[Piece], positions: torch.Tensor, start: int
+) -> tuple[tuple[int, ...], int]:
+    """Return the position behind everything before each piece, and behind all of them.
+
+    A piece starts behind the largest position before it, on any axis.
+
+    Args:
+        pieces: pieces of a span.
+        positions: positions of their tokens, (1, tokens) or (3, 1, tokens), on the CPU.
+        start: position behind everything before the span.
+    """
+    largest = positions.reshape(-1, positions.shape[-1]).amax(dim=0).cummax(dim=0).values
+    behind = [start, *(largest + 1).tolist()]
+    starts = []
+    at = 0
+    for piece in pieces:
+        starts.append(behind[at])
+        at += 1 if isinstance(piece, int) else len(piece.ids)
+    return tuple(starts), behind[-1]
+
 
 class Embedder:
-    """Embeds spans of prompts for one model, with a cache of features of frames and clips."""
+    """Embeds spans of prompts, with a cache of features of frames and clips.
 
-    def __init__(self, model: Any, family: Family, features: FeatureCache) -> None:
+    Attributes:
+        sees_ahead: False: attention is causal.
+    """
+
+    sees_ahead = False
+
+    def __init__(self, model: Any, family: Family, features: FeatureCache[torch.Tensor]) -> None:
         self._family = family
         self._features = features
         self._embeddings = model.get_input_embeddings()
 
     @torch.inference_mode()
-    def __call__(self, pieces: Sequence[Piece], start: int) -> EmbeddedSpan:
+    def __call__(
+        self,
+        pieces: Sequence[Piece],
+        start: int,
+        before: Sequence[Piece],
+    ) -> Span:
         """Embed pieces that begin at the position `start`, behind everything before them.
 
         Raises:
@@ -51,9 +114,7 @@ class Embedder:
         visuals = [piece for piece in pieces if not isinstance(piece, int)]
         flat: list[int] = []
         slots: list[int] = []
-        firsts: list[int] = []
         for piece in pieces:
-            firsts.append(len(flat))
             if isinstance(piece, int):
                 flat.append(piece)
             else:
@@ -74,23 +135,26 @@ class Embedder:
         embeds = self._embeddings(ids.to(device))
         if features is not None:
             embeds[slots] = features.to(embeds)
-        # A piece starts behind the largest position before it, on any axis.
-        largest = positions.reshape(-1, len(flat)).amax(dim=0).cummax(dim=0).values
-        behind = [start, *(largest + 1).tolist()]
-        return EmbeddedSpan(
-            embeds, positions.to(device), tuple(behind[at] for at in firsts), behind[-1]
-        )
+        starts, end = piece_starts(pieces, positions, start)
+        return Span({"inputs_embeds": embeds[None]}, positions.to(device), starts, end)
 
     @torch.inference_mode()
-    def words(self, tokens: Sequence[int], starts: Sequence[int]) -> EmbeddedSpan:
+    def words(self, tokens: Sequence[int], starts: Sequence[int]) -> Span:
         """Embed tokens of text of different sequences, each of which begins at its own position."""
         ids = torch.tensor(tokens)
         positions = torch.empty_like(self._family.positions(ids, [], 0)).copy_(torch.tensor(starts))
         device = self._embeddings.weight.device
-        ends = tuple(start + 1 for start in starts)
-        return EmbeddedSpan(
-            self._embeddings(ids.to(device)), positions.to(device), tuple(starts), max(ends)
-        )
+        inputs = {"inputs_embeds": self._embeddings(ids.to(device))[None]}
+        end = max(start + 1 for start in starts)
+        return Span(inputs, positions.to(device), tuple(starts), end)
+
+    def join(self, spans: Sequence[Span]) -> Mapping[str, Any]:
+        """Return the inputs of several spans as those of one sequence."""
+        return {"inputs_embeds": torch.cat([span.inputs["inputs_embeds"] for span in spans], dim=1)}
+
+    def clear(self) -> None:
+        """Free the memory of cached features."""
+        self._features.clear()
 
     def _slot_features(self, visuals: Sequence[Frame | Clip], n_slots: int) -> torch.Tensor:
         features = torch.cat(self._features.get(visuals))

@@ -1,30 +1,52 @@
 """Vision features of frames and clips, in a bounded cache."""
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Generic, Protocol, Self, TypeVar
 
 import torch
+from PIL import Image
 
-from model_adapters.hf.family import Family
+from model_adapters.hf.family import ClipShape
 from model_adapters.hf.prompting.prompt import Clip, Frame
 
 __all__ = ["FeatureCache"]
 
 
-class FeatureCache:
+class _Kept(Protocol):
+    @property
+    def nbytes(self) -> int: ...
+
+    def clone(self) -> Self: ...
+
+
+_FilmedClip = tuple[ClipShape, Sequence[Image.Image]]
+T = TypeVar("T", bound=_Kept)
+
+
+class FeatureCache(Generic[T]):
     """Features by the content of a frame or a clip; the least recently used are dropped first.
 
-    The family computes missing ones. At most `max_bytes` are cached; 0 caches none.
+    Args:
+        compute: returns the features of images.
+        max_bytes: most bytes that are cached; 0 caches none.
+        compute_clips: returns the features of clips, for families with a video input.
     """
 
-    def __init__(self, family: Family, max_bytes: int) -> None:
-        self._family = family
+    def __init__(
+        self,
+        compute: Callable[[Sequence[Image.Image]], list[T]],
+        max_bytes: int,
+        compute_clips: Callable[[Sequence[_FilmedClip]], list[T]] | None = None,
+    ) -> None:
+        self._compute_frames = compute
+        self._compute_clips = compute_clips
         self._max_bytes = max_bytes
         self._bytes = 0
-        self._cache: OrderedDict[Frame | Clip, torch.Tensor] = OrderedDict()
+        self._cache: OrderedDict[Frame | Clip, T] = OrderedDict()
 
     @torch.inference_mode()
-    def get(self, pieces: Sequence[Frame | Clip]) -> list[torch.Tensor]:
+    def get(self, pieces: Sequence[Frame | Clip]) -> list[T]:
         """Return each piece's features, (slots, hidden), in order; computes missing ones together.
 
         Raises:
@@ -42,21 +64,21 @@ class FeatureCache:
         self._cache.clear()
         self._bytes = 0
 
-    def _compute(self, pieces: Sequence[Frame | Clip]) -> dict[Frame | Clip, torch.Tensor]:
+    def _compute(self, pieces: Sequence[Frame | Clip]) -> dict[Frame | Clip, T]:
         frames = [piece for piece in pieces if isinstance(piece, Frame)]
         clips = [piece for piece in pieces if isinstance(piece, Clip)]
-        features: dict[Frame | Clip, torch.Tensor] = {}
+        features: dict[Frame | Clip, T] = {}
         if frames:
             images = [frame.ref.load() for frame in frames]
-            features |= zip(frames, self._family.features(images), strict=True)
-        if clips and self._family.video is not None:
+            features |= zip(frames, self._compute_frames(images), strict=True)
+        if clips and self._compute_clips is not None:
             videos = []
             for clip in clips:
                 videos.append((clip.shape, [ref.load() for ref in clip.refs]))
-            features |= zip(clips, self._family.video.features(videos), strict=True)
+            features |= zip(clips, self._compute_clips(videos), strict=True)
         return features
 
-    def _store(self, features: dict[Frame | Clip, torch.Tensor]) -> None:
+    def _store(self, features: dict[Frame | Clip, T]) -> None:
         for piece, tensor in features.items():
             if piece not in self._cache:
                 # A slice of a batch would keep the whole batch's memory as long as one of its

@@ -29,7 +29,7 @@ def _load(folder: Path, **options: str) -> Any:
     return load("hf-vlm", {"pretrained": str(folder), "device": "cpu", **options}, seed=0)
 
 
-@pytest.mark.parametrize("name", ["llava", "idefics3", "deepseek-vl-1.3b"])
+@pytest.mark.parametrize("name", ["llava", "idefics3", "deepseek-vl-1.3b", "gemma3"])
 def test_an_unknown_family_shares_prefixes_and_replies_as_generate(
     name: str, checkpoints: dict[str, Path], frames: list[FrameRef]
 ) -> None:

@@ -1,0 +1,161 @@
+"""Spans of a prompt as inputs of a model that merges frames into them by itself.
+
+transformers' models take what their vision encoder made of images (`mm_encoder_outputs`), and do
+all that follows: projection, features that enter at several layers, embeddings of each layer, masks
+in both directions over an image. So none of it is written here again.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Protocol
+
+import torch
+from PIL import Image
+
+from model_adapters.hf.family import Family, Size
+from model_adapters.hf.prompting.embedding import Span, piece_starts
+from model_adapters.hf.prompting.features import FeatureCache
+from model_adapters.hf.prompting.prompt import Frame, Piece, token_ids
+
+__all__ = ["EncodedImage", "MergingFamily", "NativeEmbedder"]
+
+# Outputs of vision encoders that are not for the language model, if `pooler_output` is there.
+_INNER = ("last_hidden_state", "hidden_states", "attentions")
+_BY_LAYER = ("deepstack_features",)  # one entry for each layer, not for each image
+
+
+@dataclass(frozen=True)
+class EncodedImage:
+    """What a model's vision encoder makes of one image.
+
+    Attributes:
+        output: the encoder's output, of transformers' own class.
+    """
+
+    output: Any
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of its tensors."""
+        return sum(tensor.nbytes for tensor in _tensors(list(self.output.values())))
+
+    def clone(self) -> "EncodedImage":
+        """Return itself: it is encoded alone, so its tensors are no views of a batch's."""
+        return self
+
+    @classmethod
+    def of(cls, output: Any) -> "EncodedImage":
+        """Keep of an encoder's output what the language model takes."""
+        if output.get("pooler_output") is not None:
+            for name in _INNER:
+                if output.get(name) is not None:
+                    output[name] = None
+        return cls(output)
+
+    @staticmethod
+    def join(images: Sequence["EncodedImage"]) -> Any:
+        """Return the outputs for several images as the encoder would return them together."""
+        outputs = [image.output for image in images]
+        joined = {
+            field.name: _join(
+                [output[field.name] for output in outputs], by_layer=field.name in _BY_LAYER
+            )
+            for field in fields(outputs[0])
+            if outputs[0].get(field.name) is not None
+        }
+        return type(outputs[0])(**joined)
+
+
+def _join(values: Sequence[Any], *, by_layer: bool = False) -> Any:
+    first = values[0]
+    if isinstance(first, torch.Tensor):
+        return torch.cat(list(values))
+    if by_layer:
+        return [_join(layer) for layer in zip(*values, strict=True)]
+    return [one for value in values for one in value]
+
+
+def _tensors(value: Any) -> list[torch.Tensor]:
+    if isinstance(value, torch.Tensor):
+        return [value]
+    parts = value if isinstance(value, list | tuple) else []
+    return [tensor for part in parts for tensor in _tensors(part)]
+
+
+class MergingFamily(Family, Protocol):
+    """A family whose model merges frames into the prompt by itself.
+
+    Attributes:
+        type_input: the model's input that tells tokens of images from others, if its attention
+            depends on it; else None.
+    """
+
+    type_input: str | None
+
+    def encode(self, images: Sequence[Image.Image]) -> list[EncodedImage]:
+        """Return what the vision encoder makes of each image."""
+
+    def frame_types(self, size: Size) -> tuple[int, ...]:
+        """Return the types of a frame's tokens, as the processor gives them."""
+
+
+class NativeEmbedder:
+    """Prepares spans of prompts for one model, with a cache of encoded frames."""
+
+    def __init__(
+        self, model: Any, family: MergingFamily, features: FeatureCache[EncodedImage]
+    ) -> None:
+        self._family = family
+        self._features = features
+        self._device = model.get_input_embeddings().weight.device
+
+    @property
+    def sees_ahead(self) -> bool:
+        """True if tokens of a frame attend to later ones of the same frame."""
+        return self._family.type_input is not None
+
+    @torch.inference_mode()
+    def __call__(self, pieces: Sequence[Piece], start: int, before: Sequence[Piece]) -> Span:
+        """Prepare pieces that begin at the position `start`, behind the pieces `before` them.
+
+        Raises:
+            DataError: a frame cannot be read.
+        """
+        frames = [piece for piece in pieces if isinstance(piece, Frame)]
+        ids = torch.tensor([*token_ids(pieces)])
+        positions = self._family.positions(ids, [frame.shape for frame in frames], start)
+        starts, end = piece_starts(pieces, positions, start)
+        inputs: dict[str, Any] = {"input_ids": ids[None].to(self._device)}
+        if frames:
+            inputs["mm_encoder_outputs"] = {"image": EncodedImage.join(self._features.get(frames))}
+            if self._family.type_input is not None:
+                types = [kind for piece in (*before, *pieces) for kind in self._types(piece)]
+                inputs[self._family.type_input] = torch.tensor([types], device=self._device)
+        return Span(inputs, positions.to(self._device), starts, end)
+
+    @torch.inference_mode()
+    def words(self, tokens: Sequence[int], starts: Sequence[int]) -> Span:
+        """Prepare tokens of text of different sequences, each at its own position."""
+        ids = torch.tensor(tokens)
+        positions = torch.empty_like(self._family.positions(ids, [], 0)).copy_(torch.tensor(starts))
+        inputs = {"input_ids": ids[None].to(self._device)}
+        end = max(start + 1 for start in starts)
+        return Span(inputs, positions.to(self._device), tuple(starts), end)
+
+    def join(self, spans: Sequence[Span]) -> Mapping[str, Any]:
+        """Return the inputs of several spans as those of one sequence; none sees ahead."""
+        inputs: dict[str, Any] = {
+            "input_ids": torch.cat([span.inputs["input_ids"] for span in spans], dim=-1)
+        }
+        encoded = [span.inputs["mm_encoder_outputs"] for span in spans if len(span.inputs) > 1]
+        if encoded:
+            images = [EncodedImage(outputs["image"]) for outputs in encoded]
+            inputs["mm_encoder_outputs"] = {"image": EncodedImage.join(images)}
+        return inputs
+
+    def clear(self) -> None:
+        """Free the memory of cached features."""
+        self._features.clear()
+
+    def _types(self, piece: Piece) -> tuple[int, ...]:
+        return self._family.frame_types(piece.size) if isinstance(piece, Frame) else (0,)
