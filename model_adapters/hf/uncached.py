@@ -65,14 +65,14 @@ def image_token(processor: Any) -> str:
     return token
 
 
-def expand_image_token(processor: Any, image: Image.Image) -> dict[str, list[int]]:
-    """Return the ids that the processor expands the token of one image to, and their types where
-    it gives them, by the names of the model's inputs."""
-    inputs = processor(
-        text=[image_token(processor)], images=[image], add_special_tokens=False, return_tensors="pt"
+def expand_image_token(processor: Any, images: Sequence[Image.Image]) -> Any:
+    """Return the tensors that the processor makes of image tokens and their images."""
+    return processor(
+        text=[image_token(processor) * len(images)],
+        images=[*images],
+        add_special_tokens=False,
+        return_tensors="pt",
     )
-    n = inputs["input_ids"].shape[1]
-    return {name: rows[0].tolist() for name, rows in inputs.items() if rows.shape == (1, n)}
 
 
 class _ForceReplyTokens(LogitsProcessor):
@@ -113,7 +113,7 @@ class UncachedModel(HfModel):
     def tokens_per_frame(self, frame: FrameRef) -> int:
         """Return the tokens of one frame, as the checkpoint's processor expands it."""
         with wrap_model_errors(self.name):
-            return len(expand_image_token(self._processor, frame.load())["input_ids"])
+            return int(expand_image_token(self._processor, [frame.load()])["input_ids"].shape[1])
 
     @property
     def capabilities(self) -> Capabilities:

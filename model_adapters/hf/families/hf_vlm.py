@@ -71,8 +71,7 @@ class ProcessorFamily(PlainFamily):
         super().__init__(model, image_processor, tokenizer)
         self._processor = processor
         self.placeholder_id = tokenizer.convert_tokens_to_ids(image_token(processor))
-        self._expanded: dict[Size, Mapping[str, list[int]]] = {}
-        self._grids: dict[Size, torch.Tensor] = {}
+        self._blanks: dict[Size, Mapping[str, torch.Tensor]] = {}
         self.type_input = _type_input(model)
 
     def make_embed(self, max_bytes: int) -> Embed:
@@ -81,13 +80,15 @@ class ProcessorFamily(PlainFamily):
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
         """Return the ids that the processor expands the placeholder of one image to."""
-        return tuple(self._expand(size)["input_ids"])
+        return tuple(self._blank(size)["input_ids"][0].tolist())
 
     def frame_types(self, size: Size) -> tuple[int, ...]:
         """Return the types of these, 1 for those of the image."""
-        expanded = self._expand(size)
-        types = next((expanded[name] for name in _TYPE_INPUTS if name in expanded), None)
-        return tuple(types or (0,) * len(expanded["input_ids"]))
+        blank = self._blank(size)
+        types = next((blank[name] for name in _TYPE_INPUTS if name in blank), None)
+        if types is None:
+            return (0,) * blank["input_ids"].shape[1]
+        return tuple(types[0].tolist())
 
     def template_ids(self, placeholder_id: int) -> tuple[int, ...]:
         """Return the placeholder, between the config's markers unless the processor adds them."""
@@ -98,9 +99,7 @@ class ProcessorFamily(PlainFamily):
 
     def encode(self, images: Sequence[Image.Image]) -> list[EncodedImage]:
         """Return the model's features of each image."""
-        compute = (
-            getattr(self._model, "get_image_features", None) or self._model.model.get_image_features
-        )
+        compute = _core(self._model).get_image_features
         parameters = inspect.signature(compute).parameters
         encoded = []
         for image in images:
@@ -124,7 +123,7 @@ class ProcessorFamily(PlainFamily):
 
         A span that cuts no frame can be numbered alone: all positions shift with the first.
         """
-        rule = getattr(self._model.model, "get_rope_index", None)
+        rule = getattr(_core(self._model), "get_rope_index", None)
         if rule is None:
             return super().positions(ids, shapes, start)
         if not shapes:
@@ -133,25 +132,32 @@ class ProcessorFamily(PlainFamily):
             ids[None],
             mm_token_type_ids=(ids == self.slot_id).int()[None],
             image_grid_thw=torch.cat(
-                [self._grid(shape) for shape in shapes if not isinstance(shape, ClipShape)]
+                [
+                    self._blank(shape)["image_grid_thw"]
+                    for shape in shapes
+                    if not isinstance(shape, ClipShape)
+                ]
             ),
         )
         return positions + start
 
-    def _expand(self, size: Size) -> Mapping[str, list[int]]:
-        """Return ids and types of one image's tokens."""
-        if size not in self._expanded:
-            self._expanded[size] = expand_image_token(
-                self._processor, Image.new("RGB", size, "gray")
-            )
-        return self._expanded[size]
+    def _process(self, images: Sequence[Image.Image]) -> Mapping[str, torch.Tensor]:
+        """Return the output of the whole processor, which has settings for its image processor."""
+        return expand_image_token(self._processor, images)
 
-    def _grid(self, size: Size) -> torch.Tensor:
-        """Return an image's patches along time, height and width, (1, 3), on the CPU."""
-        if size not in self._grids:
-            inputs = self._image_processor(images=[Image.new("RGB", size)], return_tensors="pt")
-            self._grids[size] = inputs["image_grid_thw"]
-        return self._grids[size]
+    def _blank(self, size: Size) -> Mapping[str, torch.Tensor]:
+        """Return what the processor makes of one image of a size, but for its pixels."""
+        if size not in self._blanks:
+            inputs = self._process([Image.new("RGB", size, "gray")])
+            self._blanks[size] = {
+                name: value for name, value in inputs.items() if not value.is_floating_point()
+            }
+        return self._blanks[size]
+
+
+def _core(model: Any) -> Any:
+    """Return the model without its output layer, which a few architectures do not have apart."""
+    return getattr(model, "model", model)
 
 
 def _type_input(model: Any) -> str | None:
@@ -159,9 +165,10 @@ def _type_input(model: Any) -> str | None:
 
     With three-axis positions they are for the positions alone.
     """
-    if hasattr(model.model, "get_rope_index"):
+    core = _core(model)
+    if hasattr(core, "get_rope_index"):
         return None
-    parameters = inspect.signature(model.model.forward).parameters
+    parameters = inspect.signature(core.forward).parameters
     return next((name for name in _TYPE_INPUTS if name in parameters), None)
 
 

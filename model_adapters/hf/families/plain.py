@@ -52,7 +52,7 @@ class PlainFamily:
 
     def _inputs(self, images: Sequence[Image.Image]) -> Mapping[str, torch.Tensor]:
         """Return the image processor's output on the model's device, pixels in the model's type."""
-        inputs = self._image_processor(images=list(images), return_tensors="pt")
+        inputs = self._process(images)
         weight = self._model.get_input_embeddings().weight
         # Without weights (meta device) only shapes of pixels are used, but counts need values.
         counts = torch.device("cpu") if weight.is_meta else weight.device
@@ -62,3 +62,10 @@ class PlainFamily:
             else value.to(counts)
             for name, value in inputs.items()
         }
+
+    def _process(self, images: Sequence[Image.Image]) -> Mapping[str, torch.Tensor]:
+        """Return the image processor's output."""
+        inputs: Mapping[str, torch.Tensor] = self._image_processor(
+            images=list(images), return_tensors="pt"
+        )
+        return inputs
