@@ -98,8 +98,8 @@ class BranchAttention:
         self._n_prefix = n_prefix
         # Branch of each token behind the prefix.
         self._branches = torch.empty(0, dtype=torch.long, device=device)
-        # Position of each in prefix and branch.
-        self._positions = torch.empty(0, dtype=torch.long, device=device)
+        # Position of every token, the prefix's too, in prefix and branch.
+        self._positions = torch.arange(n_prefix, device=device)
         self._n_new = 0
         self._n_calls = 0
 
@@ -211,15 +211,15 @@ class BranchAttention:
             raise CannotBranchError("the model adds rules of its own to masks; set batch_size=1")
         if local_size is not None:
             self.windows.add(local_size)
-        new = slice(len(self._branches) - self._n_new, None)
-        prefix = torch.arange(self._n_prefix, device=self._positions.device)
         first = self._positions.new_zeros(1, 1, 1, 1)  # the only batch, and any head
         seen = mask_function(
             first,
             first,
-            self._positions[new][None, None, :, None],
-            torch.cat((prefix, self._positions))[None, None, None],
+            self._positions[-self._n_new :][None, None, :, None],
+            self._positions[None, None, None],
         )
-        own = self._branches == self._branches[new, None]
-        everyones = own.new_ones(self._n_new, self._n_prefix)
-        return seen & torch.cat((everyones, own), dim=-1)
+        if seen.shape[-2:] != (self._n_new, len(self._positions)):  # it goes by one of both
+            seen = seen.expand(1, 1, self._n_new, len(self._positions)).clone()
+        # In place, because a copy for every token would be as long as the context.
+        seen[..., self._n_prefix :] &= self._branches == self._branches[-self._n_new :, None]
+        return seen
