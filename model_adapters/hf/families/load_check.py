@@ -52,13 +52,12 @@ def check_loaded(model: TransformersModel | UncachedModel, processor: Any, pretr
         turns = [Turn("user", _sample(Path(folder)))]
         if isinstance(model, TransformersModel):
             _check_shared(model, turns, processor, pretrained)
+            _check_together(model, turns[0].parts[1], pretrained)
         else:
             _plain_logits(
                 model.loaded, _inputs(model.loaded, turns, processor, pretrained), pretrained
             )
             model.try_generate(turns)
-    if isinstance(model, TransformersModel) and model.capabilities.batch_size > 1:
-        _check_together(model)
 
 
 def require_same_ids(loaded: LoadedCheckpoint, processor: Any, pretrained: str, hint: str) -> None:
@@ -102,19 +101,22 @@ def _check_shared(
 
 
 @torch.inference_mode()
-def _check_together(model: TransformersModel) -> None:
+def _check_together(model: TransformersModel, frame: Part, pretrained: str) -> None:
     """Raise `ModelError` unless continuations answered together have the logits they have alone."""
-    widest = min(max(model.windows or (), default=0), _WIDEST)
-    prompts = _long_prompts(model, widest)
-    with _narrow_windows(model.loaded.model.get_decoder().config):
-        together = model.encode_together(prompts)
-        alone = torch.stack([model.encode(prompt) for prompt in prompts])
+    problem = f"{pretrained}: {model.loaded.model.config.model_type} cannot be asked in batches"
+    hint = "use batch_size=1"
+    # Any error is possible, as with shared prefixes.
+    with wrap_errors(problem, hint, catch=Exception, raise_as=ModelError):
+        if model.capabilities.batch_size == 1:
+            return
+        prompts = _long_prompts(model, frame, max(model.windows or (), default=0))
+        with _narrow_windows(model.loaded.model.get_decoder().config):
+            together = model.encode_together(prompts)
+            alone = torch.stack([model.encode(prompt) for prompt in prompts])
         model.forget()  # what was encoded with other windows
     if _differ(together, alone):
-        kind = model.loaded.model.config.model_type
         raise ModelError(
-            f"logits of continuations together differ from those alone: {kind} cannot be asked in "
-            "batches; use batch_size=1"
+            f"{problem} (logits of continuations together differ from those alone); {hint}"
         )
 
 
@@ -144,15 +146,18 @@ def _narrow_windows(config: Any) -> Iterator[None]:
         config._attn_implementation = kernel
 
 
-def _long_prompts(model: TransformersModel, widest: int) -> list[list[Piece]]:
-    """Return two prompts that share more tokens than the widest window has; one goes on for another
-    window."""
+def _long_prompts(model: TransformersModel, frame: Part, window: int) -> list[list[Piece]]:
+    """Return two prompts that share more text than the widest window; one goes on for another."""
+
+    def written(*texts: str) -> list[Piece]:
+        return model.pieces([Turn("user", (frame, "".join(texts)))])
+
     sentence = "The mug was on the table. "
-    n = 1
-    while n_tokens(model.pieces([Turn("user", (sentence * n,))])) <= widest + 16:
+    n = 2
+    while n_tokens(written(sentence * n)) - n_tokens(written(sentence)) <= min(window, _WIDEST):
         n *= 2
     endings = ("Is it there?", sentence * n + "And now?")
-    return [model.pieces([Turn("user", (sentence * n + ending,))]) for ending in endings]
+    return [written(sentence * n, ending) for ending in endings]
 
 
 def _inputs(loaded: LoadedCheckpoint, turns: list[Turn], processor: Any, pretrained: str) -> Any:

@@ -108,7 +108,9 @@ def test_masks_without_their_windows_are_found_when_a_checkpoint_is_loaded(
     settings = {**text, window: size}
     assert load_llava(settings).capabilities.batch_size == 64
     monkeypatch.setattr(BranchAttention, "_mask", ignore_windows)
-    with pytest.raises(ModelError, match=r"together differ from those alone: .* use batch_size=1$"):
+    with pytest.raises(
+        ModelError, match=r"in batches \(.*differ from those alone\); use batch_size=1$"
+    ):
         load_llava(settings)
     model = load_llava(settings, batch_size="1")
     assert getattr(model.loaded.model.get_decoder().config, window) == size
