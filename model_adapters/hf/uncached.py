@@ -29,7 +29,7 @@ from model_adapters.hf.prompting.rendering import Marks, render, starts_with_bos
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 
-__all__ = ["UncachedModel", "expand_image_token", "image_token", "process_turns"]
+__all__ = ["UncachedModel", "expand_image_tokens", "image_token", "n_image_tokens", "process_turns"]
 
 
 def process_turns(processor: Any, template: str, turns: Sequence[Turn]) -> Any:
@@ -54,10 +54,13 @@ def process_turns(processor: Any, template: str, turns: Sequence[Turn]) -> Any:
 def image_token(processor: Any) -> str:
     """Return the image token of chat templates, which the processor expands.
 
+    Processors look for their `image_token`. Most that have a `boi_token`, too, write it around what
+    they expand that to (Gemma 4, Cohere 2 Vision); the first ones have nothing else (Kosmos 2).
+
     Raises:
         ModelError: the processor names none.
     """
-    token = getattr(processor, "boi_token", None) or getattr(processor, "image_token", None)
+    token = getattr(processor, "image_token", None) or getattr(processor, "boi_token", None)
     if not isinstance(token, str):
         raise ModelError(
             f"{type(processor).__name__} names no image token, so its frames cannot be counted"
@@ -65,8 +68,19 @@ def image_token(processor: Any) -> str:
     return token
 
 
-def expand_image_token(processor: Any, images: Sequence[Image.Image]) -> Any:
-    """Return the tensors that the processor makes of image tokens and their images."""
+def n_image_tokens(processor: Any, image: Image.Image) -> int:
+    """Return the tokens of one more image in a prompt.
+
+    What the processor writes once around a whole prompt, or between two images for both, is not one
+    image's.
+    """
+    one, two = (expand_image_tokens(processor, [image] * n)["input_ids"].shape[1] for n in (1, 2))
+    return int(two - one)
+
+
+def expand_image_tokens(processor: Any, images: Sequence[Image.Image]) -> Any:
+    """Return the tensors that the processor makes of image tokens and their images, with what it
+    writes around every prompt."""
     return processor(
         text=[image_token(processor) * len(images)],
         images=[*images],
@@ -83,8 +97,9 @@ class _ForceReplyTokens(LogitsProcessor):
         self._reply = reply
 
     def __call__(self, input_ids: torch.LongTensor, scores: torch.FloatTensor) -> torch.FloatTensor:
+        n_before = len(self._reply.ids)
         extend_replies([(self._reply, scores[0])])
-        if not self._reply.done:
+        if len(self._reply.ids) > n_before:  # it did not end before this token
             scores[0, self._reply.ids[-1]] = torch.inf
         return scores
 
@@ -111,9 +126,9 @@ class UncachedModel(HfModel):
         self._processor = processor
 
     def tokens_per_frame(self, frame: FrameRef) -> int:
-        """Return the tokens of one frame, as the checkpoint's processor expands it."""
+        """Return the tokens of one more frame, as the checkpoint's processor expands it."""
         with wrap_model_errors(self.name):
-            return int(expand_image_token(self._processor, [frame.load()])["input_ids"].shape[1])
+            return n_image_tokens(self._processor, frame.load())
 
     @property
     def capabilities(self) -> Capabilities:
@@ -140,15 +155,29 @@ class UncachedModel(HfModel):
         with wrap_model_errors(self.name):
             return process_turns(self._processor, self._loaded.template, turns)
 
-    @torch.inference_mode()
+    def try_generate(self, turns: Sequence[Turn]) -> None:
+        """Have `generate` reply with two tokens, whatever the context limit is.
+
+        Raises:
+            ModelError: it fails, or does not return the tokens that are chosen here.
+        """
+        with torch_threads(self._threads):
+            self._generate(self._inputs(turns), Decoding(max_new_tokens=2))
+
     def _answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
         inputs = self._inputs(turns)
         n_context = int(inputs["input_ids"].shape[1])
         check_limit(self.name, n_context, decoding.max_new_tokens, self.capabilities.max_tokens)
-        reply = begin_reply(self._loaded, decoding, inputs["input_ids"][0].tolist())
+        return self._generate(inputs, decoding)
+
+    @torch.inference_mode()
+    def _generate(self, inputs: Any, decoding: Decoding) -> Reply:
+        """Reply to what the processor made of a conversation."""
+        context: list[int] = inputs["input_ids"][0].tolist()
+        reply = begin_reply(self._loaded, decoding, context)
         weight = self._loaded.model.get_input_embeddings().weight
-        with wrap_model_errors(self.name), wrap_memory_errors(self.name, n_context):
-            self._loaded.model.generate(
+        with wrap_model_errors(self.name), wrap_memory_errors(self.name, len(context)):
+            output = self._loaded.model.generate(
                 **inputs.to(weight.device, self._loaded.model.dtype),
                 do_sample=False,
                 repetition_penalty=1.0,
@@ -156,4 +185,22 @@ class UncachedModel(HfModel):
                 logits_processor=LogitsProcessorList([_ForceReplyTokens(reply)]),
                 stopping_criteria=StoppingCriteriaList([_StopWithReply(reply)]),
             )
-        return end_reply(self._loaded, reply, n_context, n_cached=0)
+        self._check_generated(output, context, reply)
+        return end_reply(self._loaded, reply, len(context), n_cached=0)
+
+    def _check_generated(self, output: Any, context: list[int], reply: ReplyState) -> None:
+        """Raise `ModelError` unless `generate` returned the reply's tokens, with or without an end
+        token: some models have their own `generate`, which ignores what chooses the tokens."""
+        # Settings of a checkpoint can make it an object with more.
+        ids = getattr(output, "sequences", output)[0].tolist()
+        if self._loaded.model.config.is_encoder_decoder:
+            ids = ids[1:]  # the token that a decoder starts with
+        elif ids[: len(context)] == context:
+            ids = ids[len(context) :]
+        n = len(reply.ids)
+        if not reply.done or ids[:n] != reply.ids or len(ids) > n + 1:
+            kind = type(self._loaded.model).__name__
+            raise ModelError(
+                f"{kind}.generate returns other tokens than were chosen ({len(ids)} and {n}): it "
+                "cannot be run without shared prefixes; use share_prefix=true"
+            )

@@ -9,9 +9,9 @@ from model_adapters.hf.families.hf_vlm import (
     ProcessorFamily,
     family_of,
     load_processor,
-    require_same_ids,
 )
 from model_adapters.hf.families.llava_onevision import LlavaOnevision
+from model_adapters.hf.families.load_check import require_same_ids
 from model_adapters.hf.families.pixtral import Pixtral
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VL
 from model_adapters.hf.family import MakeFamily

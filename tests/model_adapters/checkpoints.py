@@ -33,7 +33,18 @@ from model_adapters.built_in import BUILT_IN
 from model_adapters.tiny.tokenizer import train_tokenizer
 from model_adapters.tiny.twin import HEAD, HIDDEN, Twin
 
-__all__ = ["FAMILIES", "OTHERS", "save", "twin"]
+__all__ = [
+    "FAMILIES",
+    "OTHERS",
+    "TEMPLATE",
+    "TEXT",
+    "VISION",
+    "other_tokenizer",
+    "save",
+    "save_llava",
+    "save_parts",
+    "twin",
+]
 
 TEMPLATE = """\
 {%- for message in messages -%}
@@ -64,25 +75,29 @@ VISION = {
 }
 
 
-def _tokenizer(special: tuple[str, ...], **named: str) -> Any:
+def other_tokenizer(special: tuple[str, ...], **named: str) -> Any:
+    """Train a tokenizer that begins texts with <s>; `named` are the tokens that processors look
+    up."""
     return train_tokenizer(
         ("<s>", "</s>", *special), begin="<s>", end="</s>", pad="</s>", named=named
     )
 
 
-def _save(folder: Path, model: Any, processor: Any) -> None:
+def save_parts(folder: Path, model: Any, processor: Any) -> None:
+    """Write a checkpoint of a model and its processor."""
     model.generation_config.eos_token_id = processor.tokenizer.eos_token_id
     model.generation_config.pad_token_id = processor.tokenizer.eos_token_id
     model.save_pretrained(folder)  # in the form of this transformers
     processor.save_pretrained(folder)
 
 
-def _llava(folder: Path) -> None:
-    tokenizer = _tokenizer(("<image>",), image_token="<image>")
+def save_llava(folder: Path, **text: Any) -> None:
+    """Write a LLaVA; settings of the language model add to the usual ones or replace them."""
+    tokenizer = other_tokenizer(("<image>",), image_token="<image>")
     config = LlavaConfig(
         image_token_index=tokenizer.convert_tokens_to_ids("<image>"),
         vision_config={"model_type": "clip_vision_model", "initializer_factor": 10.0, **VISION},
-        text_config={"model_type": "llama", "vocab_size": len(tokenizer), **TEXT},
+        text_config={"model_type": "llama", "vocab_size": len(tokenizer), **TEXT, **text},
     )
     processor = LlavaProcessor(
         CLIPImageProcessorPil(size={"shortest_edge": 56}, crop_size={"height": 56, "width": 56}),
@@ -92,13 +107,13 @@ def _llava(folder: Path) -> None:
         num_additional_image_tokens=1,
         chat_template=TEMPLATE.replace("IMAGE", "<image>"),
     )
-    _save(folder, LlavaForConditionalGeneration(config), processor)
+    save_parts(folder, LlavaForConditionalGeneration(config), processor)
 
 
 def _idefics3(folder: Path) -> None:
     tiles = tuple(f"<row_{row}_col_{column}>" for row in range(1, 7) for column in range(1, 7))
     special = ("<image>", "<fake_token_around_image>", "<end_of_utterance>", "<global-img>", *tiles)
-    tokenizer = _tokenizer(special, image_token="<image>")
+    tokenizer = other_tokenizer(special, image_token="<image>")
     config = Idefics3Config(
         image_token_id=tokenizer.convert_tokens_to_ids("<image>"),
         scale_factor=2,
@@ -112,12 +127,12 @@ def _idefics3(folder: Path) -> None:
         image_seq_len=4,
         chat_template=TEMPLATE.replace("IMAGE", "<image>"),
     )
-    _save(folder, Idefics3ForConditionalGeneration(config), processor)
+    save_parts(folder, Idefics3ForConditionalGeneration(config), processor)
 
 
 def _deepseek_vl(folder: Path) -> None:
     """The smaller DeepSeek-VL (1.3B), which has no tower for high resolution."""
-    tokenizer = _tokenizer(("<image_placeholder>",), image_token="<image_placeholder>")
+    tokenizer = other_tokenizer(("<image_placeholder>",), image_token="<image_placeholder>")
     config = DeepseekVLConfig(
         image_token_id=tokenizer.convert_tokens_to_ids("<image_placeholder>"),
         tie_word_embeddings=False,
@@ -130,7 +145,7 @@ def _deepseek_vl(folder: Path) -> None:
         num_image_tokens=16,
         chat_template=TEMPLATE.replace("IMAGE", "<image_placeholder>"),
     )
-    _save(folder, DeepseekVLForConditionalGeneration(config), processor)
+    save_parts(folder, DeepseekVLForConditionalGeneration(config), processor)
 
 
 def _gemma3(folder: Path, line_breaks: tuple[str, ...] = ()) -> None:
@@ -144,7 +159,7 @@ def _gemma3(folder: Path, line_breaks: tuple[str, ...] = ()) -> None:
         "eoi_token": "<end_of_image>",
         "image_token": "<image_soft_token>",
     }
-    tokenizer = _tokenizer((*names.values(), *line_breaks), **names)
+    tokenizer = other_tokenizer((*names.values(), *line_breaks), **names)
     ids = {name: tokenizer.convert_tokens_to_ids(token) for name, token in names.items()}
     config = Gemma3Config(
         image_token_index=ids["image_token"],
@@ -167,12 +182,12 @@ def _gemma3(folder: Path, line_breaks: tuple[str, ...] = ()) -> None:
         image_seq_length=4,
         chat_template=TEMPLATE.replace("IMAGE", "<start_of_image>"),
     )
-    _save(folder, model, processor)
+    save_parts(folder, model, processor)
 
 
 FAMILIES = ("qwen2.5-vl", "llava-onevision", "deepseek-vl", "pixtral")
 OTHERS: dict[str, Callable[[Path], None]] = {
-    "llava": _llava,
+    "llava": save_llava,
     "idefics3": _idefics3,
     "deepseek-vl-1.3b": _deepseek_vl,
     "gemma3": _gemma3,

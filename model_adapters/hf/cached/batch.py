@@ -9,9 +9,9 @@ from model_adapters.hf.cached.branch_attention import BranchAttention
 from model_adapters.hf.cached.decoding import ReplyState, decode_replies
 from model_adapters.hf.cached.prefix import Prefix, chunks
 from model_adapters.hf.prompting.embedding import Embed, Span
-from model_adapters.hf.prompting.prompt import Piece
+from model_adapters.hf.prompting.prompt import Piece, token_ids
 
-__all__ = ["answer_together"]
+__all__ = ["answer_together", "encode_together"]
 
 _Span = tuple[int, Span]  # of a branch
 
@@ -93,7 +93,8 @@ class _Branches:
                 logits_to_keep=keep,
             )
         logits: torch.Tensor = output.logits[0]
-        return logits
+        # A few models return those of all tokens.
+        return logits[keep] if len(logits) == len(owners) else logits
 
 
 def answer_together(
@@ -115,3 +116,23 @@ def answer_together(
     branches = _Branches(model, embed, prefix, len(prompts))
     with prefix.extended(continuations, sum(reply.decoding.max_new_tokens for reply in replies)):
         decode_replies(branches.feed(continuations, chunk_tokens), branches.step, replies)
+
+
+def encode_together(
+    model: Any,
+    embed: Embed,
+    *,
+    prefix: Prefix,
+    continuations: Sequence[Sequence[Piece]],
+    chunk_tokens: int,
+) -> torch.Tensor:
+    """Encode continuations of a prefix, of two pieces or more; the last of each is a token of text
+    and fed as tokens of replies are.
+
+    Returns:
+        Logits of each next token, (continuations, vocabulary).
+    """
+    branches = _Branches(model, embed, prefix, len(continuations))
+    with prefix.extended(continuations, 0):
+        branches.feed([pieces[:-1] for pieces in continuations], chunk_tokens)
+        return branches.step(dict(enumerate(token_ids([pieces[-1] for pieces in continuations]))))

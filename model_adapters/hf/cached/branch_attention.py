@@ -1,33 +1,83 @@
 """Attention of several continuations of one prefix that stand behind it in one sequence.
 
-Every token attends to the prefix and to the earlier tokens of its own continuation. So keys and
-values of the prefix are stored once and read once for all continuations, as in Hydragen
-(arXiv:2402.05099).
+Every token attends to the prefix and to the earlier tokens of its own continuation, as far as the
+model lets it: which of them a layer sees (all, a window, a chunk) is asked of the model's own mask
+functions, with the positions that the tokens have in prefix and continuation. So keys and values of
+the prefix are stored once and read once for all continuations, as in Hydragen (arXiv:2402.05099).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import torch
 from torch import Tensor
 from torch.nn.functional import scaled_dot_product_attention
+from transformers.masking_utils import AttentionMaskInterface
 from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
 
 from infthor_eval.errors import ModelError
+from model_adapters.hf.cached.kv_cache import BufferedCache
+from model_adapters.hf.prompting.embedding import Span
 
-__all__ = ["BranchAttention", "can_branch"]
+__all__ = ["BranchAttention", "CannotBranchError", "layer_windows"]
 
 _NOT_COMPUTED = ("softcap", "s_aux", "position_bias")  # what some models add to the scores
 
 
-def can_branch(model: Any) -> bool:
-    """Return whether a model's attention can be replaced by `BranchAttention`."""
+class CannotBranchError(ModelError):
+    """A model attends in a way that `BranchAttention` cannot take the place of."""
+
+
+class _WatchedCache(BufferedCache):
+    """A cache that notes whether a model asks how long it is, other than for its masks.
+
+    Such a model (Llama 4 with its temperature by position) counts a token's position by what is
+    stored before it, which is wrong behind other branches.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.was_measured = False
+
+    def get_seq_length(self, layer_idx: int = 0) -> int:
+        """Return the number of stored tokens."""
+        self.was_measured = True
+        return super().get_seq_length(layer_idx)
+
+    def get_query_offset(self, layer_idx: int = 0) -> int:
+        """Return the number of stored tokens, for masks."""
+        return super().get_seq_length(layer_idx)
+
+
+@torch.inference_mode()
+def layer_windows(model: Any, words: Span) -> frozenset[int] | None:
+    """Return the windows and chunks, in tokens, that bound what layers attend to.
+
+    The model is run on two words as two branches, so that its own code says which masks it makes
+    and whether `BranchAttention` can take the place of its attention; None if it cannot.
+    """
     decoder = model.get_decoder()
     # Eager attention is chosen for what its model adds to the scores.
-    return bool(getattr(decoder, "_supports_attention_backend", False)) and (
-        decoder.config._attn_implementation != "eager"
-    )
+    if (
+        not getattr(decoder, "_supports_attention_backend", False)
+        or decoder.config._attn_implementation == "eager"
+    ):
+        return None
+    cache = _WatchedCache()
+    attention = BranchAttention(decoder.config, 0, words.positions.device)
+    try:
+        with attention.appended([0, 1], [0, 0]):
+            model(
+                **words.inputs,
+                position_ids=words.positions,
+                past_key_values=cache,
+                use_cache=True,
+                logits_to_keep=1,
+            )
+    except CannotBranchError:
+        return None
+    return None if cache.was_measured else frozenset(attention.windows)
 
 
 class BranchAttention:
@@ -37,17 +87,20 @@ class BranchAttention:
         config: config of the decoder.
         n_prefix: tokens of the prefix.
         device: device of the decoder's inputs.
+
+    Attributes:
+        windows: sizes of the windows and chunks that the model's masks had, in tokens.
     """
 
     def __init__(self, config: Any, n_prefix: int, device: torch.device) -> None:
+        self.windows: set[int] = set()
         self._config = config
         self._n_prefix = n_prefix
         # Branch of each token behind the prefix.
         self._branches = torch.empty(0, dtype=torch.long, device=device)
-        # Position of each in prefix and branch.
-        self._positions = torch.empty(0, dtype=torch.long, device=device)
+        # Position of every token, the prefix's too, in prefix and branch.
+        self._positions = torch.arange(n_prefix, device=device)
         self._n_new = 0
-        self._masks: dict[tuple[int | None, torch.device], Tensor] = {}
         self._n_calls = 0
 
     @contextmanager
@@ -59,27 +112,29 @@ class BranchAttention:
             n_before: number of tokens before each in its branch and the prefix.
 
         Raises:
-            ModelError: the decoder has layers that do not attend by transformers' interface.
+            CannotBranchError: the decoder has layers that do not attend by transformers' interface,
+                or with masks that are not made by transformers' functions of positions.
         """
         new = torch.tensor([branches, n_before]).to(self._branches.device)
         self._branches = torch.cat((self._branches, new[0]))
         self._positions = torch.cat((self._positions, new[1]))
         self._n_new = len(branches)
-        self._masks.clear()
         self._n_calls = 0
         name = f"branches_{id(self)}"
         before = self._config._attn_implementation
-        # transformers creates no mask for a name that it does not know. The function is put into
-        # the dictionary directly, because a registered one cannot be removed.
+        # The functions are put into the dictionaries directly, because registered ones cannot be
+        # removed; transformers looks for masks in that of the class.
+        masks = AttentionMaskInterface._global_mapping
         ALL_ATTENTION_FUNCTIONS[name] = self._attention
+        masks[name] = self._mask
         self._config._attn_implementation = name
         try:
             yield
         finally:
             self._config._attn_implementation = before
-            del ALL_ATTENTION_FUNCTIONS[name]
+            del ALL_ATTENTION_FUNCTIONS[name], masks[name]
         if self._n_calls != self._config.num_hidden_layers:
-            raise ModelError(
+            raise CannotBranchError(
                 "the model's layers do not all attend by transformers' interface; set batch_size=1"
             )
 
@@ -89,10 +144,9 @@ class BranchAttention:
         query: Tensor,
         key: Tensor,
         value: Tensor,
-        attention_mask: None,
+        attention_mask: Tensor | None,
         *,
         scaling: float | None = None,
-        sliding_window: int | None = None,
         **others: Any,
     ) -> tuple[Tensor, None]:
         """Return the attention of the new tokens, in the form of transformers' attention functions.
@@ -102,20 +156,23 @@ class BranchAttention:
             query: queries, (1, heads, new tokens, head size).
             key: keys, (1, key heads, all tokens, head size).
             value: values, like `key`.
-            attention_mask: None.
+            attention_mask: what `_mask` returned, handed on by the model.
             scaling: factor of the dot products; by the head size where None.
-            sliding_window: a token attends to fewer tokens than this before it; to all where None.
-            others: settings of some models.
+            others: settings of some models. Windows are among them, which the mask has already.
 
         Returns:
             The outputs, (1, new tokens, heads, head size), and None instead of weights.
 
         Raises:
-            ModelError: the model adds something to the scores.
+            CannotBranchError: the model adds something to the scores, or gives a layer no mask.
         """
         added = [name for name in _NOT_COMPUTED if others.get(name) is not None]
         if added:
-            raise ModelError(f"the model's attention has {added[0]}; set batch_size=1")
+            raise CannotBranchError(f"the model's attention has {added[0]}; set batch_size=1")
+        if attention_mask is None:
+            raise CannotBranchError(
+                "the model's masks are not all made by transformers' functions; set batch_size=1"
+            )
         self._n_calls += 1
         n_key_heads = key.shape[1]
         # Heads that share keys become the second axis, along which a view repeats keys without a
@@ -125,28 +182,44 @@ class BranchAttention:
             query.unflatten(1, shared)[0],
             key[0, :, None].expand(-1, shared[1], -1, -1),
             value[0, :, None].expand(-1, shared[1], -1, -1),
-            attn_mask=self._mask(sliding_window, query),
+            attn_mask=attention_mask[0, 0].to(query.device),  # a model can be on several devices
             scale=scaling,
         )
         return output.flatten(0, 1).transpose(0, 1)[None], None
 
-    def _mask(self, window: int | None, query: Tensor) -> Tensor:
-        """Return what is added to scores, (new tokens, all tokens): 0 or minus infinity."""
-        key = (window, query.device)  # a model can be on several devices
-        if key not in self._masks:
-            self._masks[key] = self._new_mask(window, query.dtype).to(query.device)
-        return self._masks[key]
+    def _mask(
+        self,
+        *,
+        mask_function: Callable[..., Tensor],
+        use_vmap: bool = False,
+        local_size: int | None = None,
+        **others: Any,
+    ) -> Tensor:
+        """Return which tokens the new ones attend to, (1, 1, new tokens, all tokens), true or
+        false, in the form of transformers' mask functions.
 
-    def _new_mask(self, window: int | None, dtype: torch.dtype) -> Tensor:
-        new = slice(len(self._branches) - self._n_new, None)
-        own = self._branches[new, None]
-        at = self._positions[new, None]
-        seen = (self._branches == own) & (self._positions <= at)
-        mask = torch.zeros(
-            self._n_new, self._n_prefix + len(self._branches), dtype=dtype, device=seen.device
+        Args:
+            mask_function: whether a token attends to another, by batch, head and both positions.
+            use_vmap: true if the model adds a rule of its own, which may go by more than positions.
+            local_size: the model's window or chunk in tokens, None without.
+            others: sizes of the sequence, which are known here.
+
+        Raises:
+            CannotBranchError: the model adds a rule of its own.
+        """
+        if use_vmap:
+            raise CannotBranchError("the model adds rules of its own to masks; set batch_size=1")
+        if local_size is not None:
+            self.windows.add(local_size)
+        first = self._positions.new_zeros(1, 1, 1, 1)  # the only batch, and any head
+        seen = mask_function(
+            first,
+            first,
+            self._positions[-self._n_new :][None, None, :, None],
+            self._positions[None, None, None],
         )
-        mask[:, self._n_prefix :].masked_fill_(~seen, -torch.inf)
-        if window is not None:
-            prefix = torch.arange(self._n_prefix, device=seen.device)
-            mask.masked_fill_(torch.cat((prefix, self._positions)) <= at - window, -torch.inf)
-        return mask
+        if seen.shape[-2:] != (self._n_new, len(self._positions)):  # it goes by one of both
+            seen = seen.expand(1, 1, self._n_new, len(self._positions)).clone()
+        # In place, because a copy for every token would be as long as the context.
+        seen[..., self._n_prefix :] &= self._branches == self._branches[-self._n_new :, None]
+        return seen

@@ -1,12 +1,13 @@
 """Any transformers model of a known family as a `Model`; conversations share an encoded prefix."""
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import torch
 
 from infthor_eval.errors import ModelError
-from model_adapters.hf.cached.batch import answer_together
-from model_adapters.hf.cached.branch_attention import can_branch
+from model_adapters.hf.cached.batch import answer_together, encode_together
+from model_adapters.hf.cached.branch_attention import layer_windows
 from model_adapters.hf.cached.decoding import ReplyState, decode_replies
 from model_adapters.hf.cached.prefix import Prefix
 from model_adapters.hf.cached.replies import begin_reply, end_reply
@@ -56,12 +57,36 @@ class TransformersModel(HfModel):
         del self._prefix, self._embed, self._rope
         super().close()
 
+    def forget(self) -> None:
+        """Drop the encoded sequence."""
+        self._prefix.reset()
+
     def encode(self, pieces: Sequence[Piece]) -> torch.Tensor:
         """Encode a prompt anew, in two parts; return the next token's logits, (vocabulary,)."""
         self._prefix.reset()
         self._prefix.rewind_to(pieces)
         self._prefix.feed(pieces[:2])
         return self._prefix.feed(pieces[2:])
+
+    def encode_together(self, prompts: Sequence[Sequence[Piece]]) -> torch.Tensor:
+        """Encode prompts anew as continuations of what they share; return each next token's logits,
+        (prompts, vocabulary).
+
+        The last piece of each is fed by itself, as tokens of replies are.
+
+        Raises:
+            ModelError: the model cannot answer continuations together.
+        """
+        common = n_common([prompt[:-1] for prompt in prompts])
+        self._prefix.reset()
+        self._prefix.feed(prompts[0][:common])
+        return encode_together(
+            self._loaded.model,
+            self._embed,
+            prefix=self._prefix,
+            continuations=[prompt[common:] for prompt in prompts],
+            chunk_tokens=self._options.chunk_tokens,
+        )
 
     def answer_each(
         self, conversations: Sequence[Sequence[Turn]], decoding: Decoding
@@ -80,11 +105,18 @@ class TransformersModel(HfModel):
 
     @property
     def _batch_size(self) -> int:
+        size = self._options.batch_size
+        return size if size > 1 and self.windows is not None else 1
+
+    @cached_property
+    def windows(self) -> frozenset[int] | None:
+        """Windows and chunks of the model's layers, in tokens; None if continuations cannot be
+        answered together."""
         # Branches have to share one prefix and one set of rotary frequencies.
-        branches = (
-            self._options.share_prefix and self._rope is None and can_branch(self._loaded.model)
-        )
-        return self._options.batch_size if branches else 1
+        if not self._options.share_prefix or self._rope is not None:
+            return None
+        with wrap_model_errors(self.name), torch_threads(self._threads):
+            return layer_windows(self._loaded.model, self._embed.words([0, 0], [0, 0]))
 
     def _answer_batch(self, prompts: Sequence[Sequence[Piece]], decoding: Decoding) -> list[Reply]:
         if not self._options.share_prefix:

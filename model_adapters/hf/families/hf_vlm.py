@@ -2,32 +2,27 @@
 
 A model of a known family runs as that family. For others, the processor says what a frame's
 placeholder expands to, the model's `get_image_features` encodes it, and the model merges that into
-the prompt by itself. When
-such a model is loaded, token ids and logits of a sample are compared with those of the processor
-and the plain model: an architecture that works differently is refused instead of giving wrong
-results. With share_prefix=false it is run by its own processor and `generate`, and the sample shows
-only that processor and model fit each other.
+the prompt by itself. With share_prefix=false it is run by its own processor and `generate`. When it
+is loaded, samples show that it is run as its own code does it (`load_check`): an architecture that
+works differently is refused instead of giving wrong results.
 """
 
 import functools
 import inspect
-import tempfile
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-import numpy as np
 import torch
 import transformers
 from PIL import Image
 from transformers.models.auto.modeling_auto import MODEL_FOR_IMAGE_TEXT_TO_TEXT_MAPPING_NAMES
 
 from infthor_eval.errors import ModelError, UsageError
-from infthor_eval.formats.frames import FrameRef
-from model_adapters.hf.adapter import load_model, wrap_mismatch_errors
+from model_adapters.hf.adapter import load_model
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.families.deepseek_vl import DeepseekVLFamily
 from model_adapters.hf.families.llava_onevision import LlavaOnevisionFamily
+from model_adapters.hf.families.load_check import check_loaded
 from model_adapters.hf.families.pixtral import PixtralFamily
 from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
@@ -38,21 +33,16 @@ from model_adapters.hf.loading.checkpoint import (
     locate,
     wrap_loading_errors,
 )
-from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.embedding import Embed
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.native import EncodedImage, NativeEmbedder
-from model_adapters.hf.prompting.prompt import Piece, Prompter, token_ids
-from model_adapters.hf.uncached import UncachedModel, expand_image_token, image_token, process_turns
+from model_adapters.hf.uncached import UncachedModel, expand_image_tokens, image_token
 from model_adapters.options.checkpoints import CheckpointReading
 from model_adapters.options.families import HfVlmOptions
-from model_adapters.protocols import Model, Part, Turn
+from model_adapters.protocols import Model
 
-__all__ = ["HfVlm", "ProcessorFamily", "family_of", "load_processor", "require_same_ids"]
+__all__ = ["HfVlm", "ProcessorFamily", "family_of", "load_processor"]
 
-# Relative to the largest logit; more in half precision.
-_TOLERANCE = {torch.float32: 1e-3, torch.float64: 1e-3}
-_HALF_TOLERANCE = 0.1
 # Inputs that tell tokens of images from others, by models' and processors' names for them.
 _TYPE_INPUTS = ("token_type_ids", "mm_token_type_ids")
 _BLANK = (300, 300)  # width and height of a sample image
@@ -143,7 +133,7 @@ class ProcessorFamily(PlainFamily):
 
     def _process(self, images: Sequence[Image.Image]) -> Mapping[str, torch.Tensor]:
         """Return the output of the whole processor, which has settings for its image processor."""
-        return expand_image_token(self._processor, images)
+        return expand_image_tokens(self._processor, images)
 
     def _blank(self, size: Size) -> Mapping[str, torch.Tensor]:
         """Return what the processor makes of one image of a size, but for its pixels."""
@@ -207,7 +197,7 @@ class HfVlm:
             model = TransformersModel(name, loaded, options)
         else:
             model = UncachedModel(name, loaded, processor, options)
-        _compare_with_plain_model(model, loaded, processor, options.pretrained)
+        check_loaded(model, processor, options.pretrained)
         return model
 
     @classmethod
@@ -262,58 +252,3 @@ def load_processor(located: LocatedCheckpoint[Any]) -> Any:
             f"{located.options.pretrained} has no processor of images and text together"
         )
     return processor
-
-
-def require_same_ids(loaded: LoadedCheckpoint, processor: Any, pretrained: str, hint: str) -> None:
-    """Refuse a checkpoint whose processor makes other token ids of a sample than the parts of a
-    conversation have.
-
-    Raises:
-        ModelError: the ids differ; the message ends in `hint`.
-    """
-    prompter = Prompter(loaded.tokenizer, loaded.template, loaded.family)
-    with tempfile.TemporaryDirectory() as folder, wrap_mismatch_errors(pretrained):
-        turns = [Turn("user", _sample(Path(folder)))]
-        _compare_ids(prompter.pieces(turns), process_turns(processor, loaded.template, turns), hint)
-
-
-def _compare_ids(pieces: Iterable[Piece], inputs: Any, hint: str) -> None:
-    if list(token_ids(pieces)) != inputs["input_ids"][0].tolist():
-        raise ModelError(f"token ids differ from the processor's: {hint}")
-
-
-@torch.inference_mode()
-def _compare_with_plain_model(
-    model: TransformersModel | UncachedModel,
-    loaded: LoadedCheckpoint,
-    processor: Any,
-    pretrained: str,
-) -> None:
-    """Raise `ModelError` unless a sample has the processor's ids and the plain model's logits."""
-    hint = (
-        f"{loaded.model.config.model_type} cannot be run with shared prefixes; use "
-        "share_prefix=false"
-    )
-    shared = None
-    with tempfile.TemporaryDirectory() as folder, wrap_mismatch_errors(pretrained):
-        turns = [Turn("user", _sample(Path(folder)))]
-        inputs = process_turns(processor, loaded.template, turns)
-        if isinstance(model, TransformersModel):
-            pieces = model.pieces(turns)
-            _compare_ids(pieces, inputs, hint)
-            shared = model.encode(pieces)
-        weight = loaded.model.get_input_embeddings().weight
-        plain = loaded.model(**inputs.to(weight.device, loaded.model.dtype)).logits[0, -1]
-    tolerance = _TOLERANCE.get(loaded.model.dtype, _HALF_TOLERANCE) * plain.abs().max()
-    if shared is not None and (shared - plain).abs().max() > tolerance:
-        raise ModelError(f"logits differ from the plain model's: {hint}")
-
-
-def _sample(folder: Path) -> tuple[Part, ...]:
-    draw = np.random.default_rng(0)
-    frames = []
-    for number, (height, width) in enumerate([(300, 300), (200, 280)]):
-        path = folder / f"{number}.png"
-        Image.fromarray(draw.integers(0, 256, (height, width, 3), dtype=np.uint8)).save(path)
-        frames.append(FrameRef(path))
-    return "The first view:\n", frames[0], "RotateLeft", frames[1], frames[0], "\nWhat do you see?"

@@ -87,7 +87,7 @@ BROKEN = {
         "llava",
         lambda folder: _edit(folder, "processor_config.json", patch_size=28),
         {},
-        "do not belong to one checkpoint",
+        "do they belong to one checkpoint?",
     ),
     "number of tokens, without sharing": (
         "hf-vlm",

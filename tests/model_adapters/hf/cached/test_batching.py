@@ -94,12 +94,16 @@ def test_a_model_that_does_not_attend_by_the_interface_is_refused_or_asked_alone
     model: Any = load("qwen2.5-vl-tiny", {}, seed=0)
     talk = model.conversation()
     talk.append(frames[0])
+    assert model.capabilities.batch_size == 64  # the model has been asked how it attends
     decoder = model._loaded.model.get_decoder()
     decoder.config.num_hidden_layers += 1  # as if a layer did something else
     with pytest.raises(
         ModelError, match="do not all attend by transformers' interface; set batch_size=1"
     ):
         talk.replies([["\nWhat?"], ["\nWho?"]], up_to(2))
+    other: Any = load("qwen2.5-vl-tiny", {}, seed=0)
+    other._loaded.model.get_decoder().config.num_hidden_layers += 1
+    assert other.capabilities.batch_size == 1
     decoder.config.num_hidden_layers -= 1
     assert len(talk.replies([["\nWhat?"], ["\nWho?"]], up_to(2))) == 2
     assert (
