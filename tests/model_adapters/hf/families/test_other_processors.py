@@ -248,7 +248,8 @@ def test_a_processor_expands_its_image_token_and_not_the_marker_of_its_begin() -
     images.patch_size = 3
     cohere = Cohere2VisionProcessor(images, tokenizer)
     assert image_token(cohere) == "<image>"
-    assert (
+    ids = expand_image_tokens(cohere, [Image.new("RGB", (60, 60))])["input_ids"]
+    assert ids.shape[1] == 1 + 3 * 3 + 1 + 1
         expand_image_tokens(cohere, [Image.new("RGB", (60, 60))])["input_ids"].shape[1]
         == 1 + 3 * 3 + 1 + 1
     )
