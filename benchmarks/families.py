@@ -24,8 +24,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 from tiny_families.checkpoint import save
+from tiny_families.crops import CROPS
 from tiny_families.grids import GRIDS
 from tiny_families.squares import SQUARES
+from tiny_families.tiles import TILES
 from tiny_families.trial import (
     PEERS,
     WAYS,
@@ -41,7 +43,7 @@ from infthor_eval.errors import InfthorError, ModelError, wrap_errors
 
 __all__ = ["FAMILIES", "Row", "main", "table", "try_families"]
 
-_ALL = {**GRIDS, **SQUARES}
+_ALL = {**GRIDS, **SQUARES, **TILES, **CROPS}
 # In the order of those that people bring.
 _ORDER = (
     "qwen2_vl",
