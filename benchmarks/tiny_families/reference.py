@@ -13,7 +13,7 @@ import transformers
 from PIL import Image, ImageOps
 from transformers.models.smolvlm import processing_smolvlm
 
-_TRANSFORMERS = cast(Any, transformers)  # whose loading functions are untyped
+_AUTO = cast(Any, transformers)  # whose loading functions are untyped
 
 
 def main() -> None:
@@ -34,12 +34,10 @@ def main() -> None:
 def _answer(
     folder: str, paths: list[str], questions: list[str], new_tokens: int
 ) -> list[list[int]]:
-    processor = _TRANSFORMERS.AutoProcessor.from_pretrained(folder)
+    processor = _AUTO.AutoProcessor.from_pretrained(folder)
     # As in the project: torchvision's resize gives other pixels.
-    processor.image_processor = _TRANSFORMERS.AutoImageProcessor.from_pretrained(
-        folder, backend="pil"
-    )
-    model = _TRANSFORMERS.AutoModelForImageTextToText.from_pretrained(folder).eval()
+    processor.image_processor = _AUTO.AutoImageProcessor.from_pretrained(folder, backend="pil")
+    model = _AUTO.AutoModelForImageTextToText.from_pretrained(folder).eval()
     frames: list[Image.Image] = [Image.open(path) for path in paths]
     asked = [(frames, question) for question in questions]
     asked.append(([ImageOps.invert(frame) for frame in frames], questions[0]))
