@@ -119,8 +119,11 @@ def main(words: Sequence[str] | None = None) -> None:
     options = _arguments(words)
     if options.torchvision:
         _start_again_with_torchvision()
-    with tempfile.TemporaryDirectory() as folder:
-        rows = try_families(options.families, Path(folder), options.frames, options.new_tokens)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            rows = try_families(options.families, Path(folder), options.frames, options.new_tokens)
+    except InfthorError as error:
+        sys.exit(str(error))
     text = report(rows)
     print(text)
     if options.out is not None:
