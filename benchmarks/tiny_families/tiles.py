@@ -78,6 +78,7 @@ def _llama4_config(vocabulary: Vocabulary) -> dict[str, Any]:
             num_local_experts=2,
             no_rope_layers=[1, 0],
             attention_chunk_size=WINDOW,
+            floor_scale=WINDOW,  # positions at which the temperature of attention changes
         ),
     }
 
