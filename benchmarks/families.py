@@ -24,8 +24,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 from tiny_families.checkpoint import save
+from tiny_families.crops import CROPS
 from tiny_families.grids import GRIDS
 from tiny_families.squares import SQUARES
+from tiny_families.tiles import TILES
 from tiny_families.trial import (
     PEERS,
     WAYS,
@@ -39,9 +41,9 @@ from tiny_families.trial import (
 
 from infthor_eval.errors import InfthorError, ModelError, wrap_errors
 
-__all__ = ["FAMILIES", "Row", "main", "table", "try_families"]
+__all__ = ["FAMILIES", "Row", "main", "report", "try_families"]
 
-_ALL = {**GRIDS, **SQUARES}
+_ALL = {**GRIDS, **SQUARES, **TILES, **CROPS}
 # In the order of those that people bring.
 _ORDER = (
     "qwen2_vl",
@@ -96,7 +98,8 @@ class Row:
         loads: whether `hf-vlm` loads it in some way.
         equal: number of replies equal to the reference's by way; None for a way that failed.
         asked: number of questions.
-        notes: what went wrong, and what replies were compared with if not with `generate`'s.
+        notes: what went wrong, a line each, as users see it.
+        reference: what replies were compared with: `generate`, `unshared`, or `-` for nothing.
     """
 
     name: str
@@ -104,6 +107,7 @@ class Row:
     equal: Mapping[str, int | None]
     asked: int
     notes: tuple[str, ...]
+    reference: str = "-"
 
     def right(self, *ways: str) -> bool:
         """Return whether all replies of these ways are equal to the reference's."""
@@ -115,9 +119,12 @@ def main(words: Sequence[str] | None = None) -> None:
     options = _arguments(words)
     if options.torchvision:
         _start_again_with_torchvision()
-    with tempfile.TemporaryDirectory() as folder:
-        rows = try_families(options.families, Path(folder), options.frames, options.new_tokens)
-    text = table(rows)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            rows = try_families(options.families, Path(folder), options.frames, options.new_tokens)
+    except InfthorError as error:
+        sys.exit(str(error))
+    text = report(rows)
     print(text)
     if options.out is not None:
         options.out.write_text(text + "\n", encoding="utf-8")
@@ -173,7 +180,7 @@ def try_families(
     return [
         _row(name, ask(made[name], work), expected[name])
         if name in made
-        else Row(name, False, dict.fromkeys(WAYS), len(_QUESTIONS), (f"not made: {unmade[name]}",))
+        else _unmade_row(name, unmade[name])
         for name in names
     ]
 
@@ -198,13 +205,19 @@ def _make(name: str, folder: Path) -> str | None:
     return None
 
 
+def _unmade_row(name: str, reason: str | None) -> Row:
+    return Row(name, False, dict.fromkeys(WAYS), len(_QUESTIONS), (f"not made: {reason}",))
+
+
 def _row(name: str, trial: Trial, reference: Replies | str) -> Row:
     notes = list(dict.fromkeys(trial.errors.values()))
     if isinstance(reference, str):
-        notes.append(f"compared with unshared, as generate fails: {reference}")
+        notes.append(f"transformers' own way fails: {reference}")
         expected = trial.replies.get("unshared", [])
+        compared = "unshared" if expected else "-"
     else:
         *expected, inverted = reference
+        compared = "generate"
         if inverted == expected[0]:
             notes.append("replies do not depend on the frames")
     return Row(
@@ -213,6 +226,7 @@ def _row(name: str, trial: Trial, reference: Replies | str) -> Row:
         equal={way: _n_equal(trial.replies.get(way), expected) for way in WAYS},
         asked=len(_QUESTIONS),
         notes=tuple(notes),
+        reference=compared,
     )
 
 
@@ -222,29 +236,33 @@ def _n_equal(replies: Replies | None, expected: Replies) -> int | None:
     return sum(ours == theirs for ours, theirs in zip(replies, expected, strict=False))
 
 
-def table(rows: Sequence[Row]) -> str:
-    """Return the rows and the totals in Markdown."""
+def report(rows: Sequence[Row]) -> str:
+    """Return the table, the totals and what went wrong, a line each, in Markdown."""
     lines = [
-        "| family | loads | equal alone | equal together | equal unshared | notes |",
+        "| family | loads | equal alone | equal together | equal unshared | compared with |",
         "|---|---|---|---|---|---|",
         *map(_line, rows),
+        "",
+        _totals(rows),
     ]
-    shares = sum(row.right("alone", "together") for row in rows)
-    only_unshared = sum(
-        row.right("unshared") and not row.right("alone", "together") for row in rows
-    )
-    loads = sum(row.loads for row in rows)
-    totals = (
-        f"**{shares} of {len(rows)} share with equal replies, alone and together; {only_unshared} "
-        f"run only unshared, equally; {len(rows) - loads} do not load.**"
-    )
-    return "\n".join([*lines, "", totals])
+    notes = [f"{row.name}: {note}" for row in rows for note in row.notes]
+    return "\n".join([*lines, "", "```", *notes, "```"] if notes else lines)
 
 
 def _line(row: Row) -> str:
     cells = ["-" if row.equal[way] is None else f"{row.equal[way]} of {row.asked}" for way in WAYS]
-    notes = "; ".join(row.notes).replace("|", "\\|")
-    return f"| {row.name} | {'yes' if row.loads else 'no'} | {' | '.join(cells)} | {notes} |"
+    words = [row.name, "yes" if row.loads else "no", *cells, row.reference]
+    return f"| {' | '.join(words)} |"
+
+
+def _totals(rows: Sequence[Row]) -> str:
+    shares = sum(row.right("alone", "together") for row in rows)
+    runs = sum(row.right("unshared") and not row.right("alone", "together") for row in rows)
+    loads = sum(row.loads for row in rows)
+    return (
+        f"**{shares} of {len(rows)} share with equal replies, alone and together; {runs} run only "
+        f"unshared, equally; {len(rows) - loads} do not load.**"
+    )
 
 
 if __name__ == "__main__":

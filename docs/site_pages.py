@@ -26,6 +26,7 @@ _OUTSIDE = {  # where a file lies in the repository: where its page stands in th
     "benchmarks/gpu.md": "benchmarks/gpu.md",
     "benchmarks/manipulation.md": "benchmarks/manipulation.md",
     "benchmarks/memories.md": "benchmarks/memories.md",
+    "benchmarks/families.md": "benchmarks/families.md",
     "benchmarks/plans.md": "benchmarks/plans.md",
     "benchmarks/simulator.md": "benchmarks/simulator.md",
     "benchmarks/speed.md": "benchmarks/speed.md",

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-from model_adapters.tiny.twin import HIDDEN
-from tiny_families.chats import CHATML, GLM, MISTRAL, Chat, headers
+from model_adapters.tiny.twin import HEAD, HIDDEN, SPREAD
+from tiny_families.chats import CHATML, GEMMA4, GLM, MISTRAL, Chat, headers
 from tiny_families.checkpoint import Family, Vocabulary
-from tiny_families.towers import GRID_TOWER, PATCH, TOWER, video
+from tiny_families.parts import GRID_TOWER, PATCH, SLIDING, TOWER, video
 
 __all__ = ["GRIDS"]
 
@@ -222,6 +222,43 @@ def _minicpm_config(vocabulary: Vocabulary) -> dict[str, Any]:
     }
 
 
+_GEMMA4_TOKENS = {
+    "boi_token": "<|image>",
+    "eoi_token": "<image|>",
+    "image_token": "<|image|>",
+    "boa_token": "<|audio>",
+    "eoa_token": "<audio|>",
+    "audio_token": "<|audio|>",
+}
+
+
+def _gemma4_config(vocabulary: Vocabulary) -> dict[str, Any]:
+    """As in the smaller published ones: inputs of each layer, the last layers' keys shared."""
+    return {
+        **{f"{name}_id": vocabulary[token] for name, token in _GEMMA4_TOKENS.items()},
+        "video_token_id": vocabulary["<|video|>"],
+        "audio_config": None,
+        "text_config": vocabulary.text(
+            **SLIDING | {"layer_types": 2 * SLIDING["layer_types"]},
+            num_hidden_layers=4,
+            num_kv_shared_layers=2,
+            global_head_dim=2 * HEAD,
+            hidden_size_per_layer_input=8,
+            vocab_size_per_layer_input=vocabulary.size,
+        ),
+        "vision_config": {
+            "hidden_size": 32,
+            "intermediate_size": 64,
+            "num_hidden_layers": 2,
+            "num_attention_heads": 2,
+            "num_key_value_heads": 2,
+            "head_dim": 16,
+            "position_embedding_size": 64,
+            "initializer_range": SPREAD,
+        },
+    }
+
+
 GRIDS = {
     "qwen2_vl": _qwen(
         _three_axes(4, 6, 6),
@@ -311,5 +348,18 @@ GRIDS = {
         },
         processor={"processor_class": "VideoLlama3Processor"},
         video=video("VideoLlama3VideoProcessor"),
+    ),
+    "gemma4": Family(
+        chat=GEMMA4,
+        image="\n\n<|image|>\n\n",
+        named=_GEMMA4_TOKENS,
+        special=("<|video|>",),
+        config=_gemma4_config,
+        images={"image_processor_type": "Gemma4ImageProcessor", "max_soft_tokens": 70},
+        processor={
+            "processor_class": "Gemma4Processor",
+            "feature_extractor": {"feature_extractor_type": "Gemma4AudioFeatureExtractor"},
+        },
+        video=video("Gemma4VideoProcessor"),
     ),
 }

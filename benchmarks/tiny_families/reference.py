@@ -7,17 +7,20 @@ the ids of each family's replies, the last of them on inverted frames, or one li
 
 import json
 import sys
-from typing import Any
+from typing import Any, cast
 
+import transformers
 from PIL import Image, ImageOps
-from transformers import AutoImageProcessor, AutoModelForImageTextToText, AutoProcessor
 from transformers.models.smolvlm import processing_smolvlm
+
+_AUTO = cast(Any, transformers)  # whose loading functions are untyped
 
 
 def main() -> None:
     """Answer the questions that the standard input has."""
     # SmolVLM's processor insists on a package that it writes videos' times with; here are none.
-    processing_smolvlm.num2words = processing_smolvlm.num2words or str
+    smolvlm = cast(Any, processing_smolvlm)
+    smolvlm.num2words = smolvlm.num2words or str
     work = json.load(sys.stdin)
     answers: dict[str, Any] = {}
     for name, folder in work["folders"].items():
@@ -31,11 +34,11 @@ def main() -> None:
 def _answer(
     folder: str, paths: list[str], questions: list[str], new_tokens: int
 ) -> list[list[int]]:
-    processor = AutoProcessor.from_pretrained(folder)
+    processor = _AUTO.AutoProcessor.from_pretrained(folder)
     # As in the project: torchvision's resize gives other pixels.
-    processor.image_processor = AutoImageProcessor.from_pretrained(folder, backend="pil")
-    model = AutoModelForImageTextToText.from_pretrained(folder).eval()
-    frames = [Image.open(path) for path in paths]
+    processor.image_processor = _AUTO.AutoImageProcessor.from_pretrained(folder, backend="pil")
+    model = _AUTO.AutoModelForImageTextToText.from_pretrained(folder).eval()
+    frames: list[Image.Image] = [Image.open(path) for path in paths]
     asked = [(frames, question) for question in questions]
     asked.append(([ImageOps.invert(frame) for frame in frames], questions[0]))
     return [_reply(processor, model, *each, new_tokens) for each in asked]
@@ -59,7 +62,7 @@ def _reply(
     output = model.generate(
         **inputs.to(model.device, model.dtype), do_sample=False, max_new_tokens=new_tokens
     )
-    reply = output[0, inputs["input_ids"].shape[1] :].tolist()
+    reply: list[int] = output[0, inputs["input_ids"].shape[1] :].tolist()
     ends = model.generation_config.eos_token_id
     return reply[:-1] if reply and reply[-1] in ends else reply
 

@@ -77,20 +77,22 @@ def test_a_family_that_cannot_be_made_stops_no_other(families, tmp_path, monkeyp
     assert (bad_row.loads, good_row.loads) == (False, True)
 
 
-def test_the_table_has_a_row_for_each_and_the_totals(families):
+def test_the_table_has_a_row_for_each_the_totals_and_what_went_wrong(families):
     ways = dict.fromkeys(families.WAYS, 5)
     rows = [
-        families.Row("a", True, ways, 5, ()),
-        families.Row("b", True, {**ways, "alone": None, "together": None}, 5, ("a | b",)),
-        families.Row("c", True, {**ways, "together": 0}, 5, ()),
+        families.Row("a", True, ways, 5, (), "generate"),
+        families.Row("b", True, ways | {"alone": None, "together": None}, 5, ("no",), "unshared"),
+        families.Row("c", True, ways | {"together": 0}, 5, (), "generate"),
         families.Row("d", False, dict.fromkeys(families.WAYS), 5, ("not made: no",)),
     ]
-    table = families.table(rows)
-    assert "| a | yes | 5 of 5 | 5 of 5 | 5 of 5 |  |" in table
-    assert "| b | yes | - | - | 5 of 5 | a \\| b |" in table
-    assert "1 of 4 share" in table
-    assert "2 run only unshared" in table
-    assert "1 do not load" in table
+    text = families.report(rows)
+    assert "| a | yes | 5 of 5 | 5 of 5 | 5 of 5 | generate |" in text
+    assert "| b | yes | - | - | 5 of 5 | unshared |" in text
+    assert "| d | no | - | - | - | - |" in text
+    assert "**1 of 4 share with equal replies, alone and together; 2 run only" in text
+    assert "1 do not load" in text
+    assert text.endswith("```\nb: no\nd: not made: no\n```")
+    assert "```" not in families.report(rows[:1])
 
 
 def test_replies_are_compared_with_unshared_where_generate_fails(families):
@@ -98,10 +100,8 @@ def test_replies_are_compared_with_unshared_where_generate_fails(families):
     trial = families.Trial({"alone": replies, "unshared": [*replies[:4], (9,)]}, {"together": "x"})
     row = families._row("a", trial, "ImportError: none")
     assert dict(row.equal) == {"alone": 4, "together": None, "unshared": 5}
-    assert row.notes == (
-        "x",
-        "compared with unshared, as generate fails: ImportError: no torchvision",
-    )
+    assert row.notes == ("x", "transformers' own way fails: ImportError: none")
+    assert row.reference == "unshared"
 
 
 def test_an_unknown_family_is_one_line(families, capsys):

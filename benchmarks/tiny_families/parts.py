@@ -1,5 +1,5 @@
-"""Vision towers and image processors that several families share: images of 56 pixels in patches of
-14, 4 x 4 of them."""
+"""Parts that several families share: towers for images of 56 pixels in 4 x 4 patches of 14, image
+processors, and windows of attention."""
 
 from typing import Any
 
@@ -8,9 +8,12 @@ from model_adapters.tiny.twin import HIDDEN, SPREAD
 __all__ = [
     "GRID_TOWER",
     "PATCH",
+    "PINPOINTS",
     "SIDE",
+    "SLIDING",
     "SQUARE",
     "TOWER",
+    "WINDOW",
     "got_images",
     "siglip",
     "tower",
@@ -20,6 +23,14 @@ __all__ = [
 SIDE = 56
 PATCH = 14
 SQUARE = {"height": SIDE, "width": SIDE}
+# Sizes of an image in tiles.
+PINPOINTS = [[SIDE, 2 * SIDE], [2 * SIDE, SIDE], [2 * SIDE, 2 * SIDE]]
+# Tokens; shorter than the trial's context, so that a window that is not kept shows in the replies.
+WINDOW = 64
+SLIDING: dict[str, Any] = {
+    "layer_types": ["sliding_attention", "full_attention"],
+    "sliding_window": WINDOW,
+}
 TOWER = {
     "hidden_size": 32,
     "intermediate_size": 64,
