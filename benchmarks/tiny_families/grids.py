@@ -137,6 +137,7 @@ def _ernie_config(vocabulary: Vocabulary) -> dict[str, Any]:
         **{f"{name}_id": vocabulary[token] for name, token in _ERNIE_TOKENS.items()},
         "text_config": vocabulary.text(
             **_three_axes(6, 6, 4),
+            num_hidden_layers=3,  # what frames become in the second reaches words in the third
             moe_num_experts=4,
             moe_k=2,
             moe_num_shared_experts=1,

@@ -43,8 +43,8 @@ from model_adapters.protocols import Model
 
 __all__ = ["HfVlm", "ProcessorFamily", "family_of", "load_processor"]
 
-# Inputs that tell tokens of images from others, by models' and processors' names for them.
-_TYPE_INPUTS = ("token_type_ids", "mm_token_type_ids")
+# Inputs that say which tokens are of images, of which models make masks or positions.
+_MASK_TYPES = ("token_type_ids", "mm_token_type_ids")
 _BLANK = (300, 300)  # width and height of a sample image
 
 R = TypeVar("R", bound=CheckpointReading)
@@ -59,10 +59,18 @@ class ProcessorFamily(PlainFamily):
 
     def __init__(self, model: Any, image_processor: Any, tokenizer: Any, processor: Any) -> None:
         super().__init__(model, image_processor, tokenizer)
+        self._tokenizer = tokenizer
         self._processor = processor
         self.placeholder_id = tokenizer.convert_tokens_to_ids(image_token(processor))
         self._blanks: dict[Size, Mapping[str, torch.Tensor]] = {}
-        self.type_input = _type_input(model)
+        by_attention = not hasattr(_core(model), "get_rope_index")  # else types are for positions
+        types = self._types_by_id()
+        self.mask_types: Mapping[str, Mapping[int, int]] = {
+            name: types[name] for name in _MASK_TYPES if by_attention and name in types
+        }
+        self.token_types: Mapping[str, Mapping[int, int]] = {
+            name: types[name] for name in types if name not in _MASK_TYPES
+        }
 
     def make_embed(self, max_bytes: int) -> Embed:
         """Return what prepares spans of prompts, with a cache of so many bytes of features."""
@@ -71,14 +79,6 @@ class ProcessorFamily(PlainFamily):
     def frame_ids(self, size: Size) -> tuple[int, ...]:
         """Return the ids that the processor expands the placeholder of one image to."""
         return tuple(self._blank(size)["input_ids"][0].tolist())
-
-    def frame_types(self, size: Size) -> tuple[int, ...]:
-        """Return the types of these, 1 for those of the image."""
-        blank = self._blank(size)
-        types = next((blank[name] for name in _TYPE_INPUTS if name in blank), None)
-        if types is None:
-            return (0,) * blank["input_ids"].shape[1]
-        return tuple(types[0].tolist())
 
     def template_ids(self, placeholder_id: int) -> tuple[int, ...]:
         """Return the placeholder, between the config's markers unless the processor adds them."""
@@ -135,6 +135,28 @@ class ProcessorFamily(PlainFamily):
         """Return the output of the whole processor, which has settings for its image processor."""
         return expand_image_tokens(self._processor, images)
 
+    def _types_by_id(self) -> dict[str, dict[int, int]]:
+        """Return the types that the processor gives tokens of images and around them, by id, for
+        each input of the model that has such."""
+        accepted = {
+            *inspect.signature(self._model.forward).parameters,
+            *inspect.signature(_core(self._model).forward).parameters,
+        }
+        ids = self.template_ids(self.placeholder_id)
+        text = "".join(self._tokenizer.convert_ids_to_tokens(list(ids)))
+        blank = self._processor(
+            text=[text],
+            images=[Image.new("RGB", _BLANK)],
+            add_special_tokens=False,
+            return_tensors="pt",
+        )
+        written = blank["input_ids"][0].tolist()
+        return {
+            name: dict(zip(written, values[0].tolist(), strict=True))
+            for name, values in blank.items()
+            if name in accepted and name.endswith("token_type_ids")
+        }
+
     def _blank(self, size: Size) -> Mapping[str, torch.Tensor]:
         """Return what the processor makes of one image of a size, but for its pixels."""
         if size not in self._blanks:
@@ -148,18 +170,6 @@ class ProcessorFamily(PlainFamily):
 def _core(model: Any) -> Any:
     """Return the model without its output layer, which a few architectures do not have apart."""
     return getattr(model, "model", model)
-
-
-def _type_input(model: Any) -> str | None:
-    """Return the model's input of token types, if its attention depends on them.
-
-    With three-axis positions they are for the positions alone.
-    """
-    core = _core(model)
-    if hasattr(core, "get_rope_index"):
-        return None
-    parameters = inspect.signature(core.forward).parameters
-    return next((name for name in _TYPE_INPUTS if name in parameters), None)
 
 
 def _markers(config: Any) -> tuple[int, int] | None:

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import torch
 from PIL import Image
 
-from model_adapters.hf.family import Family, Size
+from model_adapters.hf.family import Family
 from model_adapters.hf.prompting.embedding import Span, piece_starts
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.prompt import Frame, Piece, token_ids
@@ -21,6 +21,7 @@ __all__ = ["EncodedImage", "MergingFamily", "NativeEmbedder"]
 
 # Outputs of vision encoders that are not for the language model, if `pooler_output` is there.
 _INNER = ("last_hidden_state", "hidden_states", "attentions")
+_ENCODED = "mm_encoder_outputs"  # the model's input
 _BY_LAYER = ("deepstack_features",)  # one entry for each layer, not for each image
 
 
@@ -86,17 +87,16 @@ class MergingFamily(Family, Protocol):
     """A family whose model merges frames into the prompt by itself.
 
     Attributes:
-        type_input: the model's input that tells tokens of images from others, if its attention
-            depends on it; else None.
+        mask_types: inputs of the model that tell which tokens attend to each other in both
+            directions, by name: types by token id, 0 for all others.
+        token_types: other inputs of one value for each token, likewise.
     """
 
-    type_input: str | None
+    mask_types: Mapping[str, Mapping[int, int]]
+    token_types: Mapping[str, Mapping[int, int]]
 
     def encode(self, images: Sequence[Image.Image]) -> list[EncodedImage]:
         """Return what the vision encoder makes of each image."""
-
-    def frame_types(self, size: Size) -> tuple[int, ...]:
-        """Return the types of a frame's tokens, as the processor gives them."""
 
 
 class NativeEmbedder:
@@ -112,7 +112,7 @@ class NativeEmbedder:
     @property
     def sees_ahead(self) -> bool:
         """True if tokens of a frame attend to later ones of the same frame."""
-        return self._family.type_input is not None
+        return bool(self._family.mask_types)
 
     @torch.inference_mode()
     def __call__(self, pieces: Sequence[Piece], start: int, before: Sequence[Piece]) -> Span:
@@ -127,10 +127,10 @@ class NativeEmbedder:
         starts, end = piece_starts(pieces, positions, start)
         inputs: dict[str, Any] = {"input_ids": ids[None].to(self._device)}
         if frames:
-            inputs["mm_encoder_outputs"] = {"image": EncodedImage.join(self._features.get(frames))}
-            if self._family.type_input is not None:
-                types = [kind for piece in (*before, *pieces) for kind in self._types(piece)]
-                inputs[self._family.type_input] = torch.tensor([types], device=self._device)
+            inputs[_ENCODED] = {"image": EncodedImage.join(self._features.get(frames))}
+            # Masks are made of the whole sequence.
+            inputs |= self._types(self._family.mask_types, [*before, *pieces])
+        inputs |= self._types(self._family.token_types, pieces)
         return Span(inputs, positions.to(self._device), starts, end)
 
     @torch.inference_mode()
@@ -145,17 +145,28 @@ class NativeEmbedder:
     def join(self, spans: Sequence[Span]) -> Mapping[str, Any]:
         """Return the inputs of several spans as those of one sequence; none sees ahead."""
         inputs: dict[str, Any] = {
-            "input_ids": torch.cat([span.inputs["input_ids"] for span in spans], dim=-1)
+            name: torch.cat([span.inputs[name] for span in spans], dim=-1)
+            for name in ("input_ids", *self._family.token_types)
         }
-        encoded = [span.inputs["mm_encoder_outputs"] for span in spans if len(span.inputs) > 1]
+        encoded = [
+            EncodedImage(span.inputs[_ENCODED]["image"])
+            for span in spans
+            if _ENCODED in span.inputs
+        ]
         if encoded:
-            images = [EncodedImage(outputs["image"]) for outputs in encoded]
-            inputs["mm_encoder_outputs"] = {"image": EncodedImage.join(images)}
+            inputs[_ENCODED] = {"image": EncodedImage.join(encoded)}
         return inputs
 
     def clear(self) -> None:
         """Free the memory of cached features."""
         self._features.clear()
 
-    def _types(self, piece: Piece) -> tuple[int, ...]:
-        return self._family.frame_types(piece.size) if isinstance(piece, Frame) else (0,)
+    def _types(
+        self, inputs: Mapping[str, Mapping[int, int]], pieces: Sequence[Piece]
+    ) -> dict[str, torch.Tensor]:
+        """Return inputs of one value for each token, (1, tokens)."""
+        ids = [*token_ids(pieces)] if inputs else []
+        return {
+            name: torch.tensor([[types.get(token, 0) for token in ids]], device=self._device)
+            for name, types in inputs.items()
+        }

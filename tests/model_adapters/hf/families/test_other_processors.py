@@ -250,9 +250,6 @@ def test_a_processor_expands_its_image_token_and_not_the_marker_of_its_begin() -
     assert image_token(cohere) == "<image>"
     ids = expand_image_tokens(cohere, [Image.new("RGB", (60, 60))])["input_ids"]
     assert ids.shape[1] == 1 + 3 * 3 + 1 + 1
-        expand_image_tokens(cohere, [Image.new("RGB", (60, 60))])["input_ids"].shape[1]
-        == 1 + 3 * 3 + 1 + 1
-    )
 
 
 def test_a_model_that_only_fails_with_shared_prefixes_is_said_to_run_without(
