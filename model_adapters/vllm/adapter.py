@@ -8,7 +8,6 @@ from model_adapters.hf.families.hf_vlm import (
     HfVlm,
     ProcessorFamily,
     family_of,
-    load_processor,
 )
 from model_adapters.hf.families.llava_onevision import LlavaOnevision
 from model_adapters.hf.families.load_check import require_same_ids
@@ -21,6 +20,7 @@ from model_adapters.hf.loading.checkpoint import (
     build_meta_model,
     read_checkpoint,
 )
+from model_adapters.hf.loading.processors import load_processor
 from model_adapters.vllm.arguments import frame_limit, model_arguments, token_limit
 from model_adapters.vllm.cpu import check_head_size, runs_on_cpu
 from model_adapters.vllm.engine import Engine, import_vllm

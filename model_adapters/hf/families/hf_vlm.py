@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 import torch
-import transformers
 from PIL import Image
 from transformers.models.auto.modeling_auto import MODEL_FOR_IMAGE_TEXT_TO_TEXT_MAPPING_NAMES
 
@@ -31,8 +30,8 @@ from model_adapters.hf.loading.checkpoint import (
     LocatedCheckpoint,
     load_checkpoint,
     locate,
-    wrap_loading_errors,
 )
+from model_adapters.hf.loading.processors import load_processor
 from model_adapters.hf.prompting.embedding import Embed
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.native import EncodedImage, NativeEmbedder
@@ -41,7 +40,7 @@ from model_adapters.options.checkpoints import CheckpointReading
 from model_adapters.options.families import HfVlmOptions
 from model_adapters.protocols import Model
 
-__all__ = ["HfVlm", "ProcessorFamily", "family_of", "load_processor"]
+__all__ = ["HfVlm", "ProcessorFamily", "family_of"]
 
 # Inputs that say which tokens are of images, of which models make masks or positions.
 _MASK_TYPES = ("token_type_ids", "mm_token_type_ids")
@@ -243,22 +242,3 @@ def family_of(config: Any) -> MakeFamily | None:
     if config.model_type == "llava" and config.vision_config.model_type == "pixtral":
         return PixtralFamily
     return families.get(config.model_type)
-
-
-def load_processor(located: LocatedCheckpoint[Any]) -> Any:
-    """Return the checkpoint's processor of images and text, for architectures without a family.
-
-    Raises:
-        ModelError: the checkpoint has none, or it cannot be loaded.
-    """
-    remote = {"trust_remote_code": located.options.trust_remote_code}
-    with wrap_loading_errors(located.options.pretrained):
-        processor = transformers.AutoProcessor.from_pretrained(located.folder, **remote)
-        processor.image_processor = transformers.AutoImageProcessor.from_pretrained(
-            located.folder, backend="pil", **remote
-        )
-    if not hasattr(processor, "tokenizer"):
-        raise ModelError(
-            f"{located.options.pretrained} has no processor of images and text together"
-        )
-    return processor

@@ -21,8 +21,9 @@ import torch
 from PIL import Image
 from transformers import StoppingCriteriaList
 
-from model_adapters.hf.families.hf_vlm import ProcessorFamily, family_of, load_processor
+from model_adapters.hf.families.hf_vlm import ProcessorFamily, family_of
 from model_adapters.hf.loading.checkpoint import load_checkpoint, locate
+from model_adapters.hf.loading.processors import load_processor
 from model_adapters.options.checkpoints import CheckpointOptions
 from model_adapters.policies.decoding import embed_ids
 from model_adapters.policies.openvla.adapter import OpenVLA

@@ -1,0 +1,86 @@
+"""Loading a checkpoint's processor of images and text, without the parts that nothing here uses.
+
+transformers loads a processor whole, with its part for videos, which needs torchvision. Frames are
+given as images, so that part is left out.
+"""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import transformers
+from transformers.models.auto.processing_auto import PROCESSOR_MAPPING
+
+from infthor_eval.errors import ModelError
+from infthor_eval.formats.reading import read_json
+from model_adapters.hf.loading.checkpoint import LocatedCheckpoint, wrap_loading_errors
+
+__all__ = ["load_processor"]
+
+_VIDEO = "video_processor"
+# Files that may name the processor's class, in transformers' order.
+_NAMING = ("processor_config.json", "preprocessor_config.json", "tokenizer_config.json")
+_PACKAGE = re.compile(r"Package `(\w+)` is required|requires the (\w+) library")
+
+
+def load_processor(located: LocatedCheckpoint[Any]) -> Any:
+    """Return the checkpoint's processor, for architectures without a family.
+
+    Raises:
+        ModelError: the checkpoint has none, it cannot be loaded, or it needs a package that is not
+            installed.
+    """
+    pretrained = located.options.pretrained
+    remote = {"trust_remote_code": located.options.trust_remote_code}
+    with wrap_loading_errors(pretrained):
+        try:
+            processor = _processor_class(located).from_pretrained(located.folder, **remote)
+            processor.image_processor = transformers.AutoImageProcessor.from_pretrained(
+                located.folder, backend="pil", **remote
+            )
+        except ImportError as error:
+            raise ModelError(_missing_package(pretrained, str(error))) from error
+    if not hasattr(processor, "tokenizer"):
+        raise ModelError(f"{pretrained} has no processor of images and text together")
+    return processor
+
+
+def _processor_class(located: LocatedCheckpoint[Any]) -> Any:
+    """Return the class of the processor without its video part; for code of the checkpoint's own
+    and for what transformers does not know, the class that finds it out."""
+    name = _class_name(located.folder)
+    named = None if name is None else getattr(transformers, name, None)
+    processor_class: Any = named or PROCESSOR_MAPPING.get(type(located.config), None)
+    if processor_class is None or not hasattr(processor_class, "get_attributes"):
+        return transformers.AutoProcessor
+    attributes = processor_class.get_attributes()
+    if _VIDEO not in attributes:
+        return processor_class
+    # transformers loads what a class has by this, and checks its arguments by it.
+    left = [attribute for attribute in attributes if attribute != _VIDEO]
+    changes = {"get_attributes": classmethod(lambda _: left), _VIDEO: None}
+    return type(processor_class.__name__, (processor_class,), changes)
+
+
+def _class_name(folder: Path) -> str | None:
+    """Return the name of the processor's class in the files, if it is one of transformers."""
+    for name in _NAMING:
+        path = folder / name
+        settings = read_json(path, "restore the checkpoint's files") if path.exists() else {}
+        if "AutoProcessor" in settings.get("auto_map", {}):
+            return None
+        if "processor_class" in settings:
+            return str(settings["processor_class"])
+    return None
+
+
+def _missing_package(pretrained: str, message: str) -> str:
+    """Return what to do about a package that a processor needs."""
+    found = _PACKAGE.search(message)
+    package = next(filter(None, found.groups()), "").lower() if found else ""
+    if not package:
+        return (
+            f"the processor of {pretrained} needs a package that is not installed, most likely "
+            "torchvision: pip install torchvision"
+        )
+    return f"the processor of {pretrained} needs {package}: pip install {package}"
