@@ -36,8 +36,8 @@ class _WatchedCache(BufferedCache):
     stored before it, which is wrong behind other branches.
     """
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, config: Any) -> None:
+        super().__init__(config)
         self.was_measured = False
 
     def get_seq_length(self, layer_idx: int = 0) -> int:
@@ -64,7 +64,9 @@ def layer_windows(model: Any, words: Span) -> frozenset[int] | None:
         or decoder.config._attn_implementation == "eager"
     ):
         return None
-    cache = _WatchedCache()
+    cache = _WatchedCache(decoder.config)
+    if cache.needs_marks:  # some layers keep one state for all branches
+        return None
     attention = BranchAttention(decoder.config, 0, words.positions.device)
     try:
         with attention.appended([0, 1], [0, 0]):

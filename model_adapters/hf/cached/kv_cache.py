@@ -11,6 +11,8 @@ from typing import Any
 import torch
 from transformers.cache_utils import Cache, DynamicLayer
 
+from model_adapters.hf.cached.linear_states import LinearStates, linear_layers
+
 __all__ = ["BufferedCache"]
 
 # capacities are multiples of this, so that a slightly longer question does not reallocate the
@@ -32,16 +34,24 @@ class _Allocation:
 
 
 class BufferedCache(Cache):
-    """A cache of `BufferedLayer`s, which are created as the model reaches its layers."""
+    """A cache of `BufferedLayer`s, which are created as the model reaches its layers.
 
-    def __init__(self, storage: torch.device | None = None) -> None:
-        """Create an empty cache with buffers on the device `storage`, or the weights' where None.
+    Layers without keys, of linear attention or convolutions, have transformers' own caches.
+    """
+
+    def __init__(self, config: Any, storage: torch.device | None = None) -> None:
+        """Create an empty cache for a decoder with this config, with buffers on the device
+        `storage`, or the weights' where None.
 
         With the CPU as storage, only the computing layer's keys and values are on the weights'
         device: a context that does not fit on the device runs, at the speed of the connection.
         """
         self._allocation = _Allocation(storage)
+        self._linear = linear_layers(config)
+        self._states = LinearStates([*self._linear.values()]) if self._linear else None
         super().__init__(layers=[])
+        if self._linear:  # masks of such a model are made by its first layer that attends
+            self._create_layers(config.num_hidden_layers)
 
     def update(
         self,
@@ -52,19 +62,44 @@ class BufferedCache(Cache):
         **kwargs: Any,
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Append one layer's new states to its old ones and return all."""
-        while len(self.layers) <= layer_idx:
-            self.layers.append(BufferedLayer(self._allocation))
+        self._create_layers(layer_idx + 1)
         return super().update(key_states, value_states, layer_idx, *args, **kwargs)
 
     def reserve(self, n_tokens: int) -> None:
         """Set the capacity of buffers allocated from now on, so that they need not grow."""
         self._allocation.capacity = -(-n_tokens // _STEP) * _STEP
 
+    @property
+    def needs_marks(self) -> bool:
+        """True if the cache can be cut at marks and its end alone."""
+        return self._states is not None
+
+    def mark(self) -> None:
+        """Let the cache be cut here later, if it needs marks."""
+        if self._states is not None:
+            self._states.mark(self.get_seq_length())
+
+    def cut_before(self, n_tokens: int) -> int:
+        """Return the most tokens, of so many, behind which the cache can be cut."""
+        if self._states is None or n_tokens == self.get_seq_length():
+            return n_tokens
+        return self._states.nearest(n_tokens)
+
     def truncate(self, n_tokens: int) -> None:
-        """Keep the first `n_tokens` tokens; memory stays allocated."""
+        """Keep the first `n_tokens` tokens, one of the numbers of `cut_before`; memory stays
+        allocated."""
         excess = self.get_seq_length() - n_tokens
-        if excess > 0:
-            self.crop(-excess)
+        if excess <= 0:
+            return
+        for layer in self.layers:
+            if isinstance(layer, BufferedLayer):
+                layer.crop(-excess)
+        if self._states is not None:
+            self._states.restore(n_tokens)
+
+    def _create_layers(self, n_layers: int) -> None:
+        for number in range(len(self.layers), n_layers):
+            self.layers.append(self._linear.get(number) or BufferedLayer(self._allocation))
 
 
 class BufferedLayer(DynamicLayer):

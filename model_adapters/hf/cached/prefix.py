@@ -6,6 +6,7 @@ most that a long prompt needs. Chunks attend to the cache, so the numbers differ
 pass only by rounding.
 """
 
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -56,7 +57,7 @@ class Prefix:
 
     def reset(self) -> None:
         """Drop the sequence and free its memory."""
-        self._cache = BufferedCache(self._storage)
+        self._cache = BufferedCache(self._model.get_decoder().config, self._storage)
         self._pieces: list[Piece] = []
         self._ends: list[int] = []  # tokens up to the end of each piece
         # Position behind everything before each piece, and of the next token.
@@ -108,6 +109,8 @@ class Prefix:
             if ours is not theirs and ours != theirs:
                 break
             shared += 1
+        n_tokens = self._cache.cut_before(self._ends[shared - 1] if shared else 0)
+        shared = bisect_right(self._ends, n_tokens, hi=shared)
         self.cut(shared)
         return shared
 
@@ -142,11 +145,23 @@ class Prefix:
         """
         self._cache.reserve(self.n_tokens + n_tokens(pieces) + reserve)
         logits = None
-        for chunk in chunks(pieces, self._chunk_tokens):
+        shown, asked = self._parts(pieces)
+        for chunk in chunks(shown, self._chunk_tokens):
+            logits = self._forward(chunk)
+        if shown:
+            self._cache.mark()
+        for chunk in chunks(asked, self._chunk_tokens):
             logits = self._forward(chunk)
         if logits is None:
             raise ValueError("nothing to feed")
         return logits
+
+    def _parts(self, pieces: Sequence[Piece]) -> tuple[Sequence[Piece], Sequence[Piece]]:
+        """Return pieces up to the last frame, behind which prompts on the same frames differ, and
+        the others; a cache that can be cut anywhere gets all at once."""
+        ends = [at for at, piece in enumerate(pieces, 1) if not isinstance(piece, int)]
+        n = ends[-1] if ends and self._cache.needs_marks else 0
+        return pieces[:n], pieces[n:]
 
     @torch.inference_mode()
     def _forward(self, chunk: list[Piece]) -> torch.Tensor:

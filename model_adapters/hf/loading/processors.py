@@ -1,7 +1,7 @@
-"""Loading a checkpoint's processor of images and text, without the parts that nothing here uses.
+"""Loading a checkpoint's processor of images and text.
 
 transformers loads a processor whole, with its part for videos, which needs torchvision. Frames are
-given as images, so that part is left out.
+given as images, so that part is left out where torchvision is not installed.
 """
 
 import re
@@ -10,6 +10,7 @@ from typing import Any
 
 import transformers
 from transformers.models.auto.processing_auto import PROCESSOR_MAPPING
+from transformers.utils import is_torchvision_available
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.reading import read_json
@@ -46,12 +47,16 @@ def load_processor(located: LocatedCheckpoint[Any]) -> Any:
 
 
 def _processor_class(located: LocatedCheckpoint[Any]) -> Any:
-    """Return the class of the processor without its video part; for code of the checkpoint's own
-    and for what transformers does not know, the class that finds it out."""
+    """Return the class of the processor without its video part; the class that finds it out where
+    torchvision is installed, and for code of the checkpoint's own."""
     name = _class_name(located.folder)
     named = None if name is None else getattr(transformers, name, None)
     processor_class: Any = named or PROCESSOR_MAPPING.get(type(located.config), None)
-    if processor_class is None or not hasattr(processor_class, "get_attributes"):
+    if (
+        is_torchvision_available()
+        or processor_class is None
+        or not hasattr(processor_class, "get_attributes")
+    ):
         return transformers.AutoProcessor
     attributes = processor_class.get_attributes()
     if _VIDEO not in attributes:

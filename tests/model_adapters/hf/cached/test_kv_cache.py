@@ -1,7 +1,7 @@
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-from transformers import DynamicCache
+from transformers import DynamicCache, LlamaConfig
 
 from model_adapters.hf.cached.kv_cache import BufferedCache
 
@@ -18,7 +18,7 @@ def _states(n_tokens: int, generator: torch.Generator) -> tuple[torch.Tensor, to
 @given(OPERATIONS)
 def test_holds_what_a_dynamic_cache_holds(operations: list[int]) -> None:
     generator = torch.Generator().manual_seed(0)
-    ours, theirs = BufferedCache(), DynamicCache()
+    ours, theirs = BufferedCache(LlamaConfig()), DynamicCache()
     for count in operations:
         length = ours.get_seq_length()
         if count > 0:
@@ -36,7 +36,7 @@ def test_holds_what_a_dynamic_cache_holds(operations: list[int]) -> None:
 
 def test_neither_a_cut_nor_a_refill_moves_memory() -> None:
     generator = torch.Generator().manual_seed(0)
-    cache = BufferedCache()
+    cache = BufferedCache(LlamaConfig())
     cache.reserve(100)
     cache.update(*_states(60, generator), 0)
     layer = cache.layers[0]
@@ -51,7 +51,7 @@ def test_neither_a_cut_nor_a_refill_moves_memory() -> None:
 
 def test_grows_beyond_what_was_reserved() -> None:
     generator = torch.Generator().manual_seed(0)
-    cache = BufferedCache()
+    cache = BufferedCache(LlamaConfig())
     cache.reserve(10)
     first, _ = _states(1000, generator)
     cache.update(first, first, 0)
