@@ -1,6 +1,8 @@
 """Tiny checkpoints of many families: replies of `hf-vlm` are those of transformers' own way."""
 
 import importlib
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -13,6 +15,15 @@ from ..helpers.benchmarks import FOLDER
 SHARE = {
     "qwen2_vl",
     "qwen2_5_vl",
+    "qwen3_vl",
+    "qwen3_vl_moe",
+    "qwen3_5",
+    "glm4v",
+    "glm46v",
+    "glm4v_moe",
+    "ernie4_5_vl_moe",
+    "gemma3",
+    "internvl",
     "llava_onevision",
     "llava",
     "llava_next",
@@ -21,7 +32,11 @@ SHARE = {
     "idefics3",
     "aya_vision",
     "janus",
+    "ovis2",
+    "video_llama_3",
 }
+# They need torchvision.
+SHARE_WITH_TORCHVISION = {"gemma4", "llama4", "mistral3", "cohere2_vision", "lfm2_vl"}
 KNOWN_WRONG = {("janus", "unshared")}  # its `generate` drops the processor that makes a reply
 SIX = ("qwen2_vl", "qwen3_vl", "gemma3", "idefics3", "llava", "aya_vision")
 
@@ -57,6 +72,14 @@ def test_six_families_reply_as_transformers_does(families, tmp_path):
 def test_all_families_reply_as_transformers_does(families, tmp_path):
     assert len(families.FAMILIES) == 32
     require(families.try_families(list(families.FAMILIES), tmp_path))
+
+
+@pytest.mark.slow
+def test_families_whose_processor_needs_torchvision_share_with_it():
+    names = ",".join(sorted(SHARE_WITH_TORCHVISION))
+    command = [sys.executable, FOLDER / "families.py", "--torchvision", "--families", names]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert f"**{len(SHARE_WITH_TORCHVISION)} of {len(SHARE_WITH_TORCHVISION)} share" in run.stdout
 
 
 def test_a_family_that_cannot_be_made_stops_no_other(families, tmp_path, monkeypatch):

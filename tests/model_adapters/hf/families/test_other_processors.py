@@ -240,6 +240,16 @@ def test_janus_replies_as_its_generate_with_shared_prefixes(
     assert model.tokens_per_frame(frames[0]) == 16 + 2
 
 
+@pytest.mark.parametrize("save", [_idefics2, _mllama, _paligemma], ids=lambda save: save.__name__)
+def test_an_architecture_that_would_be_run_wrongly_is_refused(
+    save: Callable[[Path], None], tmp_path: Path
+) -> None:
+    torch.manual_seed(0)
+    save(tmp_path)
+    with pytest.raises(ModelError, match=r"with shared prefixes.*; use share_prefix=false"):
+        _load(tmp_path)
+
+
 def test_a_processor_expands_its_image_token_and_not_the_marker_of_its_begin() -> None:
     names = {"image_token": "<image>", "boi_token": "<boi>", "eoi_token": "<eoi>"}
     tokenizer = other_tokenizer((*names.values(), "<line>"), **names, img_line_break_token="<line>")
@@ -256,7 +266,9 @@ def test_a_model_that_only_fails_with_shared_prefixes_is_said_to_run_without(
     tmp_path: Path, frames: list[FrameRef]
 ) -> None:
     torch.manual_seed(0)
-    save_llava(tmp_path, model_type="lfm2", layer_types=["conv", "full_attention"])
+    # Layers that attend and keep a state, too.
+    sizes = {"mamba_d_ssm": 64, "mamba_n_heads": 4, "mamba_d_head": 16, "mamba_d_state": 8}
+    save_llava(tmp_path, model_type="falcon_h1", mamba_n_groups=1, mamba_chunk_size=16, **sizes)
     with pytest.raises(
         ModelError, match=r"llava cannot be run with shared .* \(.+\); use share_prefix=false$"
     ):
