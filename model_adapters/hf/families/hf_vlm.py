@@ -7,9 +7,9 @@ is loaded, samples show that it is run as its own code does it (`load_check`): a
 works differently is refused instead of giving wrong results.
 """
 
-import functools
 import inspect
 from collections.abc import Mapping, Sequence
+from functools import cached_property, partial
 from typing import Any, TypeVar
 
 import torch
@@ -62,14 +62,19 @@ class ProcessorFamily(PlainFamily):
         self._processor = processor
         self.placeholder_id = tokenizer.convert_tokens_to_ids(image_token(processor))
         self._blanks: dict[Size, Mapping[str, torch.Tensor]] = {}
-        by_attention = not hasattr(_core(model), "get_rope_index")  # else types are for positions
-        types = self._types_by_id()
-        self.mask_types: Mapping[str, Mapping[int, int]] = {
-            name: types[name] for name in _MASK_TYPES if by_attention and name in types
-        }
-        self.token_types: Mapping[str, Mapping[int, int]] = {
-            name: types[name] for name in types if name not in _MASK_TYPES
-        }
+
+    @cached_property
+    def mask_types(self) -> Mapping[str, Mapping[int, int]]:
+        """Inputs that say which tokens attend to each other in both directions; see
+        `MergingFamily`."""
+        if hasattr(_core(self._model), "get_rope_index"):  # they are for the positions alone
+            return {}
+        return {name: self._types[name] for name in _MASK_TYPES if name in self._types}
+
+    @cached_property
+    def token_types(self) -> Mapping[str, Mapping[int, int]]:
+        """Other inputs of one value for each token; see `MergingFamily`."""
+        return {name: self._types[name] for name in self._types if name not in _MASK_TYPES}
 
     def make_embed(self, max_bytes: int) -> Embed:
         """Return what prepares spans of prompts, with a cache of so many bytes of features."""
@@ -134,7 +139,8 @@ class ProcessorFamily(PlainFamily):
         """Return the output of the whole processor, which has settings for its image processor."""
         return expand_image_tokens(self._processor, images)
 
-    def _types_by_id(self) -> dict[str, dict[int, int]]:
+    @cached_property
+    def _types(self) -> dict[str, dict[int, int]]:
         """Return the types that the processor gives tokens of images and around them, by id, for
         each input of the model that has such."""
         accepted = {
@@ -201,7 +207,7 @@ class HfVlm:
             return load_model(name, located, family)
         processor = load_processor(located)
         model: TransformersModel | UncachedModel
-        loaded = load_checkpoint(located, functools.partial(ProcessorFamily, processor=processor))
+        loaded = load_checkpoint(located, partial(ProcessorFamily, processor=processor))
         if options.share_prefix:
             model = TransformersModel(name, loaded, options)
         else:

@@ -84,16 +84,16 @@ def _tensors(value: Any) -> list[torch.Tensor]:
 
 
 class MergingFamily(Family, Protocol):
-    """A family whose model merges frames into the prompt by itself.
+    """A family whose model merges frames into the prompt by itself."""
 
-    Attributes:
-        mask_types: inputs of the model that tell which tokens attend to each other in both
-            directions, by name: types by token id, 0 for all others.
-        token_types: other inputs of one value for each token, likewise.
-    """
+    @property
+    def mask_types(self) -> Mapping[str, Mapping[int, int]]:
+        """Inputs of the model that say which tokens attend to each other in both directions, by
+        name: types by token id, 0 for all others."""
 
-    mask_types: Mapping[str, Mapping[int, int]]
-    token_types: Mapping[str, Mapping[int, int]]
+    @property
+    def token_types(self) -> Mapping[str, Mapping[int, int]]:
+        """Other inputs of the model of one value for each token, likewise."""
 
     def encode(self, images: Sequence[Image.Image]) -> list[EncodedImage]:
         """Return what the vision encoder makes of each image."""

@@ -233,7 +233,7 @@ def test_any_size_of_the_feature_cache_gives_the_same_reply(
         talk.append(*frames, "\nWhat?")
         replies.append(talk.reply(up_to(NEW)).token_ids)
     assert replies[0] == replies[1]
-    assert model._features._bytes <= int(megabytes) * 2**20
+    assert model._embed._features._bytes <= int(megabytes) * 2**20
 
 
 def test_stop_strings_end_the_reply(tiny: Any, frames: list[FrameRef]) -> None:
@@ -297,7 +297,7 @@ def test_out_of_memory_names_the_size_and_the_model_goes_on(
     tiny._prefix.reset()
     with pytest.raises(ModelError, match=f"out of memory on a context of {talk.n_tokens} tokens"):
         talk.reply(up_to(NEW))
-    assert tiny._features._bytes == tiny._prefix.n_tokens == 0
+    assert tiny._embed._features._bytes == tiny._prefix.n_tokens == 0
     monkeypatch.undo()
     other = plain.conversation()
     other.append(*talk.turns[0].parts)

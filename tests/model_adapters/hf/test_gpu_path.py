@@ -47,7 +47,7 @@ def _tiny(family: str, options: Mapping[str, str]) -> Any:
 
 def _forget(model: Any) -> None:
     model._prefix.reset()
-    model._features.clear()
+    model._embed.clear()
 
 
 @pytest.mark.parametrize("mode", [*MODES, "mapped"])
@@ -213,10 +213,10 @@ def test_memory_that_runs_out_is_free_for_the_next_request(
 ) -> None:
     model = _tiny("qwen2.5-vl", {"batch_size": batch_size, "chunk_tokens": "40"})
     _asked(model, frames[:4])
-    family, bare = model._loaded.family, model._loaded.model
+    cache, bare = model._embed._features, model._loaded.model
     with monkeypatch.context() as patched:
         if where == "in a frame's features":
-            patched.setattr(family, "features", _failing_after(family.features, 0))
+            patched.setattr(cache, "_compute_frames", _failing_after(cache._compute_frames, 0))
         else:
             patched.setattr(
                 bare, "forward", _failing_after(bare.forward, 2 if where == "in a question" else 5)
