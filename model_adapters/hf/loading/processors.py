@@ -5,6 +5,8 @@ given as images, so that part is left out where torchvision is not installed.
 """
 
 import re
+from functools import partialmethod
+from inspect import Parameter, signature
 from pathlib import Path
 from typing import Any
 
@@ -39,8 +41,14 @@ def load_processor(located: LocatedCheckpoint[Any]) -> Any:
             processor.image_processor = transformers.AutoImageProcessor.from_pretrained(
                 located.folder, backend="pil", **remote
             )
-        except ImportError as error:
-            raise ModelError(_missing_package(pretrained, str(error))) from error
+        # Without torchvision, its classes are missing in many ways.
+        except Exception as error:
+            package = _missing_package(error)
+            if package is None:
+                raise
+            raise ModelError(
+                f"the processor of {pretrained} needs {package}: pip install {package}"
+            ) from error
     if not hasattr(processor, "tokenizer"):
         raise ModelError(f"{pretrained} has no processor of images and text together")
     return processor
@@ -63,7 +71,9 @@ def _processor_class(located: LocatedCheckpoint[Any]) -> Any:
         return processor_class
     # transformers loads what a class has by this, and checks its arguments by it.
     left = [attribute for attribute in attributes if attribute != _VIDEO]
-    changes = {"get_attributes": classmethod(lambda _: left), _VIDEO: None}
+    changes: dict[str, Any] = {"get_attributes": classmethod(lambda _: left), _VIDEO: None}
+    if signature(processor_class.__init__).parameters[_VIDEO].default is Parameter.empty:
+        changes["__init__"] = partialmethod(processor_class.__init__, **{_VIDEO: None})
     return type(processor_class.__name__, (processor_class,), changes)
 
 
@@ -79,13 +89,9 @@ def _class_name(folder: Path) -> str | None:
     return None
 
 
-def _missing_package(pretrained: str, message: str) -> str:
-    """Return what to do about a package that a processor needs."""
-    found = _PACKAGE.search(message)
-    package = next(filter(None, found.groups()), "").lower() if found else ""
-    if not package:
-        return (
-            f"the processor of {pretrained} needs a package that is not installed, most likely "
-            "torchvision: pip install torchvision"
-        )
-    return f"the processor of {pretrained} needs {package}: pip install {package}"
+def _missing_package(error: Exception) -> str | None:
+    """Return the package that a processor could not be loaded without, if that was the reason."""
+    found = _PACKAGE.search(str(error))
+    if found is not None:
+        return next(filter(None, found.groups())).lower()
+    return None if is_torchvision_available() else "torchvision"
