@@ -117,8 +117,8 @@ def command(
     """Fine-tune a model, and write a checkpoint that its family's adapter loads.
 
     Recipes of the package: infthor_32k, infthor_64k and infthor_130k (the paper's, Table 5),
-    questions, and two that train the small model from scratch: small, as it is bundled, and tiny,
-    in a quarter of the time. Others are YAML files of the same form.
+    questions, and two that train a small model from scratch: tiny, and small, which is larger and
+    takes longer. Others are YAML files of the same form.
 
     If it is stopped, the same command continues. Workers share the generation of the data of small
     and tiny.

@@ -93,11 +93,12 @@ class QuestionSampler:
         self._synthetic_questions = SyntheticQuestions(dataset.seen)
         self._tails: dict[AskedText, TrainingSequence] = {}
         self.skipped: list[SkippedSequence] = []
-        self._episodes: dict[tuple[str, ...], _Episode] = {}
+        episodes: dict[tuple[str, ...], _Episode] = {}
         for folder in folders:
-            self._read(folder, limit)
+            self._read(folder, limit, episodes)
+        self._episodes = [*episodes.values()]
         by_worlds: dict[int, list[tuple[_Episode, _Worlds]]] = defaultdict(list)
-        for episode in self._episodes.values():
+        for episode in self._episodes:
             by_worlds[len(episode.views)] += [(episode, worlds) for worlds in episode.questions]
         self._singles, self._pairs = by_worlds[1], by_worlds[_N_WORLDS]
 
@@ -105,7 +106,7 @@ class QuestionSampler:
         """Return True if there is any recorded question."""
         return bool(self._episodes)
 
-    def _read(self, folder: Path, limit: int) -> None:
+    def _read(self, folder: Path, limit: int, episodes: dict[tuple[str, ...], _Episode]) -> None:
         """Read the questions of a set; of twins, those that can be asked in both worlds."""
         samples = find_samples({"data": str(folder), "context": "clues"})
         for skipped in samples.skipped:
@@ -119,13 +120,10 @@ class QuestionSampler:
                 by_pair[sample.question.pair or sample.question.id].append(sample)
         for worlds in by_pair.values():
             if len(worlds) == (_N_WORLDS if worlds[0].question.pair else 1):
-                self._add(samples.data, tuple(worlds))
-
-    def _add(self, data: NiehSet, worlds: _Worlds) -> None:
-        names = tuple(sample.question.traj_id for sample in worlds)
-        if names not in self._episodes:
-            self._episodes[names] = _Episode(tuple(data.frames(name) for name in names))
-        self._episodes[names].questions.append(worlds)
+                names = tuple(sample.question.traj_id for sample in worlds)
+                if names not in episodes:
+                    episodes[names] = _Episode(tuple(map(samples.data.frames, names)))
+                episodes[names].questions.append(tuple(worlds))
 
     def draw(self, rng: random.Random, progress: float) -> list[TrainingSequence]:
         """Return the questions of a step, with their answers.
@@ -149,7 +147,7 @@ class QuestionSampler:
 
         There are none if the frames show nothing to ask for.
         """
-        view = rng.choice(rng.choice([*self._episodes.values()]).views)
+        view = rng.choice(rng.choice(self._episodes).views)
         most = 1 + round(rng.random() ** 2 * (self._settings.synthetic_frames - 1) * grown)
         frames = [view[at] for at in sorted(rng.sample(range(len(view)), min(most, len(view))))]
         seen = [self._dataset.seen[self._index_by_digest[frame.digest]] for frame in frames]
@@ -173,7 +171,7 @@ class QuestionSampler:
 
     def _on_trajectory(self, rng: random.Random) -> list[TrainingSequence]:
         """Return questions on a whole trajectory; of twins, in both worlds."""
-        episode = rng.choice([*self._episodes.values()])
+        episode = rng.choice(self._episodes)
         n = min(len(episode.questions), self._settings.per_trajectory)
         questions = rng.sample(episode.questions, n)
         return self._in_all_worlds(episode, range(episode.last_view + 1), questions)

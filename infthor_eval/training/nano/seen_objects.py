@@ -7,6 +7,7 @@ from typing import NamedTuple
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.step_log import (
     ObjectInFrame,
     ObjectState,
@@ -15,7 +16,7 @@ from infthor_eval.formats.step_log import (
 )
 from infthor_eval.training.data import trajectory_names
 
-__all__ = ["SeenFrame", "SeenObject", "object_type", "read_seen_frames"]
+__all__ = ["SeenFrame", "SeenObject", "read_seen_frames"]
 
 # smallest object that counts as shown: a thousandth of a 300 x 300 frame, as in the questions
 _LEAST_PIXELS = 90
@@ -46,13 +47,6 @@ class SeenFrame(NamedTuple):
 
     frame: FrameRef
     objects: tuple[SeenObject, ...]
-
-
-def object_type(key: str) -> str:
-    """Return the type in an object's id; that of the part or slice for "...|SinkBasin" and
-    "...|AppleSliced_1"."""
-    first, *_, last = key.split("|")
-    return last.partition("_")[0] if last[:1].isalpha() else first
 
 
 def read_seen_frames(folders: Iterable[Path]) -> list[SeenFrame]:
@@ -88,8 +82,8 @@ def _objects(
 
 def _object(key: str, instance: ObjectInFrame, state: ObjectState | None) -> SeenObject:
     is_shown = instance.visible and instance.pixels >= _LEAST_PIXELS
-    seen = SeenObject(object_type(key), instance.box, is_shown)
+    seen = SeenObject(object_type_of(key), instance.box, is_shown)
     if state is None:
         return seen
-    parent = object_type(state.parents[0]) if state.parents else None
+    parent = object_type_of(state.parents[0]) if state.parents else None
     return seen._replace(parent=parent, is_held=state.held, is_open=state.is_open)

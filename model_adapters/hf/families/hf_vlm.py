@@ -23,7 +23,7 @@ from model_adapters.hf.families.deepseek_vl import DeepseekVLFamily
 from model_adapters.hf.families.llava_onevision import LlavaOnevisionFamily
 from model_adapters.hf.families.load_check import check_loaded
 from model_adapters.hf.families.pixtral import PixtralFamily
-from model_adapters.hf.families.plain import PlainFamily
+from model_adapters.hf.families.plain import PlainFamily, three_axis_positions
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
 from model_adapters.hf.family import ClipShape, MakeFamily, Shape, Size
 from model_adapters.hf.loading.checkpoint import (
@@ -113,27 +113,14 @@ class ProcessorFamily(PlainFamily):
         return features
 
     def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
-        """Return the positions that the model's own rule gives, shifted to the start.
-
-        A span that cuts no frame can be numbered alone: all positions shift with the first.
-        """
-        rule = getattr(_core(self._model), "get_rope_index", None)
-        if rule is None:
+        """Return consecutive positions, or those that the model's own rule gives."""
+        core = _core(self._model)
+        if not hasattr(core, "get_rope_index"):
             return super().positions(ids, shapes, start)
-        if not shapes:
-            return torch.arange(start, start + len(ids)).expand(3, 1, -1)
-        positions, _ = rule(
-            ids[None],
-            mm_token_type_ids=(ids == self.slot_id).int()[None],
-            image_grid_thw=torch.cat(
-                [
-                    self._blank(shape)["image_grid_thw"]
-                    for shape in shapes
-                    if not isinstance(shape, ClipShape)
-                ]
-            ),
-        )
-        return positions + start
+        sizes = [shape for shape in shapes if not isinstance(shape, ClipShape)]
+        grids = [self._blank(size)["image_grid_thw"] for size in sizes]
+        joined = torch.cat(grids) if grids else None
+        return three_axis_positions(core, ids, self.slot_id, joined, start)
 
     def _process(self, images: Sequence[Image.Image]) -> Mapping[str, torch.Tensor]:
         """Return the output of the whole processor, which has settings for its image processor."""

@@ -10,7 +10,7 @@ from model_adapters.hf.family import Shape, Size, VideoInput
 from model_adapters.hf.prompting.embedding import Embed, Embedder
 from model_adapters.hf.prompting.features import FeatureCache
 
-__all__ = ["PlainFamily"]
+__all__ = ["PlainFamily", "three_axis_positions"]
 
 
 class PlainFamily:
@@ -69,3 +69,27 @@ class PlainFamily:
             images=list(images), return_tensors="pt"
         )
         return inputs
+
+
+def three_axis_positions(
+    model: Any, ids: torch.Tensor, slot_id: int, grids: torch.Tensor | None, start: int
+) -> torch.Tensor:
+    """Return temporal, height and width positions, (3, 1, tokens), on the CPU.
+
+    The model's own rule counts from the first token, and all positions shift with it. So a span
+    that cuts no frame is numbered alone and shifted, which makes chunked prefill equal to one pass.
+
+    Args:
+        model: the model without its output layer, which has the rule.
+        ids: token ids of the span, (tokens,).
+        slot_id: id of the tokens of frames.
+        grids: patches of each frame along time, height and width, (frames, 3); None without frames.
+        start: position behind everything before the span.
+    """
+    if grids is None:
+        return torch.arange(start, start + len(ids)).expand(3, 1, -1)
+    positions: torch.Tensor
+    positions, _ = model.get_rope_index(
+        ids[None], mm_token_type_ids=(ids == slot_id).int()[None], image_grid_thw=grids
+    )
+    return positions + start

@@ -15,7 +15,7 @@ from PIL import Image
 from infthor_eval.storage.folders import packaged_folder
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.cached.model import TransformersModel
-from model_adapters.hf.families.plain import PlainFamily
+from model_adapters.hf.families.plain import PlainFamily, three_axis_positions
 from model_adapters.hf.families.qwen_video import QwenVideo
 from model_adapters.hf.family import ClipShape, Shape, Size
 from model_adapters.options.checkpoints import CheckpointOptions
@@ -58,9 +58,7 @@ class Qwen25VLFamily(PlainFamily):
     def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
         """Return temporal, height and width positions, (3, 1, tokens).
 
-        The model's own rule counts from the first token, and all positions shift with it. So a span
-        that cuts no frame is numbered alone and shifted, which makes chunked prefill equal to one
-        pass. Clips are numbered one by one.
+        See `three_axis_positions`; clips are numbered one by one.
         """
         rows = []
         for run in self._runs(ids, shapes):
@@ -95,14 +93,8 @@ class Qwen25VLFamily(PlainFamily):
 
     def _still(self, ids: torch.Tensor, sizes: Sequence[Size], start: int) -> torch.Tensor:
         """Return the positions of texts and frames."""
-        if not sizes:
-            return torch.arange(start, start + len(ids)).expand(3, 1, -1)
-        positions, _ = self._model.model.get_rope_index(
-            ids[None],
-            mm_token_type_ids=(ids == self.slot_id).int()[None],
-            image_grid_thw=torch.tensor([self._grid(size) for size in sizes]),
-        )
-        return positions + start
+        grids = torch.tensor([self._grid(size) for size in sizes]) if sizes else None
+        return three_axis_positions(self._model.model, ids, self.slot_id, grids, start)
 
     def _grid(self, size: Size) -> tuple[int, int, int]:
         """Return an image's patches along time, height and width, by the image processor."""

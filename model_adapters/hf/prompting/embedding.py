@@ -11,7 +11,7 @@ from model_adapters.hf.family import Family
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.prompt import Clip, Frame, Piece
 
-__all__ = ["Embed", "Embedder", "Span", "piece_starts"]
+__all__ = ["Embed", "Embedder", "Span", "piece_starts", "word_span"]
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,19 @@ def piece_starts(
     return tuple(starts), behind[-1]
 
 
+def word_span(
+    family: Family,
+    inputs: Mapping[str, Any],
+    ids: torch.Tensor,
+    starts: Sequence[int],
+    device: torch.device,
+) -> Span:
+    """Return tokens of text of different sequences, each at its own position, with these inputs."""
+    positions = torch.empty_like(family.positions(ids, [], 0)).copy_(torch.tensor(starts))
+    end = max(start + 1 for start in starts)
+    return Span(inputs, positions.to(device), tuple(starts), end)
+
+
 class Embedder:
     """Embeds spans of prompts, with a cache of features of frames and clips.
 
@@ -142,11 +155,8 @@ class Embedder:
     def words(self, tokens: Sequence[int], starts: Sequence[int]) -> Span:
         """Embed tokens of text of different sequences, each of which begins at its own position."""
         ids = torch.tensor(tokens)
-        positions = torch.empty_like(self._family.positions(ids, [], 0)).copy_(torch.tensor(starts))
-        device = self._embeddings.weight.device
-        inputs = {"inputs_embeds": self._embeddings(ids.to(device))[None]}
-        end = max(start + 1 for start in starts)
-        return Span(inputs, positions.to(device), tuple(starts), end)
+        embeds = self._embeddings(ids.to(self._embeddings.weight.device))
+        return word_span(self._family, {"inputs_embeds": embeds[None]}, ids, starts, embeds.device)
 
     def join(self, spans: Sequence[Span]) -> Mapping[str, Any]:
         """Return the inputs of several spans as those of one sequence."""

@@ -13,7 +13,7 @@ import torch
 from PIL import Image
 
 from model_adapters.hf.family import Family
-from model_adapters.hf.prompting.embedding import Span, piece_starts
+from model_adapters.hf.prompting.embedding import Span, piece_starts, word_span
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.prompt import Frame, Piece, token_ids
 
@@ -137,10 +137,8 @@ class NativeEmbedder:
     def words(self, tokens: Sequence[int], starts: Sequence[int]) -> Span:
         """Prepare tokens of text of different sequences, each at its own position."""
         ids = torch.tensor(tokens)
-        positions = torch.empty_like(self._family.positions(ids, [], 0)).copy_(torch.tensor(starts))
         inputs = {"input_ids": ids[None].to(self._device)}
-        end = max(start + 1 for start in starts)
-        return Span(inputs, positions.to(self._device), tuple(starts), end)
+        return word_span(self._family, inputs, ids, starts, self._device)
 
     def join(self, spans: Sequence[Span]) -> Mapping[str, Any]:
         """Return the inputs of several spans as those of one sequence; none sees ahead."""

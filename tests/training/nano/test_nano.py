@@ -12,6 +12,7 @@ from safetensors.torch import load_file
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.step_log import iter_object_states, read_steps
 from infthor_eval.training.encoding import Encoder
@@ -22,7 +23,6 @@ from infthor_eval.training.nano.frame_dataset import cell_coverage, read_frame_d
 from infthor_eval.training.nano.network import NanoNetwork, spellings
 from infthor_eval.training.nano.question_sampler import question_intro
 from infthor_eval.training.nano.sampler import SequenceSampler, SyntheticPlans, corpus_texts
-from infthor_eval.training.nano.seen_objects import object_type
 from infthor_eval.training.nano.settings import NanoRecipe, QuestionSettings, VisionSettings
 from infthor_eval.training.nano.stages import train_small_model
 from infthor_eval.training.nano.whitening import whiten_patches
@@ -81,7 +81,7 @@ def test_labels_of_frames_are_those_of_the_logs(small_set, blank):
             labels = {
                 name for name, there in zip(dataset.types, dataset.shown[at], strict=True) if there
             }
-            assert present == {object_type(key) for key in step.seen}
+            assert present == {object_type_of(key) for key in step.seen}
             assert labels <= set(step.object_log.visible) | present
 
 
@@ -96,10 +96,10 @@ def test_labels_of_cells_are_of_states_and_receptacles(small_set, blank):
             data.frames(folder.name), steps, iter_object_states(steps), strict=True
         ):
             at = index[frame.digest]
-            held = {object_type(key) for key in step.seen if states[key].held}
-            opened = {object_type(key) for key in step.seen if states[key].is_open}
+            held = {object_type_of(key) for key in step.seen if states[key].held}
+            opened = {object_type_of(key) for key in step.seen if states[key].is_open}
             inside = {
-                (object_type(key), object_type(states[key].parents[0]))
+                (object_type_of(key), object_type_of(states[key].parents[0]))
                 for key in step.seen
                 if states[key].parents
             }
@@ -167,7 +167,7 @@ def test_types_are_those_of_parts_and_slices():
         "Sink|-01.00|+00.50|+01.00|SinkBasin",
         "Apple|+1|+2|+3|AppleSliced_2",
     )
-    assert [object_type(key) for key in ids] == ["Mug", "SinkBasin", "AppleSliced"]
+    assert [object_type_of(key) for key in ids] == ["Mug", "SinkBasin", "AppleSliced"]
 
 
 def test_words_are_tokens(blank):
