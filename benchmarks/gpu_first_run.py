@@ -96,7 +96,11 @@ def _numbers(text: str) -> set[int]:
 
 
 def run_steps(
-    machine: Machine, out: Path, seconds: float, chosen: set[int] | None = None
+    machine: Machine,
+    out: Path,
+    seconds: float,
+    chosen: set[int] | None = None,
+    steps: Sequence[Step] = STEPS,
 ) -> list[StepResult]:
     """Do the steps that are not done yet, and write the page after each.
 
@@ -105,26 +109,23 @@ def run_steps(
         out: an existing folder.
         seconds: no step begins after so many.
         chosen: numbers of the steps to do; None for all.
+        steps: all steps, in their order.
 
     Raises:
-        DataError: a result in the folder is damaged, or the page cannot be written.
+        DataError: a result in the folder is damaged.
     """
     end = time.monotonic() + seconds
-    folders = [out / f"{number:02d}" for number in range(1, len(STEPS) + 1)]
+    folders = [out / f"{number:02d}" for number in range(1, len(steps) + 1)]
     results = [_earlier(folder, machine) for folder in folders]
-    for at, (step, folder) in enumerate(zip(STEPS, folders, strict=True)):
+    for at, (step, folder) in enumerate(zip(steps, folders, strict=True)):
         if results[at].state == "done" or (chosen is not None and at + 1 not in chosen):
             continue
-        print(f"{at + 1}/{len(STEPS)} {step.name}", file=sys.stderr, flush=True)
-        figures = {
-            other.name: result.figures
-            for other, result in zip(STEPS, results, strict=True)
-            if result.figures
-        }
+        print(f"{at + 1}/{len(steps)} {step.name}", file=sys.stderr, flush=True)
+        figures = {other.name: result.figures for other, result in zip(steps, results, strict=True)}
         results[at] = _run(step, machine, folder, end, figures)
         write_result(folder, results[at])
         with write_atomically(out / "page.md") as unfinished:
-            unfinished.write_text(page(machine, results), encoding="utf-8")
+            unfinished.write_text(page(machine, steps, results), encoding="utf-8")
     return results
 
 

@@ -51,8 +51,7 @@ def main() -> None:
         offloading = TransformersModel(
             model.name, model._loaded, replace(model._options, kv_offload=True)
         )
-        seconds, tokens = _answer(offloading, frames)
-    found |= {"offload tokens": tokens, "offload rate": tokens / seconds}
+        found |= _with_offload(offloading, frames)
     print(json.dumps(found))
 
 
@@ -87,6 +86,14 @@ def _without_offload(
         "next seconds": seconds,
         "kept MiB": (_allocated(device) - before) / 2**20,
     }
+
+
+def _with_offload(model: TransformersModel, frames: Sequence[FrameRef]) -> dict[str, Any]:
+    try:
+        seconds, tokens = _answer(model, frames)
+    except ModelError as error:
+        return {"offload failure": str(error)}
+    return {"offload failure": None, "offload tokens": tokens, "offload rate": tokens / seconds}
 
 
 def _answer(model: TransformersModel, frames: Sequence[FrameRef]) -> tuple[float, int]:

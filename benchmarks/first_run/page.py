@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from .machine import Machine
 from .results import StepResult
-from .steps import STEPS
+from .steps import Step
 
 __all__ = ["page"]
 
@@ -15,8 +15,8 @@ _REHEARSAL = (
 )
 
 
-def page(machine: Machine, results: Sequence[StepResult]) -> str:
-    """Return the page in Markdown; `results` are those of `STEPS`, in their order."""
+def page(machine: Machine, steps: Sequence[Step], results: Sequence[StepResult]) -> str:
+    """Return the page in Markdown: of each step its result."""
     kind = "A rehearsal of the first run on a GPU" if machine.tiny else "The first run on a GPU"
     versions = ", ".join(
         f"{name} {machine.identity[name]}" for name in ("infthor-eval", "torch", "transformers")
@@ -28,7 +28,7 @@ def page(machine: Machine, results: Sequence[StepResult]) -> str:
     lines += ["", _totals(results), ""]
     lines += ["| | step, and its question | expected on an H100 | measured | as expected | s |"]
     lines += ["|---|---|---|---|---|---|"]
-    for number, (step, result) in enumerate(zip(STEPS, results, strict=True), 1):
+    for number, (step, result) in enumerate(zip(steps, results, strict=True), 1):
         question = f"**{step.name}**: {step.purpose}"
         cells = [str(number), question, f"{step.expected}; {step.seconds} s", *_found(result)]
         lines.append(f"| {' | '.join(map(_cell, cells))} |")

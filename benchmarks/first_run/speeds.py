@@ -126,11 +126,11 @@ def run_out_of_memory(work: Work) -> Outcome:
 
 def offload(work: Work) -> Outcome:
     """Ask on the context that did not fit, with its keys and values in the machine's memory."""
-    found = (
-        work.earlier["out of memory"] if "out of memory" in work.earlier else _memory_limit(work)
-    )
+    found = work.earlier.get("out of memory") or _memory_limit(work)
+    if found["offload failure"] is not None:
+        return Outcome(found["offload failure"], False)
     return Outcome(
         f"a context of {found['offload tokens']:,} tokens is answered with kv_offload=true, at "
         f"{found['offload rate']:,.0f} tokens/s",
-        found["offload tokens"] > 0,
+        True,
     )

@@ -133,7 +133,7 @@ STEPS = (
     Step(
         "whole trajectories",
         "Is a trajectory encoded once?",
-        "at least 95 % of the tokens of later questions cached, under a second a question, 0 failed",
+        "under a second a question, 95 % of the tokens of later ones cached, 0 failed",
         240,
         _weights,
         ask_on_trajectories,
