@@ -13,6 +13,7 @@ import psutil
 import pytest
 
 from ..helpers.benchmarks import FOLDER
+from ..helpers.waiting import wait_until
 
 SCRIPT = FOLDER / "gpu_first_run.py"
 
@@ -150,13 +151,21 @@ def test_a_command_is_stopped_with_its_children_when_the_time_is_up(machine, tmp
     module = importlib.import_module("first_run.work")
     work = module.Work(machine, tmp_path, time.monotonic() + 3)
     child = tmp_path / "child"
+    child = tmp_path / "child"
     sleeps = (
-        "import subprocess, sys; subprocess.run([sys.executable, '-c', 'import os, pathlib, sys, "
-        "time; pathlib.Path(sys.argv[1]).write_text(str(os.getpid())); time.sleep(99)', sys.argv[1]])"
+        "import os, pathlib, sys, time; pathlib.Path(sys.argv[1]).write_text(str(os.getpid()));"
     )
+    starts = "import subprocess, sys; subprocess.run([sys.executable, '-c', *sys.argv[1:]])"
     with pytest.raises(module.StepFailed, match="the step's time"):
-        work.python("-c", sleeps, str(child))
-    assert not psutil.pid_exists(int(child.read_text()))
+        work.python("-c", starts, f"{sleeps} time.sleep(99)", str(child))
+    wait_until(lambda: has_ended(int(child.read_text())))
+
+
+def has_ended(process: int) -> bool:
+    try:
+        return psutil.Process(process).status() == psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return True
 
 
 def test_a_command_that_fails_says_its_last_line(machine, tmp_path, script):
