@@ -120,7 +120,6 @@ class EngineOptions(Throughput):
 
     switches: ClassVar[tuple[str, ...]] = (
         *(field.name for field in fields(Throughput)),
-        "enforce_eager",
         "prefix_caching",
         "mm_processor_cache_gb",
     )
