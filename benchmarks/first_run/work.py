@@ -17,10 +17,10 @@ from infthor_eval.suites import find_suite
 
 from .machine import Machine
 
-__all__ = ["BENCHMARKS", "TINY_LIMIT", "Done", "Run", "StepFailed", "Work"]
+__all__ = ["BENCHMARKS", "INFTHOR_EVAL", "TINY_LIMIT", "Done", "Run", "StepFailed", "Work"]
 
 BENCHMARKS = Path(__file__).parents[1]
-_INFTHOR_EVAL = ("-c", "from infthor_eval.cli import main; main()")
+INFTHOR_EVAL = ("-c", "from infthor_eval.cli import main; main()")
 TINY_LIMIT = 12  # questions of a run in a rehearsal: two on each trajectory
 _START_S = 300
 
@@ -102,7 +102,7 @@ class Work:
 
     def command(self, *words: str, codes: Sequence[int] = (0,)) -> Done:
         """Run a command of infthor-eval."""
-        return self._run([*_INFTHOR_EVAL, *words], codes)
+        return self._run((*INFTHOR_EVAL, *words), codes)
 
     def benchmark(self, script: str, *words: str) -> Done:
         """Run a script of the benchmarks."""

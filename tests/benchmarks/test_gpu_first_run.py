@@ -12,6 +12,8 @@ from typing import Any
 import psutil
 import pytest
 
+from infthor_eval.plugins import import_target
+
 from ..helpers.benchmarks import FOLDER
 from ..helpers.waiting import wait_until
 
@@ -145,6 +147,35 @@ def test_one_gpu_without_weights_runs_what_it_can(script, machine):
         "the real model",
         "cost",
     ]
+
+
+def test_commands_of_the_real_model_are_commands_that_there_are(
+    script, machine, tmp_path, monkeypatch
+):
+    module = importlib.import_module("first_run.work")
+    typed = []
+
+    def record(self, words, codes):
+        typed.append(words[2:] if words[:2] == module.INFTHOR_EVAL else ())
+        raise module.StepFailed("not run in this test")
+
+    monkeypatch.setattr(module.Work, "_run", record)
+    there = tmp_path / "there"
+    (there / "metadata").mkdir(parents=True)
+    for data in (there, tmp_path / "to-be-downloaded"):
+        whole = replace(
+            machine, checkpoint="Q", data=data, gpus=2, old_libraries="old", download=True
+        )
+        for step in script.STEPS:
+            with pytest.raises(module.StepFailed):
+                step.run(module.Work(whole, tmp_path / "work", time.monotonic() + 60))
+    asked = list(filter(None, typed))
+    assert ("fetch", "nieh", "--dir", str(data)) in asked
+    assert {words[0] for words in asked} == {"--model", "fetch", "plan"}
+    for words in asked:
+        name, *rest = ("run", *words) if words[0] == "--model" else words
+        target = import_target(f"infthor_eval.cli.commands.{name}:command")
+        assert target.make_context(name, rest).params
 
 
 def test_a_command_is_stopped_with_its_children_when_the_time_is_up(machine, tmp_path, script):
