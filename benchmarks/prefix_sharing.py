@@ -11,25 +11,37 @@ One run measures, with the same Qwen2.5-VL with random weights and the same fram
 
     python benchmarks/prefix_sharing.py --frames 120 --questions 24
 
-On a machine with a GPU it also prints tokens per second in the form of published_evaluation.py,
-peak memory and the largest context that fits, for random weights of the real shape:
+With --machine it also prints tokens per second in the form of published_evaluation.py, peak memory
+and, with --largest, the largest context that fits. On a GPU, for random weights of the real shape:
 
-    python benchmarks/prefix_sharing.py --device cuda --model-size 7b --largest --attention
+    python benchmarks/prefix_sharing.py --device cuda --model-size 7b --machine --attention
     flash_attention_2
+
+--chunk-tokens and --batch-size take several values, and --ways some of the ways: all are measured
+with the same model, whose weights take a minute to draw.
 """
 
 import argparse
 import json
 import tempfile
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import torch
 from noise_set import question_texts, write_frames
-from transformers import DynamicCache, Qwen2_5_VLConfig
+from prefix_ways import (
+    Replies,
+    Timed,
+    answer_in_batches,
+    answer_one_by_one,
+    answer_with_transformers,
+    clear_cache,
+    timed,
+)
+from transformers import Qwen2_5_VLConfig
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
@@ -39,16 +51,12 @@ from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 from model_adapters.tiny.twin import TinyAdapter
 
-PROMPT = (
-    "\nAnswer the question given the agent's views in time order. Do not include explanation or "
-    "reasoning in the answer. Answer with a single word or words.\nQuestion: "
-)
-Replies = list[tuple[int, ...]]
-Timed = tuple[float, Replies]
+WAYS = ("shared", "batched", "plain", "floor")
+FACTORS = ("plain / batched", "plain / shared", "shared / floor")
 
 
 def main() -> None:
-    """Run the four ways, and print seconds, factors and whether the replies are equal."""
+    """Measure the ways, and print seconds, factors, whether the replies are equal, and speeds."""
     options = _arguments()
     torch.set_num_threads(options.threads)
     questions = question_texts(options.questions)
@@ -56,33 +64,67 @@ def main() -> None:
         frames = [
             FrameRef(path) for path in write_frames(Path(folder), options.frames, options.seed)
         ]
-        sharing = build(options)
-        not_sharing = TransformersModel(
-            "plain", sharing._loaded, replace(sharing._options, share_prefix=False)
-        )
-        answer_one_by_one(
-            sharing, frames[:1], questions[:1], 2
-        )  # warms up imports, threads and kernels
-        ways = {
-            "shared": lambda: answer_one_by_one(sharing, *work),
-            "batched": lambda: answer_in_batches(sharing, *work),
-            "floor": lambda: answer_with_transformers(sharing, *work),
-        }
-        work = frames, questions, options.new_tokens
-        measured: dict[str, list[Timed]] = {name: [] for name in ways}
-        for _ in range(options.repeats):
-            for (
-                name,
-                way,
-            ) in ways.items():  # alternating, so that other work on the machine affects all alike
-                clear_cache(sharing)
-                measured[name].append(_time(way))
-        measured["plain"] = [_time(lambda: answer_one_by_one(not_sharing, *work))]
-        if options.json:
-            print(json.dumps(figures(measured)))
-            return
-        report(measured, options)
-        machine_report(sharing, frames, options)
+        model = build(options)
+        # Warms up imports, threads and kernels.
+        answer_one_by_one(model, frames[:1], questions[:1], 2)
+        measured = measure(model, options, frames, questions)
+        machine = {}
+        if options.machine:
+            for chunk_tokens in options.chunk_tokens:
+                same = _with_options(model, chunk_tokens=chunk_tokens)
+                machine[str(chunk_tokens)] = machine_figures(same, frames, options)
+    if options.json:
+        print(json.dumps({**figures(measured), "machine": machine}))
+        return
+    report(measured, options)
+    for chunk_tokens, found in machine.items():
+        report_machine(chunk_tokens, found)
+
+
+def measure(
+    model: TransformersModel,
+    options: argparse.Namespace,
+    frames: Sequence[FrameRef],
+    questions: Sequence[str],
+) -> dict[str, list[Timed]]:
+    """Return seconds and replies of each run of each way."""
+    work = frames, questions, options.new_tokens
+    ways: dict[str, tuple[TransformersModel, Callable[..., Replies]]] = {
+        "shared": (model, answer_one_by_one),
+        "floor": (model, answer_with_transformers),
+    }
+    for batch_size in options.batch_size:
+        name = "batched" if len(options.batch_size) == 1 else f"batched by {batch_size}"
+        ways[name] = (_with_options(model, batch_size=batch_size), answer_in_batches)
+    asked = {name: way for name, way in ways.items() if name.split()[0] in options.ways}
+    measured: dict[str, list[Timed]] = {name: [] for name in asked}
+    for _ in range(options.repeats):
+        # Alternating, so that other work on the machine affects all alike.
+        for name, (way_model, answer) in asked.items():
+            clear_cache(way_model)
+            measured[name].append(timed(partial(answer, way_model, *work)))
+            clear_cache(way_model)  # its memory is the next one's
+    if "plain" in options.ways:
+        not_sharing = _with_options(model, share_prefix=False)
+        measured["plain"] = [timed(partial(answer_one_by_one, not_sharing, *work))]
+    return measured
+
+
+def _with_options(model: TransformersModel, **changed: Any) -> TransformersModel:
+    """Return a model with the same weights, and a cache of its own."""
+    return TransformersModel(model.name, model._loaded, replace(model._options, **changed))
+
+
+def _numbers(text: str) -> list[int]:
+    return [int(number) for number in text.split(",")]
+
+
+def _ways(text: str) -> list[str]:
+    names = text.split(",")
+    unknown = [name for name in names if name not in WAYS]
+    if unknown:
+        raise argparse.ArgumentTypeError(f"{unknown[0]} is not one of {', '.join(WAYS)}")
+    return names
 
 
 def _arguments() -> argparse.Namespace:
@@ -93,20 +135,23 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--repeats", type=int, default=3, help="runs of all ways but plain; the fastest is printed"
     )
-    parser.add_argument("--batch-size", type=int, default=8)
+    parser.add_argument("--ways", type=_ways, default=list(WAYS), help="ways, with commas")
+    parser.add_argument("--batch-size", type=_numbers, default=[8], help="sizes, with commas")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--model-size", choices=("tiny", "7b"), default="tiny")
     parser.add_argument("--attention", default="sdpa", help="attn_implementation")
-    parser.add_argument("--chunk-tokens", type=int, default=1024)
+    parser.add_argument("--chunk-tokens", type=_numbers, default=[1024], help="sizes, with commas")
+    parser.add_argument("--machine", action="store_true", help="measure speeds and memory as well")
     parser.add_argument("--largest", action="store_true", help="find the largest context that fits")
     parser.add_argument(
-        "--json", action="store_true", help="print seconds and factors as one JSON object"
+        "--json", action="store_true", help="print seconds, factors and speeds as one JSON object"
     )
     options = parser.parse_args()
     if options.largest and not options.device.startswith("cuda"):
         parser.error("--largest needs --device cuda, as a CPU swaps memory and has no clear limit")
+    options.machine = options.machine or options.largest
     return options
 
 
@@ -121,8 +166,8 @@ def build(options: argparse.Namespace) -> TransformersModel:
         device=options.device,
         dtype=dtype,
         attn_implementation=options.attention,
-        chunk_tokens=options.chunk_tokens,
-        batch_size=options.batch_size,
+        chunk_tokens=options.chunk_tokens[0],
+        batch_size=options.batch_size[0],
         max_tokens=0,
     )
     return adapter.build(f"qwen2.5-vl-{options.model_size}", settings, options.seed)
@@ -149,31 +194,39 @@ def _real_shape(ids: Mapping[str, int], vocab_size: int) -> Qwen2_5_VLConfig:  #
     return config
 
 
-def clear_cache(model: TransformersModel) -> None:
-    """Clear the caches of a model."""
-    model._prefix.reset()
-    model._features.clear()
-
-
-def machine_report(
+def machine_figures(
     model: TransformersModel, frames: Sequence[FrameRef], options: argparse.Namespace
-) -> None:
-    """Print the speed of encoding and decoding, the peak memory of a GPU, and the largest context
-    that fits."""
+) -> dict[str, Any]:
+    """Return the speed of encoding and decoding, the peak memory of a GPU at two lengths, and the
+    largest context that fits if it is asked for."""
     on_gpu = options.device.startswith("cuda")
-    if on_gpu:
-        torch.cuda.reset_peak_memory_stats()
     points = []
     for some in (frames[: max(1, len(frames) // 8)], frames):
         clear_cache(model)
-        seconds, replies = _time(lambda some=some: [_prefill(model, some)])
-        points.append(f"{replies[0][0]}:{replies[0][0] / seconds:.0f}")
-    print(f"prefill          {','.join(points)} (tokens:tokens/s)")
-    print(f"decode           {_decoding_speed(model, frames[:1]):.1f} tokens/s")
-    if on_gpu:
-        print(f"peak memory      {torch.cuda.max_memory_allocated() / 2**30:.1f} GiB")
-    if options.largest:
-        print(f"largest context  {_largest(model, frames)} tokens (found by doubling)")
+        if on_gpu:
+            torch.cuda.reset_peak_memory_stats()
+        seconds, replies = timed(lambda some=some: [_prefill(model, some)])
+        tokens = replies[0][0]
+        peak = torch.cuda.max_memory_allocated() / 2**30 if on_gpu else None
+        points.append({"tokens": tokens, "rate": tokens / seconds, "peak_gib": peak})
+    largest = _largest(model, frames) if options.largest else None
+    return {
+        "prefill": points,
+        "decode": _decoding_speed(model, frames[:1]),
+        "largest": largest,
+    }
+
+
+def report_machine(chunk_tokens: str, found: Mapping[str, Any]) -> None:
+    """Print the speeds and memory of one size of chunks."""
+    points = ",".join(f"{point['tokens']}:{point['rate']:.0f}" for point in found["prefill"])
+    print(f"prefill          {points} (tokens:tokens/s, chunks of {chunk_tokens})")
+    print(f"decode           {found['decode']:.1f} tokens/s")
+    peak = found["prefill"][-1]["peak_gib"]
+    if peak is not None:
+        print(f"peak memory      {peak:.1f} GiB")
+    if found["largest"] is not None:
+        print(f"largest context  {found['largest']} tokens (found by doubling)")
 
 
 def _decoding_speed(
@@ -184,7 +237,7 @@ def _decoding_speed(
     times, lengths = [], []
     for new in (few, more):
         answer_one_by_one(model, frames, [""], new)
-        seconds, replies = _time(lambda new=new: answer_one_by_one(model, frames, [""], new))
+        seconds, replies = timed(lambda new=new: answer_one_by_one(model, frames, [""], new))
         times.append(seconds)
         lengths.append(len(replies[0]))
     return (lengths[1] - lengths[0]) / (times[1] - times[0])
@@ -216,129 +269,25 @@ def report(measured: dict[str, list[Timed]], options: argparse.Namespace) -> Non
         "each"
     )
     for name in measured:
-        print(f"{name:8s}{found[name]:9.2f} s")
-    for name in ("plain / batched", "plain / shared", "shared / floor"):
-        print(f"{name:16s}{found[name]:7.2f}")
+        print(f"{name:14s}{found[name]:9.2f} s")
+    for name in FACTORS:
+        if name in found:
+            print(f"{name:16s}{found[name]:7.2f}")
     print(f"replies equal    {'yes' if found['replies equal'] else 'NO'}")
 
 
 def figures(measured: dict[str, list[Timed]]) -> dict[str, float | bool]:
-    """Return the fastest seconds of each way, the factors, and whether all replies are equal."""
+    """Return the fastest seconds of each way, the factors of those that were measured, and whether
+    all replies are equal."""
     best = {name: min(seconds for seconds, _ in runs) for name, runs in measured.items()}
     replies = [reply for runs in measured.values() for _, reply in runs]
-    return {
-        **best,
-        "plain / batched": best["plain"] / best["batched"],
-        "plain / shared": best["plain"] / best["shared"],
-        "shared / floor": best["shared"] / best["floor"],
-        "replies equal": all(reply == replies[0] for reply in replies),
+    pairs = {name: name.split(" / ") for name in FACTORS}
+    factors = {
+        name: best[slow] / best[fast]
+        for name, (slow, fast) in pairs.items()
+        if slow in best and fast in best
     }
-
-
-def answer_one_by_one(
-    model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int
-) -> Replies:
-    """Answer all questions on one prefix, as the NIEH runner does."""
-    talk = model.conversation()
-    talk.append(*frames)
-    start = talk.mark()
-    replies = []
-    for question in questions:
-        talk.append(PROMPT + question)
-        replies.append(talk.reply(Decoding(max_new_tokens=new_tokens)).token_ids)
-        talk.rewind(start)
-    return replies
-
-
-def answer_in_batches(
-    model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int
-) -> Replies:
-    """Answer all questions on one prefix, several at a time."""
-    talk, decoding = model.conversation(), Decoding(max_new_tokens=new_tokens)
-    talk.append(*frames)
-    return [
-        reply.token_ids for reply in talk.replies([[PROMPT + text] for text in questions], decoding)
-    ]
-
-
-@torch.inference_mode()
-def answer_with_transformers(
-    model: Any,
-    frames: Sequence[FrameRef],
-    questions: Sequence[str],
-    new_tokens: int,
-    chunk_frames: int = 8,
-) -> Replies:
-    """Answer all questions with the bare model, computing only what is necessary."""
-    bare, tokenizer = model._loaded.model, model._loaded.tokenizer
-    processor, pad = model._loaded.family._image_processor, bare.config.image_token_id
-    content: list[dict[str, str]] = [{"type": "image"}] * len(frames) + [
-        {"type": "text", "text": "@"}
-    ]
-    text = tokenizer.apply_chat_template(
-        [{"role": "user", "content": content}],
-        chat_template=model._loaded.template,
-        tokenize=False,
-        add_generation_prompt=True,
-    )
-    head, tail = text.replace("<|image_pad|>", "<|image_pad|>" * 121).split("@")
-    device = bare.device
-    ids = torch.tensor([tokenizer(head)["input_ids"]], device=device)
-    grids = torch.tensor([[1, 22, 22]] * len(frames))
-    positions, _ = bare.model.get_rope_index(ids, (ids == pad).int(), image_grid_thw=grids)
-    cache = DynamicCache()
-    # Chunks end after the end marker of a frame; the first chunk also has the start of the
-    # template.
-    ends = [ids.shape[1] - 123 * left for left in range(len(frames) - 1, -1, -1)]
-    for at in range(0, len(frames), chunk_frames):
-        some = frames[at : at + chunk_frames]
-        images = processor(images=[ref.load() for ref in some], return_tensors="pt")
-        part = slice(cache.get_seq_length(), ends[at + len(some) - 1])
-        bare(
-            input_ids=ids[:, part],
-            pixel_values=images["pixel_values"].to(device),
-            image_grid_thw=images["image_grid_thw"].to(device),
-            position_ids=positions[:, :, part],
-            past_key_values=cache,
-            logits_to_keep=1,
-        )
-    behind = int(positions.max()) + 1
-    return [
-        _decode(model, cache, tokenizer(PROMPT + question + tail)["input_ids"], behind, new_tokens)
-        for question in questions
-    ]
-
-
-def _decode(
-    model: Any, cache: DynamicCache, ids: list[int], position: int, new_tokens: int
-) -> tuple[int, ...]:
-    bare, ends = model._loaded.model, model._loaded.generation.end_ids
-    device = bare.device
-    n_prefix = cache.get_seq_length()
-    reply: list[int] = []
-    feed = ids
-    while True:
-        positions = torch.arange(position, position + len(feed), device=device).expand(3, 1, -1)
-        ids_fed = torch.tensor([feed], device=device)
-        output = bare(
-            input_ids=ids_fed, position_ids=positions, past_key_values=cache, logits_to_keep=1
-        )
-        position += len(feed)
-        token = int(output.logits[0, -1].argmax())
-        if token in ends:
-            break
-        reply.append(token)
-        if len(reply) == new_tokens:
-            break
-        feed = [token]
-    cache.crop(n_prefix - cache.get_seq_length())
-    return tuple(reply)
-
-
-def _time(run: Callable[[], Replies]) -> Timed:
-    start = time.perf_counter()
-    result = run()
-    return time.perf_counter() - start, result
+    return {**best, **factors, "replies equal": all(reply == replies[0] for reply in replies)}
 
 
 if __name__ == "__main__":

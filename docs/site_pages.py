@@ -24,6 +24,7 @@ _OUTSIDE = {  # where a file lies in the repository: where its page stands in th
     "benchmarks/drawings.md": "benchmarks/drawings.md",
     "benchmarks/generation.md": "benchmarks/generation.md",
     "benchmarks/gpu.md": "benchmarks/gpu.md",
+    "benchmarks/gpu_first_run.md": "benchmarks/gpu_first_run.md",
     "benchmarks/manipulation.md": "benchmarks/manipulation.md",
     "benchmarks/memories.md": "benchmarks/memories.md",
     "benchmarks/families.md": "benchmarks/families.md",

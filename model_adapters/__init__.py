@@ -39,6 +39,8 @@ from model_adapters.registry import (
     name_on_engine,
     names,
     options,
+    switched_on,
+    switches,
 )
 from model_adapters.thinking import Thought, answer_of, cut_at_stop
 from model_adapters.transcript import Transcript
@@ -83,5 +85,7 @@ __all__ = [
     "names",
     "options",
     "run_checks",
+    "switched_on",
+    "switches",
     "wrap_request_errors",
 ]

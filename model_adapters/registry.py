@@ -36,6 +36,8 @@ __all__ = [
     "name_on_engine",
     "names",
     "options",
+    "switched_on",
+    "switches",
 ]
 
 ENTRY_POINTS = "infthor_eval.models"
@@ -165,6 +167,34 @@ def has_option(name: str, option: str) -> bool:
         ModelError: the adapter cannot be imported.
     """
     return option in {field.name for field in dataclasses.fields(_options(name))}
+
+
+def switches(name: str) -> tuple[str, ...]:
+    """Return a model's options that are to save time or memory and to change no reply: the class
+    attribute `switches` of its options.
+
+    Raises:
+        UsageError: the name is unknown.
+        ModelError: the adapter cannot be imported.
+    """
+    return tuple(getattr(_options(name), "switches", ()))
+
+
+def switched_on(name: str, options: Mapping[str, str]) -> dict[str, str]:
+    """Return those of a model's options as typed that are switches and have not their defaults.
+
+    Raises:
+        UsageError: a name is unknown, or a value does not fit its option.
+        ModelError: the adapter cannot be imported.
+    """
+    of_model = _options(name)
+    parsed = parse(name, of_model, options)
+    defaults = {field.name: field.default for field in dataclasses.fields(of_model)}
+    return {
+        option: options[option]
+        for option in switches(name)
+        if option in options and getattr(parsed, option) != defaults[option]
+    }
 
 
 def label(name: str, options: Mapping[str, str]) -> str:

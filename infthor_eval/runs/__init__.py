@@ -28,6 +28,7 @@ from infthor_eval.runs.suite import (
 )
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.runs.work.driver import Observer, RunOutcome, Silent, execute
+from infthor_eval.runs.work.equality import Equality, check_equality, require_switches
 from infthor_eval.runs.work.estimate import Estimate, TaskEstimate, estimate_run
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "BoundEvaluation",
     "Catalog",
     "Cost",
+    "Equality",
     "Estimate",
     "Evaluation",
     "Group",
@@ -62,10 +64,12 @@ __all__ = [
     "UnitSample",
     "Usage",
     "Workload",
+    "check_equality",
     "estimate_run",
     "execute",
     "prepare",
     "read_header",
     "read_run",
     "read_stored_command",
+    "require_switches",
 ]

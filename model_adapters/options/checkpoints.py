@@ -2,7 +2,7 @@
 
 import importlib.util
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 __all__ = [
     "CheckpointOptions",
@@ -144,7 +144,17 @@ class HfOptions(Reading, Placement):
             GPU.
         feature_cache_mb: memory for vision features of earlier frames, in MiB.
         max_tokens: context limit instead of the checkpoint's; 0 for none.
+
+    `switches` are the options that are to save time or memory and to change no reply.
     """
+
+    switches: ClassVar[tuple[str, ...]] = (
+        "attn_implementation",
+        "share_prefix",
+        "chunk_tokens",
+        "batch_size",
+        "kv_offload",
+    )
 
     share_prefix: bool = True
     chunk_tokens: int = 1024

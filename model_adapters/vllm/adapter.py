@@ -23,7 +23,7 @@ from model_adapters.hf.loading.checkpoint import (
 from model_adapters.hf.loading.processors import load_processor
 from model_adapters.vllm.arguments import frame_limit, model_arguments, token_limit
 from model_adapters.vllm.cpu import check_head_size, runs_on_cpu
-from model_adapters.vllm.engine import Engine, import_vllm
+from model_adapters.vllm.engine import Engine, import_vllm, require_version
 from model_adapters.vllm.model import VllmModel
 from model_adapters.vllm.options import (
     HfVlmOnVllmOptions,
@@ -102,6 +102,8 @@ def _start(
     name: str, located: LocatedCheckpoint[Any], family: MakeFamily, processor: Any = None
 ) -> VllmModel:
     options: VllmOptions = located.options
+    if options.encoder_cache_tokens is not None:
+        require_version(name, "0.33", "encoder_cache_tokens")
     if runs_on_cpu():
         check_head_size(name, located.config.get_text_config())
     loaded = read_checkpoint(located, family, build_meta_model)

@@ -6,6 +6,7 @@ from typing import Any
 from infthor_eval.errors import ModelError
 from model_adapters.options.checkpoints import parse_rope
 from model_adapters.vllm.options import EngineOptions, VllmOptions
+from model_adapters.vllm.plugin import encoder_cache_of
 
 __all__ = ["engine_arguments", "frame_limit", "model_arguments", "rope_overrides", "token_limit"]
 
@@ -60,6 +61,8 @@ def model_arguments(
         "trust_remote_code": options.trust_remote_code,
         "limit_mm_per_prompt": {"image": frames, "video": _NO_VIDEO},
     }
+    if options.encoder_cache_tokens is not None:
+        arguments["ec_manager_config"] = encoder_cache_of(options.encoder_cache_tokens)
     if options.rope is not None:
         arguments["hf_overrides"] = rope_overrides(config, options.rope)
     arguments["mm_processor_kwargs"] = {

@@ -9,12 +9,13 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any
 
+from packaging.version import Version
 from PIL import Image
 
 from infthor_eval.errors import ModelError, wrap_errors
 from model_adapters.vllm import cpu, plugin
 
-__all__ = ["Engine", "EngineOutput", "EngineRequest", "import_vllm"]
+__all__ = ["Engine", "EngineOutput", "EngineRequest", "import_vllm", "require_version"]
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,20 @@ def import_vllm(name: str) -> Any:
         if cpu.runs_on_cpu():
             cpu.prepare()
         return package
+
+
+def require_version(name: str, least: str, option: str) -> None:
+    """Refuse an option that an older vLLM has no argument for.
+
+    Raises:
+        ModelError: vLLM is older, or not installed.
+    """
+    version = str(import_vllm(name).__version__)
+    if Version(version) < Version(least):
+        raise ModelError(
+            f"{name}: {option} needs vLLM {least} or newer, and {version} is installed; leave it "
+            "out"
+        )
 
 
 class Engine:

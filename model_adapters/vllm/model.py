@@ -94,7 +94,7 @@ class VllmModel(CheckpointModel):
             ],
             "enforce_eager": options.enforce_eager,
             "prefix_caching": options.prefix_caching,
-            "throughput": options.throughput(),
+            "throughput": options.throughput() | options.encoder_cache(),
             "batch_invariant": self._engine.batch_invariant,
             "seed": options.seed,
             "generation": {

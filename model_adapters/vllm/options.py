@@ -5,7 +5,7 @@ To add an option of models in vLLM: a field here, its effect in `arguments.py`, 
 """
 
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
 from model_adapters.options.checkpoints import CheckpointReading, CheckpointSource
 from model_adapters.options.families import (
@@ -42,6 +42,7 @@ _RANGES = {
     "threads": (1, 1024),
     "max_num_seqs": (1, 2**20),
     "max_num_batched_tokens": (1, 2**31 - 1),
+    "encoder_cache_tokens": (1, 2**31 - 1),
     "block_size": (1, 2**20),
     "kv_offloading_size": (0, 2**20),
     "decode_context_parallel_size": (1, 1024),
@@ -60,7 +61,7 @@ class Throughput:
     Attributes:
         max_num_seqs: most requests that run at the same time.
         max_num_batched_tokens: most tokens of a step: the size of the chunks in which long prompts
-            are encoded.
+            are encoded, and of the cache of encoded frames.
         enable_chunked_prefill: encode long prompts in chunks, between which other requests are
             decoded.
         block_size: tokens of a block of keys and values, of which the prefix cache shares whole
@@ -113,7 +114,15 @@ class EngineOptions(Throughput):
         mm_processor_cache_gb: memory for processed frames, in GiB; vLLM's default where None.
         seed: seed of the engine; each request has its own in addition.
         threads: processor threads of vLLM on a CPU; those of OMP_NUM_THREADS, else all, where None.
+
+    `switches` are the options that are to save time or memory and to change no reply.
     """
+
+    switches: ClassVar[tuple[str, ...]] = (
+        *(field.name for field in fields(Throughput)),
+        "prefix_caching",
+        "mm_processor_cache_gb",
+    )
 
     dtype: str = "auto"
     max_model_len: int | None = None
@@ -163,11 +172,16 @@ class VllmOptions(EngineOptions, CheckpointReading):
         max_frames: most frames of a request; as many as fit into max_model_len where None.
         image_backend: what resizes frames: pil, as with transformers here, or torchvision, vLLM's
             own choice. They make slightly different pixels.
+        encoder_cache_tokens: tokens of encoded frames that are kept for other requests, beside
+            gpu_memory_utilization; as many as max_num_batched_tokens where None.
     """
+
+    switches: ClassVar[tuple[str, ...]] = (*EngineOptions.switches, "encoder_cache_tokens")
 
     frame_size: int = 300
     max_frames: int | None = None
     image_backend: str = "pil"
+    encoder_cache_tokens: int | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -176,6 +190,11 @@ class VllmOptions(EngineOptions, CheckpointReading):
             raise ValueError(
                 f"image_backend={self.image_backend} is not {' or '.join(_IMAGE_BACKENDS)}"
             )
+
+    def encoder_cache(self) -> dict[str, int]:
+        """Return the size of the cache of encoded frames, if it is chosen."""
+        tokens = self.encoder_cache_tokens
+        return {} if tokens is None else {"encoder_cache_tokens": tokens}
 
 
 @dataclass(frozen=True, kw_only=True)

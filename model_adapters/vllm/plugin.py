@@ -1,6 +1,7 @@
-"""A plugin that vLLM calls in each of its processes: it loads checkpoints of new transformers.
+"""What vLLM calls in its own processes: a plugin, and the maker of its cache of encoded frames.
 
-See `hf.tower_names` for the two forms; vLLM 0.32 reads one of them alone.
+The plugin loads checkpoints of new transformers. See `hf.tower_names` for the two forms; vLLM 0.32
+reads one of them alone.
 """
 
 import functools
@@ -11,7 +12,7 @@ from typing import Any
 
 from model_adapters.hf.loading.tower_names import published_name
 
-__all__ = ["ACTIVE", "register"]
+__all__ = ["ACTIVE", "EncoderCacheMaker", "encoder_cache_of", "register"]
 
 # Set by our engine. Whatever else uses vLLM in this environment keeps vLLM as it is.
 ACTIVE = "INFTHOR_EVAL_VLLM_PLUGIN"
@@ -21,6 +22,7 @@ _MODELS = {
     "llava_next": "LlavaNextForConditionalGeneration",
     "llava_onevision": "LlavaOnevisionForConditionalGeneration",
 }
+_TOKENS = "tokens"
 _Weights = Iterable[tuple[str, Any]]
 
 
@@ -46,3 +48,21 @@ def _taking_both(load_weights: Callable[[Any, _Weights], Any]) -> Callable[[Any,
 def _with_level(weights: _Weights) -> Iterator[tuple[str, Any]]:
     for name, tensor in weights:
         yield published_name(name), tensor
+
+
+class EncoderCacheMaker:
+    """Makes vLLM's own cache of encoded frames, of a size that vLLM has no argument for."""
+
+    @classmethod
+    def create_manager(cls, *, cache_size: int, vllm_config: Any) -> Any:
+        """Return the cache with room for the tokens of `encoder_cache_of`, or for vLLM's own choice
+        if that is more."""
+        module = importlib.import_module("vllm.v1.core.encoder_cache_manager")
+        asked = vllm_config.ec_manager_config.manager_config[_TOKENS]
+        return module.EncoderCacheManager(cache_size=max(cache_size, asked))
+
+
+def encoder_cache_of(n_tokens: int) -> dict[str, Any]:
+    """Return vLLM's `ec_manager_config` for a cache of encoded frames of so many tokens."""
+    maker = f"{EncoderCacheMaker.__module__}.{EncoderCacheMaker.__qualname__}"
+    return {"encoder_cache_manager_cls": maker, "manager_config": {_TOKENS: n_tokens}}

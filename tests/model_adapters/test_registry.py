@@ -20,6 +20,8 @@ from model_adapters import (
     names,
     options,
     registry,
+    switched_on,
+    switches,
 )
 from model_adapters.built_in import BUILT_IN
 from model_adapters.options import NoOptions
@@ -250,3 +252,17 @@ def test_tiny_models_are_described_as_random_and_the_nano_model_as_trained() -> 
         )
     assert model_description("qwen2.5-vl-nano") == "small, trained, bundled with the package"
     assert (model_note("qwen2.5-vl-nano"), model_description("qwen2.5-vl")) == ("", "")
+
+
+def test_switches_are_on_where_they_have_not_their_defaults() -> None:
+    typed = {"share_prefix": "yes", "chunk_tokens": "1_024", "kv_offload": "1", "dtype": "float32"}
+    assert switched_on("qwen2.5-vl", typed) == {"kv_offload": "1"}
+    typed["attn_implementation"] = "eager"
+    assert list(switched_on("qwen2.5-vl", typed)) == ["attn_implementation", "kv_offload"]
+    with pytest.raises(UsageError, match="has no option chunk"):
+        switched_on("qwen2.5-vl", {"chunk": "1"})
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_every_switch_is_an_option(name: str) -> None:
+    assert set(switches(name)) <= {each.partition("=")[0] for each in options(name).split(", ")}

@@ -15,12 +15,21 @@ from infthor_eval.cli.options.show import (
     show_options,
     tracker_options,
 )
+from infthor_eval.cli.options.values import WholeNumber
 from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note, quiet_notes
 from infthor_eval.cli.progress.runs import execute_with_progress
 from infthor_eval.cli.results import RunResults, print_results
 from infthor_eval.errors import DataError
 from infthor_eval.reasons import count_reasons
-from infthor_eval.runs import RunOutcome, RunRequest, Suite, prepare
+from infthor_eval.runs import (
+    Equality,
+    RunOutcome,
+    RunRequest,
+    Suite,
+    check_equality,
+    prepare,
+    require_switches,
+)
 from model_adapters import model_note
 
 if TYPE_CHECKING:
@@ -37,14 +46,59 @@ __all__ = ["command", "evaluate"]
 @run_options
 @show_options
 @tracker_options
+@click.option(
+    "--check-equality",
+    "n_checked",
+    type=WholeNumber(1),
+    metavar="N",
+    help="First ask N of each task with and without the engine's switches in --model-args "
+    "(docs/engines.md); a run whose switches change a reply is not started.",
+)
 @click.option("--quiet", is_flag=True, help="Print only failures, and the runs' folders.")
-def command(**params: Any) -> int:
+def command(n_checked: int | None, **params: Any) -> int:
     """Evaluate MODEL on TASKS and print the results; --full prints all, beside the published ones.
 
     Stop it whenever you like: the same command continues where it stopped.
     """
     requests = RunOptions.from_click(params).requests()
-    return evaluate(requests, ShowOptions.from_click(params), parse_trackers(params))
+    show = ShowOptions.from_click(params)
+    if n_checked is not None and not _are_equal(requests, n_checked, show.quiet):
+        return 1
+    return evaluate(requests, show, parse_trackers(params))
+
+
+def _are_equal(requests: Sequence[tuple[RunRequest, Suite]], n_units: int, quiet: bool) -> bool:
+    """Try the switches of all runs; print what they change, and return whether that is nothing."""
+    for request, _ in requests:  # before any of them is loaded
+        require_switches(request, n_units)
+    n_changing = 0
+    with quiet_notes(quiet):
+        for request, suite in requests:
+            with NOTES.status(f"{request.label}: asking with and without its switches"):
+                equality = check_equality(request, suite, n_units)
+            if equality.n_differing:
+                print_failure(f"{request.label}: {_difference(equality)}")
+                n_changing += 1
+            else:
+                replies = f"{equality.n_units} replies are equal"
+                print_note(f"{request.label}: {replies} with and without {_typed(equality)}")
+    return n_changing == 0
+
+
+def _typed(equality: Equality) -> str:
+    return ",".join(f"{name}={value}" for name, value in equality.switched.items())
+
+
+def _difference(equality: Equality) -> str:
+    known = [f"{name}={equality.switched[name]} alone: {n}" for name, n in equality.alone.items()]
+    if equality.n_unstable:
+        known.append(f"without it, asked again: {equality.n_unstable}")
+    more = f" ({', '.join(known)})" if known else ""
+    return (
+        f"{equality.n_differing} of {equality.n_units} replies differ with {_typed(equality)}"
+        f"{more}; not started: leave it out, or leave out "
+        "--check-equality to accept that"
+    )
 
 
 def evaluate(

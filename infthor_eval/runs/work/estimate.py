@@ -17,18 +17,16 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from infthor_eval.runs.journals.records import (
-    Artifact,
     Payload,
     SuiteUnit,
     Unit,
     UnitRecord,
-    describe_failure,
 )
 from infthor_eval.runs.request import RunRequest, prepare
 from infthor_eval.runs.suite import BoundEvaluation, Group, Suite, Workload
-from infthor_eval.runs.usage import NOTHING, Usage
+from infthor_eval.runs.usage import Usage
 from infthor_eval.runs.work.binding import bind_run
-from infthor_eval.runs.work.executor import group_records
+from infthor_eval.runs.work.executor import UnrecordedSession, group_records
 
 __all__ = ["Estimate", "Quantities", "TaskEstimate", "estimate_run", "estimate_tasks"]
 
@@ -104,28 +102,6 @@ class Estimate:
     failures: Sequence[tuple[str, str]]
 
 
-class _MeasuringSession:
-    """A `Session` without records: every unit is measured; artifacts are cached in memory."""
-
-    def __init__(self) -> None:
-        self._artifacts: dict[str, Any] = {}
-
-    def find_record(self, unit: Unit[Any], fingerprint: str) -> None:
-        """Return None: there are no records."""
-
-    def describe_failure(self, unit: Unit[Any], error: Exception) -> str:
-        """See `Session`; nothing is written."""
-        return describe_failure(error)
-
-    def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
-        """See `Session`."""
-        return self._artifacts.get(fingerprint)
-
-    def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
-        """See `Session`."""
-        self._artifacts[fingerprint] = artifact
-
-
 def estimate_run(
     request: RunRequest,
     suite: Suite[SuiteUnit, Payload],
@@ -154,7 +130,7 @@ def _measure(
     evaluation: BoundEvaluation[SuiteUnit, Payload], n_units: int
 ) -> Iterator[_MeasuredGroup]:
     """Do a few units of each task: of groups of all sizes, the first, middle and last unit."""
-    session = _MeasuringSession()
+    session = UnrecordedSession()
     for group in _choose_groups(
         evaluation.workload.groups, max(1, round(n_units / _UNITS_OF_A_GROUP))
     ):

@@ -8,14 +8,23 @@ import msgspec
 
 from infthor_eval.errors import ModelError
 from infthor_eval.runs.journals.journal import Journal
-from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit, Unit, UnitRecord
+from infthor_eval.runs.journals.records import (
+    Artifact,
+    Payload,
+    RunHeader,
+    SuiteUnit,
+    Unit,
+    UnitRecord,
+    describe_failure,
+)
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import BoundEvaluation, Group, Session, UnitSample, Workload
+from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.runs.work.binding import bind_run
 from infthor_eval.runs.work.scheduling import run_groups
 
-__all__ = ["Executor", "LocalExecutor", "Recorded", "group_records"]
+__all__ = ["Executor", "LocalExecutor", "Recorded", "UnrecordedSession", "group_records"]
 
 
 # A record that is on disk; True if an earlier run had put it there.
@@ -79,6 +88,28 @@ class LocalExecutor(Generic[SuiteUnit, Payload]):
     def close(self) -> None:
         """See `Executor`."""
         self._bound.close()
+
+
+class UnrecordedSession:
+    """A `Session` without a journal: every unit is done; artifacts are cached in memory."""
+
+    def __init__(self) -> None:
+        self._artifacts: dict[str, Any] = {}
+
+    def find_record(self, unit: Unit[Any], fingerprint: str) -> None:
+        """Return None: there are no records."""
+
+    def describe_failure(self, unit: Unit[Any], error: Exception) -> str:
+        """See `Session`; nothing is written."""
+        return describe_failure(error)
+
+    def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
+        """See `Session`."""
+        return self._artifacts.get(fingerprint)
+
+    def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
+        """See `Session`."""
+        self._artifacts[fingerprint] = artifact
 
 
 def group_records(

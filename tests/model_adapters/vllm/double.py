@@ -91,6 +91,8 @@ class _Vlm:
         if family is None:
             family = functools.partial(ProcessorFamily, processor=load_processor(located))
         self._loaded = load_checkpoint(located, family)
+        if arguments.get("kv_cache_dtype", "auto").startswith("fp8"):
+            _round_keys_and_values(self._loaded.model)
         self.limit: int = located.config.get_text_config().max_position_embeddings
 
     def read(
@@ -165,6 +167,15 @@ class _Vlm:
         if "mm_token_type_ids" in takes:
             inputs["mm_token_type_ids"] = (rows == self._loaded.family.slot_id).int()
         return inputs
+
+
+def _round_keys_and_values(model: torch.nn.Module) -> None:
+    def rounded(module: Any, inputs: Any, output: torch.Tensor) -> torch.Tensor:
+        return output.to(torch.float8_e4m3fn).to(output.dtype)
+
+    for name, part in model.named_modules():
+        if name.endswith(("k_proj", "v_proj")) and "visual" not in name:
+            part.register_forward_hook(rounded)
 
 
 def _held(

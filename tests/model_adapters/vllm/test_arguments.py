@@ -1,7 +1,8 @@
 """What becomes of each option, by hand, and that vLLM takes it."""
 
+import sys
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from transformers import LlamaConfig, Qwen2_5_VLConfig
 
 from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.plugins import import_target
 from model_adapters import check_options, options
 from model_adapters.hf.loading.rope import apply_rope
 from model_adapters.vllm.adapter import Qwen25VLOnVllm
@@ -21,8 +23,9 @@ from model_adapters.vllm.arguments import (
     token_limit,
 )
 from model_adapters.vllm.options import EngineOptions, VllmOptions
+from model_adapters.vllm.plugin import encoder_cache_of
 
-from .double import SIGNATURES
+from .double import SIGNATURES, Double
 
 TAKEN = {*SIGNATURES["LLM"], *SIGNATURES["EngineArgs"]}
 FOLDER = Path("checkpoint")
@@ -82,6 +85,7 @@ def test_every_option_arrives_under_vllms_name() -> None:
         prefill_context_parallel_size=4,
         mm_encoder_tp_mode="data",
         mm_encoder_attn_backend="TORCH_SDPA",
+        encoder_cache_tokens=50_000,
         seed=7,
         frame_size=640,
         rope="yarn:4",
@@ -113,6 +117,10 @@ def test_every_option_arrives_under_vllms_name() -> None:
         "trust_remote_code": True,
         "limit_mm_per_prompt": {"image": {"count": 12, "width": 640, "height": 640}, "video": 0},
         "mm_processor_kwargs": {"use_fast": False},
+        "ec_manager_config": {
+            "encoder_cache_manager_cls": "model_adapters.vllm.plugin.EncoderCacheMaker",
+            "manager_config": {"tokens": 50_000},
+        },
         "hf_overrides": {
             "text_config": {
                 "rope_parameters": {
@@ -127,6 +135,29 @@ def test_every_option_arrives_under_vllms_name() -> None:
             }
         },
     }
+
+
+@pytest.mark.parametrize(("own", "size"), [(16_384, 50_000), (60_000, 60_000)])
+def test_vllm_makes_its_cache_of_encoded_frames_through_the_class_that_it_is_told(
+    own: int, size: int, vllm: Double, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = ModuleType("vllm.v1.core.encoder_cache_manager")
+    vars(module)["EncoderCacheManager"] = SimpleNamespace
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    told = encoder_cache_of(50_000)
+    maker = import_target(told["encoder_cache_manager_cls"].replace("plugin.", "plugin:"))
+    config = SimpleNamespace(ec_manager_config=SimpleNamespace(**told))
+    assert maker.create_manager(cache_size=own, vllm_config=config).cache_size == size
+
+
+def test_an_older_vllm_has_no_size_for_it(
+    start: Any, vllm: Double, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = start(encoder_cache_tokens=50_000)
+    assert model.identity()["throughput"] == {"encoder_cache_tokens": 50_000}
+    monkeypatch.setattr(sys.modules["vllm"], "__version__", "0.32.0")
+    with pytest.raises(ModelError, match=r"_tokens needs vLLM 0.33 or newer, and 0.32"):
+        start(encoder_cache_tokens=50_000)
 
 
 def test_limits_of_a_frames_area_are_the_processors() -> None:

@@ -1,6 +1,8 @@
 """Whole runs on the double, as their user types them."""
 
+import itertools
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ from model_adapters import name_on_engine
 from tests.helpers.command_line import option_words
 from tests.helpers.trajectories import MUG, cut_trajectory, write_trajectories
 
+from . import double
 from .double import Double
 
 
@@ -129,6 +132,70 @@ def test_plans_are_carried_out_alike(
         )
     assert played[0] == played[1]
     assert all(call.params.structured_outputs is not None for call in vllm.calls)
+
+
+def test_switches_that_change_no_reply_are_checked_and_the_run_follows(
+    ask: Any, vllm: Double, tmp_path: Path
+) -> None:
+    switches = {"block_size": 32, "max_num_batched_tokens": 256, "prefix_caching": "true"}
+    code, _, err = ask("on vllm", "--engine", "vllm", "--check-equality", 3, **switches)
+    assert code == 0, err
+    typed = "max_num_batched_tokens=256,block_size=32"
+    assert f"on vllm: 3 replies are equal with and without {typed}" in " ".join(err.split())
+    switched, plain, run = vllm.started
+    assert switched == run
+    assert plain == {name: value for name, value in run.items() if name not in switches}
+    assert len(_found(tmp_path / "out" / "on vllm")[0]) == 5
+
+
+def test_a_cache_type_that_changes_replies_is_named_and_the_run_is_not_started(
+    ask: Any, vllm: Double, tmp_path: Path
+) -> None:
+    fp8 = {"block_size": 32, "kv_cache_dtype": "fp8"}
+    code, out, err = ask("on vllm", "--engine", "vllm", "--check-equality", 5, **fp8)
+    assert (code, out) == (1, "")
+    line = " ".join(err.split())
+    found = re.search(r"(\d) of 5 replies differ with block_size=32,kv_cache_dtype=fp8", line)
+    assert found is not None and int(found[1]) > 0
+    assert f"(block_size=32 alone: 0, kv_cache_dtype=fp8 alone: {found[1]}); not started" in line
+    assert not (tmp_path / "out" / "on vllm").exists()
+
+
+def test_an_engine_that_differs_from_itself_is_said_to(
+    ask: Any, vllm: Double, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ids = itertools.count(30)
+    monkeypatch.setattr(double._Vlm, "write", lambda *_: ([next(ids)], ""))
+    code, _, err = ask("on vllm", "--engine", "vllm", "--check-equality", 2, block_size=32)
+    assert code == 1
+    line = "2 of 2 replies differ with block_size=32 (without it, asked again: 2); not started"
+    assert line in " ".join(err.split())
+
+
+def test_transformers_switches_are_checked_as_well(ask: Any) -> None:
+    small = {"device": "cpu", "chunk_tokens": 64, "batch_size": 1}
+    code, _, err = ask("here", "--check-equality", 2, **small)
+    assert code == 0, err
+    assert "2 replies are equal with and without chunk_tokens=64,batch_size=1" in " ".join(
+        err.split()
+    )
+
+
+@pytest.mark.parametrize(
+    ("model", "expected"),
+    [
+        ("qwen2.5-vl@vllm", "its switches are max_num_seqs, max_num_batched_tokens, "),
+        ("qwen2.5-vl-nano", "its switches are attn_implementation, share_prefix, "),
+        ("oracle", "it has none"),
+    ],
+)
+def test_without_a_switch_there_is_nothing_to_compare(
+    run_cli: Any, model: str, expected: str
+) -> None:
+    code, _, err = run_cli("--model", model, "--tasks", "nieh_mini", "--check-equality", 3)
+    assert code == 2
+    assert f"--check-equality 3: --model-args turns no switch of {model} on" in err
+    assert expected in err
 
 
 def test_engines_that_do_not_run_a_model_are_refused_in_one_line(

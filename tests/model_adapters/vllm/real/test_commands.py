@@ -63,6 +63,21 @@ def test_questions_are_answered_alike(run_engine: Run) -> None:
     assert cached > 0.5 * read
 
 
+def test_switches_are_tried_before_the_run(
+    run_cli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("VLLM_CPU_KVCACHE_SPACE", "1")
+    tasks = ("--tasks", "nieh_mini_gt", "--limit", 6, "--check-equality", 6)
+    switches = "max_num_batched_tokens=256,kv_cache_dtype=fp8"
+    arguments = _arguments("vllm", tmp_path / "out", *tasks)
+    at = arguments.index("--model-args") + 1
+    arguments[at] += f",{switches}"
+    code, _, err = run_cli(*arguments)
+    assert code == 0, err
+    assert f"6 replies are equal with and without {switches}" in " ".join(err.split())
+    assert len(read_records(tmp_path / "out")) == 6
+
+
 @pytest.mark.parametrize("more", [("--greedy",), ("--greedy", "--constrained")])
 def test_plans_are_carried_out_alike(
     more: tuple[str, ...], run_engine: Run, tmp_path: Path
