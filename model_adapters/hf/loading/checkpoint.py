@@ -2,8 +2,8 @@
 
 transformers cannot build the processors of video-capable families without torchvision, so the parts
 that a conversation needs (image processor, tokenizer, chat template) are loaded one by one. Image
-processors are always those of PIL: torchvision's resize gives other pixels, and results must not
-depend on which packages are installed.
+processors are those of PIL wherever there is one: torchvision's resize gives other pixels, and
+results must not depend on which packages are installed.
 """
 
 import contextlib

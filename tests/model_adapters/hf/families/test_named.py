@@ -1,0 +1,102 @@
+"""Models with a name of their own, on tiny checkpoints of their families."""
+
+import importlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import load, options
+from model_adapters.hf.cached.model import TransformersModel
+from model_adapters.hf.uncached import UncachedModel
+
+from ....helpers.benchmarks import FOLDER
+from ...asking import up_to
+
+# Name to the family of its tiny checkpoint, and a usual checkpoint.
+NAMED = {
+    "qwen3-vl": ("qwen3_vl", "Qwen/Qwen3-VL-8B-Instruct"),
+    "qwen3-vl-moe": ("qwen3_vl_moe", "Qwen/Qwen3-VL-30B-A3B-Instruct"),
+    "qwen3.5": ("qwen3_5", "Qwen/Qwen3.5-9B"),
+    "internvl3.5": ("internvl", "OpenGVLab/InternVL3_5-8B-HF"),
+    "gemma3": ("gemma3", "google/gemma-3-12b-it"),
+    "gemma4": ("gemma4", "google/gemma-4-E4B-it"),
+    "smolvlm2": ("smolvlm", "HuggingFaceTB/SmolVLM2-2.2B-Instruct"),
+    "glm-4.6v": ("glm46v", "zai-org/GLM-4.6V-Flash"),
+    "mistral-small": ("mistral3", "mistralai/Mistral-Small-3.1-24B-Instruct-2503"),
+    "llama4": ("llama4", "meta-llama/Llama-4-Scout-17B-16E-Instruct"),
+    "molmo2": ("molmo2", "allenai/Molmo2-8B"),
+}
+Make = Callable[[str], Path]
+
+
+@pytest.fixture(scope="module")
+def make(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Make]:
+    """The folder of a family's tiny checkpoint."""
+    made: dict[str, Path] = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(FOLDER)
+        families = importlib.import_module("families").FAMILIES
+        save = importlib.import_module("tiny_families.checkpoint").save
+
+        def make(family: str) -> Path:
+            if family not in made:
+                made[family] = tmp_path_factory.mktemp(family)
+                save(family, families[family], made[family])
+            return made[family]
+
+        yield make
+
+
+def _load(name: str, folder: Path, **settings: str) -> Any:
+    return load(name, {"pretrained": str(folder), "device": "cpu", **settings}, seed=0)
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_a_name_runs_its_family_as_hf_vlm_does(
+    name: str, make: Make, frames: list[FrameRef]
+) -> None:
+    family, usual = NAMED[name]
+    assert f"pretrained={usual}" in options(name)
+    shares = name != "molmo2"
+    settings = {} if shares else {"share_prefix": "false"}
+    model, generic = _load(name, make(family)), _load("hf-vlm", make(family), **settings)
+    assert isinstance(model, TransformersModel if shares else UncachedModel)
+    replies = []
+    for each in (model, generic):
+        talk = each.conversation()
+        talk.append(*frames[:2], "\nWhat is it?")
+        replies.append(talk.reply(up_to(4)))
+    assert replies[0] == replies[1]
+    assert model.identity() | {"adapter": "hf-vlm"} == generic.identity()
+
+
+def test_a_checkpoint_of_another_model_is_refused(make: Make) -> None:
+    with pytest.raises(ModelError, match=r"is a gemma3 checkpoint, not qwen3_vl; try hf-vlm"):
+        _load("qwen3-vl", make("gemma3"))
+
+
+@pytest.mark.parametrize(
+    ("name", "setting", "value"),
+    [
+        ("qwen3-vl", "max_pixels", "4096"),
+        ("gemma4", "soft_tokens", "140"),
+        ("smolvlm2", "image_splitting", "false"),
+    ],
+)
+def test_a_size_of_frames_changes_their_tokens_and_the_identity(
+    name: str, setting: str, value: str, make: Make, frames: list[FrameRef]
+) -> None:
+    folder = make(NAMED[name][0])
+    usual, changed = _load(name, folder), _load(name, folder, **{setting: value})
+    fewer, more = sorted(each.tokens_per_frame(frames[0]) for each in (usual, changed))
+    assert fewer < more
+    assert usual.identity()["image_processor"] != changed.identity()["image_processor"]
+
+
+def test_sizes_that_gemma_4_does_not_know_are_refused() -> None:
+    with pytest.raises(UsageError, match="soft_tokens=100 is not 70, 140, 280, 560, 1120"):
+        load("gemma4", {"soft_tokens": "100"}, 0)
