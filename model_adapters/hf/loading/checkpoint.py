@@ -317,6 +317,11 @@ def _load_model(located: LocatedCheckpoint[CheckpointOptions]) -> Any:
         raise ModelError(
             f"{options.pretrained} lacks {len(missing)} weights of its model ({missing[0]}, ...)"
         )
+    if model.get_input_embeddings().weight.is_meta:
+        raise ModelError(
+            f"device_map={options.device_map} has no room for the embeddings of "
+            f"{options.pretrained}; use quantization=bnb4, more GPUs, or device_map=none"
+        )
     return model if options.device_map or options.quantization else model.to(device)
 
 

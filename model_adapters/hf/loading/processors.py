@@ -64,19 +64,18 @@ def _processor_class(located: LocatedCheckpoint[Any]) -> Any:
     """Return the class of the processor without its video part; the class that finds it out where
     torchvision is installed, and for code of the checkpoint's own."""
     name = _class_name(located.folder)
-    named = None if name is None else available_class(name)
-    processor_class: Any = named or PROCESSOR_MAPPING.get(type(located.config), None)
+    named = None if name is None else getattr(transformers, name, None)
+    processor_class: Any = available_class(
+        named or PROCESSOR_MAPPING.get(type(located.config), None)
+    )
     if (
         is_torchvision_available()
         or processor_class is None
         or not hasattr(processor_class, "get_attributes")
     ):
         return transformers.AutoProcessor
-    return (
-        _without_video(processor_class)
-        if _VIDEO in processor_class.get_attributes()
-        else (processor_class)
-    )
+    has_video = _VIDEO in processor_class.get_attributes()
+    return _without_video(processor_class) if has_video else processor_class
 
 
 def _without_video(processor_class: Any) -> Any:

@@ -168,12 +168,9 @@ def _packages(functions: ModuleType) -> dict[str, ModuleType]:
     return modules
 
 
-def available_class(name: str) -> Any:
-    """Return a class of transformers by its name, or None if there is none.
-
-    transformers gives a dummy where a package is missing; this imports the class itself.
-    """
-    found = getattr(transformers, name, None)
+def available_class(found: Any) -> Any:
+    """Return a class of transformers; where it has a dummy, because a package is missing, the class
+    itself."""
     if getattr(found, "is_dummy", False):
         return getattr(import_module(found.__module__), found.__name__)
     return found
@@ -184,8 +181,7 @@ def register_image_processor(config: Any) -> None:
     names = IMAGE_PROCESSOR_MAPPING_NAMES.get(config.model_type, {})
     if is_torchvision_available() or "pil" in names or "torchvision" not in names:
         return
+    processor_class = available_class(getattr(transformers, names["torchvision"]))
     transformers.AutoImageProcessor.register(
-        type(config),
-        image_processor_classes={"torchvision": available_class(names["torchvision"])},
-        exist_ok=True,
+        type(config), image_processor_classes={"torchvision": processor_class}, exist_ok=True
     )

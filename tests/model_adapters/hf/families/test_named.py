@@ -1,7 +1,5 @@
 """Models with a name of their own, on tiny checkpoints of their families."""
 
-import importlib
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +11,8 @@ from model_adapters import load, options
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.uncached import UncachedModel
 
-from ....helpers.benchmarks import FOLDER
 from ...asking import up_to
+from ...conftest import TinyFamily
 
 # Name to the family of its tiny checkpoint, and a usual checkpoint.
 NAMED = {
@@ -30,25 +28,6 @@ NAMED = {
     "llama4": ("llama4", "meta-llama/Llama-4-Scout-17B-16E-Instruct"),
     "molmo2": ("molmo2", "allenai/Molmo2-8B"),
 }
-Make = Callable[[str], Path]
-
-
-@pytest.fixture(scope="module")
-def make(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Make]:
-    """The folder of a family's tiny checkpoint."""
-    made: dict[str, Path] = {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(FOLDER)
-        families = importlib.import_module("families").FAMILIES
-        save = importlib.import_module("tiny_families.checkpoint").save
-
-        def make(family: str) -> Path:
-            if family not in made:
-                made[family] = tmp_path_factory.mktemp(family)
-                save(family, families[family], made[family])
-            return made[family]
-
-        yield make
 
 
 def _load(name: str, folder: Path, **settings: str) -> Any:
@@ -57,13 +36,16 @@ def _load(name: str, folder: Path, **settings: str) -> Any:
 
 @pytest.mark.parametrize("name", NAMED)
 def test_a_name_runs_its_family_as_hf_vlm_does(
-    name: str, make: Make, frames: list[FrameRef]
+    name: str, tiny_family: TinyFamily, frames: list[FrameRef]
 ) -> None:
     family, usual = NAMED[name]
     assert f"pretrained={usual}" in options(name)
     shares = name != "molmo2"
     settings = {} if shares else {"share_prefix": "false"}
-    model, generic = _load(name, make(family)), _load("hf-vlm", make(family), **settings)
+    model, generic = (
+        _load(name, tiny_family(family)),
+        _load("hf-vlm", tiny_family(family), **settings),
+    )
     assert isinstance(model, TransformersModel if shares else UncachedModel)
     replies = []
     for each in (model, generic):
@@ -74,9 +56,9 @@ def test_a_name_runs_its_family_as_hf_vlm_does(
     assert model.identity() | {"adapter": "hf-vlm"} == generic.identity()
 
 
-def test_a_checkpoint_of_another_model_is_refused(make: Make) -> None:
+def test_a_checkpoint_of_another_model_is_refused(tiny_family: TinyFamily) -> None:
     with pytest.raises(ModelError, match=r"is a gemma3 checkpoint, not qwen3_vl; try hf-vlm"):
-        _load("qwen3-vl", make("gemma3"))
+        _load("qwen3-vl", tiny_family("gemma3"))
 
 
 @pytest.mark.parametrize(
@@ -88,9 +70,9 @@ def test_a_checkpoint_of_another_model_is_refused(make: Make) -> None:
     ],
 )
 def test_a_size_of_frames_changes_their_tokens_and_the_identity(
-    name: str, setting: str, value: str, make: Make, frames: list[FrameRef]
+    name: str, setting: str, value: str, tiny_family: TinyFamily, frames: list[FrameRef]
 ) -> None:
-    folder = make(NAMED[name][0])
+    folder = tiny_family(NAMED[name][0])
     usual, changed = _load(name, folder), _load(name, folder, **{setting: value})
     fewer, more = sorted(each.tokens_per_frame(frames[0]) for each in (usual, changed))
     assert fewer < more

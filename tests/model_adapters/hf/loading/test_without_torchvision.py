@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+import transformers
 from PIL import Image
 from transformers import AutoConfig
 from transformers.models.auto.image_processing_auto import IMAGE_PROCESSOR_MAPPING_NAMES
@@ -82,7 +83,7 @@ def test_pixels_are_those_of_torchvision(tmp_path: Path) -> None:
     expected = torch.load(tmp_path / "pixels.pt")
     for name in names:
         with torchvision_or_stand_in():
-            processor = available_class(name)()
+            processor = available_class(getattr(transformers, name))()
         for image, theirs in zip(images, expected[name], strict=True):
             ours = processor(images=[image], return_tensors="pt")
             assert set(ours) == set(theirs)
@@ -110,7 +111,8 @@ def test_transformers_finds_what_is_registered_and_no_torchvision(
 
 def test_what_torch_cannot_do_alone_is_named() -> None:
     with torchvision_or_stand_in():
-        processor: Any = available_class("Llama4ImageProcessor")(resample=Image.Resampling.LANCZOS)
+        processor_class: Any = available_class(transformers.Llama4ImageProcessor)
+        processor = processor_class(resample=Image.Resampling.LANCZOS)
     with pytest.raises(NotImplementedError, match=r"resample=1 requires the torchvision library"):
         processor(images=[Image.new("RGB", (60, 60))], return_tensors="pt")
 
