@@ -89,7 +89,7 @@ def _without_video(processor_class: Any) -> Any:
         {"get_attributes": classmethod(lambda _: left)},
     )
 
-    class WithoutVideo(processor_class):  # type: ignore[misc]
+    class WithoutVideo(processor_class):
         @classmethod
         def _get_arguments_from_pretrained(cls, *args: Any, **kwargs: Any) -> list[Any]:
             parts = loaded._get_arguments_from_pretrained(*args, **kwargs)

@@ -111,7 +111,7 @@ class NativeEmbedder:
 
     @property
     def _device(self) -> torch.device:
-        return self._embeddings.weight.device  # type: ignore[no-any-return]
+        return self._embeddings.weight.device
 
     @property
     def sees_ahead(self) -> bool:

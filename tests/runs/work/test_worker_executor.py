@@ -142,8 +142,15 @@ class Unequal(Sums):
             yield session.find_record(unit, "f") or unit.record("f", Sum(unit.payload.numbers, 1))
 
 
+class UnequalSuite(ToySuite):
+    """Gives `Unequal`."""
+
+    def prepare(self, run_request):
+        return Prepared(Unequal)
+
+
 def test_workers_begin_with_the_dearest_groups(tmp_path):
-    suite = make_suite(Unequal)
+    suite = UnequalSuite()
     _, watching = run(request(tmp_path / "2", worker_settings=TWO), suite)
     assert watching.seen[0][0] in ("5+0", "4+0")
     assert watching.seen[-1][0] in ("0+0", "1+0")
