@@ -45,9 +45,14 @@ BUILT_IN = {
     "deepseek-vl-tiny": _locate(
         "tiny.deepseek_vl:DeepseekVLTiny", "options.tiny:TinyOptions", _RANDOM
     ),
+    "gemma3": _locate("hf.families.named:Gemma3", "options.named:Gemma3Options"),
+    "gemma4": _locate("hf.families.named:Gemma4", "options.named:Gemma4Options"),
+    "glm-4.6v": _locate("hf.families.named:Glm46V", "options.named:Glm46VOptions"),
     "hf-vlm": _locate("hf.families.hf_vlm:HfVlm", "options.families:HfVlmOptions"),
     "hf-vlm@vllm": _locate("vllm.adapter:HfVlmOnVllm", "vllm.options:HfVlmOnVllmOptions"),
     "human": _locate("human.adapter:Human", "human.adapter:HumanOptions", _PERSON),
+    "internvl3.5": _locate("hf.families.named:InternVL35", "options.named:InternVL35Options"),
+    "llama4": _locate("hf.families.named:Llama4", "options.named:Llama4Options"),
     "llava-onevision": _locate(
         "hf.families.llava_onevision:LlavaOnevision", "options.families:LlavaOnevisionOptions"
     ),
@@ -57,6 +62,8 @@ BUILT_IN = {
     "llava-onevision-tiny": _locate(
         "tiny.llava_onevision:LlavaOnevisionTiny", "options.tiny:TinyOptions", _RANDOM
     ),
+    "mistral-small": _locate("hf.families.named:MistralSmall", "options.named:MistralSmallOptions"),
+    "molmo2": _locate("hf.families.named:Molmo2", "options.named:Molmo2Options"),
     "openai": _locate("openai.adapter:OpenAI", "openai.options:OpenAIOptions"),
     "openvla": _locate("policies.openvla.adapter:OpenVLA", "options.policies:OpenVLAOptions"),
     "openvla@vllm": _locate("vllm.openvla:OpenVLAOnVllm", "vllm.options:OpenVLAOnVllmOptions"),
@@ -72,6 +79,10 @@ BUILT_IN = {
     "qwen2.5-vl-tiny": _locate(
         "tiny.qwen2_5_vl:Qwen25VLTiny", "options.tiny:Qwen25VLTinyOptions", _RANDOM
     ),
+    "qwen3-vl": _locate("hf.families.named:Qwen3VL", "options.named:Qwen3VLOptions"),
+    "qwen3-vl-moe": _locate("hf.families.named:Qwen3VLMoe", "options.named:Qwen3VLMoeOptions"),
+    "qwen3.5": _locate("hf.families.named:Qwen35", "options.named:Qwen35Options"),
+    "smolvlm2": _locate("hf.families.named:SmolVLM2", "options.named:SmolVLM2Options"),
     "spatialvla": _locate(
         "policies.spatialvla.adapter:SpatialVLA", "options.policies:SpatialVLACheckpointOptions"
     ),

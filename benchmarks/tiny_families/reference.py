@@ -11,16 +11,12 @@ from typing import Any, cast
 
 import transformers
 from PIL import Image, ImageOps
-from transformers.models.smolvlm import processing_smolvlm
 
 _AUTO = cast(Any, transformers)  # whose loading functions are untyped
 
 
 def main() -> None:
     """Answer the questions that the standard input has."""
-    # SmolVLM's processor insists on a package that it writes videos' times with; here are none.
-    smolvlm = cast(Any, processing_smolvlm)
-    smolvlm.num2words = smolvlm.num2words or str
     work = json.load(sys.stdin)
     answers: dict[str, Any] = {}
     for name, folder in work["folders"].items():

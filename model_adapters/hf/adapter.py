@@ -1,8 +1,8 @@
 """Base of the adapters of model families, whose classes have nothing but settings."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import torch
 from PIL import Image
@@ -13,7 +13,7 @@ from model_adapters.hf.family import MakeFamily
 from model_adapters.hf.loading.checkpoint import LocatedCheckpoint, load_checkpoint, locate
 from model_adapters.options.checkpoints import CheckpointOptions, CheckpointReading
 
-__all__ = ["CheckpointAdapter", "load_model", "wrap_mismatch_errors"]
+__all__ = ["CheckpointAdapter", "load_model", "require_model_type", "wrap_mismatch_errors"]
 
 _SAMPLE = (300, 300)  # width and height of frames in the published data
 
@@ -55,13 +55,22 @@ class CheckpointAdapter:
             ModelError: the checkpoint does not exist, or is of another family.
         """
         located = locate(options)
-        model_type = located.config.model_type
-        if model_type not in cls.model_types:
-            raise ModelError(
-                f"{options.pretrained} is a {model_type} checkpoint, not "
-                f"{' or '.join(cls.model_types)}; try hf-vlm"
-            )
+        require_model_type(located, cls.model_types)
         return located
+
+
+def require_model_type(located: LocatedCheckpoint[Any], model_types: Sequence[str]) -> None:
+    """Refuse a checkpoint of another `model_type`.
+
+    Raises:
+        ModelError: the checkpoint's is none of these.
+    """
+    model_type = located.config.model_type
+    if model_type not in model_types:
+        raise ModelError(
+            f"{located.options.pretrained} is a {model_type} checkpoint, not "
+            f"{' or '.join(model_types)}; try hf-vlm"
+        )
 
 
 def load_model(

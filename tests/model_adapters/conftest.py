@@ -1,6 +1,7 @@
 """Frames, tiny models and their checkpoints for the tests of adapters, and transformers' own way of
 running these."""
 
+import importlib
 import json
 import os
 import subprocess
@@ -16,7 +17,10 @@ from PIL import Image
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Part, Turn, Video, load
 
+from ..helpers.benchmarks import FOLDER
 from .checkpoints import FAMILIES, OTHERS, save
+
+TinyFamily = Callable[[str], Path]
 
 PEERS = Path(sys.prefix) / "test-peers"  # torchvision's Python half, kept out of the environment
 
@@ -177,3 +181,21 @@ def _part_as_json(part: Part) -> tuple[str, Any]:
     if isinstance(part, Video):
         return "video", {"frames": [str(frame.path) for frame in part.frames], "fps": part.fps}
     return ("text", part) if isinstance(part, str) else ("image", str(part.path))
+
+
+@pytest.fixture(scope="session")
+def tiny_family(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TinyFamily]:
+    """Returns the folder of a tiny checkpoint of a family of `benchmarks/families.py`."""
+    made: dict[str, Path] = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(FOLDER)
+        families = importlib.import_module("families").FAMILIES
+        save_family = importlib.import_module("tiny_families.checkpoint").save
+
+        def make(family: str) -> Path:
+            if family not in made:
+                made[family] = tmp_path_factory.mktemp(family)
+                save_family(family, families[family], made[family])
+            return made[family]
+
+        yield make

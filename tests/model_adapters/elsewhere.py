@@ -1,9 +1,10 @@
-"""A device that is not the CPU, on any machine: what a GPU would refuse is refused, what it waits
+"""Devices that are not the CPU, on any machine: what a GPU would refuse is refused, what it waits
 for is counted.
 
-Its tensors hold CPU tensors and say that they are torch's `meta` device, which every build of torch
-has. They compute what the CPU computes, so that replies can be compared; but as on a GPU, two
-devices do not meet in one operation, and what is read or copied from one to the other is seen.
+Their tensors hold CPU tensors and say that they are torch's `meta` device, which every build of
+torch has, with a number. They compute what the CPU computes, so that replies can be compared; but
+as on GPUs, two devices do not meet in one operation, and what is read or copied from one to the
+other is seen.
 """
 
 from collections import Counter
@@ -19,7 +20,7 @@ from torch.utils._pytree import tree_leaves, tree_map
 
 __all__ = ["Seen", "elsewhere", "move"]
 
-_HERE, _ELSEWHERE = torch.device("cpu"), torch.device("meta")
+_HERE, _ELSEWHERE = torch.device("cpu"), torch.device("meta", 0)
 _MOVES = {"_to_copy", "copy_", "to"}
 _READS = {
     "_local_scalar_dense",
@@ -54,10 +55,13 @@ class _Elsewhere(torch.Tensor):
 
     held: torch.Tensor
     seen: Seen
+    place: torch.device
     is_meta = False  # it has values
 
     @staticmethod
-    def __new__(cls, held: torch.Tensor, seen: Seen) -> "_Elsewhere":
+    def __new__(
+        cls, held: torch.Tensor, seen: Seen, device: torch.device = _ELSEWHERE
+    ) -> "_Elsewhere":
         tensor: _Elsewhere = torch.Tensor._make_wrapper_subclass(
             cls,
             held.shape,
@@ -66,8 +70,12 @@ class _Elsewhere(torch.Tensor):
             dtype=held.dtype,
             device=_ELSEWHERE,
         )
-        tensor.held, tensor.seen = held, seen
+        tensor.held, tensor.seen, tensor.place = held, seen, device
         return tensor
+
+    @property
+    def device(self) -> torch.device:  # type: ignore[override]  # torch's has no number
+        return self.place
 
     @classmethod
     def __torch_function__(cls, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
@@ -78,6 +86,9 @@ class _Elsewhere(torch.Tensor):
         if func is torch.Tensor.tolist:
             args[0].seen.reads["tolist"] += 1
             return args[0].held.tolist()
+        if func is torch.Tensor.__format__:
+            args[0].seen.reads["printed"] += 1
+            return format(args[0].held, *args[1:])
         if func is torch.nn.functional.scaled_dot_product_attention:
             return _attended(func, args, kwargs)
         with torch._C.DisableTorchFunctionSubclass():
@@ -90,6 +101,13 @@ class _Elsewhere(torch.Tensor):
 
 def _ours(leaves: Sequence[Any]) -> list[_Elsewhere]:
     return [leaf for leaf in leaves if isinstance(leaf, _Elsewhere)]
+
+
+def _require_one_device(name: Any, leaves: Sequence[Any]) -> None:
+    devices = {tensor.device for tensor in _ours(leaves)}
+    devices |= {tensor.device for tensor in _theirs(leaves) if tensor.dim()}
+    if len(devices) > 1:
+        raise RuntimeError(f"{name} of tensors on {len(devices)} devices")
 
 
 def _theirs(leaves: Sequence[Any]) -> list[torch.Tensor]:
@@ -110,7 +128,9 @@ def _storage(tensor: torch.Tensor) -> int:
     return tensor.untyped_storage().data_ptr()
 
 
-def _wrapped(out: Any, ours: Sequence[_Elsewhere], seen: Seen, name: str) -> Any:
+def _wrapped(
+    out: Any, ours: Sequence[_Elsewhere], seen: Seen, name: str, device: torch.device
+) -> Any:
     """Results as tensors of the device; what an operation wrote in place is the tensor that was
     given."""
     known = {_storage(tensor.held) for tensor in ours}
@@ -119,11 +139,11 @@ def _wrapped(out: Any, ours: Sequence[_Elsewhere], seen: Seen, name: str) -> Any
         if not isinstance(leaf, torch.Tensor):
             return leaf
         for tensor in ours:
-            if tensor.held is leaf:
+            if tensor.held is leaf and tensor.device == device:
                 return tensor
         if _storage(leaf) not in known:
             seen.allocated[name] += leaf.untyped_storage().nbytes()
-        return _Elsewhere(leaf, seen)
+        return _Elsewhere(leaf, seen, device)
 
     return tree_map(wrap, out)
 
@@ -137,7 +157,10 @@ def _target(
     if func._schema.name == "aten::copy_":
         return args[0].device  # type: ignore[no-any-return]
     named = [leaf for leaf in leaves if isinstance(leaf, torch.device)]
-    return named[0] if named else _ELSEWHERE if ours else _HERE
+    # torch leaves the number out where it names the device of a given tensor itself.
+    if named and (named[0] == _HERE or named[0].index is not None):
+        return named[0]
+    return ours[0].device if ours else _HERE
 
 
 def _dispatched(
@@ -146,16 +169,19 @@ def _dispatched(
     """Carry out one operation of torch."""
     leaves, name = tree_leaves((args, kwargs)), func._schema.name.removeprefix("aten::")
     ours, theirs = _ours(leaves), _theirs(leaves)
-    if ours and name not in _MOVES and any(tensor.dim() for tensor in theirs):
-        raise RuntimeError(f"{func} of tensors on two devices")
+    if ours and name not in _MOVES:
+        _require_one_device(func, leaves)
     seen = ours[0].seen if ours else seen
     target = _target(func, args, leaves, ours)
-    out = func(*tree_map(_plain, args), **tree_map(_plain, kwargs))
+    if name == "histc" and ours:  # of whole numbers, too, on a GPU
+        out = func(args[0].held.float(), *args[1:], **kwargs).to(args[0].dtype)
+    else:
+        out = func(*tree_map(_plain, args), **tree_map(_plain, kwargs))
     if seen is None:
         return out
     seen.reads[name] += bool(ours) and (name in _READS or (name in _MOVES and target == _HERE))
     seen.brought[name] += bool(theirs) and name in _MOVES and target != _HERE
-    return out if target == _HERE else _wrapped(out, ours, seen, name)
+    return out if target == _HERE else _wrapped(out, ours, seen, name, target)
 
 
 def _indexed(func: Callable[..., Any], args: Sequence[Any]) -> Any:
@@ -166,6 +192,8 @@ def _indexed(func: Callable[..., Any], args: Sequence[Any]) -> Any:
     seen.reads["mask"] += sum(
         isinstance(part, _Elsewhere) and part.dtype == torch.bool for part in index
     )
+    if func is torch.Tensor.__getitem__ or any(isinstance(part, torch.Tensor) for part in index):
+        _require_one_device("an index", ours)
     if isinstance(target, _Elsewhere):
         seen.brought["index"] += sum(isinstance(part, list) for part in index) + len(
             _theirs(leaves)
@@ -177,18 +205,17 @@ def _indexed(func: Callable[..., Any], args: Sequence[Any]) -> Any:
     return (
         out
         if out is None or not isinstance(target, _Elsewhere)
-        else _wrapped(out, ours, seen, "index")
+        else _wrapped(out, ours, seen, "index", target.device)
     )
 
 
 def _attended(func: Callable[..., Any], args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
     leaves = tree_leaves((args, kwargs))
-    if _theirs(leaves):
-        raise RuntimeError("attention over tensors on two devices")
+    _require_one_device("attention", leaves)
+    first = _ours(leaves)[0]
     with _disable_current_modes():
-        return _Elsewhere(
-            func(*tree_map(_plain, args), **tree_map(_plain, kwargs)), _ours(leaves)[0].seen
-        )
+        out = func(*tree_map(_plain, args), **tree_map(_plain, kwargs))
+    return _Elsewhere(out, first.seen, first.device)
 
 
 class _Making(TorchFunctionMode):
@@ -200,13 +227,14 @@ class _Making(TorchFunctionMode):
 
     def __torch_function__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
         kwargs = kwargs or {}
-        if func not in (torch.tensor, torch.as_tensor) or kwargs.get("device") != _ELSEWHERE:
+        device = kwargs.get("device")
+        if func not in (torch.tensor, torch.as_tensor) or device is None or device.type != "meta":
             return func(*args, **kwargs)
         tensor = func(*args, **(kwargs | {"device": None}))
         if isinstance(tensor, _Elsewhere):
             return tensor
         self._seen.brought["tensor"] += 1
-        return _Elsewhere(tensor, self._seen)
+        return _Elsewhere(tensor, self._seen, device)
 
 
 class _Dispatching(TorchDispatchMode):
@@ -227,10 +255,12 @@ def elsewhere(seen: Seen) -> Iterator[None]:
         yield
 
 
-def move(model: torch.nn.Module, seen: Seen) -> None:
-    """Bring a model's parameters and buffers to the device."""
-    for module in model.modules():
-        for tensors in (module._parameters, module._buffers):
+@torch.inference_mode()  # in which they are used: a view of another tensor cannot be made there
+def move(module: torch.nn.Module, seen: Seen, device: torch.device = _ELSEWHERE) -> None:
+    """Bring the parameters and buffers of a model, or of a part of it, to a device."""
+    for part in module.modules():
+        for tensors in (part._parameters, part._buffers):
             for name, tensor in tensors.items():
                 if tensor is not None:
-                    tensors[name] = _Elsewhere(tensor.detach(), seen)  # type: ignore[assignment]
+                    held = tensor.held if isinstance(tensor, _Elsewhere) else tensor.detach()
+                    tensors[name] = _Elsewhere(held, seen, device)  # type: ignore[assignment]

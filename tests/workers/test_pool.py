@@ -157,6 +157,23 @@ def test_processes_share_the_processors_of_the_machine(monkeypatch):
     shared.close()
 
 
+@pytest.mark.parametrize(
+    ("count", "gpus", "shares"),
+    [
+        (2, "0,1", ["0", "1"]),
+        (3, "GPU-aa, GPU-bb", ["GPU-aa", "GPU-bb", "GPU-aa"]),  # by name; two share one
+        (2, "3,5,7,9", ["3,7", "5,9"]),  # a model over several
+    ],
+)
+def test_processes_share_the_gpus_of_the_machine(count, gpus, shares, monkeypatch):
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", gpus)
+    connect = WorkerSettings(count).connect(OpenCounter())
+    links = [connect(number) for number in range(1, count + 1)]
+    assert [link.open()["gpus"] for link in links] == shares
+    for link in links:
+        link.close()
+
+
 def test_a_driver_that_is_killed_takes_its_workers_with_it(tmp_path):
     script = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"

@@ -62,6 +62,7 @@ class Counter:
             "pid": os.getpid(),
             "number": number,
             "threads": os.environ["OMP_NUM_THREADS"],
+            "gpus": os.environ.get("CUDA_VISIBLE_DEVICES"),
         }
 
     def do(self, job: Job) -> Iterator[tuple[int, int]]:

@@ -109,10 +109,16 @@ def _torch() -> Check:
         )
     if torch.cuda.is_available():
         properties = torch.cuda.get_device_properties(0)
+        gpu = f"{properties.name}, {properties.total_memory / _GB:.0f} GB"
+        n_gpus = torch.cuda.device_count()
+        if n_gpus == 1:
+            return Check("torch", "ok", f"{torch.__version__}, {gpu}")
         return Check(
             "torch",
             "ok",
-            f"{torch.__version__}, {properties.name}, {properties.total_memory / _GB:.0f} GB",
+            f"{torch.__version__}, {n_gpus} GPUs: {gpu}",
+            f"--workers {n_gpus} puts a model on each; a model that does not fit on one: --engine "
+            f"vllm --model-args tensor_parallel_size={n_gpus}",
         )
     hint = (
         "large models need a GPU and a torch built for it; tiny models, baselines and served ones "

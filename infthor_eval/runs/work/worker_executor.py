@@ -97,6 +97,11 @@ def _without_inputs(group: Group[SuiteUnit]) -> Group[Unit[Any]]:
     return Group([unit.without_inputs() for unit in group.units], group.frames)
 
 
+def _cost(group: Group[Any]) -> tuple[int, int]:
+    """Return what a group's cost grows with, what its units share first."""
+    return group.frames, len(group.units)
+
+
 class _Evaluator(Generic[SuiteUnit, Payload]):
     """A worker of a run; see `infthor_eval.workers.Worker`."""
 
@@ -184,8 +189,11 @@ class WorkerPoolExecutor(Generic[SuiteUnit, Payload]):
         """See `Executor`."""
         groups = self.workload.groups
         progress = _Progress(folder, journal, should_stop)
+        # The dearest first: one that is begun last would keep a worker busy for long while the
+        # others have nothing left to do.
+        order = sorted(range(len(groups)), key=lambda n: _cost(groups[n]), reverse=True)
         given_up = yield from self._do_portions(
-            [_Portion(n) for n in range(len(groups))], progress, _GROUP_TRIES
+            [_Portion(n) for n in order], progress, _GROUP_TRIES
         )
         # Some unit in them is to blame; the others must not fail with it.
         alone = [

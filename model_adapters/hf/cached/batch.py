@@ -69,7 +69,7 @@ class _Branches:
         last = {branch: at for at, branch in enumerate(owners)}
         positions = torch.cat([span.positions for _, span in group], dim=-1)
         inputs = self._embed.join([span for _, span in group])
-        rows = self._logits(inputs, positions, owners, torch.tensor(list(last.values())))
+        rows = self._logits(inputs, positions, owners, list(last.values()))
         return dict(zip(last, rows, strict=True))
 
     def _logits(
@@ -77,7 +77,7 @@ class _Branches:
         inputs: Mapping[str, Any],
         positions: torch.Tensor,
         owners: Sequence[int],
-        keep: slice | torch.Tensor,
+        keep: slice | list[int],  # a tensor would be sent to the first of several devices
     ) -> torch.Tensor:
         """Encode tokens of the owners' branches; return the kept logits, (kept, vocabulary)."""
         n_before = []

@@ -10,7 +10,7 @@ works differently is refused instead of giving wrong results.
 import inspect
 from collections.abc import Mapping, Sequence
 from functools import cached_property, partial
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import torch
 from PIL import Image
@@ -177,7 +177,7 @@ def _markers(config: Any) -> tuple[int, int] | None:
 class HfVlm:
     """The adapter `hf-vlm`."""
 
-    Options = HfVlmOptions
+    Options: ClassVar[type] = HfVlmOptions
 
     @classmethod
     def build(cls, name: str, options: HfVlmOptions, seed: int) -> Model:  # noqa: ARG003

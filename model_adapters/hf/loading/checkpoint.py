@@ -2,8 +2,8 @@
 
 transformers cannot build the processors of video-capable families without torchvision, so the parts
 that a conversation needs (image processor, tokenizer, chat template) are loaded one by one. Image
-processors are always those of PIL: torchvision's resize gives other pixels, and results must not
-depend on which packages are installed.
+processors are those of PIL wherever there is one: torchvision's resize gives other pixels, and
+results must not depend on which packages are installed.
 """
 
 import contextlib
@@ -316,6 +316,11 @@ def _load_model(located: LocatedCheckpoint[CheckpointOptions]) -> Any:
     if missing:  # transformers would draw them at random and only warn
         raise ModelError(
             f"{options.pretrained} lacks {len(missing)} weights of its model ({missing[0]}, ...)"
+        )
+    if model.get_input_embeddings().weight.is_meta:
+        raise ModelError(
+            f"device_map={options.device_map} has no room for the embeddings of "
+            f"{options.pretrained}; use quantization=bnb4, more GPUs, or device_map=none"
         )
     return model if options.device_map or options.quantization else model.to(device)
 

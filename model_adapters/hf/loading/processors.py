@@ -1,12 +1,12 @@
 """Loading a checkpoint's processor of images and text.
 
 transformers loads a processor whole, with its part for videos, which needs torchvision. Frames are
-given as images, so that part is left out where torchvision is not installed.
+given as images, so that part is left out where torchvision is not installed. Images are scaled by
+PIL; a few families have no such processor, and torchvision's part in theirs is torch's own
+(`without_torchvision`).
 """
 
 import re
-from functools import partialmethod
-from inspect import Parameter, signature
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,11 @@ from transformers.utils import is_torchvision_available
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.reading import read_json
 from model_adapters.hf.loading.checkpoint import LocatedCheckpoint, wrap_loading_errors
+from model_adapters.hf.loading.without_torchvision import (
+    available_class,
+    register_image_processor,
+    torchvision_or_stand_in,
+)
 
 __all__ = ["load_processor"]
 
@@ -35,11 +40,12 @@ def load_processor(located: LocatedCheckpoint[Any]) -> Any:
     """
     pretrained = located.options.pretrained
     remote = {"trust_remote_code": located.options.trust_remote_code}
-    with wrap_loading_errors(pretrained):
+    with wrap_loading_errors(pretrained), torchvision_or_stand_in():
         try:
+            register_image_processor(located.config)
             processor = _processor_class(located).from_pretrained(located.folder, **remote)
             processor.image_processor = transformers.AutoImageProcessor.from_pretrained(
-                located.folder, backend="pil", **remote
+                located.folder, backend="pil", **remote, **located.options.image_settings()
             )
         # Without torchvision, its classes are missing in many ways.
         except Exception as error:
@@ -59,22 +65,44 @@ def _processor_class(located: LocatedCheckpoint[Any]) -> Any:
     torchvision is installed, and for code of the checkpoint's own."""
     name = _class_name(located.folder)
     named = None if name is None else getattr(transformers, name, None)
-    processor_class: Any = named or PROCESSOR_MAPPING.get(type(located.config), None)
+    processor_class: Any = available_class(
+        named or PROCESSOR_MAPPING.get(type(located.config), None)
+    )
     if (
         is_torchvision_available()
         or processor_class is None
         or not hasattr(processor_class, "get_attributes")
     ):
         return transformers.AutoProcessor
+    has_video = _VIDEO in processor_class.get_attributes()
+    return _without_video(processor_class) if has_video else processor_class
+
+
+def _without_video(processor_class: Any) -> Any:
+    """Return a processor's class that loads None for the part for videos."""
     attributes = processor_class.get_attributes()
-    if _VIDEO not in attributes:
-        return processor_class
-    # transformers loads what a class has by this, and checks its arguments by it.
     left = [attribute for attribute in attributes if attribute != _VIDEO]
-    changes: dict[str, Any] = {"get_attributes": classmethod(lambda _: left), _VIDEO: None}
-    if signature(processor_class.__init__).parameters[_VIDEO].default is Parameter.empty:
-        changes["__init__"] = partialmethod(processor_class.__init__, **{_VIDEO: None})
-    return type(processor_class.__name__, (processor_class,), changes)
+    # transformers loads what a class has by this; all else goes by the class itself.
+    loaded: Any = type(
+        processor_class.__name__,
+        (processor_class,),
+        {"get_attributes": classmethod(lambda _: left)},
+    )
+
+    class WithoutVideo(processor_class):
+        @classmethod
+        def _get_arguments_from_pretrained(cls, *args: Any, **kwargs: Any) -> list[Any]:
+            parts = loaded._get_arguments_from_pretrained(*args, **kwargs)
+            by_name = dict(zip(left, parts, strict=True))
+            return [by_name.get(attribute) for attribute in attributes]
+
+        def check_argument_for_proper_class(self, argument_name: str, argument: Any) -> Any:
+            if argument_name == _VIDEO and argument is None:
+                return None
+            return super().check_argument_for_proper_class(argument_name, argument)
+
+    WithoutVideo.__name__ = processor_class.__name__
+    return WithoutVideo
 
 
 def _class_name(folder: Path) -> str | None:

@@ -107,7 +107,11 @@ class NativeEmbedder:
     ) -> None:
         self._family = family
         self._features = features
-        self._device = model.get_input_embeddings().weight.device
+        self._embeddings = model.get_input_embeddings()
+
+    @property
+    def _device(self) -> torch.device:
+        return self._embeddings.weight.device
 
     @property
     def sees_ahead(self) -> bool:

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 from typing import Any
 
 from jinja2 import TemplateError
@@ -31,6 +32,8 @@ _REFUSALS = (
     AttributeError,
     RecursionError,
 )
+# What templates that write the date (Mistral Small's) take for today: the same prompt every day.
+_TODAY = date(2025, 1, 1)
 _PRINTED = "{'type': 'text'"  # appears where a template that expects a string prints a list
 
 
@@ -173,7 +176,11 @@ def _apply(
         limit_memory(TEMPLATE_MB.value),
     ):
         text: str = tokenizer.apply_chat_template(
-            list(messages), chat_template=template, tokenize=False, add_generation_prompt=True
+            list(messages),
+            chat_template=template,
+            tokenize=False,
+            add_generation_prompt=True,
+            strftime_now=_TODAY.strftime,
         )
     if len(text) > TEMPLATE_CHARACTERS.value:  # the tokenizer would take minutes and gigabytes
         raise ModelError(

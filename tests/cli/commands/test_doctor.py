@@ -2,6 +2,7 @@
 
 import json
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -54,6 +55,21 @@ def test_everything_is_checked_and_what_is_missing_has_a_hint(run_cli, monkeypat
     }
     assert "fetch nieh" in by_name["NIEH data"]["hint"]
     assert TOKEN not in out
+
+
+@pytest.mark.parametrize(("n_gpus", "hinted"), [(1, False), (4, True)])
+def test_several_gpus_are_for_several_workers_or_one_model_that_is_split(
+    n_gpus, hinted, monkeypatch
+):
+    card = SimpleNamespace(name="A card", total_memory=80e9)
+    monkeypatch.setattr("torch.cuda.is_available", lambda: True)
+    monkeypatch.setattr("torch.cuda.device_count", lambda: n_gpus)
+    monkeypatch.setattr("torch.cuda.get_device_properties", lambda number: card)
+    check = checks._torch()
+    assert check.state == "ok"
+    assert check.detail.endswith(("4 GPUs: " if hinted else "") + "A card, 80 GB")
+    words = ("--workers 4 puts a model on each", "--engine vllm", "tensor_parallel_size=4")
+    assert all(text in check.hint for text in words) if hinted else not check.hint
 
 
 def test_people_read_lines(run_cli):

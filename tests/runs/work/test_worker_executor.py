@@ -127,6 +127,37 @@ def test_several_workers_find_what_one_process_finds_and_each_writes_a_shard(tmp
     )
 
 
+class Unequal(Sums):
+    """Sums in six groups, each of which looks at more frames than the one before."""
+
+    def __init__(self):
+        groups = [
+            runs.Group([runs.Unit(runs.UnitKey("sums", f"{n}+0"), f"from {n}", Sum((n, 0)))], n)
+            for n in range(6)
+        ]
+        self.workload = runs.Workload(groups, (), runs.RunConfig())
+
+    def run(self, group, session):
+        for unit in group.units:
+            yield session.find_record(unit, "f") or unit.record("f", Sum(unit.payload.numbers, 1))
+
+
+class UnequalSuite(ToySuite):
+    """Gives `Unequal`."""
+
+    def prepare(self, run_request):
+        return Prepared(Unequal)
+
+
+def test_workers_begin_with_the_dearest_groups(tmp_path):
+    suite = UnequalSuite()
+    _, watching = run(request(tmp_path / "2", worker_settings=TWO), suite)
+    assert watching.seen[0][0] in ("5+0", "4+0")
+    assert watching.seen[-1][0] in ("0+0", "1+0")
+    _, watching = run(request(tmp_path / "1"), suite)
+    assert [name for name, _ in watching.seen] == [f"{n}+0" for n in range(6)]
+
+
 class Faulty(Sums):
     """Raises in every group."""
 

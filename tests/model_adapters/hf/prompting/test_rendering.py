@@ -133,3 +133,8 @@ def test_the_systems_words_are_a_string_where_the_template_joins_them(tokenizer:
     )
     template = JOINED.replace(BODY, strings + "{%- endif -%}")
     assert _render(tokenizer, template, (SYSTEM, *SAID)) == text
+
+
+def test_a_template_that_writes_the_date_writes_the_same_every_day(tokenizer: Any) -> None:
+    dated = "{{- strftime_now('%Y-%m-%d') }}: " + PLAIN
+    assert _render(tokenizer, dated, user("What?")).startswith("2025-01-01:")
