@@ -11,13 +11,12 @@ import torch
 from PIL import Image
 
 from infthor_eval.errors import ModelError, UsageError
-from model_adapters.hf.families.hf_vlm import ProcessorFamily, family_of
+from model_adapters.hf.families.hf_vlm import HfVlm, ProcessorFamily, family_of
 from model_adapters.hf.families.plain import PlainFamily, three_axis_positions
 from model_adapters.hf.family import Family, Shape, Size
 from model_adapters.hf.loading.checkpoint import (
     LocatedCheckpoint,
     build_meta_model,
-    locate,
     read_checkpoint,
     resolve_dtype,
 )
@@ -114,7 +113,9 @@ def load_shapes(options: CheckpointOptions) -> RehearsedModel:
     with tempfile.TemporaryDirectory() as folder:
         known.write(Path(folder))
         stored = replace(options, pretrained=folder, revision=None, prompt="plain")
-        return replace(_load(stored, known.source), options=options)
+        loaded = _load(stored, known.source)
+        problem = loaded.problem.replace(folder, options.pretrained)
+        return replace(loaded, options=options, problem=problem)
 
 
 def _refuse_options(options: CheckpointOptions) -> None:
@@ -126,7 +127,7 @@ def _refuse_options(options: CheckpointOptions) -> None:
 
 
 def _load(options: CheckpointOptions, source: str) -> RehearsedModel:
-    located = locate(options)
+    located = HfVlm.locate("hf-vlm", options)
     device = ShapesDevice()
     build = partial(_build, device=device)
     family = family_of(located.config)
@@ -139,11 +140,11 @@ def _load(options: CheckpointOptions, source: str) -> RehearsedModel:
         loaded = read_checkpoint(located, family, build)
     except ModelError as error:
         limit = apply_rope(located.config, options.rope)
-        model = build(located)
-        problem = str(error).replace(options.pretrained, "the checkpoint")
+        device = ShapesDevice()  # the error may keep a first model
+        model = _build(located, device)
         text = _TextFamily(model)
         return RehearsedModel(
-            model, text, options, device, device.allocated, source, limit, problem=problem
+            model, text, options, device, device.allocated, source, limit, problem=str(error)
         )
     if process is None:
         process = partial(loaded.image_processor, return_tensors="pt")
