@@ -32,7 +32,7 @@ from model_adapters.registry import name_on_engine, read_options
 __all__ = ["rehearse"]
 
 _GIGABYTES = (24, 48, 80, 141)  # of common GPUs
-_CONTEXTS = (32_768, 131_072, 524_288)  # tokens
+_CONTEXTS = (8_192, 32_768, 131_072, 524_288, 1_048_576)  # tokens
 _STEP = 1024  # tokens that the largest context is found to
 # Of docs/cost.md, for an H100: share of the memory that is used, operations in a second in products
 # of matrices and in attention.
@@ -90,7 +90,7 @@ def rehearse(
         frame_tokens=per_frame,
         problem=rehearsed.problem,
         flash_problem=run.flash_problem,
-        attention=_attention(run.usage(_CONTEXTS[1])),
+        attention=_attention(run.usage(_CONTEXTS[-1])),
         contexts=contexts,
         gpus=[_gpu(gigabytes, run, flash, longest) for gigabytes in _GIGABYTES],
         images=_images(rehearsed, samples, run.frame_work(longest // 2)) if per_frame else None,

@@ -55,7 +55,7 @@ class KnownCheckpoint:
         for name, content in files.items():
             if content:
                 (folder / name).write_text(json.dumps(content), encoding="utf-8")
-        ids = {_UNKNOWN: 0} | self.tokens
+        ids = {_UNKNOWN: 0, **self.tokens}
         tokenizer = Tokenizer(models.WordLevel(ids, unk_token=_UNKNOWN))
         tokenizer.add_special_tokens(list(ids))
         PreTrainedTokenizerFast(

@@ -27,6 +27,7 @@ from model_adapters.hf.rehearsal.model import RehearsedModel
 __all__ = ["FrameWork", "Kernels", "Rehearsal", "Usage"]
 
 _QUESTION = 60  # tokens of a question and what is around it, as in docs/cost.md
+_TOGETHER = 25  # most questions on a trajectory of the published set
 _MIB = 2**20
 _FIRST_STEPS = (32, 512)
 _MOST_TRIALS = 6
@@ -267,14 +268,13 @@ class Rehearsal:
         return _counted(self._device.attention, self._prefix.n_tokens)
 
     def _answer_together(self) -> None:
-        """Encode questions together, as many as one pass takes; more take no more at a time."""
+        """Encode questions together, as many as a trajectory of the published set has at most."""
         options = self._rehearsed.options
-        size = max(2, min(options.batch_size, options.chunk_tokens // _QUESTION))
         encode_together(
             self._rehearsed.model,
             self._embed,
             prefix=self._prefix,
-            continuations=[[_TOKEN] * _QUESTION] * size,
+            continuations=[[_TOKEN] * _QUESTION] * min(options.batch_size, _TOGETHER),
             chunk_tokens=options.chunk_tokens,
         )
 
