@@ -53,8 +53,6 @@ def _lines(found: Rehearsed) -> list[str]:
 
 def _attention(call: Attention) -> str:
     given = "with a mask, which the flash kernel does not take" if call.has_mask else "no mask"
-    if call.kernel != "memory-efficient":
-        given = "with a mask" if call.has_mask else "no mask"
     return f"{call.of}: {call.kernel}, {given}; {call.calls} calls, heads of {call.head_size}"
 
 

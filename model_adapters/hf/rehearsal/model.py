@@ -100,7 +100,7 @@ def load_shapes(options: CheckpointOptions) -> RehearsedModel:
         ModelError: the config is of no vision-language model that transformers has.
     """
     _refuse_options(options)
-    if (Path(options.pretrained) / _CONFIG).is_file():
+    if options.pretrained and (Path(options.pretrained) / _CONFIG).is_file():
         return _load(options, f"{options.pretrained}/{_CONFIG}")
     known = known_checkpoints().get(options.pretrained)
     if known is None:
