@@ -21,6 +21,7 @@ setup(
         "infthor_eval.household": ["*.yaml"],
         "infthor_eval.nieh": ["*.yaml"],
         "infthor_eval.report": ["*.html", "web/*.html", "web/*.css", "web/*.js", "live/live.*"],
+        "model_adapters.hf.rehearsal": ["*.yaml"],
         "model_adapters.human": ["*.html", "*.css", "*.js"],
         "infthor_eval.training": ["recipes/*.yaml"],
         "infthor_eval.tasks": ["**/*.yaml"],

@@ -29,6 +29,7 @@ _OUTSIDE = {  # where a file lies in the repository: where its page stands in th
     "benchmarks/memories.md": "benchmarks/memories.md",
     "benchmarks/families.md": "benchmarks/families.md",
     "benchmarks/plans.md": "benchmarks/plans.md",
+    "benchmarks/rehearsal.md": "benchmarks/rehearsal.md",
     "benchmarks/simulator.md": "benchmarks/simulator.md",
     "benchmarks/speed.md": "benchmarks/speed.md",
     "benchmarks/twins.md": "benchmarks/twins.md",

@@ -36,6 +36,7 @@ __all__ = [
     "name_on_engine",
     "names",
     "options",
+    "read_options",
     "switched_on",
     "switches",
 ]
@@ -106,7 +107,17 @@ def check_options(name: str, options: Mapping[str, str]) -> None:
         UsageError: a name is unknown, or a value does not fit its option.
         ModelError: the adapter cannot be imported.
     """
-    parse(name, _options(name), options)
+    read_options(name, options)
+
+
+def read_options(name: str, options: Mapping[str, str]) -> Any:
+    """Return the options that a model's adapter is given, of the adapter's own type.
+
+    Raises:
+        UsageError: a name is unknown, or a value does not fit its option.
+        ModelError: the adapter cannot be imported.
+    """
+    return parse(name, _options(name), options)
 
 
 def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:

@@ -21,7 +21,13 @@ import msgspec
 from rich.text import Text
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH
+from infthor_eval.cli.options.values import (
+    PATH,
+    ModelArgs,
+    ModelList,
+    ModelSpec,
+    split_names,
+)
 from infthor_eval.cli.set_checks import Check, set_checks
 from infthor_eval.errors import UsageError, in_one_line
 from infthor_eval.nieh.published.hub_data import default_folder
@@ -46,7 +52,12 @@ _EXTRAS = {
 }
 
 
-@click.command("doctor", cls=ExampleCommand, example="infthor-eval doctor --data SET")
+@click.command(
+    "doctor",
+    cls=ExampleCommand,
+    example="infthor-eval doctor --data SET\n"
+    "infthor-eval doctor --rehearse --model qwen2.5-vl --tasks nieh",
+)
 @click.option(
     "--data",
     type=PATH,
@@ -57,15 +68,48 @@ _EXTRAS = {
     type=PATH,
     help="Folder of the set's trajectories, if they are not in the set.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the checks as JSON.")
-def command(data: Path | None, trajectories: Path | None, as_json: bool) -> int:
+@click.option(
+    "--rehearse",
+    is_flag=True,
+    help="Say instead what a model needs on a GPU, without one and without its weights: memory by "
+    "context, what fits, attention kernels, rates of frames, disk, and the commands to type.",
+)
+@click.option(
+    "--model",
+    "models",
+    type=ModelList(),
+    metavar="MODEL,...",
+    help="Models to rehearse, as for `run`.",
+)
+@click.option(
+    "--model-args",
+    type=ModelArgs(),
+    default="",
+    metavar="K=V,...",
+    help="Options of the models; pretrained=DIR takes the config of a folder.",
+)
+@click.option("--tasks", help="Tasks to rehearse, as for `run`.")
+@click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON.")
+def command(
+    data: Path | None,
+    trajectories: Path | None,
+    rehearse: bool,
+    models: tuple[ModelSpec, ...] | None,
+    model_args: dict[str, str],
+    tasks: str | None,
+    as_json: bool,
+) -> int:
     """Check the installation and suggest fixes: Python, torch, simulators, the hub, disk, data.
 
     With --data it checks an NIEH set: its questions, frames and logs, and what each task can ask of
-    it.
+    it. With --rehearse it runs a model's code on shapes alone, for the contexts of some tasks.
 
     Exit code 1 if something is missing that every use needs, or if nothing can be asked of the set.
     """
+    if rehearse:
+        return _rehearse(models, model_args, tasks, data, as_json)
+    if models or model_args or tasks:
+        raise UsageError("--model, --model-args and --tasks are of a rehearsal; add --rehearse")
     if trajectories is not None and data is None:
         raise UsageError("--trajectories is of a set; give its folder with --data")
     results = []
@@ -80,6 +124,30 @@ def command(data: Path | None, trajectories: Path | None, as_json: bool) -> int:
     if as_json:
         click.echo(msgspec.json.format(msgspec.json.encode(results), indent=2))
     return int(any(check.state == "wrong" for check in results))
+
+
+def _rehearse(
+    models: tuple[ModelSpec, ...] | None,
+    model_args: dict[str, str],
+    tasks: str | None,
+    data: Path | None,
+    as_json: bool,
+) -> int:
+    """Rehearse models, one after the other, and print what was found."""
+    if not models or not tasks:
+        raise UsageError("--rehearse needs --model and --tasks")
+    from infthor_eval.cli.rehearsal.gathering import rehearse
+    from infthor_eval.cli.rehearsal.printing import print_rehearsed
+
+    found = []
+    for name, options in models:
+        texts = {**model_args, **options}
+        found.append(rehearse(name, texts, split_names(tasks, "--tasks"), data))
+        if not as_json:
+            print_rehearsed(found[-1])
+    if as_json:
+        click.echo(msgspec.json.format(msgspec.json.encode(found), indent=2))
+    return 0
 
 
 def checks() -> Iterator[Check]:

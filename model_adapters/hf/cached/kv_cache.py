@@ -69,6 +69,13 @@ class BufferedCache(Cache):
         """Set the capacity of buffers allocated from now on, so that they need not grow."""
         self._allocation.capacity = -(-n_tokens // _STEP) * _STEP
 
+    def lengthen(self, n_tokens: int) -> None:
+        """Append so many tokens to every layer with keys, each with the keys and values of the last
+        one: for measuring memory, not for replies."""
+        for layer in self.layers:
+            if isinstance(layer, BufferedLayer) and layer.keys is not None:
+                layer.update(*(_repeated(last, n_tokens) for last in (layer.keys, layer.values)))
+
     @property
     def needs_marks(self) -> bool:
         """True if the cache can be cut at marks and its end alone."""
@@ -100,6 +107,11 @@ class BufferedCache(Cache):
     def _create_layers(self, n_layers: int) -> None:
         for number in range(len(self.layers), n_layers):
             self.layers.append(self._linear.get(number) or BufferedLayer(self._allocation))
+
+
+def _repeated(states: torch.Tensor, n_tokens: int) -> torch.Tensor:
+    """Return the last token's states so many times, as a view."""
+    return states[..., -1:, :].expand(*states.shape[:-2], n_tokens, states.shape[-1])
 
 
 class BufferedLayer(DynamicLayer):

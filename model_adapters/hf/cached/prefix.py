@@ -129,6 +129,16 @@ class Prefix:
         del self._pieces[n_pieces:], self._ends[n_pieces:], self._starts[n_pieces + 1 :]
         self._cache.truncate(self.n_tokens)
 
+    def lengthen(self, n_tokens: int) -> None:
+        """Take so many tokens of text as encoded behind the sequence, each like its last token: for
+        measuring memory, not for replies."""
+        self._cache.lengthen(n_tokens)
+        ends = range(self.n_tokens + 1, self.n_tokens + n_tokens + 1)
+        starts = range(self.end + 1, self.end + n_tokens + 1)
+        self._pieces += [0] * n_tokens
+        self._ends += ends
+        self._starts += starts
+
     def feed(self, pieces: Sequence[Piece], reserve: int = 0) -> torch.Tensor:
         """Encode pieces behind the sequence.
 

@@ -1,0 +1,1 @@
+"""`doctor --rehearse`: what a model needs on a GPU for some tasks, told without one."""

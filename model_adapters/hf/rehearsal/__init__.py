@@ -1,0 +1,1 @@
+"""What a model needs on a GPU, found without one: its code run on shapes."""

@@ -1,0 +1,165 @@
+"""A checkpoint's model, and what prepares its prompts, on a device that computes no numbers."""
+
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import torch
+from PIL import Image
+
+from infthor_eval.errors import ModelError, UsageError
+from model_adapters.hf.families.hf_vlm import HfVlm, ProcessorFamily, family_of
+from model_adapters.hf.families.plain import PlainFamily, three_axis_positions
+from model_adapters.hf.family import Family, Shape, Size
+from model_adapters.hf.loading.checkpoint import (
+    LocatedCheckpoint,
+    build_meta_model,
+    read_checkpoint,
+    resolve_dtype,
+)
+from model_adapters.hf.loading.processors import load_processor
+from model_adapters.hf.loading.rope import apply_rope
+from model_adapters.hf.prompting.embedding import Embed
+from model_adapters.hf.prompting.features import FeatureCache
+from model_adapters.hf.prompting.native import EncodedImage, NativeEmbedder
+from model_adapters.hf.rehearsal.device import ShapesDevice
+from model_adapters.hf.rehearsal.known import known_checkpoints
+from model_adapters.hf.uncached import expand_image_tokens
+from model_adapters.options.checkpoints import CheckpointOptions
+
+__all__ = ["RehearsedModel", "load_shapes"]
+
+_CONFIG = "config.json"
+
+
+class _TextFamily(PlainFamily):
+    """What is left of a family whose processor cannot be built: text."""
+
+    def __init__(self, model: Any) -> None:
+        self._model = model
+        self.video = None
+        self.mask_types: Mapping[str, Mapping[int, int]] = {}
+        self.token_types: Mapping[str, Mapping[int, int]] = {}
+
+    def frame_ids(self, size: Size) -> tuple[int, ...]:
+        """Refuse frames."""
+        raise NotImplementedError
+
+    def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
+        """Return the positions of text, on as many axes as the model's."""
+        core = getattr(self._model, "model", self._model)
+        if hasattr(core, "get_rope_index"):
+            return three_axis_positions(core, ids, -1, None, start)
+        return super().positions(ids, shapes, start)
+
+    def make_embed(self, max_bytes: int) -> Embed:
+        """Return what prepares spans of text."""
+        return NativeEmbedder(self._model, self, FeatureCache(self.encode, max_bytes))
+
+    def encode(self, images: Sequence[Image.Image]) -> list[EncodedImage]:
+        """Refuse frames."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class RehearsedModel:
+    """A model of shapes.
+
+    Attributes:
+        model: the transformers model.
+        family: family of the model.
+        options: options of the model.
+        device: the device that it is on.
+        weights: bytes of its weights and buffers.
+        source: where its config is from.
+        limit: context limit in tokens, or None.
+        process: scales and cuts images, as a run does; None if frames cannot be counted.
+        problem: why frames cannot be counted; empty if they can.
+    """
+
+    model: Any
+    family: Family
+    options: CheckpointOptions
+    device: ShapesDevice
+    weights: int
+    source: str
+    limit: int | None
+    process: Callable[[Sequence[Image.Image]], Any] | None = None
+    problem: str = ""
+
+
+def load_shapes(options: CheckpointOptions) -> RehearsedModel:
+    """Build a checkpoint's model from its config alone.
+
+    Raises:
+        UsageError: no checkpoint is named, its config is neither in a folder nor kept here, or an
+            option cannot be rehearsed.
+        ModelError: the config is of no vision-language model that transformers has.
+    """
+    _refuse_options(options)
+    if options.pretrained and (Path(options.pretrained) / _CONFIG).is_file():
+        return _load(options, f"{options.pretrained}/{_CONFIG}")
+    known = known_checkpoints().get(options.pretrained)
+    if known is None:
+        raise UsageError(
+            f"pretrained={options.pretrained}: no folder with a config.json, and no config is kept "
+            f"here; get one with `hf download {options.pretrained or 'OWNER/NAME'} --include "
+            "'*.json' '*.jinja' --local-dir DIR` and give pretrained=DIR, or name one of "
+            f"{', '.join(known_checkpoints())}"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        known.write(Path(folder))
+        stored = replace(options, pretrained=folder, revision=None, prompt="plain")
+        loaded = _load(stored, known.source)
+        problem = loaded.problem.replace(folder, options.pretrained)
+        return replace(loaded, options=options, problem=problem)
+
+
+def _refuse_options(options: CheckpointOptions) -> None:
+    if options.kv_offload or options.quantization:
+        name = "kv_offload" if options.kv_offload else "quantization"
+        raise UsageError(
+            f"{name} cannot be rehearsed: memory would be counted wrongly; leave it out"
+        )
+
+
+def _load(options: CheckpointOptions, source: str) -> RehearsedModel:
+    located = HfVlm.locate("hf-vlm", options)
+    device = ShapesDevice()
+    build = partial(_build, device=device)
+    family = family_of(located.config)
+    process: Callable[[Sequence[Image.Image]], Any] | None = None
+    try:
+        if family is None:
+            processor = load_processor(located)
+            family = partial(ProcessorFamily, processor=processor)
+            process = partial(expand_image_tokens, processor)
+        loaded = read_checkpoint(located, family, build)
+    except ModelError as error:
+        limit = apply_rope(located.config, options.rope)
+        device = ShapesDevice()  # the error may keep a first model
+        model = _build(located, device)
+        text = _TextFamily(model)
+        return RehearsedModel(
+            model, text, options, device, device.allocated, source, limit, problem=str(error)
+        )
+    if process is None:
+        process = partial(loaded.image_processor, return_tensors="pt")
+    weights = device.allocated
+    return RehearsedModel(
+        loaded.model, loaded.family, options, device, weights, source, loaded.max_tokens, process
+    )
+
+
+def _build(located: LocatedCheckpoint[CheckpointOptions], device: ShapesDevice) -> Any:
+    """Return the model in the type and with the kernel that the options name, and count its
+    memory."""
+    dtype = resolve_dtype(located.options)
+    if isinstance(dtype, torch.dtype):
+        located.config.dtype = dtype
+    located.config._attn_implementation = located.options.attn_implementation
+    with device.running():
+        return build_meta_model(located).eval()

@@ -1,0 +1,288 @@
+"""Memory of a context and work of a frame, by running the model's code on shapes.
+
+A context is lengthened to its size without computing (`Prefix.lengthen`), then frames, a question,
+a token of a reply, and several questions together are encoded behind it, as in a run. What is
+allocated at a time is the memory of the context.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch.utils.flop_counter import FlopCounterMode
+
+from infthor_eval.errors import ModelError, wrap_errors
+from infthor_eval.formats.frames import FrameRef
+from model_adapters.hf.cached.batch import encode_together
+from model_adapters.hf.cached.branch_attention import layer_windows
+from model_adapters.hf.cached.prefix import Prefix, chunks
+from model_adapters.hf.prompting.prompt import Frame, Piece, n_tokens
+from model_adapters.hf.rehearsal.flash import flash_attention, flash_problem
+from model_adapters.hf.rehearsal.kernels import Attention
+from model_adapters.hf.rehearsal.model import RehearsedModel
+
+__all__ = ["FrameWork", "Kernels", "Rehearsal", "Usage"]
+
+_QUESTION = 60  # tokens of a question and what is around it, as in docs/cost.md
+_TOGETHER = 25  # most questions on a trajectory of the published set
+_MIB = 2**20
+_FIRST_STEPS = (32, 512)
+_MOST_TRIALS = 6
+_TOKEN = 0  # any token of text
+
+Kernels = Counter[
+    tuple[str, bool, int]
+]  # calls by kernel, by whether they have a mask, by head size
+
+
+@dataclass(frozen=True)
+class Usage:
+    """Memory of one context, in bytes.
+
+    Attributes:
+        n_tokens: tokens of the context.
+        weights: weights and buffers.
+        cache: keys and values, and states of linear layers.
+        activations: most that is allocated beside these while a chunk of frames, a question or a
+            token is encoded.
+        together: the same while questions are answered together; 0 if the model cannot.
+        features: features of earlier frames that are kept.
+        kernels: calls of attention to the context, by what is encoded.
+    """
+
+    n_tokens: int
+    weights: int
+    cache: int
+    activations: int
+    together: int
+    features: int
+    kernels: dict[str, Kernels]
+
+    @property
+    def total(self) -> int:
+        """All of it."""
+        return self.weights + self.cache + max(self.activations, self.together) + self.features
+
+
+@dataclass(frozen=True)
+class FrameWork:
+    """Work of encoding frames.
+
+    Attributes:
+        n_tokens: tokens of a frame, with those around it.
+        flop: of the products of matrices for one frame, the vision tower's among them.
+        attention: of attention for one frame, to a context of the given length.
+    """
+
+    n_tokens: int
+    flop: float
+    attention: float
+
+
+class Rehearsal:
+    """Runs of one model.
+
+    Args:
+        rehearsed: the model.
+        frames: pictures of the set's size, at least one.
+        flash: whether its decoder attends by flash-attn instead of the kernel of its options.
+
+    Raises:
+        ModelError: the model cannot be run on shapes.
+    """
+
+    def __init__(
+        self, rehearsed: RehearsedModel, frames: Sequence[FrameRef], *, flash: bool = False
+    ) -> None:
+        self._rehearsed = rehearsed
+        self._flash = flash
+        self._device = rehearsed.device
+        self._weights = rehearsed.weights
+        self._frames = frames
+        self._usages: dict[int, Usage] = {}
+        options = rehearsed.options
+        cache_bytes = options.feature_cache_mb * _MIB if options.share_prefix else 0
+        self._features = 0 if rehearsed.problem else cache_bytes
+        self._embed = rehearsed.family.make_embed(cache_bytes)
+        self._prefix = Prefix(
+            rehearsed.model, rehearsed.family, self._embed, chunk_tokens=options.chunk_tokens
+        )
+        self._chunk = self._frames_of_a_chunk()
+        with self._running():
+            self._vision = self._vision_bytes()
+            words = self._embed.words([_TOKEN, _TOKEN], [0, 0])
+            self._branches = (
+                options.share_prefix
+                and options.batch_size > 1
+                and layer_windows(rehearsed.model, words) is not None
+            )
+            self._device.attention.clear()
+            self._start(2, 0)
+            self._probe = [*self._device.attention]
+
+    @property
+    def frame_tokens(self) -> int:
+        """Tokens of a frame, with those around it in a prompt; 0 if frames cannot be counted."""
+        return 0 if self._rehearsed.problem else n_tokens(self._frame(0))
+
+    @property
+    def flash_problem(self) -> str:
+        """Why the decoder cannot attend by flash-attn; empty if it can."""
+        heads = {call.head_size for call in self._probe}
+        return flash_problem(self._rehearsed.model, max(heads), self._embed.sees_ahead)
+
+    def usage(self, n_context: int) -> Usage:
+        """Return the memory of a context of so many tokens.
+
+        Raises:
+            ModelError: the model fails.
+        """
+        if n_context not in self._usages:
+            self._usages[n_context] = self._measure(n_context)
+        return self._usages[n_context]
+
+    def largest(self, budget: float, step: int) -> int:
+        """Return the largest context, a multiple of `step` tokens, that takes at most `budget`
+        bytes; 0 if there is none.
+
+        Memory grows along a line for long contexts, so it is found where the line through the last
+        two measured contexts meets the budget.
+        """
+        before, last = (n * step for n in _FIRST_STEPS)
+        best = 0
+        for _ in range(_MOST_TRIALS):
+            slope = (self.usage(last).total - self.usage(before).total) / (last - before)
+            n_more = (budget - self.usage(last).total) / slope
+            reached = (last + int(n_more)) // step * step
+            if reached < step:
+                return best
+            left = budget - self.usage(reached).total
+            if left >= 0:
+                best = max(best, reached)
+            if reached == last or 0 <= left < slope * step:
+                return best
+            before, last = last, reached
+        return best
+
+    def frame_work(self, n_context: int) -> FrameWork:
+        """Return the work of frames behind a context of so many tokens."""
+        n_frames = sum(isinstance(piece, Frame) for piece in self._chunk)
+        with self._running():
+            self._start(n_context, n_tokens(self._chunk))
+            self._embed.clear()
+            self._device.attention.clear()
+        # Below the device, which hands operations on to it.
+        with FlopCounterMode(display=False) as counter, self._running():
+            self._prefix.feed(self._chunk)
+        flop = counter.get_total_flops()
+        attention = sum(call.flop for call in self._device.attention)
+        return FrameWork(self.frame_tokens, flop / n_frames, attention / n_frames)
+
+    def _vision_bytes(self) -> int:
+        """Return the most memory that the vision tower takes for the frames of a chunk."""
+        held = self._device.allocated
+        self._device.reset_peak()
+        if not self._rehearsed.problem:
+            self._embed(self._chunk, 0, ())
+        return self._device.peak - held
+
+    @contextmanager
+    def _running(self) -> Iterator[None]:
+        model = self._rehearsed.model
+        with ExitStack() as stack:
+            stack.enter_context(torch.inference_mode())
+            if self._flash:
+                decoder = model.get_decoder().config
+                stack.enter_context(flash_attention(decoder, self._device))
+            # Any error is possible: code that needs numbers finds none.
+            problem = f"{model.config.model_type} cannot be rehearsed"
+            stack.enter_context(
+                wrap_errors(problem, "measure on a GPU", catch=Exception, raise_as=ModelError)
+            )
+            stack.enter_context(self._device.running())
+            yield
+
+    def _frame(self, number: int) -> list[Piece]:
+        """Return a frame as pieces of a prompt; each number is a frame of its own."""
+        family = self._rehearsed.family
+        ref = self._frames[number % len(self._frames)]
+        frame = Frame(str(number), ref.size, family.frame_ids(ref.size), ref)
+        placeholder = family.placeholder_id
+        written = family.template_ids(placeholder)
+        return [frame if token == placeholder else token for token in written]
+
+    def _frames_of_a_chunk(self) -> list[Piece]:
+        """Return pieces of one chunk: frames, or text where frames cannot be counted."""
+        size = self._rehearsed.options.chunk_tokens
+        if self._rehearsed.problem:
+            return [_TOKEN] * size
+        pieces: list[Piece] = []
+        for number in range(max(1, size // self.frame_tokens)):
+            pieces += self._frame(number)
+        return next(chunks(pieces, max(size, self.frame_tokens)))
+
+    def _start(self, n_context: int, n_left: int) -> None:
+        """Encode a context up to what is left to feed."""
+        self._prefix.reset()
+        self._prefix.feed([_TOKEN], reserve=n_context - 1)
+        self._prefix.lengthen(max(1, n_context - 1 - n_left))
+
+    def _measure(self, n_context: int) -> Usage:
+        device = self._device
+        with self._running():
+            self._prefix.reset()
+            held = device.allocated  # weights, and features of the frames below
+            self._start(n_context, n_tokens(self._chunk) + _QUESTION + 1)
+            device.reset_peak()
+            kernels = {
+                name: self._attention(lambda pieces=pieces: self._prefix.feed(pieces))
+                for name, pieces in self.parts.items()
+            }
+            cache = device.allocated - held
+            activations = max(device.peak - held - cache, self._vision)
+            together = 0
+            if self._branches:
+                device.reset_peak()
+                kernels["questions together"] = self._attention(self._answer_together)
+                together = device.peak - held - cache
+        return Usage(
+            n_context, self._weights, cache, activations, together, self._features, kernels
+        )
+
+    @property
+    def parts(self) -> dict[str, Sequence[Piece]]:
+        """What is encoded behind a context, in order."""
+        return {
+            "frames": self._chunk,
+            "a question": [_TOKEN] * _QUESTION,
+            "a token of a reply": [_TOKEN],
+        }
+
+    def _attention(self, run: Callable[[], Any]) -> Kernels:
+        """Return the calls of attention to the whole context."""
+        self._device.attention.clear()
+        run()
+        return _counted(self._device.attention, self._prefix.n_tokens)
+
+    def _answer_together(self) -> None:
+        """Encode questions together, as many as a trajectory of the published set has at most."""
+        options = self._rehearsed.options
+        encode_together(
+            self._rehearsed.model,
+            self._embed,
+            prefix=self._prefix,
+            continuations=[[_TOKEN] * _QUESTION] * min(options.batch_size, _TOGETHER),
+            chunk_tokens=options.chunk_tokens,
+        )
+
+
+def _counted(calls: Sequence[Attention], n_context: int) -> Kernels:
+    """Return the calls that attend to more than half of a context."""
+    return Counter(
+        (call.kernel, call.has_mask, call.head_size)
+        for call in calls
+        if call.n_keys > n_context // 2
+    )
