@@ -1,8 +1,9 @@
 """Frames a second that are read and scaled, and how long a model waits for them.
 
-The old way (transformers' own image processor in the model's thread) and the present one take turns
-in one process, so that the speed of the machine cancels out. The model is a null model: it sleeps as
-long as a GPU would compute. Reading, digests and sizes are part of the time.
+The way before (transformers' own image processor in the model's thread) and the present one take
+turns, so that the speed of the machine cancels out; each has a process, because the present one
+changes how memory is kept. The model is a null model: it sleeps as long as a GPU would compute.
+Reading, digests and sizes are part of the time.
 
     python benchmarks/frames_ahead.py
     python benchmarks/frames_ahead.py --models smolvlm2 --frames 60
@@ -15,14 +16,19 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.util import find_spec
+from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, cast
 
 import torch
+import transformers
 from rich.console import Console
 from rich.table import Table
 from tiny_families.trial import PEERS, torchvision_path
@@ -38,6 +44,7 @@ from model_adapters.options.checkpoints import FrameScaling
 __all__ = ["main"]
 
 _CHUNK_TOKENS = 1024  # the default of a model's option
+_BEFORE = "before, singly"
 
 
 @dataclass(frozen=True)
@@ -48,11 +55,13 @@ class _Case:
         settings: those that matter for time.
         tokens: tokens of a frame of 300x300.
         null_rate: frames a second of the null model.
+        share: the frames of the others for one of this.
     """
 
     settings: dict[str, Any]
     tokens: int
     null_rate: int
+    share: int = 1
 
 
 _CASES = {
@@ -75,8 +84,32 @@ _CASES = {
         },
         tokens=1228,
         null_rate=10,
+        share=30,
     ),
 }
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A way to prepare frames.
+
+    Attributes:
+        backend: what scales them: transformers (its own class for PIL), pil or torchvision.
+        n_threads: threads ahead of the model.
+        batch: frames that are scaled together.
+    """
+
+    backend: str
+    n_threads: int = 0
+    batch: int = 1
+
+
+@dataclass
+class _Turns:
+    """What the turns of a way took: seconds, and seconds of processor time, of each."""
+
+    wall: list[float] = field(default_factory=list)
+    cpu: list[float] = field(default_factory=list)
 
 
 def main() -> None:
@@ -84,27 +117,35 @@ def main() -> None:
     options = _read_options()
     if options.torchvision:
         _start_again_with_torchvision()
-    paths = sorted(packaged_folder("sets/nieh_mini").glob("metadata/*/img/*.png"))
+    ways = _ways(options.threads)
     console = Console(width=110)
-    with tempfile.TemporaryDirectory() as folder:
+    with ExitStack() as stack:
+        processes = {
+            backend: stack.enter_context(ProcessPoolExecutor(1, get_context("spawn")))
+            for backend in dict.fromkeys(way.backend for way in ways.values())
+        }
         for name in options.models.split(","):
             case = _CASES[name]
-            n_frames = min(options.frames, len(paths)) // (1 if case.null_rate > 50 else 10)
-            ways = _ways(Path(folder) / name, case, options.threads)
-            rates = _rates(ways, paths[:n_frames], options.repeat)
-            console.print(_rate_table(name, n_frames, rates))
             rate = options.null_rate or case.null_rate
-            per_chunk = max(1, _CHUNK_TOKENS // case.tokens)
-            idle = _idle_shares(ways, paths[:n_frames], rate, per_chunk, options.repeat)
-            console.print(_idle_table(rate, idle))
+            for table, null_rate in ((_rate_table, None), (_idle_table, rate)):
+                n_frames = max(8, options.frames // case.share)
+                turns: dict[str, _Turns] = {title: _Turns() for title in ways}
+                for turn in range(options.repeat + 1):
+                    for title, way in ways.items():
+                        work = processes[way.backend].submit(_feed, name, way, n_frames, null_rate)
+                        wall, cpu = work.result()
+                        if turn:  # the first one warms up
+                            turns[title].wall.append(wall)
+                            turns[title].cpu.append(cpu)
+                console.print(table(name, n_frames, rate, turns))
 
 
 def _read_options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--models", default=",".join(_CASES), help="separated by commas")
-    parser.add_argument("--frames", type=int, default=600, help="of SmolVLM2 a tenth")
-    parser.add_argument("--threads", type=int, default=os.cpu_count(), help="of the present way")
-    parser.add_argument("--repeat", type=int, default=5, help="turns of each way")
+    parser.add_argument("--frames", type=int, default=600, help="of SmolVLM2 a thirtieth")
+    parser.add_argument("--threads", type=int, default=os.cpu_count(), help="ahead of the model")
+    parser.add_argument("--repeat", type=int, default=3, help="turns of each way")
     parser.add_argument("--null-rate", type=int, help="frames a second of the null model")
     parser.add_argument(
         "--torchvision", action="store_true", help="have torchvision, as `make test` sets it aside"
@@ -119,35 +160,59 @@ def _start_again_with_torchvision() -> None:
     os.execve(sys.executable, [sys.executable, *words], os.environ | torchvision_path())
 
 
-@dataclass(frozen=True)
-class _Way:
-    """A way to prepare frames: `process` makes pixels of an image, in `n_threads` ahead."""
-
-    process: Callable[..., Any]
-    n_threads: int
-    batch: int = 1
-
-
-def _ways(folder: Path, case: _Case, n_threads: int) -> dict[str, _Way]:
-    folder.mkdir()
-    (folder / "preprocessor_config.json").write_text(json.dumps(case.settings))
-    quick = load_image_processor(folder)
-    own = type(quick).__mro__[2](**quick.to_dict())  # transformers' class behind the quick one
+def _ways(n_threads: int) -> dict[str, _Way]:
     ways = {
-        "before: batches of 8": _Way(own, 0, batch=8),
-        "before, singly": _Way(own, 0),
-        "now, no thread": _Way(quick, 0),
-        f"now, {n_threads} threads ahead": _Way(quick, n_threads),
+        "before, batches of 8": _Way("transformers", batch=8),
+        _BEFORE: _Way("transformers"),
+        "now, no thread": _Way("pil"),
+        f"now, {n_threads} threads ahead": _Way("pil", n_threads),
     }
+    if find_spec("torchvision") is not None:
+        ways["torchvision, no thread"] = _Way("torchvision")
+        ways[f"torchvision, {n_threads} threads ahead"] = _Way("torchvision", n_threads)
+    return ways
+
+
+@cache
+def _image_processor(name: str, backend: str) -> Any:
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "preprocessor_config.json").write_text(json.dumps(_CASES[name].settings))
+        if backend == "transformers":
+            auto = cast(Any, transformers).AutoImageProcessor
+            return auto.from_pretrained(folder, backend="pil")
+        return load_image_processor(Path(folder), FrameScaling(image_backend=backend))
+
+
+def _feed(name: str, way: _Way, n_frames: int, null_rate: int | None) -> tuple[float, float]:
+    """Prepare frames in chunks, and compute on each in between, at the null model's rate or in no
+    time; return seconds of it all, and seconds of processor time."""
+    torch.set_num_threads(1)
+    process = _image_processor(name, way.backend)
+
+    def prepare(piece: Frame | Clip) -> Pixels:
+        assert isinstance(piece, Frame)
+        pixels: Pixels = process(images=[piece.ref.load()], return_tensors="pt")
+        return pixels
+
+    paths = sorted(packaged_folder("sets/nieh_mini").glob("metadata/*/img/*.png"))[:n_frames]
+    per_chunk = max(way.batch, _CHUNK_TOKENS // _CASES[name].tokens)
+    ahead = PixelsAhead(prepare, Ahead(way.n_threads))
     try:
-        scaling = FrameScaling(image_backend="torchvision")
-    except ValueError:
-        return ways
-    theirs = load_image_processor(folder, scaling)
-    return ways | {
-        "torchvision, no thread": _Way(theirs, 0),
-        f"torchvision, {n_threads} threads ahead": _Way(theirs, n_threads),
-    }
+        start, start_cpu = time.perf_counter(), time.process_time()
+        frames = _frames(paths)
+        ahead.expect(frames)
+        for at in range(0, n_frames, per_chunk):
+            chunk = frames[at : at + per_chunk]
+            if way.batch > 1:
+                process(images=[frame.ref.load() for frame in chunk], return_tensors="pt")
+            else:
+                for frame in chunk:
+                    ahead.take(frame)
+            if null_rate is not None:
+                time.sleep(len(chunk) / null_rate)
+        return time.perf_counter() - start, time.process_time() - start_cpu
+    finally:
+        ahead.close()
 
 
 def _frames(paths: Sequence[Path]) -> list[Frame]:
@@ -156,88 +221,35 @@ def _frames(paths: Sequence[Path]) -> list[Frame]:
     return [Frame(f"{at}{ref.digest}", ref.size, (), ref) for at, ref in enumerate(refs)]
 
 
-@contextmanager
-def _opened(way: _Way) -> Iterator[PixelsAhead]:
-    def prepare(piece: Frame | Clip) -> Pixels:
-        assert isinstance(piece, Frame)
-        pixels: Pixels = way.process(images=[piece.ref.load()], return_tensors="pt")
-        return pixels
-
-    ahead = PixelsAhead(prepare, Ahead(way.n_threads))
-    try:
-        yield ahead
-    finally:
-        ahead.close()
-
-
-def _feed(
-    way: _Way, paths: Sequence[Path], per_chunk: int, compute: Callable[[int], None]
-) -> float:
-    """Prepare all frames in chunks, each computed on in between; return seconds of it all."""
-    with _opened(way) as ahead:
-        start = time.perf_counter()
-        frames = _frames(paths)
-        ahead.expect(frames)
-        for at in range(0, len(frames), per_chunk):
-            chunk = frames[at : at + per_chunk]
-            if way.batch > 1:
-                way.process(images=[frame.ref.load() for frame in chunk], return_tensors="pt")
-            else:
-                for frame in chunk:
-                    ahead.take(frame)
-            compute(len(chunk))
-        return time.perf_counter() - start
-
-
-def _rates(ways: dict[str, _Way], paths: Sequence[Path], repeat: int) -> dict[str, list[float]]:
-    """Return frames a second of each way, in turns."""
-    rates: dict[str, list[float]] = {name: [] for name in ways}
-    with _one_torch_thread():
-        for turn in range(repeat + 1):
-            for name, way in ways.items():
-                seconds = _feed(way, paths, way.batch, lambda _: None)
-                if turn:  # the first one warms up
-                    rates[name].append(len(paths) / seconds)
-    return rates
-
-
-def _idle_shares(
-    ways: dict[str, _Way], paths: Sequence[Path], rate: int, per_chunk: int, repeat: int
-) -> dict[str, list[float]]:
-    """Return the share of time that the null model waits, of each way, in turns."""
-    shares: dict[str, list[float]] = {name: [] for name in ways}
-    with _one_torch_thread():
-        for _ in range(repeat):
-            for name, way in ways.items():
-                seconds = _feed(way, paths, per_chunk, lambda n: time.sleep(n / rate))
-                shares[name].append(1 - len(paths) / rate / seconds)
-    return shares
-
-
-@contextmanager
-def _one_torch_thread() -> Iterator[None]:
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-
-
-def _rate_table(name: str, n_frames: int, rates: dict[str, list[float]]) -> Table:
-    table = Table(f"{name}, {n_frames} frames", "frames/s", "least", "most", "times before, singly")
-    base = rates["before, singly"]
-    for way, values in rates.items():
-        ratio = median([value / other for value, other in zip(values, base, strict=True)])
-        table.add_row(way, *(f"{each(values):.1f}" for each in (median, min, max)), f"{ratio:.2f}")
+def _rate_table(name: str, n_frames: int, _: int, turns: dict[str, _Turns]) -> Table:
+    table = Table(f"{name}, {n_frames} frames")
+    for head in ("frames/s", "least", "most", "times before", "CPU ms a frame", "times less"):
+        table.add_column(head)
+    before = turns[_BEFORE]
+    for title, took in turns.items():
+        rates = [n_frames / wall for wall in took.wall]
+        table.add_row(
+            title,
+            *(f"{each(rates):.1f}" for each in (median, min, max)),
+            f"{_ratio(before.wall, took.wall):.2f}",
+            f"{1e3 * median(took.cpu) / n_frames:.2f}",
+            f"{_ratio(before.cpu, took.cpu):.2f}",
+        )
     return table
 
 
-def _idle_table(rate: int, shares: dict[str, list[float]]) -> Table:
-    table = Table(f"null model of {rate} frames/s", "waits (% of the time)", "least", "most")
-    for way, values in shares.items():
-        table.add_row(way, *(f"{100 * each(values):.1f}" for each in (median, min, max)))
+def _idle_table(name: str, n_frames: int, rate: int, turns: dict[str, _Turns]) -> Table:
+    table = Table(f"{name}, {n_frames} frames, null model of {rate} frames/s")
+    for head in ("waits (% of the time)", "least", "most"):
+        table.add_column(head)
+    for title, took in turns.items():
+        waits = [100 * (1 - n_frames / rate / wall) for wall in took.wall]
+        table.add_row(title, *(f"{each(waits):.1f}" for each in (median, min, max)))
     return table
+
+
+def _ratio(before: Sequence[float], now: Sequence[float]) -> float:
+    return median([old / new for old, new in zip(before, now, strict=True)])
 
 
 if __name__ == "__main__":

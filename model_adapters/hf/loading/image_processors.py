@@ -29,6 +29,7 @@ _LEVELS = 256  # of a pixel
 _LEAST = 32  # pixels along a side, below which Pillow itself takes no time
 _MOST = 64  # sizes whose resize is found out; to do so takes longer than to resize once
 _SEED = 0
+_KEPT_BYTES = 2**25 - 2**14  # slightly less than the largest that glibc learns from
 
 
 def load_image_processor(
@@ -47,6 +48,7 @@ def load_image_processor(
     Raises:
         ModelError: the image processor cannot split frames, and should.
     """
+    _keep_freed_memory()
     scaling = options if isinstance(options, FrameScaling) else FrameScaling()
     processor = cast(Any, transformers).AutoImageProcessor.from_pretrained(
         folder, backend=scaling.image_backend, trust_remote_code=trust_remote_code, **settings
@@ -56,6 +58,16 @@ def load_image_processor(
     if scaling.image_splitting is not None:
         setattr(processor, splitting_setting(processor), scaling.image_splitting)
     return processor
+
+
+def _keep_freed_memory() -> None:
+    """Have glibc keep up to 64 MiB of freed memory in each thread for the next frame.
+
+    It gives larger pieces back to the system and asks for them anew, and the system clears every
+    page of them: for a frame that took longer than its arithmetic. The limit is raised whenever a
+    larger piece is freed (mallopt(3), "dynamic mmap threshold").
+    """
+    np.empty(_KEPT_BYTES, np.uint8)
 
 
 def image_backend(image_processor: Any) -> str:

@@ -130,6 +130,7 @@ def _start_threads(n_threads: int) -> ThreadPoolExecutor:
     started = Barrier(n_threads + 1)
 
     def begin() -> None:
+        torch.get_num_threads()  # sets the thread's number, which it would do later otherwise
         torch.set_num_threads(1)
         started.wait()
 
