@@ -19,7 +19,8 @@ def _reply(model: Any, *frames: FrameRef) -> str:
 def test_replies_are_those_of_frames_read_when_they_are_asked_for(
     name: str, frames: list[FrameRef], make_frames: Any
 ) -> None:
-    shown = [*frames, frames[1], *make_frames(2, width=80, height=40)]  # one twice, two of another size
+    # One twice, two of another size.
+    shown = [*frames, frames[1], *make_frames(2, width=80, height=40)]
     replies = set()
     for n_threads, memory in (("0", "256"), ("3", "256"), ("2", "0")):
         model: Any = load(
