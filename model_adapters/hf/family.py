@@ -1,6 +1,6 @@
 """Protocol of a model family: everything that differs between families."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -8,11 +8,13 @@ import torch
 from PIL import Image
 
 if TYPE_CHECKING:
+    from model_adapters.hf.prompting.ahead import Ahead
     from model_adapters.hf.prompting.embedding import Embed
 
-__all__ = ["ClipShape", "Family", "MakeFamily", "Shape", "Size", "VideoInput"]
+__all__ = ["ClipShape", "Family", "MakeFamily", "Pixels", "Shape", "Size", "VideoInput"]
 
 Size = tuple[int, int]  # width, height in pixels
+Pixels = Mapping[str, torch.Tensor]  # what an image processor makes of a frame or a clip
 
 
 @dataclass(frozen=True)
@@ -50,9 +52,10 @@ class VideoInput(Protocol):
     def n_tokens(self, shape: ClipShape) -> int:
         """Return the number of tokens of a clip."""
 
-    def features(
-        self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]
-    ) -> list[torch.Tensor]:
+    def prepare(self, shape: ClipShape, images: Sequence[Image.Image]) -> Pixels:
+        """Return what the image processor makes of a clip's frames; see `Family.prepare`."""
+
+    def features_of(self, clips: Sequence[tuple[ClipShape, Pixels]]) -> list[torch.Tensor]:
         """Return embeddings for each clip's tokens, (tokens, hidden), on the embeddings' device."""
 
 
@@ -76,13 +79,19 @@ class Family(Protocol):
         """Return the ids of a frame or a video in a template: its placeholder and, in some
         families, markers."""
 
+    def prepare(self, image: Image.Image) -> Pixels:
+        """Return what the image processor makes of a frame, on the CPU.
+
+        It is called from several threads at the same time.
+        """
+
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Return embeddings for each image's slots, (slots, hidden), on the embeddings' device.
 
         They carry gradients, for training; inference calls this under `torch.inference_mode`.
         """
 
-    def make_embed(self, max_bytes: int) -> "Embed":
+    def make_embed(self, max_bytes: int, ahead: "Ahead") -> "Embed":
         """Return what prepares spans of prompts, with a cache of so many bytes of features."""
 
     def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:

@@ -26,6 +26,7 @@ from model_adapters.hf.loading.checkpoint import (
     wrap_loading_errors,
 )
 from model_adapters.hf.loading.hub import fetch
+from model_adapters.hf.loading.image_processors import load_image_processor
 from model_adapters.hf.vectors import VectorFile
 from model_adapters.options.checkpoints import Placement
 
@@ -53,9 +54,7 @@ class Retriever:
             with wrap_loading_errors(name):
                 model = _load_model(folder)
                 self._tokenizer = transformers.AutoTokenizer.from_pretrained(folder)
-                self._image_processor = transformers.AutoImageProcessor.from_pretrained(
-                    folder, backend="pil"
-                )
+                self._image_processor = load_image_processor(folder)
         except ModelError as error:
             raise UsageError(str(error)) from error
         self._model: Any = model.to(resolve_device(Placement())).eval()

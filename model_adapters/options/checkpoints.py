@@ -8,6 +8,7 @@ __all__ = [
     "CheckpointOptions",
     "CheckpointReading",
     "CheckpointSource",
+    "FrameScaling",
     "HfOptions",
     "Placement",
     "parse_rope",
@@ -20,7 +21,9 @@ _PACKAGES = {
     "flash_attention_3": ("flash_attn_interface", "flash-attn-3"),
 }
 _LARGEST = 2**53  # largest value of an option; anything above is a typing error
+_SIZES = ("chunk_tokens", "batch_size", "feature_cache_mb", "frames_ahead_mb", "max_tokens")
 _MOST_THREADS = 1024
+_IMAGE_BACKENDS = ("pil", "torchvision")
 _PROMPTS = ("chat", "plain")
 _ROPES = ("dynamic", "linear", "longrope", "longrope-scaled", "yarn")
 
@@ -106,6 +109,30 @@ class Reading:
 
 
 @dataclass(frozen=True, kw_only=True)
+class FrameScaling:
+    """What is made of a frame before the vision encoder, by transformers' code.
+
+    Attributes:
+        image_backend: what resizes frames: pil, or torchvision, which makes slightly other pixels.
+        image_splitting: cut frames into crops beside the whole frame, for processors that can; the
+            checkpoint's setting where None.
+    """
+
+    image_backend: str = "pil"
+    image_splitting: bool | None = None
+
+    def __post_init__(self) -> None:
+        if self.image_backend not in _IMAGE_BACKENDS:
+            raise ValueError(
+                f"image_backend={self.image_backend} is not {' or '.join(_IMAGE_BACKENDS)}"
+            )
+        if self.image_backend == "torchvision" and importlib.util.find_spec("torchvision") is None:
+            raise ValueError(
+                "image_backend=torchvision needs the package torchvision: pip install torchvision"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
 class CheckpointSource:
     """Source of a checkpoint, on any engine.
 
@@ -143,6 +170,9 @@ class HfOptions(Reading, Placement):
         kv_offload: keep keys and values in CPU memory; slower, for contexts that do not fit on the
             GPU.
         feature_cache_mb: memory for vision features of earlier frames, in MiB.
+        frame_threads: threads that read and scale frames ahead of the model; 0 for none. The
+            process's share of processors, at most 8, where None.
+        frames_ahead_mb: memory for frames that are ready before the model, in MiB.
         max_tokens: context limit instead of the checkpoint's; 0 for none.
 
     `switches` are the options that are to save time or memory and to change no reply.
@@ -161,6 +191,8 @@ class HfOptions(Reading, Placement):
     batch_size: int = 64
     kv_offload: bool = False
     feature_cache_mb: int = 128
+    frame_threads: int | None = None
+    frames_ahead_mb: int = 256
     max_tokens: int | None = None
 
     def __post_init__(self) -> None:
@@ -168,15 +200,18 @@ class HfOptions(Reading, Placement):
             self.chunk_tokens < 1
             or self.batch_size < 1
             or self.feature_cache_mb < 0
+            or self.frames_ahead_mb < 0
             or (self.max_tokens or 0) < 0
         ):
             raise ValueError(
-                "chunk_tokens and batch_size must be positive, feature_cache_mb and max_tokens not "
-                "negative"
+                "chunk_tokens and batch_size must be positive, feature_cache_mb, frames_ahead_mb "
+                "and max_tokens not negative"
             )
-        for name in ("chunk_tokens", "batch_size", "feature_cache_mb", "max_tokens"):
+        for name in _SIZES:
             if (getattr(self, name) or 0) > _LARGEST:
                 raise ValueError(f"{name} is above {_LARGEST}")
+        if self.frame_threads is not None and not 0 <= self.frame_threads <= _MOST_THREADS:
+            raise ValueError(f"frame_threads={self.frame_threads} is not from 0 to {_MOST_THREADS}")
         super().__post_init__()
         Placement.__post_init__(self)
 

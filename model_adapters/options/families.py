@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from infthor_eval.storage.limits import IMAGE_MEGAPIXELS
-from model_adapters.options.checkpoints import CheckpointOptions
+from model_adapters.options.checkpoints import CheckpointOptions, FrameScaling
 
 __all__ = [
     "DeepseekVLOptions",
@@ -87,7 +87,11 @@ class PixtralOptions(CheckpointOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HfVlmOptions(CheckpointOptions):
+class HfVlmOptions(FrameScaling, CheckpointOptions):
     """Options of `hf-vlm`, which has no default checkpoint."""
 
     pretrained: str = ""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        CheckpointOptions.__post_init__(self)

@@ -88,19 +88,9 @@ class Gemma4Options(HfVlmOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class SmolVLM2Options(HfVlmOptions):
-    """Options of `smolvlm2`.
-
-    Attributes:
-        image_splitting: whether a frame is given as tiles and as a whole, or as a whole alone,
-            which has a fraction of the tokens; the checkpoint's setting where None.
-    """
+    """Options of `smolvlm2`; with `image_splitting=false` a frame has a fraction of the tokens."""
 
     pretrained: str = "HuggingFaceTB/SmolVLM2-2.2B-Instruct"
-    image_splitting: bool | None = None
-
-    def image_settings(self) -> dict[str, Any]:
-        """Return the image processor settings that differ from the checkpoint's."""
-        return {} if self.image_splitting is None else {"do_image_splitting": self.image_splitting}
 
 
 @dataclass(frozen=True, kw_only=True)

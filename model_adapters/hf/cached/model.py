@@ -16,6 +16,7 @@ from model_adapters.hf.global_settings import torch_threads
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.loading.rope import take_length_rope
+from model_adapters.hf.prompting.ahead import Ahead
 from model_adapters.hf.prompting.prompt import Piece, n_common, n_tokens, token_ids
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Decoding, Reply, Turn
@@ -34,7 +35,9 @@ class TransformersModel(HfModel):
     def __init__(self, name: str, loaded: LoadedCheckpoint, options: HfOptions) -> None:
         super().__init__(name, loaded, options)
         cache_bytes = options.feature_cache_mb * 2**20 if options.share_prefix else 0
-        self._embed = loaded.family.make_embed(cache_bytes)
+        self._embed = loaded.family.make_embed(
+            cache_bytes, Ahead(options.frame_threads, options.frames_ahead_mb * 2**20)
+        )
         self._rope = take_length_rope(loaded.model)
         self._prefix = Prefix(
             loaded.model,
@@ -54,6 +57,7 @@ class TransformersModel(HfModel):
     def close(self) -> None:
         """Free the KV cache, the features and the weights."""
         self._prefix.reset()
+        self._embed.close()
         del self._prefix, self._embed, self._rope
         super().close()
 

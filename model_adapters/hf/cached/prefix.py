@@ -154,6 +154,7 @@ class Prefix:
             ModelError: processor and model disagree on the number of a frame's tokens.
         """
         self._cache.reserve(self.n_tokens + n_tokens(pieces) + reserve)
+        self._embed.expect(pieces)
         logits = None
         shown, asked = self._parts(pieces)
         for chunk in chunks(shown, self._chunk_tokens):

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 import torch
-from PIL import Image
 
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.families.plain import PlainFamily
+from model_adapters.hf.family import Pixels
 from model_adapters.options.families import DeepseekVLOptions
 
 __all__ = ["DeepseekVL", "DeepseekVLFamily"]
@@ -15,9 +15,9 @@ __all__ = ["DeepseekVL", "DeepseekVLFamily"]
 class DeepseekVLFamily(PlainFamily):
     """The family of DeepSeek-VL hybrid."""
 
-    def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Return the aligned features of both vision towers for each image, (tokens, hidden)."""
-        inputs = self._inputs(images)
+    def features_of(self, frames: Sequence[Pixels]) -> list[torch.Tensor]:
+        """Return the aligned features of both vision towers for each frame, (tokens, hidden)."""
+        inputs = self._inputs(frames)
         output = self._model.model.get_image_features(
             inputs["pixel_values"], inputs["high_res_pixel_values"], return_dict=True
         )

@@ -25,13 +25,14 @@ from model_adapters.hf.families.load_check import check_loaded
 from model_adapters.hf.families.pixtral import PixtralFamily
 from model_adapters.hf.families.plain import PlainFamily, three_axis_positions
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
-from model_adapters.hf.family import ClipShape, MakeFamily, Shape, Size
+from model_adapters.hf.family import ClipShape, MakeFamily, Pixels, Shape, Size
 from model_adapters.hf.loading.checkpoint import (
     LocatedCheckpoint,
     load_checkpoint,
     locate,
 )
 from model_adapters.hf.loading.processors import load_processor
+from model_adapters.hf.prompting.ahead import Ahead, PixelsAhead, read_pixels
 from model_adapters.hf.prompting.embedding import Embed
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.native import EncodedImage, NativeEmbedder
@@ -61,7 +62,7 @@ class ProcessorFamily(PlainFamily):
         self._tokenizer = tokenizer
         self._processor = processor
         self.placeholder_id = tokenizer.convert_tokens_to_ids(image_token(processor))
-        self._blanks: dict[Size, Mapping[str, torch.Tensor]] = {}
+        self._blanks: dict[Size, Pixels] = {}
 
     @cached_property
     def mask_types(self) -> Mapping[str, Mapping[int, int]]:
@@ -76,9 +77,10 @@ class ProcessorFamily(PlainFamily):
         """Other inputs of one value for each token; see `MergingFamily`."""
         return {name: self._types[name] for name in self._types if name not in _MASK_TYPES}
 
-    def make_embed(self, max_bytes: int) -> Embed:
+    def make_embed(self, max_bytes: int, ahead: Ahead) -> Embed:
         """Return what prepares spans of prompts, with a cache of so many bytes of features."""
-        return NativeEmbedder(self._model, self, FeatureCache(self.encode, max_bytes))
+        pixels = PixelsAhead(partial(read_pixels, self), ahead)
+        return NativeEmbedder(self._model, self, FeatureCache(pixels, self.encode, max_bytes))
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
         """Return the ids that the processor expands the placeholder of one image to."""
@@ -91,22 +93,22 @@ class ProcessorFamily(PlainFamily):
             return (placeholder_id,)
         return (markers[0], placeholder_id, markers[1])
 
-    def encode(self, images: Sequence[Image.Image]) -> list[EncodedImage]:
-        """Return the model's features of each image."""
+    def encode(self, frames: Sequence[Pixels]) -> list[EncodedImage]:
+        """Return the model's features of each prepared frame."""
         compute = _core(self._model).get_image_features
         parameters = inspect.signature(compute).parameters
         encoded = []
-        for image in images:
+        for frame in frames:
             inputs = {
-                name: value for name, value in self._inputs([image]).items() if name in parameters
+                name: value for name, value in self._inputs([frame]).items() if name in parameters
             }
             encoded.append(EncodedImage.of(compute(**inputs, return_dict=True)))
         return encoded
 
-    def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Return the embeddings for the slots of each image, (slots, hidden), for training."""
+    def features_of(self, frames: Sequence[Pixels]) -> list[torch.Tensor]:
+        """Return the embeddings for the slots of each frame, (slots, hidden), for training."""
         features = []
-        for image in self.encode(images):
+        for image in self.encode(frames):
             pooled = image.output.pooler_output
             parts = pooled if isinstance(pooled, list | tuple) else [pooled]
             features.append(torch.cat([part.reshape(-1, part.shape[-1]) for part in parts]))
@@ -122,9 +124,10 @@ class ProcessorFamily(PlainFamily):
         joined = torch.cat(grids) if grids else None
         return three_axis_positions(core, ids, self.slot_id, joined, start)
 
-    def _process(self, images: Sequence[Image.Image]) -> Mapping[str, torch.Tensor]:
+    def prepare(self, image: Image.Image) -> Pixels:
         """Return the output of the whole processor, which has settings for its image processor."""
-        return expand_image_tokens(self._processor, images)
+        pixels: Pixels = expand_image_tokens(self._processor, [image])
+        return pixels
 
     @cached_property
     def _types(self) -> dict[str, dict[int, int]]:
@@ -149,10 +152,10 @@ class ProcessorFamily(PlainFamily):
             if name in accepted and name.endswith("token_type_ids")
         }
 
-    def _blank(self, size: Size) -> Mapping[str, torch.Tensor]:
+    def _blank(self, size: Size) -> Pixels:
         """Return what the processor makes of one image of a size, but for its pixels."""
         if size not in self._blanks:
-            inputs = self._process([Image.new("RGB", size, "gray")])
+            inputs = self.prepare(Image.new("RGB", size, "gray"))
             self._blanks[size] = {
                 name: value for name, value in inputs.items() if not value.is_floating_point()
             }

@@ -4,14 +4,15 @@ A frame of a video takes 196 tokens (`llava_video`).
 """
 
 from collections.abc import Sequence
+from itertools import groupby
 from typing import Any
 
 import torch
-from PIL import Image
 
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.families.llava_video import LlavaVideo
 from model_adapters.hf.families.plain import PlainFamily
+from model_adapters.hf.family import Pixels
 from model_adapters.options.families import LlavaOnevisionOptions
 
 __all__ = ["LlavaOnevision", "LlavaOnevisionFamily"]
@@ -28,13 +29,16 @@ class LlavaOnevisionFamily(PlainFamily):
         super().__init__(model, image_processor, tokenizer)
         self.video = LlavaVideo(model, image_processor)
 
-    def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Return each image's packed features, (tokens, hidden): overview, patches, row breaks."""
-        inputs = self._inputs(images)
-        output = self._model.get_image_features(
-            inputs["pixel_values"], inputs["image_sizes"], return_dict=True
-        )
-        return list(output.pooler_output)
+    def features_of(self, frames: Sequence[Pixels]) -> list[torch.Tensor]:
+        """Return each frame's packed features, (tokens, hidden): overview, patches, row breaks."""
+        features = []
+        for _, alike in groupby(frames, lambda frame: frame["pixel_values"].shape):
+            inputs = self._inputs(list(alike))
+            output = self._model.get_image_features(
+                inputs["pixel_values"], inputs["image_sizes"], return_dict=True
+            )
+            features.extend(output.pooler_output)
+        return features
 
 
 class LlavaOnevision(CheckpointAdapter):

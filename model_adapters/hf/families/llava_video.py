@@ -12,7 +12,7 @@ from typing import Any
 import torch
 from PIL import Image
 
-from model_adapters.hf.family import ClipShape
+from model_adapters.hf.family import ClipShape, Pixels
 
 __all__ = ["LlavaVideo"]
 
@@ -35,19 +35,21 @@ class LlavaVideo:
         side = math.ceil(vision.image_size // vision.patch_size / _POOLED)
         return side**2 + _is_last(shape)
 
-    def features(
-        self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]
-    ) -> list[torch.Tensor]:
+    def prepare(self, shape: ClipShape, images: Sequence[Image.Image]) -> Pixels:
+        """Return the overview of the clip's frame."""
+        inputs = self._image_processor(images=list(images), return_tensors="pt")
+        return {"pixel_values": inputs["pixel_values"][:, 0]}
+
+    def features_of(self, clips: Sequence[tuple[ClipShape, Pixels]]) -> list[torch.Tensor]:
         """Return the pooled patches of each frame, (tokens, hidden), with the break after the last
         frame of a video."""
-        frames = [image for _, images in clips for image in images]
-        overviews = self._image_processor(images=frames, return_tensors="pt")["pixel_values"][:, 0]
+        overviews = torch.cat([pixels["pixel_values"] for _, pixels in clips])
         weight = self._model.get_input_embeddings().weight
         output = self._model.get_video_features(
             overviews.to(weight.device, self._model.dtype)[None], return_dict=True
         )
         features = output.pooler_output[0]
-        pooled = features[:-1].chunk(len(frames))
+        pooled = features[:-1].chunk(len(clips))
         line_break = features[-1:]
         return [
             torch.cat([own, line_break]) if _is_last(shape) else own

@@ -9,7 +9,7 @@ from PIL import Image
 from infthor_eval.errors import ModelError
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.families.plain import PlainFamily
-from model_adapters.hf.family import Size
+from model_adapters.hf.family import Pixels, Size
 from model_adapters.options.families import PixtralOptions
 
 __all__ = ["Pixtral", "PixtralFamily"]
@@ -38,20 +38,20 @@ class PixtralFamily(PlainFamily):
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
         """Return rows of slots, each followed by a break, the last one by the end."""
-        height, width = self._inputs([Image.new("RGB", size)])["image_sizes"][0].tolist()
+        height, width = self.prepare(Image.new("RGB", size))["image_sizes"][0].tolist()
         side = self._model.model.vision_tower.patch_size
         row = (self.slot_id,) * (width // side) + (self._break_id,)
         return (*(row * (height // side))[:-1], self._end_id)
 
-    def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Return the projected patches of each image, (tokens, hidden).
+    def features_of(self, frames: Sequence[Pixels]) -> list[torch.Tensor]:
+        """Return the projected patches of each frame, (tokens, hidden).
 
-        Frames are processed one by one: the vision tower joins a batch to one sequence with a mask
+        Frames are encoded one by one: the vision tower joins a batch to one sequence with a mask
         over all pairs of patches, so the cost would be quadratic in the number of frames.
         """
         features = []
-        for image in images:
-            inputs = self._inputs([image])
+        for frame in frames:
+            inputs = self._inputs([frame])
             output = self._model.get_image_features(
                 inputs["pixel_values"], image_sizes=inputs["image_sizes"], return_dict=True
             )

@@ -1,12 +1,14 @@
 """Base of families with one-axis positions."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import torch
 from PIL import Image
 
-from model_adapters.hf.family import Shape, Size, VideoInput
+from model_adapters.hf.family import Pixels, Shape, Size, VideoInput
+from model_adapters.hf.prompting.ahead import Ahead, PixelsAhead, read_pixels
 from model_adapters.hf.prompting.embedding import Embed, Embedder
 from model_adapters.hf.prompting.features import FeatureCache
 
@@ -37,22 +39,32 @@ class PlainFamily:
         """Return the placeholder alone."""
         return (placeholder_id,)
 
+    def prepare(self, image: Image.Image) -> Pixels:
+        """Return the image processor's output for a frame."""
+        pixels: Pixels = self._image_processor(images=[image], return_tensors="pt")
+        return pixels
+
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Return the embeddings for the slots of each image, (slots, hidden)."""
+        return self.features_of([self.prepare(image) for image in images])
+
+    def features_of(self, frames: Sequence[Pixels]) -> list[torch.Tensor]:
+        """Return the embeddings for the slots of each prepared frame, (slots, hidden)."""
         raise NotImplementedError
 
-    def make_embed(self, max_bytes: int) -> Embed:
+    def make_embed(self, max_bytes: int, ahead: Ahead) -> Embed:
         """Return what embeds spans of prompts, with a cache of so many bytes of features."""
-        clips = None if self.video is None else self.video.features
-        return Embedder(self._model, self, FeatureCache(self.features, max_bytes, clips))
+        clips = None if self.video is None else self.video.features_of
+        pixels = PixelsAhead(partial(read_pixels, self), ahead)
+        return Embedder(self._model, self, FeatureCache(pixels, self.features_of, max_bytes, clips))
 
     def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
         """Return consecutive positions, (1, tokens)."""
         return torch.arange(start, start + len(ids), device=ids.device)[None]
 
-    def _inputs(self, images: Sequence[Image.Image]) -> Mapping[str, torch.Tensor]:
-        """Return the image processor's output on the model's device, pixels in the model's type."""
-        inputs = self._process(images)
+    def _inputs(self, frames: Sequence[Pixels]) -> Pixels:
+        """Return prepared frames as one input on the model's device, pixels in the model's type."""
+        inputs = {name: torch.cat([frame[name] for frame in frames]) for name in frames[0]}
         weight = self._model.get_input_embeddings().weight
         # Without weights (meta device) only shapes of pixels are used, but counts need values.
         counts = torch.device("cpu") if weight.is_meta else weight.device
@@ -62,13 +74,6 @@ class PlainFamily:
             else value.to(counts)
             for name, value in inputs.items()
         }
-
-    def _process(self, images: Sequence[Image.Image]) -> Mapping[str, torch.Tensor]:
-        """Return the image processor's output."""
-        inputs: Mapping[str, torch.Tensor] = self._image_processor(
-            images=list(images), return_tensors="pt"
-        )
-        return inputs
 
 
 def three_axis_positions(

@@ -17,7 +17,7 @@ from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.families.plain import PlainFamily, three_axis_positions
 from model_adapters.hf.families.qwen_video import QwenVideo
-from model_adapters.hf.family import ClipShape, Shape, Size
+from model_adapters.hf.family import ClipShape, Pixels, Shape, Size
 from model_adapters.options.checkpoints import CheckpointOptions
 from model_adapters.options.families import Qwen25VLNanoOptions, Qwen25VLOptions
 
@@ -47,9 +47,9 @@ class Qwen25VLFamily(PlainFamily):
         config = self._model.config
         return (config.vision_start_token_id, placeholder_id, config.vision_end_token_id)
 
-    def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Return the vision tower's merged patches of each image, (tokens, hidden)."""
-        inputs = self._inputs(images)
+    def features_of(self, frames: Sequence[Pixels]) -> list[torch.Tensor]:
+        """Return the vision tower's merged patches of each frame, (tokens, hidden)."""
+        inputs = self._inputs(frames)
         output = self._model.get_image_features(
             inputs["pixel_values"], inputs["image_grid_thw"], return_dict=True
         )

@@ -12,7 +12,7 @@ from typing import Any
 import torch
 from PIL import Image
 
-from model_adapters.hf.family import ClipShape, Size
+from model_adapters.hf.family import ClipShape, Pixels, Size
 
 __all__ = ["QwenVideo"]
 
@@ -37,26 +37,28 @@ class QwenVideo:
         """Return one token for each square of merged patches."""
         return math.prod(self._merged_sides(shape))
 
-    def features(
-        self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]
-    ) -> list[torch.Tensor]:
+    def prepare(self, shape: ClipShape, images: Sequence[Image.Image]) -> Pixels:
+        """Return a clip's patches, and how many there are along time, height and width."""
+        inputs = self._image_processor(
+            images=list(images), size=self._limits(shape), return_tensors="pt"
+        )
+        return {
+            "pixel_values": self._interleave(inputs["pixel_values"], len(images)),
+            "image_grid_thw": inputs["image_grid_thw"][:1],
+        }
+
+    def features_of(self, clips: Sequence[tuple[ClipShape, Pixels]]) -> list[torch.Tensor]:
         """Return the vision tower's merged patches of each clip, (tokens, hidden).
 
         The tower attends within a temporal patch only, so clips can be encoded one by one as well
         as together.
         """
-        pixels = []
-        grids = []
-        for shape, images in clips:
-            inputs = self._image_processor(
-                images=list(images), size=self._limits(shape), return_tensors="pt"
-            )
-            pixels.append(self._interleave(inputs["pixel_values"], len(images)))
-            grids.append(inputs["image_grid_thw"][0])
+        pixels = torch.cat([pixels["pixel_values"] for _, pixels in clips])
+        grids = torch.cat([pixels["image_grid_thw"] for _, pixels in clips])
         weight = self._model.get_input_embeddings().weight
         output = self._model.get_video_features(
-            torch.cat(pixels).to(weight.device, self._model.dtype),
-            torch.stack(grids).to(torch.device("cpu") if weight.is_meta else weight.device),
+            pixels.to(weight.device, self._model.dtype),
+            grids.to(torch.device("cpu") if weight.is_meta else weight.device),
             return_dict=True,
         )
         return list(output.pooler_output)

@@ -1,15 +1,14 @@
 """Loading of a checkpoint from the hub or a folder, without torchvision and without remote code.
 
 transformers cannot build the processors of video-capable families without torchvision, so the parts
-that a conversation needs (image processor, tokenizer, chat template) are loaded one by one. Image
-processors are those of PIL wherever there is one: torchvision's resize gives other pixels, and
-results must not depend on which packages are installed.
+that a conversation needs (image processor, tokenizer, chat template) are loaded one by one.
 """
 
 import contextlib
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
@@ -26,6 +25,7 @@ from model_adapters.hf.family import Family, MakeFamily
 from model_adapters.hf.global_settings import hide_transformers_output
 from model_adapters.hf.loading.card import read_card_words
 from model_adapters.hf.loading.hub import fetch
+from model_adapters.hf.loading.image_processors import image_backend, load_image_processor
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.loading.rope import apply_rope
 from model_adapters.hf.prompting.templates import chat_template, plain_template
@@ -121,8 +121,8 @@ def read_checkpoint(
     folder = located.folder
     remote = {"trust_remote_code": options.trust_remote_code}
     with wrap_loading_errors(options.pretrained):
-        image_processor = transformers.AutoImageProcessor.from_pretrained(
-            folder, backend="pil", **remote, **options.image_settings()
+        image_processor = load_image_processor(
+            folder, options, **remote, **options.image_settings()
         )
         tokenizer = transformers.AutoTokenizer.from_pretrained(folder, **remote)
         template = chat_template(folder, tokenizer) if options.prompt == "chat" else None
@@ -182,6 +182,8 @@ def assemble(
         "chat_template": digest(template),
         "versions": versions(),
     }
+    if image_backend(image_processor) == "torchvision":
+        identity["image_backend"] = f"torchvision {version('torchvision')}"
     return LoadedCheckpoint(
         model=model.eval(),
         tokenizer=tokenizer,

@@ -17,11 +17,13 @@ from transformers.utils import is_torchvision_available
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.reading import read_json
 from model_adapters.hf.loading.checkpoint import LocatedCheckpoint, wrap_loading_errors
+from model_adapters.hf.loading.image_processors import load_image_processor, splitting_setting
 from model_adapters.hf.loading.without_torchvision import (
     available_class,
     register_image_processor,
     torchvision_or_stand_in,
 )
+from model_adapters.options.checkpoints import FrameScaling
 
 __all__ = ["load_processor"]
 
@@ -38,14 +40,15 @@ def load_processor(located: LocatedCheckpoint[Any]) -> Any:
         ModelError: the checkpoint has none, it cannot be loaded, or it needs a package that is not
             installed.
     """
-    pretrained = located.options.pretrained
-    remote = {"trust_remote_code": located.options.trust_remote_code}
+    options = located.options
+    pretrained = options.pretrained
+    remote = {"trust_remote_code": options.trust_remote_code}
     with wrap_loading_errors(pretrained), torchvision_or_stand_in():
         try:
             register_image_processor(located.config)
             processor = _processor_class(located).from_pretrained(located.folder, **remote)
-            processor.image_processor = transformers.AutoImageProcessor.from_pretrained(
-                located.folder, backend="pil", **remote, **located.options.image_settings()
+            processor.image_processor = load_image_processor(
+                located.folder, options, **remote, **options.image_settings()
             )
         # Without torchvision, its classes are missing in many ways.
         except Exception as error:
@@ -57,7 +60,22 @@ def load_processor(located: LocatedCheckpoint[Any]) -> Any:
             ) from error
     if not hasattr(processor, "tokenizer"):
         raise ModelError(f"{pretrained} has no processor of images and text together")
+    if isinstance(options, FrameScaling) and options.image_splitting is not None:
+        _split(processor, splitting=options.image_splitting)
     return processor
+
+
+def _split(processor: Any, *, splitting: bool) -> None:
+    """Have a processor split frames or not, whatever it asks its image processor for by itself."""
+    setting = splitting_setting(processor.image_processor)
+    own = type(processor)
+
+    def merge(self: Any, *args: Any, **kwargs: Any) -> Any:
+        merged = own._merge_kwargs(self, *args, **kwargs)
+        merged["images_kwargs"][setting] = splitting
+        return merged
+
+    processor.__class__ = type(own.__name__, (own,), {"_merge_kwargs": merge})
 
 
 def _processor_class(located: LocatedCheckpoint[Any]) -> Any:

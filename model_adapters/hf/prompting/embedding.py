@@ -58,8 +58,14 @@ class Embed(Protocol):
     def join(self, spans: Sequence[Span]) -> Mapping[str, Any]:
         """Return the inputs of several spans as those of one sequence."""
 
+    def expect(self, pieces: Sequence[Piece]) -> None:
+        """Begin to read the frames of pieces that are going to be prepared, in this order."""
+
     def clear(self) -> None:
         """Free the memory of cached features."""
+
+    def close(self) -> None:
+        """End the threads that read frames."""
 
 
 def piece_starts(
@@ -162,9 +168,17 @@ class Embedder:
         """Return the inputs of several spans as those of one sequence."""
         return {"inputs_embeds": torch.cat([span.inputs["inputs_embeds"] for span in spans], dim=1)}
 
+    def expect(self, pieces: Sequence[Piece]) -> None:
+        """Begin to read the frames of pieces that are going to be embedded, in this order."""
+        self._features.expect([piece for piece in pieces if not isinstance(piece, int)])
+
     def clear(self) -> None:
         """Free the memory of cached features."""
         self._features.clear()
+
+    def close(self) -> None:
+        """End the threads that read frames."""
+        self._features.close()
 
     def _slot_features(self, visuals: Sequence[Frame | Clip], n_slots: int) -> torch.Tensor:
         features = torch.cat(self._features.get(visuals))

@@ -5,9 +5,9 @@ from collections.abc import Callable, Sequence
 from typing import Generic, Protocol, Self, TypeVar
 
 import torch
-from PIL import Image
 
-from model_adapters.hf.family import ClipShape
+from model_adapters.hf.family import ClipShape, Pixels
+from model_adapters.hf.prompting.ahead import PixelsAhead
 from model_adapters.hf.prompting.prompt import Clip, Frame
 
 __all__ = ["FeatureCache"]
@@ -20,7 +20,7 @@ class _Kept(Protocol):
     def clone(self) -> Self: ...
 
 
-_FilmedClip = tuple[ClipShape, Sequence[Image.Image]]
+_FilmedClip = tuple[ClipShape, Pixels]
 T = TypeVar("T", bound=_Kept)
 
 
@@ -28,17 +28,20 @@ class FeatureCache(Generic[T]):
     """Features by the content of a frame or a clip; the least recently used are dropped first.
 
     Args:
-        compute: returns the features of images.
+        pixels: reads and scales frames and clips.
+        compute: returns the features of frames.
         max_bytes: most bytes that are cached; 0 caches none.
         compute_clips: returns the features of clips, for families with a video input.
     """
 
     def __init__(
         self,
-        compute: Callable[[Sequence[Image.Image]], list[T]],
+        pixels: PixelsAhead,
+        compute: Callable[[Sequence[Pixels]], list[T]],
         max_bytes: int,
         compute_clips: Callable[[Sequence[_FilmedClip]], list[T]] | None = None,
     ) -> None:
+        self._pixels = pixels
         self._compute_frames = compute
         self._compute_clips = compute_clips
         self._max_bytes = max_bytes
@@ -59,22 +62,28 @@ class FeatureCache(Generic[T]):
         self._store(features)
         return [features[piece] for piece in pieces]
 
+    def expect(self, pieces: Sequence[Frame | Clip]) -> None:
+        """Begin to read those pieces that are going to be asked for and are not cached."""
+        self._pixels.expect([piece for piece in pieces if piece not in self._cache])
+
     def clear(self) -> None:
         """Drop all features."""
         self._cache.clear()
         self._bytes = 0
+
+    def close(self) -> None:
+        """End the threads that read frames."""
+        self._pixels.close()
 
     def _compute(self, pieces: Sequence[Frame | Clip]) -> dict[Frame | Clip, T]:
         frames = [piece for piece in pieces if isinstance(piece, Frame)]
         clips = [piece for piece in pieces if isinstance(piece, Clip)]
         features: dict[Frame | Clip, T] = {}
         if frames:
-            images = [frame.ref.load() for frame in frames]
-            features |= zip(frames, self._compute_frames(images), strict=True)
+            pixels = [self._pixels.take(frame) for frame in frames]
+            features |= zip(frames, self._compute_frames(pixels), strict=True)
         if clips and self._compute_clips is not None:
-            videos = []
-            for clip in clips:
-                videos.append((clip.shape, [ref.load() for ref in clip.refs]))
+            videos = [(clip.shape, self._pixels.take(clip)) for clip in clips]
             features |= zip(clips, self._compute_clips(videos), strict=True)
         return features
 

@@ -10,9 +10,8 @@ from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
 import torch
-from PIL import Image
 
-from model_adapters.hf.family import Family
+from model_adapters.hf.family import Family, Pixels
 from model_adapters.hf.prompting.embedding import Span, piece_starts, word_span
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.prompt import Frame, Piece, token_ids
@@ -95,8 +94,8 @@ class MergingFamily(Family, Protocol):
     def token_types(self) -> Mapping[str, Mapping[int, int]]:
         """Other inputs of the model of one value for each token, likewise."""
 
-    def encode(self, images: Sequence[Image.Image]) -> list[EncodedImage]:
-        """Return what the vision encoder makes of each image."""
+    def encode(self, frames: Sequence[Pixels]) -> list[EncodedImage]:
+        """Return what the vision encoder makes of each prepared frame."""
 
 
 class NativeEmbedder:
@@ -159,9 +158,17 @@ class NativeEmbedder:
             inputs[_ENCODED] = {"image": EncodedImage.join(encoded)}
         return inputs
 
+    def expect(self, pieces: Sequence[Piece]) -> None:
+        """Begin to read the frames of pieces that are going to be embedded, in this order."""
+        self._features.expect([piece for piece in pieces if not isinstance(piece, int)])
+
     def clear(self) -> None:
         """Free the memory of cached features."""
         self._features.clear()
+
+    def close(self) -> None:
+        """End the threads that read frames."""
+        self._features.close()
 
     def _types(
         self, inputs: Mapping[str, Mapping[int, int]], pieces: Sequence[Piece]

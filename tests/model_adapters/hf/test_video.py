@@ -163,7 +163,7 @@ def test_two_equal_frames_have_the_features_of_their_image(tiny: Any, published:
     family, image = tiny._loaded.family, published.load()
     shape = ClipShape(image.size, 0, 1, 2.0)
     with torch.inference_mode():
-        (clip,) = family.video.features([(shape, [image, image])])
+        (clip,) = family.video.features_of([(shape, family.video.prepare(shape, [image, image]))])
         (still,) = family.features([image.resize((336, 336), resample=3)])
     torch.testing.assert_close(clip, still, atol=1e-3, rtol=1e-3)
 

@@ -41,6 +41,22 @@ def test_an_unknown_family_shares_prefixes_and_replies_as_generate(
     _require_equal_replies(shared, whole, frames)
 
 
+def test_frames_are_split_as_the_option_says(
+    checkpoints: dict[str, Path], frames: list[FrameRef]
+) -> None:
+    by_default = _load(checkpoints["idefics3"])
+    counts = {}
+    for splitting, named in (("true", True), ("false", False)):
+        model = _load(checkpoints["idefics3"], image_splitting=splitting)
+        assert model.identity()["image_processor"]["do_image_splitting"] is named
+        counts[named] = model.tokens_per_frame(frames[0])
+        model.close()
+    assert by_default.tokens_per_frame(frames[0]) == counts[True] > counts[False]
+    by_default.close()
+    with pytest.raises(ModelError, match="cannot split frames; leave image_splitting out"):
+        _load(checkpoints["llava"], image_splitting="true")
+
+
 def test_an_image_seen_in_both_directions_shares_prefixes(
     checkpoints: dict[str, Path], frames: list[FrameRef]
 ) -> None:
