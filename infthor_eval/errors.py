@@ -20,13 +20,16 @@ __all__ = [
     "InfthorError",
     "ModelError",
     "SceneError",
+    "STOPS",
     "SimulatorError",
+    "Terminated",
     "UsageError",
     "UserCodeError",
     "describe_exception",
     "in_one_line",
     "unknown_name",
     "wrap_errors",
+    "wrap_user_code",
 ]
 
 _LONGEST = 200  # characters of another library's message
@@ -85,6 +88,15 @@ class SceneError(SimulatorError):
     """The simulator has no such scene or refuses it; a retry would end the same way."""
 
 
+class Terminated(SystemExit):
+    """SIGTERM arrived: temporary folders and simulators are removed as on Ctrl-C."""
+
+
+# What ends the program from outside. Whoever catches whatever code of others raises (it may call
+# `sys.exit`) lets these pass.
+STOPS = (KeyboardInterrupt, Terminated)
+
+
 def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
     """Return the error for an unknown name of a kind ("task"); it suggests the closest, or all."""
     names = sorted(known)
@@ -102,7 +114,7 @@ def in_one_line(error: BaseException) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
-def describe_exception(error: Exception) -> str:
+def describe_exception(error: BaseException) -> str:
     """Return type, place and message of an unexpected exception, in one line."""
     frame = traceback.extract_tb(error.__traceback__)[-1]
     where = f"{Path(frame.filename).name}:{frame.lineno} ({frame.name})"
@@ -132,3 +144,27 @@ def wrap_errors(
         raise
     except catch as error:
         raise raise_as(f"{problem} ({in_one_line(error)}); {hint}") from error
+
+
+@contextmanager
+def wrap_user_code(
+    problem: str, hint: str, raise_as: type[UserCodeError] = UserCodeError
+) -> Iterator[None]:
+    """Turn whatever code of others raises into an error of one line, with its place; ours pass.
+
+    `sys.exit` in it is an error like any other: it must not end a run, nor choose the exit code.
+    There may be no `yield` within the context.
+
+    Args:
+        problem: the code and what it fails to do ("the memory NAME fails").
+        hint: the way to fix it.
+
+    Raises:
+        UserCodeError: an instance of `raise_as`; its cause is what was raised.
+    """
+    try:
+        yield
+    except (InfthorError, *STOPS):
+        raise
+    except BaseException as error:
+        raise raise_as(f"{problem} ({describe_exception(error)}); {hint}") from error

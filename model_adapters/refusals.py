@@ -42,8 +42,7 @@ def check_turns(name: str, capabilities: Capabilities, turns: Sequence[Turn]) ->
         raise ModelError(f"{name} has no video input; give it the video's frames as images")
 
 
-@contextmanager
-def wrap_adapter_errors(problem: str) -> Iterator[None]:
+def wrap_adapter_errors(problem: str) -> AbstractContextManager[None]:
     """Turn any error in an adapter's code into an `AdapterError` of one line.
 
     The line has the place of the error. The error itself, with its traceback, is the cause of the
@@ -55,14 +54,7 @@ def wrap_adapter_errors(problem: str) -> Iterator[None]:
     Raises:
         AdapterError: the adapter raised an error that is not one of ours.
     """
-    try:
-        yield
-    except InfthorError:
-        raise
-    except Exception as error:  # an adapter may be anybody's code and raise anything
-        raise AdapterError(
-            f"{problem} ({describe_exception(error)}); fix the adapter, or report it"
-        ) from error
+    return wrap_user_code(problem, "fix the adapter, or report it", AdapterError)
 
 
 def wrap_request_errors(name: str) -> AbstractContextManager[None]:

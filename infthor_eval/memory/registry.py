@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import UsageError, UserCodeError, in_one_line, unknown_name, wrap_errors
+from infthor_eval.errors import UsageError, in_one_line, unknown_name, wrap_user_code
 from infthor_eval.memory.protocol import Memory
 from infthor_eval.plugins import PluginTable
 from model_adapters.adapter_identity import package_identity
@@ -102,9 +102,7 @@ def parse_options(text: str | None) -> dict[str, str] | None:
 
 def wrap_memory_errors(name: str) -> AbstractContextManager[None]:
     """Turn whatever a memory raises into an error of one line; ours pass unchanged."""
-    return wrap_errors(
-        f"the memory {name} fails", "fix it", catch=Exception, raise_as=UserCodeError
-    )
+    return wrap_user_code(f"the memory {name} fails", "fix it")
 
 
 @lru_cache(maxsize=8)  # by the class: an edited file has another one

@@ -31,7 +31,7 @@ class TracebackFile:
         self._units: dict[str, str] = {}  # traceback to the first unit that has it
         self._lock = Lock()
 
-    def append(self, key: UnitKey, attempt: int, error: Exception) -> str:
+    def append(self, key: UnitKey, attempt: int, error: BaseException) -> str:
         """Append the traceback of an unexpected exception, or of a `UserCodeError`'s cause.
 
         Returns:

@@ -16,6 +16,7 @@ from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.records import (
     Artifact,
     Payload,
@@ -113,7 +114,7 @@ class _MeasuringSession:
     def find_record(self, unit: Unit[Any], fingerprint: str) -> None:
         """Return None: there are no records."""
 
-    def describe_failure(self, unit: Unit[Any], error: Exception) -> str:
+    def describe_failure(self, unit: Unit[Any], error: BaseException) -> str:
         """See `Session`; nothing is written."""
         return describe_failure(error)
 
@@ -142,7 +143,7 @@ def estimate_run(
     with closing(bind_run(prepare(request, suite))) as bound:
         workload = bound.evaluation.workload
         groups = []
-        for group in _measure(bound.evaluation, n_units):
+        for group in _measure(bound.evaluation, n_units, Gate(suite.records)):
             groups.append(group)
             progress()
     failures = [failure for group in groups for failure in group.failures]
@@ -151,7 +152,7 @@ def estimate_run(
 
 
 def _measure(
-    evaluation: BoundEvaluation[SuiteUnit, Payload], n_units: int
+    evaluation: BoundEvaluation[SuiteUnit, Payload], n_units: int, gate: Gate[Payload]
 ) -> Iterator[_MeasuredGroup]:
     """Do a few units of each task: of groups of all sizes, the first, middle and last unit."""
     session = _MeasuringSession()
@@ -164,7 +165,7 @@ def _measure(
         failures = []
         few = replace(group, units=[units[n] for n in part])
         start = time.perf_counter()
-        for record in group_records(evaluation, few, session):
+        for record in group_records(evaluation, few, session, gate):
             now = time.perf_counter()
             if record.failure is None:
                 quantities.append((record.task, Quantities.of(record, now - start)))

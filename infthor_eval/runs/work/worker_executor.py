@@ -12,6 +12,7 @@ from typing import Any, Generic
 
 from infthor_eval.errors import UsageError
 from infthor_eval.runs.config import RunConfig
+from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.records import (
     Payload,
@@ -102,6 +103,7 @@ class _Evaluator(Generic[SuiteUnit, Payload]):
 
     def __init__(self, run: PreparedRun[SuiteUnit, Payload], number: int) -> None:
         self._records = run.suite.records
+        self._gate = Gate(run.suite.records)
         self._number = number
         self._bound = bind_run(run)
         self._session: JournalSession[Payload] | None = None
@@ -124,7 +126,7 @@ class _Evaluator(Generic[SuiteUnit, Payload]):
         for record in job.earlier:
             session.journal.add(record)
         for record in group_records(
-            evaluation, job.portion.select(evaluation.workload.groups), session
+            evaluation, job.portion.select(evaluation.workload.groups), session, self._gate
         ):
             yield session.append_new(record)
 
