@@ -1,9 +1,9 @@
 """Checks of requests, with the same messages for every model."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 
-from infthor_eval.errors import AdapterError, InfthorError, ModelError, describe_exception
+from infthor_eval.errors import AdapterError, ModelError, wrap_user_code
 from model_adapters.protocols import Capabilities, Decoding, Turn, Video
 
 __all__ = ["check_decoding", "check_turns", "wrap_adapter_errors", "wrap_request_errors"]

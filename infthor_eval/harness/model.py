@@ -20,7 +20,7 @@ from infthor_eval.runs.work.binding import require_capability
 from infthor_eval.runs.work.executor import group_records
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.suites import baseline_suites, find_request_adapter, find_suite
-from model_adapters import adapter_identity, has_option, label, load
+from model_adapters import adapter_identity, has_option, identity_of, label, load
 
 __all__ = ["InfthorLM"]
 
@@ -154,7 +154,7 @@ class InfthorLM(LM):
     def _session(self, suite: Suite[SuiteUnit, Payload]) -> JournalSession[Payload]:
         """Return the session of a suite, whose journal is in a folder of the suite's name."""
         if suite.name not in self._sessions:
-            model = {"name": self._model.name, **self._model.identity()}
+            model = {"name": self._model.name, **identity_of(self._model)}
             config = suite.records.config(host="lm-eval")
             whole = config.complete(suite.name, model, adapter=self._code, seed=self._seed)
             header = RunHeader(suite=suite.name, name=self._name, config=whole)

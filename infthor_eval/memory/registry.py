@@ -12,9 +12,10 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import UsageError, in_one_line, unknown_name, wrap_user_code
+from infthor_eval.errors import ModelError, UsageError, in_one_line, unknown_name, wrap_user_code
 from infthor_eval.memory.protocol import Memory
 from infthor_eval.plugins import PluginTable
+from infthor_eval.storage.digests import json_values
 from model_adapters.adapter_identity import package_identity
 from model_adapters.options.parsing import read_pairs
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
@@ -81,11 +82,17 @@ def memory_identity(name: str, options: MemoryOptions = ()) -> dict[str, Any]:
 
     Raises:
         UsageError: it cannot be opened.
-        ModelError: its source cannot be read.
+        ModelError: its source cannot be read, or its identity is none.
+        UserCodeError: it fails.
     """
     memory = open_memory(name, options)
     with wrap_memory_errors(name):
-        identity = dict(memory.identity())
+        given = memory.identity()
+    try:
+        identity = dict(json_values(given, "identity()"))
+    except (TypeError, ValueError) as error:
+        hint = "give numbers, texts, lists and dicts"
+        raise ModelError(f"the memory {name}: {in_one_line(error)}; {hint}") from error
     own = name_in_file(name) if names_a_file(name) else name
     about = {"name": own, "options": dict(options), "privileged": memory.capabilities.privileged}
     return {"memory": {**about, **_code(name)}} | identity

@@ -87,6 +87,7 @@ def command(
     Neither the set nor the model is needed. Replies that are not there stay failed. The exit code
     is 1 if your scorer fails on a reply, or the judge cannot be asked.
     """
+    from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.nieh.own_scorers import find_scorer
     from infthor_eval.nieh.rescoring.rescore import read_source, score_again
 
@@ -96,7 +97,7 @@ def command(
         raise click.UsageError("--judge-prompt is how a judge is asked; give one with --judge")
     if judge is not None and len(judge) > 1:
         raise click.UsageError(f"--judge names {len(judge)} models; give one")
-    source = read_source(folder)
+    source = read_source(folder, print_failure)
     own = find_scorer(scorer) if scorer is not None else None
     prompt = judge_prompt or _JUDGE_PROMPT
     settings = (judge_tokens or _JUDGE_TOKENS[prompt], seed, prompt)

@@ -83,6 +83,7 @@ def command(
     RUN is the run's folder. A journal has every action and no frame: the actions are replayed in
     the simulator of the run. Where an action ends otherwise than recorded, a line says so.
     """
+    from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.errors import UsageError
     from infthor_eval.formats.animations import require_animation_name
     from infthor_eval.report.presented import read_report_runs
@@ -93,7 +94,7 @@ def command(
         require_animation_name(out)
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise UsageError(f"--sheet {sheet}: a sheet is a PNG; give a file whose name ends in .png")
-    (recorded,) = read_report_runs([run])
+    (recorded,) = read_report_runs([run], print_failure)
     replay = _require_replay(recorded)
     _refuse_options(recorded, replay, {"--plans": plans, "--episode": episode, "--sheet": sheet})
     if sheet is not None and out is not None:

@@ -8,7 +8,7 @@ from infthor_eval.errors import UsageError
 from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import BoundEvaluation, Need, Suite, Workload
-from model_adapters import Model, Policy, Subject, adapter_identity, load
+from model_adapters import Model, Policy, Subject, adapter_identity, identity_of, load
 
 __all__ = ["BoundRun", "bind_run", "require_capability"]
 
@@ -60,7 +60,7 @@ def _header(
     is_baseline = request.model in run.suite.baselines
     config = workload.config.complete(
         run.suite.name,
-        {"name": subject.name, **subject.identity()},
+        {"name": subject.name, **identity_of(subject)},
         adapter={} if is_baseline else adapter_identity(request.model),
         suite_code=request.suite_code,
         limit=request.tasks.limit,
