@@ -15,12 +15,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 __all__ = [
+    "STOPS",
     "AdapterError",
     "DataError",
     "InfthorError",
     "ModelError",
     "SceneError",
-    "STOPS",
     "SimulatorError",
     "Terminated",
     "UsageError",

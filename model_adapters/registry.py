@@ -120,7 +120,8 @@ def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
     Raises:
         UsageError: a name is unknown (the message has the nearest one), or a value does not fit its
             option.
-        ModelError: the model cannot be loaded, lacks a member, or its name or capabilities are none.
+        ModelError: the model cannot be loaded, lacks a member, or has no name or
+            capabilities.
     """
     model = build(name, options, seed)
     if name in BUILT_IN:

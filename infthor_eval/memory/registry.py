@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import ModelError, UsageError, in_one_line, unknown_name, wrap_user_code
-from infthor_eval.memory.protocol import Memory
+from infthor_eval.memory.protocol import Memory, MemoryCapabilities
 from infthor_eval.plugins import PluginTable
 from infthor_eval.storage.digests import json_values
 from model_adapters.adapter_identity import package_identity
@@ -115,20 +115,25 @@ def wrap_memory_errors(name: str) -> AbstractContextManager[None]:
 @lru_cache(maxsize=8)  # by the class: an edited file has another one
 def _build(name: str, kind: Any, options: MemoryOptions) -> Memory:
     values = _converted(name, kind, dict(options))
-    try:
-        memory = kind(**values)
-    except (TypeError, ValueError) as error:
+    with wrap_memory_errors(name):
+        try:
+            memory = kind(**values)
+        except (TypeError, ValueError) as error:
+            raise UsageError(
+                f"the memory {name} cannot be made ({in_one_line(error)}); see docs/memories.md"
+            ) from error
+        names = [member for member in vars(Memory) if not member.startswith("_")]
+        missing = [member for member in names if not hasattr(memory, member)]
+        if missing:
+            raise UsageError(f"the memory {name} lacks {', '.join(missing)}; see docs/memories.md")
+        capabilities = memory.capabilities
+    if not isinstance(capabilities, MemoryCapabilities):
+        given = f"{capabilities!r:.60}"
         raise UsageError(
-            f"the memory {name} cannot be made ({in_one_line(error)}); see docs/memories.md"
-        ) from error
-    if not isinstance(memory, Memory):
-        members = [
-            member
-            for member in vars(Memory)
-            if not member.startswith("_") and not hasattr(memory, member)
-        ]
-        raise UsageError(f"the memory {name} lacks {', '.join(members)}; see docs/memories.md")
-    return memory
+            f"the memory {name}: its capabilities are {given}; make them MemoryCapabilities"
+        )
+    opened: Memory = memory
+    return opened
 
 
 def memory_class(name: str) -> Any:

@@ -43,9 +43,7 @@ class PresentedRun(ReportRun):
         return "right" if score >= 1 else "partly" if score > 0 else "wrong"
 
 
-def read_report_runs(
-    folders: Sequence[Path], tell: Tell | None = None
-) -> list[PresentedRun]:
+def read_report_runs(folders: Sequence[Path], tell: Tell | None = None) -> list[PresentedRun]:
     """Read runs from their folders, at least one.
 
     Args:

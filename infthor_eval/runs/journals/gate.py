@@ -23,7 +23,7 @@ _LONGEST_VALUE = 60  # characters of a value in a message
 
 
 class RefusedRecordError(DataError):
-    """A record that a journal cannot hold; the message names the field and what is wrong with it."""
+    """A record that a journal cannot hold; the message names the field, and what is wrong."""
 
 
 class Gate(Generic[Payload]):
@@ -67,7 +67,7 @@ def _difference(given: Any, read: Any) -> str:
 
 
 def _differing_items(given: Any, read: Any) -> Any:
-    """Yield name, value given and value read of items that differ, where both have the same ones."""
+    """Yield name, value given and value read of items that differ, if both have the same."""
     if type(given) is not type(read):
         return
     if isinstance(given, msgspec.Struct):

@@ -4,7 +4,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Generic
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import UsageError, wrap_user_code
 from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import BoundEvaluation, Need, Suite, Workload
@@ -28,9 +28,14 @@ class BoundRun(Generic[SuiteUnit, Payload]):
     header: RunHeader
 
     def close(self) -> None:
-        """Release the evaluation, then the subject."""
+        """Release the evaluation, then the subject.
+
+        Raises:
+            UserCodeError: one of them fails; both were tried.
+        """
         with ExitStack() as stack:
             stack.callback(self.subject.close)
+            stack.enter_context(wrap_user_code(f"{self.header.suite}: close() fails", "fix it"))
             stack.callback(self.evaluation.close)
 
 

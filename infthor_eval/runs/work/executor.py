@@ -7,7 +7,14 @@ from typing import Any, Generic, Protocol
 from infthor_eval.errors import STOPS, ModelError
 from infthor_eval.runs.journals.gate import Gate, RefusedRecordError
 from infthor_eval.runs.journals.journal import Journal
-from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.journals.records import (
+    Payload,
+    RunHeader,
+    SuiteUnit,
+    Unit,
+    UnitKey,
+    UnitRecord,
+)
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import BoundEvaluation, Group, Session, UnitSample, Workload
@@ -121,9 +128,7 @@ def group_records(
         yield unit.record_failure(session.describe_failure(unit, fault))
 
 
-def _unit_of(
-    record: UnitRecord[Payload], units: Mapping[UnitKey, Unit[Payload]]
-) -> Unit[Payload]:
+def _unit_of(record: UnitRecord[Payload], units: Mapping[UnitKey, Unit[Payload]]) -> Unit[Payload]:
     unit = units.get(record.key)
     if unit is None:
         raise ModelError(
