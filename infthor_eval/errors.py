@@ -45,14 +45,14 @@ _LINE_BREAKS = {
 class InfthorError(Exception):
     """Base of all errors that the command line shows as one line.
 
-    Messages quote what is in files and replies, and that may be anything: line breaks are escaped,
-    and the middle of a very long message is left out.
+    Messages quote what is in files and replies, and that may be anything: line breaks and lone
+    surrogates are escaped, and the middle of a very long message is left out.
     """
 
     exit_code = 2
 
     def __init__(self, message: str) -> None:
-        line = message.translate(_LINE_BREAKS)
+        line = _as_unicode(message.translate(_LINE_BREAKS))
         super().__init__(
             line if len(line) <= _LONGEST_MESSAGE else f"{line[:_HEAD]} [...] {line[-_TAIL:]}"
         )
@@ -108,10 +108,22 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
 def in_one_line(error: BaseException) -> str:
     """Return another library's error message as one line, short enough for one of ours."""
     reason = error.strerror if isinstance(error, OSError) else None  # `str` would repeat the path
-    text = " ".join((reason or str(error)).split()) or type(error).__name__
+    text = _as_unicode(" ".join((reason or _text_of(error)).split())) or type(error).__name__
     if isinstance(error, KeyError):  # its text is only the key
         text = f"no {text}"
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+
+
+def _text_of(error: BaseException) -> str:
+    try:
+        return str(error)
+    except Exception:  # noqa: BLE001 - of a class of others, whose text may fail too
+        return ""
+
+
+def _as_unicode(text: str) -> str:
+    """Return a text that files and terminals take: lone surrogates are escaped."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def describe_exception(error: BaseException) -> str:

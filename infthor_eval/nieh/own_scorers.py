@@ -97,6 +97,8 @@ class OwnScorer:
                 raise ValueError(
                     f"it gives {', '.join(map(str, scores)) or 'nothing'}, not {', '.join(names)}"
                 )
+            for name in scores:
+                str(name).encode()  # it is in the run's config
             return {str(name): require_number(str(name), scores[name]) for name in names or scores}
 
 

@@ -49,7 +49,7 @@ class TracebackFile:
             entry = text if first == unit else f"{_SAME}{first}\n"
             # One write in append mode: workers share the file, and must not interleave.
             with self._path.open("ab", buffering=0) as file:
-                file.write(f"== {unit}\n{entry}\n".encode())
+                file.write(f"== {unit}\n{entry}\n".encode("utf-8", "backslashreplace"))
         return f"{self._path.parent.name}/{_NAME}"
 
 
