@@ -3,7 +3,6 @@ run, and the run goes on."""
 
 import json
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -100,7 +99,13 @@ def test_every_field_of_every_record_takes_the_worst_values(name, run_cli, tmp_p
 def _worst_values() -> st.SearchStrategy[Any]:
     text = st.text(st.characters(codec=None))  # with lone surrogates
     single = st.one_of(
-        st.none(), st.booleans(), st.integers(), st.floats(), text, st.binary(), st.complex_numbers()
+        st.none(),
+        st.booleans(),
+        st.integers(),
+        st.floats(),
+        text,
+        st.binary(),
+        st.complex_numbers(),
     )
     return st.recursive(
         st.one_of(single, st.integers(0, len(WORST) - 1).map(WORST.__getitem__)),
@@ -134,7 +139,7 @@ def test_what_passes_the_gate_is_read_as_it_was_given(name: str, data: st.DataOb
 # -- an adapter, a judge
 
 
-OWN = '''
+OWN = """
 import itertools
 from dataclasses import dataclass
 from model_adapters import Capabilities, Reply, Transcript
@@ -180,7 +185,7 @@ class Own:
 class PlainModel(Own):
     def conversation(self):
         return Plain(self.numbers)
-'''
+"""
 N_PAIRS = 9 * len(WORST)  # fields of a reply
 
 
@@ -194,7 +199,15 @@ def test_an_adapter_gives_the_worst_replies(own, run_cli, tmp_path) -> None:
     n_units = 126
     for start in range(0, N_PAIRS, n_units):
         code, _, err = run_cli(
-            *("run", "--model", own, "--model-args", f"start={start}", "--output", tmp_path / "out"),
+            *(
+                "run",
+                "--model",
+                own,
+                "--model-args",
+                f"start={start}",
+                "--output",
+                tmp_path / "out",
+            ),
             *("--tasks", "nieh_mini_gt", "--name", f"from{start}", "--quiet"),
         )
         assert code == 1
@@ -230,7 +243,7 @@ def test_a_judge_gives_the_worst_replies(own, source, run_cli, tmp_path) -> None
     assert run_cli("rescore", folder, "--output", tmp_path / "again")[0] == 0
 
 
-SCORER = '''
+SCORER = """
 from tests.helpers.spoiled import WORST
 
 def measure(reply, answers):
@@ -244,7 +257,7 @@ def several(reply, answers):
 def named(reply, answers):
     number = int(reply.split()[-1])
     return {"a": 1.0} if number == 0 else {WORST[number % len(WORST)]: 1.0}
-'''
+"""
 
 
 @pytest.mark.parametrize("function", ["measure", "several", "named"])
@@ -259,7 +272,7 @@ def test_a_scorer_gives_the_worst_scores(function, source, run_cli, tmp_path) ->
     assert run_cli("rescore", folder, "--output", tmp_path / "again")[0] == 0
 
 
-MEMORY = '''
+MEMORY = """
 import itertools
 from infthor_eval.memory import MemoryCapabilities, Observation
 from tests.helpers.spoiled import WORST
@@ -278,7 +291,7 @@ class Own:
         value = WORST[number % len(WORST)]
         kinds = (value, [value], [Observation(number=value, frame=query.present.frame)])
         return kinds[number % len(kinds)]
-'''
+"""
 
 
 def test_a_memory_recalls_the_worst(own, run_cli, tmp_path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -136,8 +135,9 @@ def _refuse_options(run: PresentedRun, replay: Replay, options: Mapping[str, obj
 
 def _default_file(parts: Sequence[str]) -> Path:
     """Return a file of its own for each choice."""
-    name = "-".join(re.sub(r"[^\w.-]", "_", part) for part in parts)
-    return _FOLDER / f"{name:.200}.mp4"
+    from infthor_eval.storage.files import file_name
+
+    return _FOLDER / f"{file_name('-'.join(parts))}.mp4"
 
 
 def _write(
