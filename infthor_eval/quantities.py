@@ -3,8 +3,6 @@
 The types of records hold the limits, so that who writes a record and who reads it cannot differ.
 JSON has no NaN and no infinity, and means and sums of numbers beyond these limits would fail, or be
 wrong.
-
-To add a kind of number with a limit of its own: here, for every suite's records.
 """
 
 import math

@@ -163,7 +163,8 @@ class _GuardedConversation:
 
     def mark(self) -> Mark:
         """See `Conversation`."""
-        return self._call(self._conversation.mark)
+        mark: Mark = self._call(self._conversation.mark)
+        return mark
 
     def rewind(self, mark: Mark) -> None:
         """See `Conversation`."""
@@ -226,11 +227,12 @@ def _require_reply(name: str, reply: Any) -> Reply:
 
 def _require_count(name: str, what: str, count: Any) -> int | None:
     try:
-        return msgspec.convert(count, Count | None)
+        checked: int | None = msgspec.convert(count, Count | None)
     except msgspec.ValidationError as error:
         raise ModelError(
             f"{name} gives {count!r:.60} for {what} ({in_one_line(error)}); fix the adapter"
         ) from error
+    return checked
 
 
 def _in_words(value: Any) -> str:

@@ -46,11 +46,13 @@ from infthor_eval.runs.journals.shards import (
 )
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.limits import FILE_MB
 
 __all__ = ["Journal", "recover", "set_aside"]
 
 
 _SHARD = "worker-{:d}.jsonl"
+_MB = 2**20
 _RETRY_S = 0.1  # between two attempts to lock
 _BAD_LINES = "bad_lines.txt"
 
@@ -203,6 +205,8 @@ class Journal(Generic[Payload]):
 
     def _write(self, record: msgspec.Struct) -> None:
         line = memoryview(self._gate.line_of(record) + b"\n")
+        if os.fstat(self._file.fileno()).st_size + len(line) > FILE_MB.value * _MB:
+            raise DataError(f"{self._path}: holds {FILE_MB.value} MiB, the most; {FILE_MB.hint}")
         hint = "make room and run the same command again, which resumes it"
         # Threads must not mix their lines.
         with self._writing, wrap_errors(f"{self._path}: cannot be written", hint):
