@@ -69,12 +69,14 @@ def _check_step(name: str, step: ArmDelta) -> None:
     try:
         numbers = (*step.translation, *step.rotation, step.gripper)
         is_whole = (len(step.translation), len(step.rotation)) == (3, 3)
-        # Not beyond the limit either: a simulator takes metres and radians.
-        is_finite = all(abs(number) <= MOST for number in numbers)
-    except (TypeError, ValueError) as error:
+    except TypeError as error:
         raise ModelError(f"{name} gives {step!r:.60} for a step (not of numbers)") from error
     if not is_whole:
         raise ModelError(f"{name} gives {len(numbers)} numbers for a step; it must be {_N_NUMBERS}")
+    try:  # not beyond the limit either: a simulator takes metres and radians
+        is_finite = all(abs(number) <= MOST for number in numbers)
+    except TypeError:
+        is_finite = False
     if not is_finite:
         raise ModelError(
             f"{name} gives numbers that are not finite; its weights or its input are broken"

@@ -7,8 +7,10 @@ from typing import Any
 
 import pytest
 
+from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
+from infthor_eval.storage.files import file_name
 
 from ..helpers.journals import write_journal
 from ..helpers.nieh_runs import make_config, make_header, make_record
@@ -184,7 +186,8 @@ def test_a_scorer_that_ends_the_program_fails_its_reply_alone(stored, run_cli, t
 def test_no_name_of_a_run_writes_outside_the_output(stored, run_cli, tmp_path):
     output = tmp_path / "a" / "b" / "out"
     assert run_cli("rescore", stored, "--output", output)[0] == 0
-    assert [path.name for path in output.iterdir()] == ["_.._evil-rescored-0bdc3fd8"]
+    (folder,) = output.iterdir()
+    assert folder.name.startswith("_.._evil-rescored-")
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["b"]
     assert [path.name for path in (tmp_path / "a" / "b").iterdir()] == ["out"]
 
@@ -206,5 +209,16 @@ def test_a_line_of_an_older_version_is_named_and_the_rest_is_shown(stored, run_c
         code, _, err = run_cli(*command)
         assert code == 0, err
         assert f"left out: {path}, line 2: not a line of a journal" in "".join(err.split("\n"))
-    code, out, _ = run_cli("show", stored, "--json")
-    assert json.loads(out)[0]["summary"]["tasks"]["nieh_gt"]["n_failed"] == 0
+    assert [record.id for record in read_run(stored, RECORDS, lambda _: None)[1]] == ["q1"]
+
+
+def test_no_name_of_a_model_writes_outside_the_output(make_nieh_set, run_cli, tmp_path):
+    data = make_nieh_set(size=56)
+    question = NiehSet(data).questions[0].id
+    log = tmp_path / "log.jsonl"
+    log.write_text(json.dumps({"question_id": question, "reply": "mug"}))
+    output = tmp_path / "a" / "out"
+    typed = ("--data", data, "--model", "../../evil", "--output", output)
+    assert run_cli("import-replies", log, *typed)[0] == 0
+    assert [path.name for path in output.iterdir()] == [file_name("../../evil")]
+    assert [path.name for path in (tmp_path / "a").iterdir()] == ["out"]
