@@ -43,6 +43,6 @@ def _violation(check: Callable[[], None]) -> str | None:
         return f"it raises {type(error).__name__}: {error}"
     except STOPS:
         raise
-    except BaseException as error:  # noqa: BLE001 - it is anybody's code, and its error is the result
+    except BaseException as error:  # noqa: BLE001 - anybody's code; its error is the result
         return f"it raises {describe_exception(error)}"
     return None
