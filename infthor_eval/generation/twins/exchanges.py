@@ -6,15 +6,16 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import ClassVar
 
+from infthor_eval.formats.trajectory import Scene
 from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.generation.twins.kinds import EditRefused, Worlds
-from infthor_eval.generation.twins.placing import may_fit, moved_scene, scene_of
+from infthor_eval.generation.twins.placing import may_fit, scenes_of_both
 from infthor_eval.generation.twins.rewriting import exchange_ids, in_world
 from infthor_eval.household.affordances import SLICEABLE, goes_into
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import SimulatorView, ThorObject
+from infthor_eval.thor.view import ThorObject
 
 __all__ = ["Exchange", "ExchangeKind", "Move", "Swap", "SwapSliced", "SwapTask", "Untouched"]
 
@@ -36,31 +37,47 @@ class Exchange:
     other: ThorObject
 
     def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
-        """See `Proposal`: the first world is the episode's, the second has the places exchanged."""
-        one = self.one
-        other = self.other
-        moves = [(one, other), (other, one)]
-        scene = moved_scene(episode.trajectory.scene, simulator, moves)
-        if restore(simulator, scene).lines():
-            raise EditRefused("the exchanged start cannot be restored")
-        after = _ids_by_name(simulator.view)
-        roles = {one.object_id: after[other.name], other.object_id: after[one.name]}
-        types = {one.object_type: other.object_type, other.object_type: one.object_type}
-        handled = episode.actions_on(one.object_id) or episode.actions_on(other.object_id)
-        trajectory = episode.trajectory
+        """See `Proposal`: the first world is as the episode, the second with places exchanged."""
+        both = self.one, self.other
+        exchanged = self.other, self.one
+        scenes = scenes_of_both(episode.trajectory.scene, simulator, [both, exchanged])
+        ids = [restored_ids(simulator, scene, both) for scene in scenes]
+        types = {self.one.object_type: self.other.object_type}
+        types |= {new: old for old, new in types.items()}
+        is_handled = any(episode.actions_on(obj.object_id) for obj in both)
+        roles = (
+            {obj.object_id: ids[0][obj.name] for obj in both},
+            {
+                obj.object_id: ids[1][other.name]
+                for obj, other in zip(both, both[::-1], strict=True)
+            },
+        )
+        words = {}, types if is_handled else {}
+        first, second = (
+            in_world(episode.trajectory, scene, exchange_ids(role), renamed)
+            for scene, role, renamed in zip(scenes, roles, words, strict=True)
+        )
         return Worlds(
-            pair=(
-                in_world(trajectory, scene_of(trajectory.scene, episode.start)),
-                in_world(trajectory, scene, exchange_ids(roles), types if handled else {}),
-            ),
-            changed=frozenset(roles),
+            pair=(first, second),
+            changed=frozenset(ids[0].values()),
             types=frozenset(types),
-            ids={one.object_id: after[one.name], other.object_id: after[other.name]},
+            ids={ids[0][obj.name]: ids[1][obj.name] for obj in both},
         )
 
 
-def _ids_by_name(view: SimulatorView) -> dict[str, str]:
-    return {obj.name: obj.object_id for obj in view.objects.values()}
+def restored_ids(
+    simulator: Simulator, scene: Scene, objects: Iterable[ThorObject]
+) -> dict[str, str]:
+    """Restore a scene, and return the ids that objects have in it, by name.
+
+    Raises:
+        EditRefused: it cannot be restored.
+        SimulatorError: the simulator fails.
+    """
+    if restore(simulator, scene).lines():
+        raise EditRefused("the exchanged start cannot be restored")
+    by_name = {obj.name: obj.object_id for obj in simulator.view.objects.values()}
+    return {obj.name: by_name[obj.name] for obj in objects}
 
 
 class ExchangeKind:
@@ -78,7 +95,8 @@ class ExchangeKind:
     def propose(self, episode: Episode, rng: random.Random) -> Iterator[Exchange]:
         """See `EditKind`."""
         for one, other in self.pairs(episode, rng):
-            yield Exchange(one, other)
+            if rng.random() < self.chance(episode, one, other):
+                yield Exchange(one, other)
 
     def pairs(self, episode: Episode, rng: random.Random) -> list[_Pair]:
         """Return the pairs of objects that may exchange places, the likeliest first."""
@@ -92,6 +110,14 @@ class ExchangeKind:
         rng.shuffle(pairs)
         pairs.sort(key=lambda pair: _n_unseen(episode, pair))
         return _spread(pairs)
+
+    def chance(self, episode: Episode, one: ThorObject, other: ThorObject) -> float:
+        """Return with what probability an exchange is proposed: 1 if its world is as likely.
+
+        If a world that is half as likely as the episode is proposed half as often, neither of two
+        worlds is the likelier original (the rule of Metropolis).
+        """
+        return 1.0
 
     def allows(self, first: set[str], second: set[str]) -> bool:
         """Return True for two objects with these names of actions on them."""
@@ -155,6 +181,12 @@ class Swap(ExchangeKind):
             return False
         low, high = sorted(episode.task_shares[obj.object_type] for obj in (one, other))
         return low >= high / 2 > 0
+
+    def chance(self, episode: Episode, one: ThorObject, other: ThorObject) -> float:
+        """See the base: how often tasks name what is carried."""
+        carried, left = (one, other) if episode.actions_on(one.object_id) else (other, one)
+        shares = episode.task_shares
+        return shares[left.object_type] / shares[carried.object_type]
 
 
 class SwapTask(ExchangeKind):

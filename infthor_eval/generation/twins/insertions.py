@@ -40,7 +40,12 @@ class Insertion:
             with_inserted(episode.trajectory, self.index, actions) for actions in self.actions
         )
         inside = (key for holder in self.keys for key in episode.inside(holder, self.index))
-        return Worlds((first, second), self.keys.union(inside), self.types)
+        return Worlds(
+            pair=(first, second),
+            changed=self.keys.union(inside),
+            types=self.types,
+            inserted=range(self.index, self.index + len(self.actions[0])),
+        )
 
 
 def moments(episode: Episode, rng: random.Random) -> list[int]:

@@ -49,12 +49,14 @@ class Worlds:
         ids: ids in the second world by those in the first, for objects whose ids differ.
         changed: ids in the first world of the objects that may differ, with their slices.
         types: object types that the changed fact is about; only questions on them are paired.
+        inserted: indices of the actions that the episode does not have, in each world.
     """
 
     pair: tuple[Trajectory, Trajectory]
     changed: frozenset[str]
     types: frozenset[str]
     ids: dict[str, str] = field(default_factory=dict)
+    inserted: range = range(0)
 
     @property
     def changed_in_second(self) -> frozenset[str]:
@@ -65,7 +67,7 @@ class Worlds:
         """Return the same worlds in the other order."""
         first, second = self.pair
         back = {new: old for old, new in self.ids.items()}
-        return Worlds((second, first), self.changed_in_second, self.types, back)
+        return Worlds((second, first), self.changed_in_second, self.types, back, self.inserted)
 
 
 class Proposal(Protocol):

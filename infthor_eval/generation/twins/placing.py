@@ -1,7 +1,7 @@
 """Giving objects each other's places in a restored scene, and the scene that results."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 
 import msgspec
@@ -14,7 +14,9 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import Box, SimulatorView, ThorObject, Vector
 
-__all__ = ["may_fit", "moved_scene", "scene_of"]
+__all__ = ["may_fit", "scenes_of_both"]
+
+_Offset = tuple[float, float]
 
 # Places beside the other's that are tried, nearest first, metres.
 _STEPS = [step / 20 for step in range(-5, 6)]
@@ -24,47 +26,152 @@ _WIDER = 0.15  # how much wider it may be elsewhere, metres
 _FAR = 50.0  # metres above the room, where objects wait for their new places
 
 
-def moved_scene(
-    scene: Scene,
-    simulator: Simulator,
-    moves: Sequence[tuple[ThorObject, ThorObject]],
-    aside: Sequence[ThorObject] = (),
-) -> Scene:
-    """Move objects to the places of others in a restored scene; return it as trajectories have it.
+def scenes_of_both(
+    scene: Scene, simulator: Simulator, places: Sequence[tuple[ThorObject, ThorObject]]
+) -> tuple[Scene, Scene]:
+    """Stand one of two objects at each of some places, the other one in a second world.
+
+    Both stand at the same point, so that no distance tells which of them a room was generated with:
+    where only the one of the episode has room, both are moved aside. What a world has no place for
+    is above the room, at the same height in both.
 
     Args:
         scene: the scene, which is restored first.
         simulator: a simulator.
-        moves: each object, and the one at whose place it is to be.
-        aside: further objects that are taken out of the way, above the room.
+        places: for each place the object of the episode, and that of the second world.
+
+    Returns:
+        The two scenes, as trajectories have them.
 
     Raises:
         EditRefused: there is no room, or a third object moved or is elsewhere.
         SimulatorError: the simulator fails.
     """
-    restore(simulator, scene)
-    before = simulator.view.objects
-    # What goes aside first, so that it is at the same place whatever is moved.
-    lifted = [*aside, *(_turned(item, where) for item, where in moves)]
-    for number, item in enumerate(lifted):
-        _lift(simulator, item, {"x": 0.0, "y": _FAR + number, "z": 0.0})
-    waiting = simulator.view.objects
-    for item, where in moves:
-        _place(simulator, waiting[item.object_id], where, before)
-    after = simulator.view.objects
-    moved = {item.object_id for item in lifted}
-    tolerance = tolerance_of(simulator)
-    for key, obj in before.items():
-        if key not in moved and obj.parent_receptacles != after[key].parent_receptacles:
-            raise EditRefused("the move changed what a third object is in or on")
-        if key not in moved and not tolerance.is_same_place(obj.position, after[key].position):
-            raise EditRefused("the move moved a third object")
-    if not all(_has_place(simulator.view, item, where) for item, where in moves):
-        raise EditRefused("an object is not where the other was")
-    return scene_of(scene, simulator.view)
+    mover = _Mover(scene, simulator, {obj.object_id: obj for place in places for obj in place})
+    offsets = [mover.offset_for_both(*place) for place in places]
+    worlds = []
+    for side in (0, 1):
+        standing = [
+            (place[side], place[0], offset) for place, offset in zip(places, offsets, strict=True)
+        ]
+        worlds.append(mover.scene(standing))
+    return worlds[0], worlds[1]
 
 
-def scene_of(scene: Scene, view: SimulatorView) -> Scene:
+class _Mover:
+    """Stands objects of a restored scene at the places of others.
+
+    Args:
+        scene: the scene.
+        simulator: a simulator.
+        items: the objects that are moved, by id.
+    """
+
+    def __init__(self, scene: Scene, simulator: Simulator, items: Mapping[str, ThorObject]) -> None:
+        self._scene = scene
+        self._simulator = simulator
+        self._items = items
+        restore(simulator, scene)
+        self._before = simulator.view.objects
+        for item in items.values():
+            self._lift(item)
+
+    def _lift(self, item: ThorObject) -> None:
+        """Take an object out of the way, in the rotation that it has."""
+        _lift(self._simulator, item, _above([*self._items].index(item.object_id)))
+
+    def offset_for_both(self, where: ThorObject, other: ThorObject) -> _Offset:
+        """Return how far from a place, at least, both the object there and another have room.
+
+        Raises:
+            EditRefused: there is no such point.
+        """
+        for offset in _OFFSETS:
+            if all(self._stands(item, where, offset) for item in (other, where)):
+                return offset
+        raise EditRefused("no room at the other's place")
+
+    def scene(self, standing: Sequence[tuple[ThorObject, ThorObject, _Offset]]) -> Scene:
+        """Return the scene in which some objects stand at places of objects, and the rest nowhere.
+
+        Raises:
+            EditRefused: they are in each other's way, or move another object.
+        """
+        for item in self._items.values():
+            self._lift(item)
+        for item, where, offset in standing:
+            if not self._try(item, where, offset):
+                raise EditRefused("no room for both at once")
+        placed = {item.object_id for item, _, _ in standing}
+        for number, key in enumerate(key for key in self._items if key not in placed):
+            _lift(self._simulator, self._items[key], _above(number))
+        self._check_others()
+        return _scene_of(self._scene, self._simulator.view)
+
+    def _stands(self, item: ThorObject, where: ThorObject, offset: _Offset) -> bool:
+        """Return True if an object can stand beside a place; it is taken away again."""
+        stands = self._try(item, where, offset)
+        self._lift(item)
+        return stands
+
+    def _try(self, item: ThorObject, where: ThorObject, offset: _Offset) -> bool:
+        """Stand an object beside a place, in line with what is there; return whether it can."""
+        simulator = self._simulator
+        self._lift(_turned(item, where))
+        waiting = simulator.view.objects[item.object_id]
+        container = _container(where, self._before)
+        if container is None:
+            view = simulator.step(
+                "PlaceObjectAtPoint",
+                objectId=item.object_id,
+                position=_foot(where, offset),
+            )
+            return view.success and _has_place(view, item, where)
+        position = self._inside(waiting, where, container, offset)
+        if position is None:
+            return False
+        _lift(simulator, waiting, position)
+        return _has_place(simulator.view, item, where)
+
+    def _inside(
+        self, item: ThorObject, where: ThorObject, container: Box, offset: _Offset
+    ) -> dict[str, float] | None:
+        """Return an object's position in a container, clear of what is there; None for no room."""
+        own, other = _box(item), _box(where)
+        box = _box_beside(own, other, offset)
+        others = [
+            obj.axis_aligned_bounding_box
+            for obj in self._simulator.view.objects.values()
+            if obj.pickupable and obj.object_id != item.object_id
+        ]
+        is_clear = not any(taken is not None and _meet(box, taken) for taken in others)
+        if not is_clear or not _is_within(box, container):
+            return None
+        return {
+            axis: getattr(item.position, axis)
+            - getattr(own.center, axis)
+            + getattr(box.center, axis)
+            for axis in "xyz"
+        }
+
+    def _check_others(self) -> None:
+        """Check that nothing else moved.
+
+        Raises:
+            EditRefused: something did.
+        """
+        after = self._simulator.view.objects
+        tolerance = tolerance_of(self._simulator)
+        for key, obj in self._before.items():
+            if key in self._items:
+                continue
+            if obj.parent_receptacles != after[key].parent_receptacles:
+                raise EditRefused("the move changed what a third object is in or on")
+            if not tolerance.is_same_place(obj.position, after[key].position):
+                raise EditRefused("the move moved a third object")
+
+
+def _scene_of(scene: Scene, view: SimulatorView) -> Scene:
     """Return a scene with the poses of all that can be picked up in a view, sorted by name."""
     poses = [
         ObjectPose(obj.name, asdict(obj.position), asdict(obj.rotation))
@@ -83,7 +190,7 @@ def may_fit(item: ThorObject, where: ThorObject, objects: Mapping[str, ThorObjec
     container = _container(where, objects)
     if container is None:
         return max(own.size.x - other.size.x, own.size.z - other.size.z) <= _WIDER
-    return any(_is_within(box, container) for box in _boxes_beside(own, other))
+    return any(_is_within(_box_beside(own, other, offset), container) for offset in _OFFSETS)
 
 
 def _turned(item: ThorObject, where: ThorObject) -> ThorObject:
@@ -116,12 +223,26 @@ def _container(where: ThorObject, objects: Mapping[str, ThorObject]) -> Box | No
     return min(known, key=lambda box: box.size.x * box.size.y * box.size.z, default=None)
 
 
-def _boxes_beside(own: Box, other: Box) -> Iterator[Box]:
-    """Yield the box of an object that stands where another one stands, then beside it."""
+def _box_beside(own: Box, other: Box, offset: _Offset) -> Box:
+    """Return the box of an object that stands where another one stands, or beside it."""
+    x, z = offset
     bottom = other.center.y - other.size.y / 2
-    for x, z in _OFFSETS:
-        center = Vector(other.center.x + x, bottom + own.size.y / 2, other.center.z + z)
-        yield msgspec.structs.replace(own, center=center)
+    center = Vector(other.center.x + x, bottom + own.size.y / 2, other.center.z + z)
+    return msgspec.structs.replace(own, center=center)
+
+
+def _foot(where: ThorObject, offset: _Offset) -> dict[str, float]:
+    """Return the point on the surface beside which an object stands."""
+    box = _box(where)
+    x, z = offset
+    bottom = box.center.y - box.size.y / 2
+    return {"x": where.position.x + x, "y": bottom, "z": where.position.z + z}
+
+
+def _box(obj: ThorObject) -> Box:
+    if obj.axis_aligned_bounding_box is None:
+        raise EditRefused("the simulator does not report boxes")
+    return obj.axis_aligned_bounding_box
 
 
 def _is_within(inner: Box, outer: Box) -> bool:
@@ -144,65 +265,6 @@ def _distances(one: Box, other: Box) -> dict[str, float]:
     return {axis: abs(getattr(one.center, axis) - getattr(other.center, axis)) for axis in "xyz"}
 
 
-def _place(
-    simulator: Simulator, item: ThorObject, where: ThorObject, before: Mapping[str, ThorObject]
-) -> None:
-    """Stand an object where another one stood, or as near to it as there is room.
-
-    Args:
-        simulator: simulator with the restored scene.
-        item: the object, in the rotation that it is to have.
-        where: the other one, before it was moved.
-        before: the objects before any was moved.
-    """
-    box = where.axis_aligned_bounding_box
-    own = item.axis_aligned_bounding_box
-    if box is None or own is None:
-        raise EditRefused("the simulator does not report boxes")
-    container = _container(where, before)
-    if container is not None:
-        _put_inside(simulator, item, where, container)
-        return
-    bottom = box.center.y - box.size.y / 2
-    point = {"x": where.position.x, "y": bottom, "z": where.position.z}
-    for x, z in _OFFSETS:
-        view = simulator.step(
-            "PlaceObjectAtPoint",
-            objectId=item.object_id,
-            position={**point, "x": point["x"] + x, "z": point["z"] + z},
-        )
-        if view.success and _has_place(view, item, where):
-            return
-    raise EditRefused("no room at the other's place")
-
-
-def _put_inside(simulator: Simulator, item: ThorObject, where: ThorObject, container: Box) -> None:
-    """Put an object into a container where another one was, or beside, clear of what is there."""
-    own = item.axis_aligned_bounding_box
-    other = where.axis_aligned_bounding_box
-    assert own is not None
-    assert other is not None
-    others = [
-        obj.axis_aligned_bounding_box
-        for obj in simulator.view.objects.values()
-        if obj.pickupable and obj.object_id != item.object_id
-    ]
-    for box in _boxes_beside(own, other):
-        is_clear = not any(taken is not None and _meet(box, taken) for taken in others)
-        if not is_clear or not _is_within(box, container):
-            continue
-        position = {
-            axis: getattr(item.position, axis)
-            - getattr(own.center, axis)
-            + getattr(box.center, axis)
-            for axis in "xyz"
-        }
-        _lift(simulator, item, position)
-        if _has_place(simulator.view, item, where):
-            return
-    raise EditRefused("no room at the other's place")
-
-
 def _lift(simulator: Simulator, item: ThorObject, position: dict[str, float]) -> None:
     """Give an object a position, in the air too."""
     simulator.step(
@@ -213,6 +275,11 @@ def _lift(simulator: Simulator, item: ThorObject, position: dict[str, float]) ->
         forceAction=True,
         forceKinematic=True,
     )
+
+
+def _above(number: int) -> dict[str, float]:
+    """Return a place above the room."""
+    return {"x": 0.0, "y": _FAR + number, "z": 0.0}
 
 
 def _has_place(view: SimulatorView, item: ThorObject, where: ThorObject) -> bool:

@@ -12,12 +12,12 @@ import msgspec
 from infthor_eval.formats.trajectory import StartState, Trajectory
 from infthor_eval.generation.questions import presence
 from infthor_eval.generation.twins.episode import ASKED_OPEN, Episode
-from infthor_eval.generation.twins.exchanges import Untouched
-from infthor_eval.generation.twins.kinds import EditRefused, Worlds
-from infthor_eval.generation.twins.placing import moved_scene
+from infthor_eval.generation.twins.exchanges import Untouched, restored_ids
+from infthor_eval.generation.twins.kinds import Worlds
+from infthor_eval.generation.twins.placing import scenes_of_both
 from infthor_eval.generation.twins.rewriting import in_world
+from infthor_eval.household.affordances import goes_into
 from infthor_eval.household.wording import canonical_type
-from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import ThorObject
 
@@ -123,23 +123,20 @@ class _Replacement:
 
         What is not there is put aside in both, as its pose is written, too.
         """
-        scene = episode.trajectory.scene
-        worlds = []
-        ids = []
-        for there, gone in ((self.one, self.other), (self.other, self.one)):
-            moves = [] if there is self.one else [(there, self.one)]
-            moved = moved_scene(scene, simulator, moves, aside=[gone])
-            if restore(simulator, moved).lines():
-                raise EditRefused("the exchanged start cannot be restored")
-            ids.append({obj.name: obj.object_id for obj in simulator.view.objects.values()})
-            world = in_world(episode.trajectory, moved)
-            worlds.append(_with_states(world, StartState(gone.name, is_disabled=True)))
-        keys = {ids[0][obj.name]: ids[1][obj.name] for obj in (self.one, self.other)}
+        both = self.one, self.other
+        scenes = scenes_of_both(episode.trajectory.scene, simulator, [both])
+        ids = [restored_ids(simulator, scene, both) for scene in scenes]
+        worlds = [
+            _with_states(
+                in_world(episode.trajectory, scene), StartState(gone.name, is_disabled=True)
+            )
+            for scene, gone in zip(scenes, both[::-1], strict=True)
+        ]
         return Worlds(
             pair=(worlds[0], worlds[1]),
-            changed=frozenset(keys),
+            changed=frozenset(ids[0].values()),
             types=frozenset({self.one.object_type, self.other.object_type}),
-            ids=keys,
+            ids={ids[0][obj.name]: ids[1][obj.name] for obj in both},
         )
 
 
@@ -151,18 +148,27 @@ class Replace:
     def propose(self, episode: Episode, rng: random.Random) -> Iterator[_Replacement]:
         """See `EditKind`: each is the only one of its type, and can be asked for where it is not.
 
-        Those whose places frames show, and of which both can be asked for, come first.
+        Frames show both, so that either may be taken out: if it were always the one that is hidden,
+        types that are often hidden would tell. Those of which both can be asked for come first.
         """
         pairs = [
             pair
             for pair in Untouched().pairs(episode, rng)
-            if all(map(episode.is_only_one, pair)) and any(_can_be_missed(episode, pair))
+            if all(map(episode.is_only_one, pair))
+            and all(obj.object_id in episode.seen for obj in pair)
+            and any(_can_be_missed(episode, pair))
         ]
         for pair in sorted(pairs, key=lambda pair: -sum(_can_be_missed(episode, pair))):
             one, other = rng.sample(pair, 2)
-            if one.object_id not in episode.seen:
-                one, other = other, one
-            yield _Replacement(one, other)
+            # What has few places is the likelier at each: see `ExchangeKind.chance`.
+            if rng.random() < _n_places(episode, one) / _n_places(episode, other):
+                yield _Replacement(one, other)
+
+
+def _n_places(episode: Episode, obj: ThorObject) -> int:
+    """Return the number of receptacles that an object goes into or onto."""
+    objects = episode.start.objects.values()
+    return sum(goes_into(obj.object_type, place.object_type) for place in objects)
 
 
 def _can_be_missed(episode: Episode, pair: tuple[ThorObject, ThorObject]) -> list[bool]:

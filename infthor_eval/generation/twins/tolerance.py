@@ -8,9 +8,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from PIL import Image
-
+from infthor_eval.generation.twins.pictures import channel_differences
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import Vector
 
@@ -41,9 +39,7 @@ class Tolerance:
 
     def is_same_picture(self, one: Path, other: Path) -> bool:
         """Return True if two pictures of the same size count as equal, other bytes or not."""
-        with Image.open(one) as first, Image.open(other) as second:
-            pictures = [np.asarray(picture.convert("RGB"), int) for picture in (first, second)]
-        away = np.abs(pictures[0] - pictures[1])
+        away = channel_differences(one, other)
         unlike = (away.max(axis=-1) > self.level).mean()
         return bool(away.mean() <= self.mean and unlike <= self.share)
 

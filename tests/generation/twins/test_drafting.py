@@ -2,6 +2,7 @@
 
 import json
 import random
+from dataclasses import replace as replace_fields
 from functools import partial
 
 import msgspec
@@ -10,7 +11,12 @@ from msgspec.structs import replace
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.trajectory import StartState, encode_trajectory, iter_trajectories
+from infthor_eval.formats.trajectory import (
+    ApiAction,
+    StartState,
+    encode_trajectory,
+    iter_trajectories,
+)
 from infthor_eval.generation.twins.drafting import (
     TwinSettings,
     draft_twins,
@@ -20,6 +26,8 @@ from infthor_eval.generation.twins.drafting import (
 from infthor_eval.generation.twins.episode import read_episode
 from infthor_eval.generation.twins.exchanges import Exchange
 from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Worlds
+from infthor_eval.generation.twins.openings import CountOpen
+from infthor_eval.generation.twins.pictures import are_clearly_unlike
 from infthor_eval.generation.twins.rewriting import in_world, without_traces
 from infthor_eval.nieh.scoring import score
 
@@ -108,6 +116,33 @@ def test_a_broken_edit_is_rejected_and_counted(
     assert made.rejected == {"broken": {reason: 1}}
     assert not made.pairs
     assert not list((tmp_path / "metadata").iterdir())
+
+
+class DoneUnseen:
+    """A kind that waits in one world, while a container is opened in the other."""
+
+    name = "unseen"
+
+    def propose(self, episode, rng):
+        edit = next(CountOpen().propose(episode, rng))
+        waits = [ApiAction("Pass") for _ in edit.actions[0]]
+        yield replace_fields(edit, actions=(edit.actions[0], waits))
+
+
+def test_what_cannot_be_seen_to_be_done_is_rejected(file, simulator, tmp_path, monkeypatch):
+    monkeypatch.setitem(KINDS.built_in, "unseen", f"{__name__}:DoneUnseen")
+    made = draft(file, simulator, tmp_path, "unseen")
+    assert made.rejected == {"unseen": {"an action that is added cannot be seen": 1}}
+
+
+def test_every_question_can_be_told_by_eye_from_a_clue_frame(made):
+    drafted, out = made
+    for pair in drafted.pairs:
+        first, second = (NiehSet(out, needs_questions=False).frames(name) for name in pair.traj_ids)
+        for question in pair.questions:
+            assert any(
+                are_clearly_unlike(first[clue].path, second[clue].path) for clue in question.clues
+            )
 
 
 def test_an_exchange_without_room_is_refused(episode, simulator):
@@ -215,6 +250,32 @@ def test_a_moved_object_stands_in_line_with_what_it_stands_on(episode, simulator
     one, other = (name for name, pose in before.items() if pose != after[name])
     assert after[one].rotation == before[other].rotation
     assert after[other].rotation == before[one].rotation
+
+
+@pytest.mark.parametrize("name", ["move", "swap", "replace"])
+def test_whichever_object_stands_at_a_place_stands_at_the_same_point(name, episode, simulator):
+    points = []
+    for scene in first_worlds(name, episode, simulator):
+        gone = {state.name for state in scene.object_states or [] if state.is_disabled}
+        points.append(
+            {
+                pose.name: (round(pose.position["x"], 3), round(pose.position["z"], 3))
+                for pose in scene.object_poses
+                if pose.name not in gone
+            }
+        )
+    before, after = points
+    moved = before.items() ^ after.items()
+    assert len({object_name for object_name, _ in moved}) == 2
+    assert sorted(before.values()) == sorted(after.values())
+
+
+def test_what_is_replaced_and_what_replaces_it_are_both_seen(episode):
+    kind = KINDS.load("replace", EditKind)()
+    proposals = [*kind.propose(episode, random.Random(1))]
+    assert proposals
+    for edit in proposals:
+        assert {edit.one.object_id, edit.other.object_id} <= episode.seen
 
 
 def test_labels_are_drawn_by_coin():

@@ -8,7 +8,7 @@ import pytest
 
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.generation.twins.episode import read_episode
-from infthor_eval.generation.twins.exchanges import Swap
+from infthor_eval.generation.twins.exchanges import Move, Swap
 from infthor_eval.generation.twins.task_shares import task_shares
 from infthor_eval.thor.restore import restore
 
@@ -43,3 +43,28 @@ def test_what_no_task_names_is_exchanged_with_nothing(episode):
     bare = replace(episode)
     vars(bare)["task_shares"] = Counter()
     assert not Swap().pairs(bare, random.Random(0))
+
+
+def test_a_world_half_as_likely_is_proposed_half_as_often(episode):
+    one, other = Swap().pairs(episode, random.Random(0))[0]
+    carried, left = (one, other) if episode.actions_on(one.object_id) else (other, one)
+    unequal = replace(episode)
+    shares = Counter({carried.object_type: 60, left.object_type: 30})
+    vars(unequal)["task_shares"] = shares
+    rng = random.Random(0)
+    edits = [edit for _ in range(400) for edit in Swap().propose(unequal, rng)]
+    both = {one.object_id, other.object_id}
+
+    def count(edits):
+        return sum({edit.one.object_id, edit.other.object_id} == both for edit in edits)
+
+    n_same = count(edits)
+    assert 160 < n_same < 240
+    shares[carried.object_type] = 20
+    again = [edit for _ in range(20) for edit in Swap().propose(unequal, rng)]
+    assert count(again) == 20
+
+
+def test_only_swaps_are_drawn_by_how_likely_they_are(episode):
+    one, other = episode.loose[:2]
+    assert Move().chance(episode, one, other) == 1.0

@@ -17,7 +17,7 @@ from infthor_eval.workers import WorkerSettings
 
 from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
 
-SETTINGS = TwinSettings(("move",), 1, 1)
+SETTINGS = TwinSettings(("move",), 3, 1)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_edits_are_counted_and_pairs_resumed(data, made):
     assert not summary.failures
     again = make(data, out)
     assert (again.resumed, again.pairs) == (1, summary.pairs)
-    refused = make(data, out, TwinSettings(("move",), 2, 1))
+    refused = make(data, out, TwinSettings(("move",), 4, 1))
     assert "made with other kinds, seed" in refused.failures[0]
 
 

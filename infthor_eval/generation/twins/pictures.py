@@ -1,0 +1,42 @@
+"""How unlike two pictures are, and whether an eye can tell them apart."""
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from infthor_eval.generation.questions.history import DEFAULT_SHARE
+
+__all__ = ["are_clearly_unlike", "channel_differences"]
+
+# Two objects that change places are two outlines, each as large as what counts as shown. Below
+# this, by eye, a pair differs in the edge of a door or of a plate.
+_CLEAR_SHARE = 2 * DEFAULT_SHARE
+_CLEAR_LEVEL = 24  # of 255; shadows and highlights beside an object differ by less
+
+
+def channel_differences(one: Path, other: Path) -> npt.NDArray[np.int64]:
+    """Return how far two pictures of the same size are apart.
+
+    Args:
+        one: file of a picture.
+        other: file of another.
+
+    Returns:
+        Differences of 0 to 255, of shape (height, width, 3).
+    """
+    with Image.open(one) as first, Image.open(other) as second:
+        pictures = [np.asarray(picture.convert("RGB"), np.int64) for picture in (first, second)]
+    return np.abs(pictures[0] - pictures[1])
+
+
+def are_clearly_unlike(one: Path, other: Path) -> bool:
+    """Return True if an eye can tell two pictures of the same size apart.
+
+    Args:
+        one: file of a picture.
+        other: file of another.
+    """
+    largest = channel_differences(one, other).max(axis=-1)
+    return bool((largest > _CLEAR_LEVEL).mean() >= _CLEAR_SHARE)
