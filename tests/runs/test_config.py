@@ -60,7 +60,7 @@ def test_tuples_and_texts_of_other_types_are_written_plainly():
     config = RunConfig().complete("toy", {"name": "m", "sizes": (1, 2), "torch": Version("2.1")})
     assert config.model == {"name": "m", "sizes": [1, 2], "torch": "2.1"}
     assert type(config.model["torch"]) is str
-    with pytest.raises(TypeError, match="cannot be written into a run's config"):
+    with pytest.raises(DataError, match="cannot be written into a run's config"):
         RunConfig().complete("toy", {"name": object()})
 
 
