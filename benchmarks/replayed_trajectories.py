@@ -22,8 +22,9 @@ import msgspec
 
 from infthor_eval.formats.floor_plans import floor_plan_names
 from infthor_eval.formats.step_log import read_steps
-from infthor_eval.formats.trajectory import Trajectory, folder_name, iter_trajectories
+from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
 from infthor_eval.generation.final_task import violation
+from infthor_eval.storage.files import file_name
 
 _ROOMS = ("kitchen", "living-room", "bedroom")
 _BATHROOMS = range(401, 431)
@@ -58,7 +59,7 @@ def main() -> None:
         replayed = run(command)
         trajectories = list(iter_trajectories(out / "trajectories"))
         same = sum(
-            has_same_log(item, out / "set" / "metadata" / folder_name(item.traj_id))
+            has_same_log(item, out / "set" / "metadata" / file_name(item.traj_id))
             for item in trajectories
         )
     show(generated, replayed, trajectories, same)

@@ -15,18 +15,21 @@ from contextlib import contextmanager
 from pathlib import Path
 
 __all__ = [
+    "STOPS",
     "AdapterError",
     "DataError",
     "InfthorError",
     "ModelError",
     "SceneError",
     "SimulatorError",
+    "Terminated",
     "UsageError",
     "UserCodeError",
     "describe_exception",
     "in_one_line",
     "unknown_name",
     "wrap_errors",
+    "wrap_user_code",
 ]
 
 _LONGEST = 200  # characters of another library's message
@@ -42,14 +45,14 @@ _LINE_BREAKS = {
 class InfthorError(Exception):
     """Base of all errors that the command line shows as one line.
 
-    Messages quote what is in files and replies, and that may be anything: line breaks are escaped,
-    and the middle of a very long message is left out.
+    Messages quote what is in files and replies, and that may be anything: line breaks and lone
+    surrogates are escaped, and the middle of a very long message is left out.
     """
 
     exit_code = 2
 
     def __init__(self, message: str) -> None:
-        line = message.translate(_LINE_BREAKS)
+        line = _as_unicode(message.translate(_LINE_BREAKS))
         super().__init__(
             line if len(line) <= _LONGEST_MESSAGE else f"{line[:_HEAD]} [...] {line[-_TAIL:]}"
         )
@@ -85,6 +88,15 @@ class SceneError(SimulatorError):
     """The simulator has no such scene or refuses it; a retry would end the same way."""
 
 
+class Terminated(SystemExit):
+    """SIGTERM arrived: temporary folders and simulators are removed as on Ctrl-C."""
+
+
+# What ends the program from outside. Whoever catches whatever code of others raises (it may call
+# `sys.exit`) lets these pass.
+STOPS = (KeyboardInterrupt, Terminated)
+
+
 def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
     """Return the error for an unknown name of a kind ("task"); it suggests the closest, or all."""
     names = sorted(known)
@@ -96,13 +108,25 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
 def in_one_line(error: BaseException) -> str:
     """Return another library's error message as one line, short enough for one of ours."""
     reason = error.strerror if isinstance(error, OSError) else None  # `str` would repeat the path
-    text = " ".join((reason or str(error)).split()) or type(error).__name__
+    text = _as_unicode(" ".join((reason or _text_of(error)).split())) or type(error).__name__
     if isinstance(error, KeyError):  # its text is only the key
         text = f"no {text}"
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
-def describe_exception(error: Exception) -> str:
+def _text_of(error: BaseException) -> str:
+    try:
+        return str(error)
+    except Exception:  # noqa: BLE001 - of a class of others, whose text may fail too
+        return ""
+
+
+def _as_unicode(text: str) -> str:
+    """Return a text that files and terminals take: lone surrogates are escaped."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
+def describe_exception(error: BaseException) -> str:
     """Return type, place and message of an unexpected exception, in one line."""
     frame = traceback.extract_tb(error.__traceback__)[-1]
     where = f"{Path(frame.filename).name}:{frame.lineno} ({frame.name})"
@@ -132,3 +156,27 @@ def wrap_errors(
         raise
     except catch as error:
         raise raise_as(f"{problem} ({in_one_line(error)}); {hint}") from error
+
+
+@contextmanager
+def wrap_user_code(
+    problem: str, hint: str, raise_as: type[UserCodeError] = UserCodeError
+) -> Iterator[None]:
+    """Turn whatever code of others raises into an error of one line, with its place; ours pass.
+
+    `sys.exit` in it is an error like any other: it must not end a run, nor choose the exit code.
+    There may be no `yield` within the context.
+
+    Args:
+        problem: the code and what it fails to do ("the memory NAME fails").
+        hint: the way to fix it.
+
+    Raises:
+        UserCodeError: an instance of `raise_as`; its cause is what was raised.
+    """
+    try:
+        yield
+    except (InfthorError, *STOPS):
+        raise
+    except BaseException as error:
+        raise raise_as(f"{problem} ({describe_exception(error)}); {hint}") from error

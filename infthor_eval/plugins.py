@@ -10,7 +10,7 @@ from functools import reduce
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from infthor_eval.errors import UsageError, describe_exception, in_one_line, unknown_name
+from infthor_eval.errors import STOPS, UsageError, describe_exception, in_one_line, unknown_name
 
 __all__ = ["PluginTable", "import_target"]
 
@@ -58,7 +58,9 @@ class PluginTable:
             loaded = import_target(point.value)
         except (ImportError, AttributeError) as error:
             raise UsageError(f"{problem} ({in_one_line(error)}); {hint}") from error
-        except Exception as error:  # its module is anybody's code
+        except STOPS:
+            raise
+        except BaseException as error:  # its module is anybody's code
             raise UsageError(f"{problem} ({describe_exception(error)}); {hint}") from error
         members = [
             *protocol.__annotations__,

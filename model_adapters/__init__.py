@@ -8,6 +8,7 @@ its line in `built_in.py`. In another package: `docs/own-models.md`.
 
 from model_adapters.backend import Backend, BackendConversation
 from model_adapters.check import CheckResult, ContractError, check_adapter, run_checks
+from model_adapters.guarded import identity_of
 from model_adapters.protocols import (
     ROLES,
     Adapter,
@@ -77,6 +78,7 @@ __all__ = [
     "check_turns",
     "cut_at_stop",
     "has_option",
+    "identity_of",
     "is_known",
     "label",
     "load",

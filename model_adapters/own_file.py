@@ -7,7 +7,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from infthor_eval.errors import ModelError, wrap_errors
+from infthor_eval.errors import AdapterError, ModelError, wrap_errors, wrap_user_code
 from infthor_eval.storage.digests import digest
 
 __all__ = ["file_identity", "load_from_file", "name_in_file", "names_a_file"]
@@ -78,6 +78,6 @@ def _module(path: Path, source: bytes) -> ModuleType:
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses resolve annotations through it
     problem = f"{path}: fails when it is imported"
-    with wrap_errors(problem, "fix it", catch=Exception, raise_as=ModelError):
+    with wrap_user_code(problem, "fix it", AdapterError):
         exec(compile(source, path, "exec"), vars(module))
     return module

@@ -1,12 +1,21 @@
-"""Checks of requests, with the same messages for every model."""
+"""Checks of requests and of steps, with the same messages for every model."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 
-from infthor_eval.errors import AdapterError, InfthorError, ModelError, describe_exception
-from model_adapters.protocols import Capabilities, Decoding, Turn, Video
+from infthor_eval.errors import AdapterError, ModelError, wrap_user_code
+from infthor_eval.quantities import MOST
+from model_adapters.protocols import ArmDelta, Capabilities, Decoding, Turn, Video
 
-__all__ = ["check_decoding", "check_turns", "wrap_adapter_errors", "wrap_request_errors"]
+__all__ = [
+    "check_chunk",
+    "check_decoding",
+    "check_turns",
+    "wrap_adapter_errors",
+    "wrap_request_errors",
+]
+
+_N_NUMBERS = 7  # of a policy's step
 
 
 def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) -> None:
@@ -42,8 +51,39 @@ def check_turns(name: str, capabilities: Capabilities, turns: Sequence[Turn]) ->
         raise ModelError(f"{name} has no video input; give it the video's frames as images")
 
 
-@contextmanager
-def wrap_adapter_errors(problem: str) -> Iterator[None]:
+def check_chunk(name: str, chunk: Sequence[object]) -> None:
+    """Check that the policy of this name gives steps of 7 finite numbers each, at least one.
+
+    Raises:
+        ModelError: it does not.
+    """
+    if not chunk:
+        raise ModelError(f"{name} gives no movement; a policy gives at least one")
+    for step in chunk:
+        if not isinstance(step, ArmDelta):
+            raise ModelError(f"{name} gives {step!r:.60} for a step; it must be an ArmDelta")
+        _check_step(name, step)
+
+
+def _check_step(name: str, step: ArmDelta) -> None:
+    try:
+        numbers = (*step.translation, *step.rotation, step.gripper)
+        is_whole = (len(step.translation), len(step.rotation)) == (3, 3)
+    except TypeError as error:
+        raise ModelError(f"{name} gives {step!r:.60} for a step (not of numbers)") from error
+    if not is_whole:
+        raise ModelError(f"{name} gives {len(numbers)} numbers for a step; it must be {_N_NUMBERS}")
+    try:  # not beyond the limit either: a simulator takes metres and radians
+        is_finite = all(abs(number) <= MOST for number in numbers)
+    except TypeError:
+        is_finite = False
+    if not is_finite:
+        raise ModelError(
+            f"{name} gives numbers that are not finite; its weights or its input are broken"
+        )
+
+
+def wrap_adapter_errors(problem: str) -> AbstractContextManager[None]:
     """Turn any error in an adapter's code into an `AdapterError` of one line.
 
     The line has the place of the error. The error itself, with its traceback, is the cause of the
@@ -55,14 +95,7 @@ def wrap_adapter_errors(problem: str) -> Iterator[None]:
     Raises:
         AdapterError: the adapter raised an error that is not one of ours.
     """
-    try:
-        yield
-    except InfthorError:
-        raise
-    except Exception as error:  # an adapter may be anybody's code and raise anything
-        raise AdapterError(
-            f"{problem} ({describe_exception(error)}); fix the adapter, or report it"
-        ) from error
+    return wrap_user_code(problem, "fix the adapter, or report it", AdapterError)
 
 
 def wrap_request_errors(name: str) -> AbstractContextManager[None]:

@@ -17,6 +17,7 @@ from infthor_eval.plugins import import_target
 from model_adapters.adapter_identity import package_identity
 from model_adapters.built_in import BUILT_IN
 from model_adapters.check.clauses import ContractError, check_members
+from model_adapters.guarded import guard
 from model_adapters.options import describe, parse
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
 from model_adapters.protocols import Adapter, Model, Policy
@@ -121,7 +122,7 @@ def read_options(name: str, options: Mapping[str, str]) -> Any:
 
 
 def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
-    """Build the model or policy of this name, and check that it has its protocol's members.
+    """Build the model or policy of this name; one that is not built in is behind a guard.
 
     Args:
         name: one of `names()`, or FILE.py:CLASS.
@@ -132,16 +133,18 @@ def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
     Raises:
         UsageError: a name is unknown (the message has the nearest one), or a value does not fit its
             option.
-        ModelError: the model cannot be loaded, or lacks a member.
+        ModelError: the model cannot be loaded, lacks a member, or has no name or
+            capabilities.
     """
     model = build(name, options, seed)
-    if name not in BUILT_IN:
-        with wrap_adapter_errors(f"model {name}: conversation() fails"):
-            try:
-                check_members(model)
-            except ContractError as error:
-                raise ModelError(f"model {name}: {error}; {_HELP}") from error
-    return model
+    if name in BUILT_IN:
+        return model
+    with wrap_adapter_errors(f"model {name}: conversation() fails"):
+        try:
+            check_members(model)
+        except ContractError as error:
+            raise ModelError(f"model {name}: {error}; {_HELP}") from error
+    return guard(name, model)
 
 
 def build(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:

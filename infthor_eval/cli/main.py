@@ -16,7 +16,13 @@ import infthor_eval
 from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.repeated import refuse_repeated_options
 from infthor_eval.cli.progress.stopping import handle_signal
-from infthor_eval.errors import InfthorError, in_one_line, unknown_name
+from infthor_eval.errors import (
+    InfthorError,
+    Terminated,
+    describe_exception,
+    in_one_line,
+    unknown_name,
+)
 from infthor_eval.plugins import import_target
 from infthor_eval.terminal import print_error
 
@@ -76,6 +82,7 @@ _SHARED_MODULES = {
 }
 _NAMES = tuple(name for group in _COMMANDS.values() for name in group)
 _DEFAULT = "run"
+_TERMINATED = 143  # exit code
 _COLLECT_AFTER = 50_000  # new objects between two collections of garbage
 
 
@@ -160,8 +167,8 @@ def main(args: list[str] | None = None) -> None:
         _exit(error.format_message(), error.exit_code)
     except InfthorError as error:
         _exit(str(error), error.exit_code)
-    except _Terminated:
-        _exit("stopped; run the same command to continue", 143)
+    except Terminated:
+        _exit("stopped; run the same command to continue", _TERMINATED)
     except (click.Abort, KeyboardInterrupt):
         _exit("stopped; run the same command to continue", 130)
     except OSError as error:  # that no command expects: a full disk, a file removed during the work
@@ -169,6 +176,8 @@ def main(args: list[str] | None = None) -> None:
         path = error.filename if error.filename is not None else "standard output or a file"
         problem = f"{path}: cannot be read or written ({in_one_line(error)})"
         _exit(f"{problem}; fix that and run the same command again", 2)
+    except (SystemExit, GeneratorExit) as error:  # of code of others, where no command expects it
+        _exit(f"{describe_exception(error)}; your own code must not end the program: fix it", 2)
     else:
         sys.exit(code if isinstance(code, int) else 0)
 
@@ -188,13 +197,9 @@ def _collecting_seldom() -> Iterator[None]:
         gc.set_threshold(*before)
 
 
-class _Terminated(BaseException):
-    """SIGTERM arrived."""
-
-
 def _raise_terminated(_number: int, _frame: FrameType | None) -> None:
-    """Handle SIGTERM, so that temporary folders and simulators are removed as on Ctrl-C."""
-    raise _Terminated
+    """Handle SIGTERM."""
+    raise Terminated(_TERMINATED)
 
 
 def _discard_output() -> None:

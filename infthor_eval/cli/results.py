@@ -10,6 +10,7 @@ import click
 import msgspec
 
 from infthor_eval.cli.options.show import ShowOptions
+from infthor_eval.cli.progress.notes import print_failure
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunSummary, Suite, Usage, read_header
@@ -46,14 +47,14 @@ class RunResults:
 
 
 def read_run_results(folder: Path) -> RunResults:
-    """The run in a folder, summed up from its journal.
+    """The run in a folder, summed up from its journal; bad lines are named and left out.
 
     Raises:
-        DataError: there is no journal, or one with a bad line, or of another format.
+        DataError: there is no journal, or one of another format.
         UsageError: its suite is not known here.
     """
     suite = find_suite(read_header(folder).suite)
-    header, log = read_run_log(folder, suite.records)
+    header, log = read_run_log(folder, suite.records, print_failure)
     results = read_results(folder)
     summary = RunSummary(header, suite.summarise(header, log.records))
     return RunResults(folder, suite, summary, log.usage, results.n_missing if results else None)

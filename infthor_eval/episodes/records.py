@@ -5,6 +5,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from infthor_eval.errors import DataError
+from infthor_eval.quantities import Count, Number
 
 __all__ = ["DONE", "NOT_ATTEMPTED", "EpisodeRecord", "InfeasibleError", "P"]
 
@@ -24,11 +25,11 @@ class EpisodeRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
             the subject failed or the episode is excluded.
     """
 
-    index: int
+    index: Count
     kind: str
     steps: tuple[Any, ...] = ()
-    reward: float = 0.0
-    max_reward: float | None = None
+    reward: Number = 0.0
+    max_reward: Number | None = None
     ended: str = ""
 
     @property

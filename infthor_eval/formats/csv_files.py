@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,8 @@ __all__ = ["CsvRow", "read_rows", "shield", "unshield", "write_sheet"]
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a cell that begins so is a formula to a spreadsheet
 _SHIELD = "'"  # a cell that begins so is text to a spreadsheet
+# A number, or a sign alone, is no formula.
+_NUMBER = re.compile(r"[+-](?:\d[\d,]*(?:\.\d*)?(?:[eE][+-]?\d+)?)?", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -97,5 +100,10 @@ def unshield(cell: str) -> str:
 
 
 def shield(cell: str) -> str:
-    """Return the text that a spreadsheet shows as this one: a formula gets a leading apostrophe."""
-    return _SHIELD + cell if cell.startswith((*_FORMULA, _SHIELD)) else cell
+    """Return the text that a spreadsheet shows as this one: a formula gets a leading apostrophe.
+
+    A number stays one, whatever its sign.
+    """
+    if not cell.startswith((*_FORMULA, _SHIELD)) or _NUMBER.fullmatch(cell):
+        return cell
+    return _SHIELD + cell

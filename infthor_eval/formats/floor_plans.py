@@ -17,7 +17,12 @@ import numpy as np
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import json_lines_of
 from infthor_eval.storage.digests import digest_of_files
-from infthor_eval.storage.files import OVERWRITE_HINT, refuse_overwrite, write_atomically
+from infthor_eval.storage.files import (
+    OVERWRITE_HINT,
+    file_name,
+    refuse_overwrite,
+    write_atomically,
+)
 
 __all__ = ["floor_plan_names", "floor_plans_digest", "write_floor_plan"]
 
@@ -65,6 +70,8 @@ def write_floor_plan(
         DataError: the folder has a different recording of the scene, or `objects.jsonl.gz` cannot
             be read or written.
     """
+    if file_name(scene) != scene:
+        raise DataError(f"{scene!r:.80} cannot name a file; give the name of a scene")
     path = root / _OBJECTS
     line = json.dumps({"scene": scene, "objects": [_without_corners(item) for item in objects]})
     recorded = dict(_read_scenes(path)) if path.exists() else {}

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.csv_files import CsvRow, read_rows
+from infthor_eval.formats.csv_files import CsvRow, read_rows, shield, unshield
 from infthor_eval.formats.question import PublishedColumns, Question, SkippedQuestion
 from infthor_eval.storage.files import write_atomically
 
@@ -80,14 +80,14 @@ def encode_questions(questions: Iterable[Question]) -> bytes:
         ]
         twins = (question.pair, question.fact) if are_twins else ()
         published = _published_cells(question.published) if question.published else ()
-        writer.writerow([*cells, *twins, *published])
+        writer.writerow([shield(str(cell)) for cell in (*cells, *twins, *published)])
     return text.getvalue().encode()
 
 
 def _question_or_reason(row: CsvRow, path: Path, file: str | None) -> Question | SkippedQuestion:
     # The file's name alone, without its folder: reasons are in a run's identity.
     location = f"{path.name}, line {row.line}"
-    cells = row.cells
+    cells = {name: unshield(cell) for name, cell in row.cells.items()}
     try:
         if row.problem is not None:
             raise DataError(row.problem)

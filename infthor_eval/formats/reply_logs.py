@@ -25,6 +25,7 @@ import msgspec
 from infthor_eval.errors import in_one_line
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import json_value, lines_of
+from infthor_eval.quantities import Amount, Count, Number, Whole
 
 __all__ = ["LoggedReply", "UnreadRow", "read_reply_log"]
 
@@ -34,27 +35,27 @@ _HINT = "give a log with a JSON object a line"
 
 
 class _PublishedRow(msgspec.Struct, frozen=True):
-    qidx: int
+    qidx: Count
     traj_id: str
     question: str
-    gt_img_idx: tuple[int, ...]
-    gt_answer: tuple[str | int | float, ...]
+    gt_img_idx: tuple[Count, ...]
+    gt_answer: tuple[str | Whole | Number, ...]
     llm_response: str
-    score: float | None = None
-    ctx_n_tokens: int | None = None
+    score: Number | None = None
+    ctx_n_tokens: Count | None = None
     eval_mode: str | None = None
-    ctx_size_k: float | None = None
-    n_imgs: int | None = None
-    selected_img_indices: tuple[int, ...] | None = None
+    ctx_size_k: Amount | None = None
+    n_imgs: Count | None = None
+    selected_img_indices: tuple[Count, ...] | None = None
 
 
 class _NeutralRow(msgspec.Struct, frozen=True):
     question_id: str
     reply: str
-    n_context_tokens: int | None = None
-    n_reply_tokens: int | None = None
-    seconds: float = 0.0
-    frames_shown: tuple[int, ...] | None = None
+    n_context_tokens: Count | None = None
+    n_reply_tokens: Count | None = None
+    seconds: Amount = 0.0
+    frames_shown: tuple[Count, ...] | None = None
 
 
 class _Doc(msgspec.Struct, frozen=True):

@@ -6,7 +6,6 @@ differently. Unknown fields are ignored, so code that passes a trajectory on kee
 are grid cells of 0.25 m. Angles are degrees.
 """
 
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,7 +38,6 @@ __all__ = [
     "Trajectory",
     "TrajectorySource",
     "encode_trajectory",
-    "folder_name",
     "is_trajectory_file",
     "iter_sources",
     "iter_trajectories",
@@ -374,13 +372,3 @@ def _normalize(document: Any) -> Any:
             scene["floor_plan"] = f"FloorPlan{str(scene['scene_num']).removeprefix('FloorPlan')}"
         normalized["scene"] = scene
     return normalized
-
-
-def folder_name(traj_id: str) -> str:
-    """Return a trajectory's folder name: its id, with characters outside `A-Za-z0-9_.-` replaced.
-
-    A hash is appended if any is replaced (the ids of ALFRED have a slash), so that two ids never
-    share a folder.
-    """
-    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", traj_id).lstrip(".")[:150]
-    return name if name == traj_id and name else f"{name}-{digest(traj_id, 4)}"

@@ -18,7 +18,7 @@ from infthor_eval.generation.simulator_jobs import (
 )
 from infthor_eval.generation.statistics import AttemptStatistics
 from infthor_eval.household.pddl import DOMAIN
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import file_name, write_atomically
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings, run_jobs
@@ -202,7 +202,7 @@ def _summarise(
 
 
 def _generate_one(job: TrajectorySettings, simulator: Simulator, out: Path) -> _GenerationOutcome:
-    path = out / f"{job.traj_id}.json"
+    path = out / f"{file_name(job.traj_id)}.json"
     try:
         if path.exists():
             return _GenerationOutcome(path, _check_earlier(path, job))

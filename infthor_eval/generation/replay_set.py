@@ -22,7 +22,6 @@ from infthor_eval.formats.set_info import claim_for_simulator
 from infthor_eval.formats.trajectory import (
     Trajectory,
     TrajectorySource,
-    folder_name,
     iter_sources,
     trajectory_files,
 )
@@ -32,7 +31,7 @@ from infthor_eval.generation.simulator_jobs import (
     collect_outcomes,
     freeze_existing_objects,
 )
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import file_name, write_atomically
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import agent_path
@@ -292,7 +291,7 @@ def _replay_or_check(
     out: Path,
     form: ReplayForm,
 ) -> _ReplayOutcome:
-    final = out / folder_name(trajectory.traj_id)
+    final = out / file_name(trajectory.traj_id)
     if final.exists():
         return _ReplayOutcome(_check_earlier(final, source.digest, form), is_resumed=True)
     started = time.monotonic()

@@ -16,7 +16,7 @@ from infthor_eval.harness.registration import NAME
 from infthor_eval.runs import RunOutcome, TaskFile, UnitRecord, UnitSample
 from infthor_eval.statistics import clustered_mean
 from infthor_eval.storage.digests import canonical_json
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import file_name, write_atomically
 
 __all__ = ["Exported", "convert_run", "export"]
 
@@ -63,12 +63,12 @@ def export(outcome: RunOutcome) -> Path:
         DataError: they cannot be written.
     """
     converted = convert_run(outcome)
-    folder = outcome.folder / "lm_eval" / converted.model
+    folder = outcome.folder / "lm_eval" / file_name(converted.model)
     stamp = datetime.now().isoformat().replace(":", "-")
     with wrap_errors(f"{folder}: cannot be written", "make room, the journal holds it all"):
         folder.mkdir(parents=True, exist_ok=True)
         for task, rows in converted.samples.items():
-            with write_atomically(folder / f"samples_{task}_{stamp}.jsonl") as partial:
+            with write_atomically(folder / f"samples_{file_name(task)}_{stamp}.jsonl") as partial:
                 lines = (json.dumps(row, ensure_ascii=False) + "\n" for row in rows)
                 partial.write_text("".join(lines), encoding="utf-8")
         with write_atomically(folder / f"results_{stamp}.json") as partial:

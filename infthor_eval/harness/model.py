@@ -13,12 +13,14 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.harness.registration import NAME, say_model_takes_references
 from infthor_eval.harness.requests import Payload, RequestAdapter, SuiteUnit
 from infthor_eval.runs import RunHeader, Suite, UnitRecord
+from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.work.binding import require_capability
+from infthor_eval.runs.work.executor import group_records
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.suites import baseline_suites, find_request_adapter, find_suite
-from model_adapters import adapter_identity, has_option, label, load
+from model_adapters import adapter_identity, has_option, identity_of, label, load
 
 __all__ = ["InfthorLM"]
 
@@ -130,6 +132,7 @@ class InfthorLM(LM):
         require_capability(self._model, self._name, suite)
         adapter: RequestAdapter[SuiteUnit, Payload] = find_request_adapter(suite.name)
         session = self._session(suite)
+        gate = Gate(suite.records)
         docs = [request.doc for request in requests]
         records: dict[Hashable, list[UnitRecord[Payload]]] = {
             adapter.doc_id(doc): [] for doc in docs
@@ -142,7 +145,8 @@ class InfthorLM(LM):
                     for unit in group.units
                     if adapter.doc_id_of_unit(unit.key, unit.cluster) in records
                 ]
-                for record in bound.run(replace(group, units=units), session) if units else ():
+                part = replace(group, units=units)
+                for record in group_records(bound, part, session, gate) if units else ():
                     doc_id = adapter.doc_id_of_unit(record.key, record.cluster)
                     records[doc_id].append(session.append_new(record)[0])
         return [adapter.response(records[adapter.doc_id(doc)]) for doc in docs]
@@ -150,7 +154,7 @@ class InfthorLM(LM):
     def _session(self, suite: Suite[SuiteUnit, Payload]) -> JournalSession[Payload]:
         """Return the session of a suite, whose journal is in a folder of the suite's name."""
         if suite.name not in self._sessions:
-            model = {"name": self._model.name, **self._model.identity()}
+            model = {"name": self._model.name, **identity_of(self._model)}
             config = suite.records.config(host="lm-eval")
             whole = config.complete(suite.name, model, adapter=self._code, seed=self._seed)
             header = RunHeader(suite=suite.name, name=self._name, config=whole)

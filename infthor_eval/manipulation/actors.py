@@ -4,13 +4,11 @@ To add a baseline of arms: a class in `BASELINES` here, and its name in `infthor
 how `planner-arm` moves is in `planner/reaching.py`.
 """
 
-import math
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, runtime_checkable
 
-from infthor_eval.errors import ModelError
 from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.manipulation.conversion import Call
@@ -19,12 +17,12 @@ from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.planner.reaching import plan_steps
 from infthor_eval.runs.suite import BaselineSubject
 from model_adapters import ArmDelta, Capabilities, Policy, Subject
+from model_adapters.refusals import check_chunk
 
 __all__ = ["BASELINES", "ArmActor", "ArmBaseline", "ArmSituation", "PolicyActor", "Step"]
 
 Step = ArmDelta | Sequence[Call]
 _IN_FLIGHT = 2  # trajectories at a time; each has two simulators
-_N_NUMBERS = 7  # of a policy's step
 _MAX_TURN = 0.17  # radians of a random turn about each axis: 10 degrees
 
 
@@ -78,30 +76,8 @@ class PolicyActor:
         """See `ArmActor`."""
         assert frame is not None  # frames are kept for policies
         chunk = self._policy.act(blank_like(frame) if self._blank else frame, self._instruction)
-        if not chunk:
-            raise ModelError(f"{self._policy.name} gives no movement; a policy gives at least one")
-        for step in chunk:
-            _check_step(step)
+        check_chunk(self._policy.name, chunk)
         return chunk
-
-
-def _check_step(step: object) -> None:
-    """Check that a policy, which is code of others, gives 7 finite numbers in an `ArmDelta`."""
-    if not isinstance(step, ArmDelta):
-        raise ModelError(f"the policy gives {step!r:.60} for a step; it must be an ArmDelta")
-    numbers = (*step.translation, *step.rotation, step.gripper)
-    if (len(step.translation), len(step.rotation)) != (3, 3):
-        raise ModelError(
-            f"the policy gives {len(numbers)} numbers for a step; it must be {_N_NUMBERS}"
-        )
-    try:
-        finite = all(math.isfinite(number) for number in numbers)
-    except TypeError:
-        finite = False
-    if not finite:
-        raise ModelError(
-            "the policy gives numbers that are not finite; its weights or its input are broken"
-        )
 
 
 class _ArmBaseline(BaselineSubject):

@@ -7,12 +7,13 @@ import msgspec
 
 from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.manipulation.config import ManipulationConfig
+from infthor_eval.quantities import Amount, Number
 from infthor_eval.runs.journals.records import RecordTypes
 
 __all__ = ["RECORDS", "ArmEnded", "ArmRecord", "ArmStep"]
 
 Call = dict[str, Any]
-Point = tuple[float, float, float]
+Point = tuple[Number, Number, Number]
 _COLLIDED = "Collided"  # beginning of AI2-THOR's message
 
 
@@ -38,10 +39,10 @@ class ArmStep(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             around nothing.
     """
 
-    delta: tuple[float, ...] | None = None
+    delta: tuple[Number, ...] | None = None
     calls: tuple[Call, ...] = ()
     hand: Point = (0.0, 0.0, 0.0)
-    distance: float = 0.0
+    distance: Amount = 0.0
     refusals: tuple[str, ...] = ()
 
     @property
@@ -72,9 +73,9 @@ class ArmRecord(
     receptacle_id: str | None = None
     steps: tuple[ArmStep, ...] = ()
     starts_inside: bool = False
-    start_distance: float = 0.0
-    closest: float = 0.0
-    max_reward: float = 0.0
+    start_distance: Amount = 0.0
+    closest: Amount = 0.0
+    max_reward: Number = 0.0
 
     @property
     def n_collisions(self) -> int:

@@ -130,7 +130,8 @@ def _arm_step(step: Step, outcome: ArmOutcome) -> ArmStep:
     delta = None
     if isinstance(step, ArmDelta):
         delta = tuple(
-            round(number, _DIGITS) for number in (*step.translation, *step.rotation, step.gripper)
+            round(float(number), _DIGITS)
+            for number in (*step.translation, *step.rotation, step.gripper)
         )
     return ArmStep(
         delta=delta,

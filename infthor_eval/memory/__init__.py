@@ -1,6 +1,6 @@
 """What may be remembered of a trajectory, at what cost: memories' protocol, and those built in."""
 
-from infthor_eval.memory.budgets import check_recalled, read_budget
+from infthor_eval.memory.budgets import check_recalled, pieces_of, read_budget
 from infthor_eval.memory.protocol import (
     Memory,
     MemoryCapabilities,
@@ -38,6 +38,7 @@ __all__ = [
     "memory_identity",
     "open_memory",
     "parse_options",
+    "pieces_of",
     "read_budget",
     "tokens_of",
     "wrap_memory_errors",

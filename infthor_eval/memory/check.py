@@ -3,7 +3,6 @@
 To add or change a rule of memories' contract: a check here, and in `docs/memories.md`.
 """
 
-import json
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -21,8 +20,9 @@ from infthor_eval.memory.protocol import (
     TrajectoryFacts,
     tokens_of,
 )
+from infthor_eval.storage.digests import json_values
 from infthor_eval.storage.scratch import ScratchFolder
-from model_adapters.check.clauses import require
+from model_adapters.check.clauses import ContractError, require
 from model_adapters.check.results import MEMBERS, CheckResult, run_each
 
 __all__ = ["check_memory"]
@@ -64,9 +64,9 @@ def _check_members(memory: Any) -> None:
 def _check_identity(memory: Memory) -> None:
     identity = dict(memory.identity())
     try:
-        again = json.loads(json.dumps(identity))
-    except TypeError as error:
-        require(False, f"identity() is not made of JSON values: {error}")
+        again = json_values(identity, "identity()")
+    except ValueError as error:
+        raise ContractError(str(error)) from error
     require(again == identity, "identity() changes when written as JSON and read back")
     require(dict(memory.identity()) == identity, "identity() differs from call to call")
 

@@ -12,9 +12,10 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import UsageError, UserCodeError, in_one_line, unknown_name, wrap_errors
-from infthor_eval.memory.protocol import Memory
+from infthor_eval.errors import ModelError, UsageError, in_one_line, unknown_name, wrap_user_code
+from infthor_eval.memory.protocol import Memory, MemoryCapabilities
 from infthor_eval.plugins import PluginTable
+from infthor_eval.storage.digests import json_values
 from model_adapters.adapter_identity import package_identity
 from model_adapters.options.parsing import read_pairs
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
@@ -81,11 +82,17 @@ def memory_identity(name: str, options: MemoryOptions = ()) -> dict[str, Any]:
 
     Raises:
         UsageError: it cannot be opened.
-        ModelError: its source cannot be read.
+        ModelError: its source cannot be read, or its identity is none.
+        UserCodeError: it fails.
     """
     memory = open_memory(name, options)
     with wrap_memory_errors(name):
-        identity = dict(memory.identity())
+        given = memory.identity()
+    try:
+        identity = dict(json_values(given, "identity()"))
+    except (TypeError, ValueError) as error:
+        hint = "give numbers, texts, lists and dicts"
+        raise ModelError(f"the memory {name}: {in_one_line(error)}; {hint}") from error
     own = name_in_file(name) if names_a_file(name) else name
     about = {"name": own, "options": dict(options), "privileged": memory.capabilities.privileged}
     return {"memory": {**about, **_code(name)}} | identity
@@ -102,28 +109,31 @@ def parse_options(text: str | None) -> dict[str, str] | None:
 
 def wrap_memory_errors(name: str) -> AbstractContextManager[None]:
     """Turn whatever a memory raises into an error of one line; ours pass unchanged."""
-    return wrap_errors(
-        f"the memory {name} fails", "fix it", catch=Exception, raise_as=UserCodeError
-    )
+    return wrap_user_code(f"the memory {name} fails", "fix it")
 
 
 @lru_cache(maxsize=8)  # by the class: an edited file has another one
 def _build(name: str, kind: Any, options: MemoryOptions) -> Memory:
     values = _converted(name, kind, dict(options))
-    try:
-        memory = kind(**values)
-    except (TypeError, ValueError) as error:
+    with wrap_memory_errors(name):
+        try:
+            memory = kind(**values)
+        except (TypeError, ValueError) as error:
+            raise UsageError(
+                f"the memory {name} cannot be made ({in_one_line(error)}); see docs/memories.md"
+            ) from error
+        names = [member for member in vars(Memory) if not member.startswith("_")]
+        missing = [member for member in names if not hasattr(memory, member)]
+        if missing:
+            raise UsageError(f"the memory {name} lacks {', '.join(missing)}; see docs/memories.md")
+        capabilities = memory.capabilities
+    if not isinstance(capabilities, MemoryCapabilities):
+        given = f"{capabilities!r:.60}"
         raise UsageError(
-            f"the memory {name} cannot be made ({in_one_line(error)}); see docs/memories.md"
-        ) from error
-    if not isinstance(memory, Memory):
-        members = [
-            member
-            for member in vars(Memory)
-            if not member.startswith("_") and not hasattr(memory, member)
-        ]
-        raise UsageError(f"the memory {name} lacks {', '.join(members)}; see docs/memories.md")
-    return memory
+            f"the memory {name}: its capabilities are {given}; make them MemoryCapabilities"
+        )
+    opened: Memory = memory
+    return opened
 
 
 def memory_class(name: str) -> Any:

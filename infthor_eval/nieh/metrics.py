@@ -6,7 +6,6 @@ under `process_results`, with its metrics under `metric_list`, as in lm-eval.
 
 import importlib
 import importlib.util
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -14,15 +13,16 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from infthor_eval.errors import DataError, UserCodeError, describe_exception, in_one_line
+from infthor_eval.errors import STOPS, DataError, UserCodeError, describe_exception, in_one_line
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import Doc, doc_of
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.scoring import SCORERS, STRICT_RULES, scores
+from infthor_eval.quantities import require_number
 from infthor_eval.runs.catalog import TaskFile
 from infthor_eval.storage.digests import digest_of_file
 
-__all__ = ["PUBLISHED", "MetricError", "Metrics", "finite", "metrics_of", "wrap_metric_errors"]
+__all__ = ["PUBLISHED", "MetricError", "Metrics", "metrics_of", "wrap_metric_errors"]
 
 _OURS = (
     "infthor_eval.harness.nieh_task.process_results",
@@ -61,7 +61,7 @@ class Metrics:
             return {name: by_scorer[name] for name in self.names}
         with wrap_metric_errors(f"process_results fails on {sample.question.id}"):
             results = self.process(doc_of(task_samples, sample), [reply])
-            return {name: finite(name, results[name]) for name in self.names}
+            return {name: require_number(name, results[name]) for name in self.names}
 
 
 @contextmanager
@@ -76,20 +76,10 @@ def wrap_metric_errors(problem: str) -> Iterator[None]:
     """
     try:
         yield
-    except Exception as error:  # it is anybody's code
+    except STOPS:
+        raise
+    except BaseException as error:  # it is anybody's code, and may call `sys.exit`
         raise MetricError(f"{problem}: {describe_exception(error)}") from error
-
-
-def finite(name: str, value: Any) -> float:
-    """Return a metric's value as a number.
-
-    Raises:
-        TypeError: it is no number.
-        ValueError: it is no number, or infinite.
-    """
-    if not math.isfinite(number := float(value)):
-        raise ValueError(f"{name} is {number}")  # neither a mean nor a journal can hold it
-    return number
 
 
 PUBLISHED = Metrics(SCORERS, code={"strict": STRICT_RULES})
@@ -159,7 +149,9 @@ def _import_function(task_file: Path, name: str) -> tuple[ModuleType, str]:
         else:
             imported = importlib.import_module(module)
         getattr(imported, attribute)
-    except Exception as error:  # a module may raise anything when it is imported
+    except STOPS:
+        raise
+    except BaseException as error:  # a module may raise anything when it is imported
         reason = in_one_line(error)
         raise DataError(
             f"{task_file}: process_results {name} cannot be imported ({reason})"

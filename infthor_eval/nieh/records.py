@@ -8,8 +8,8 @@ from msgspec import Meta
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
 from infthor_eval.nieh.config import NiehConfig
+from infthor_eval.quantities import Amount, Count, Number, Share, Whole
 from infthor_eval.runs.journals.records import RecordTypes
-from infthor_eval.runs.usage import Count
 
 __all__ = [
     "RECORDS",
@@ -21,6 +21,8 @@ __all__ = [
     "ShownClues",
     "TwinSide",
 ]
+
+_Answers = tuple[str | Whole | Number, ...]
 
 
 class Guess(msgspec.Struct, frozen=True, kw_only=True):
@@ -34,8 +36,8 @@ class Guess(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     form: str
-    scores: dict[str, float]
-    form_scores: dict[str, float]
+    scores: dict[str, Number]
+    form_scores: dict[str, Number]
 
     def __post_init__(self) -> None:
         """Check that both have the same scorers; msgspec turns the error into its own."""
@@ -79,7 +81,7 @@ class TwinSide(msgspec.Struct, frozen=True, kw_only=True):
     fact: str
     kind: str
     traj_id: str
-    answers: Annotated[tuple[str | int | float, ...], Meta(min_length=1)]
+    answers: Annotated[_Answers, Meta(min_length=1)]
     n_frames: Count
     n_differing: Count
     n_after_clues: Count
@@ -96,9 +98,9 @@ class NiehRecall(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", ta
         recall_s: seconds that it took to recall this.
     """
 
-    recalled: tuple[int | str, ...]
-    build_s: float
-    recall_s: float
+    recalled: tuple[Count | str, ...]
+    build_s: Amount
+    recall_s: Amount
 
     @property
     def n_frames(self) -> int:
@@ -140,14 +142,14 @@ class NiehAnswer(
     question_type: str
     n_clues: Count
     clue_column: str
-    answers: Annotated[tuple[str | int | float, ...], Meta(min_length=1)]
+    answers: Annotated[_Answers, Meta(min_length=1)]
     file: str = ""
     guess: Guess | None = None
     shown_clues: ShownClues | None = None
     twin: TwinSide | None = None
     recall: NiehRecall | None = None
     reply: str | None = None
-    scores: dict[str, float] = {}
+    scores: dict[str, Number] = {}
     thinking: str | None = None
     n_watched: Count | None = None
 
@@ -193,10 +195,10 @@ class NiehNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag=
     """
 
     note: str
-    n_frames: int
-    n_context_tokens: int | None
-    n_reply_tokens: int | None
-    seconds: float
+    n_frames: Count
+    n_context_tokens: Count | None
+    n_reply_tokens: Count | None
+    seconds: Amount
 
 
 class NiehVerdict(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="nieh_verdict"):
@@ -213,12 +215,12 @@ class NiehVerdict(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", t
     """
 
     question: str
-    answers: tuple[str | int | float, ...]
+    answers: _Answers
     reply: str
     said: str
-    score: float | None
+    score: Share | None
     judge: dict[str, Any]
-    seconds: float
+    seconds: Amount
 
 
 RECORDS: RecordTypes[NiehAnswer] = RecordTypes(

@@ -5,8 +5,8 @@ import msgspec
 from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.household.first_place import FirstPlace
 from infthor_eval.plans.config import PlansConfig
+from infthor_eval.quantities import Count, Number, Total
 from infthor_eval.runs.journals.records import RecordTypes
-from infthor_eval.runs.usage import Count, Total
 
 __all__ = ["RECORDS", "PlanRecord", "StepRecord", "TwinRecord"]
 
@@ -24,9 +24,9 @@ class StepRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     reply: str | None = None
     action: str = ""
-    call: dict[str, bool | float | str | None] | None = None
+    call: dict[str, bool | Number | str | None] | None = None
     message: str = ""
-    reward: float = 0.0
+    reward: Number = 0.0
     n_context_tokens: Count | None = None
 
 
@@ -80,7 +80,7 @@ class PlanRecord(
     first_step: Count
     n_expert_steps: Count
     is_final: bool = False
-    expert_reward: float | None = None
+    expert_reward: Number | None = None
     steps: tuple[StepRecord, ...] = ()
     goal_reached: bool = False
     conditions: tuple[Count, Total] | None = None

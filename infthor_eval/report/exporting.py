@@ -5,6 +5,7 @@ import io
 import re
 from collections.abc import Callable, Iterator, Sequence
 
+from infthor_eval.formats.csv_files import shield
 from infthor_eval.tables import Column, Table, TableCell
 from infthor_eval.terminal import printable
 
@@ -31,8 +32,9 @@ def export_tables(tables: Sequence[Table], file_format: str) -> str:
     Args:
         tables: tables with at least one column each.
         form: csv, latex or markdown. In CSV a cell holds one number: a cell with several (an
-            interval, a count) becomes several columns. The title and the notes are lines that begin
-            with `#`; a table alone has none.
+            interval, a count) becomes several columns, and a text that a spreadsheet would take for
+            a formula begins with an apostrophe. The title and the notes are lines that begin with
+            `#`; a table alone has none.
     """
     if file_format == "csv":
         return "\n".join(_csv(table, with_words=len(tables) > 1) for table in tables)
@@ -60,7 +62,7 @@ def _csv_columns(column: Column, cells: Sequence[str]) -> Iterator[list[str]]:
         )
     ) or [""]
     for number, name in enumerate(names):
-        heading = _in_one_line(f"{column.name} {name}")
+        heading = shield(_in_one_line(f"{column.name} {name}"))
         yield [heading, *(_csv_cell(cell, name, column, is_first=number == 0) for cell in cells)]
 
 
@@ -71,8 +73,8 @@ def _csv_cell(cell: str, name: str, column: Column, *, is_first: bool) -> str:
         return ""
     text = _in_one_line(cell)
     if not column.is_number:
-        return text
-    return "" if text == "-" else _THOUSANDS.sub("", text)
+        return shield(text)
+    return "" if text == "-" else shield(_THOUSANDS.sub("", text))
 
 
 def _in_one_line(text: str) -> str:

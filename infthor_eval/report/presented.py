@@ -11,7 +11,7 @@ from infthor_eval.errors import UsageError
 from infthor_eval.report.presenter import Presenter
 from infthor_eval.report.runs import ReportRun, distinct_names, with_frames
 from infthor_eval.runs import UnitRecord, read_header
-from infthor_eval.runs.journals.shards import read_run_log
+from infthor_eval.runs.journals.shards import Tell, read_run_log
 from infthor_eval.runs.stored.command import read_stored_command
 from infthor_eval.runs.stored.search import read_results
 from infthor_eval.suites import find_presenter, find_suite
@@ -43,8 +43,12 @@ class PresentedRun(ReportRun):
         return "right" if score >= 1 else "partly" if score > 0 else "wrong"
 
 
-def read_report_runs(folders: Sequence[Path]) -> list[PresentedRun]:
+def read_report_runs(folders: Sequence[Path], tell: Tell | None = None) -> list[PresentedRun]:
     """Read runs from their folders, at least one.
+
+    Args:
+        folders: the folders.
+        tell: told of bad lines of journals, see `read_run`.
 
     Raises:
         UsageError: a folder is given twice, or the suite of a run is not known here.
@@ -55,14 +59,14 @@ def read_report_runs(folders: Sequence[Path]) -> list[PresentedRun]:
     headers = [read_header(folder) for folder in folders]
     names = distinct_names(folders, headers)
     return [
-        _read(folder, header.suite, name)
+        _read(folder, header.suite, name, tell)
         for folder, header, name in zip(folders, headers, names, strict=True)
     ]
 
 
-def _read(folder: Path, suite_name: str, name: str) -> PresentedRun:
+def _read(folder: Path, suite_name: str, name: str, tell: Tell | None) -> PresentedRun:
     suite = find_suite(suite_name)
-    header, log = read_run_log(folder, suite.records)
+    header, log = read_run_log(folder, suite.records, tell)
     results = read_results(folder)
     command = read_stored_command(folder)
     return PresentedRun(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import warnings
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -75,7 +76,7 @@ def _score(run: PresentedRun, metric: str, record: UnitRecord[Any]) -> float | N
 
 def load_run(folder: str | os.PathLike[str]) -> DataFrame:
     """See `infthor_eval.load_run`."""
-    return sample_table(read_report_runs([Path(folder)])).to_pandas()
+    return sample_table(read_report_runs([Path(folder)], warnings.warn)).to_pandas()
 
 
 def encode_samples(table: Table, file_format: str) -> bytes:

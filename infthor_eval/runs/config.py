@@ -6,8 +6,8 @@ from typing import Any, Generic, Self, TypeVar
 import msgspec
 
 import infthor_eval
-from infthor_eval.errors import DataError
-from infthor_eval.storage.digests import fingerprint
+from infthor_eval.errors import DataError, in_one_line
+from infthor_eval.storage.digests import fingerprint, json_values
 
 __all__ = ["Config", "RunConfig", "TaskConfig", "TaskConfigType", "require_tasks"]
 
@@ -82,7 +82,11 @@ class RunConfig(
         limit: int | None = None,
         seed: int = 0,
     ) -> Self:
-        """Return the config with what all runs have, as it is read back from a journal."""
+        """Return the config with what all runs have, as it is read back from a journal.
+
+        Raises:
+            DataError: a value in it is none of JSON's; the message names the field.
+        """
         whole = msgspec.structs.replace(
             self,
             infthor_eval=infthor_eval.__version__,
@@ -93,6 +97,13 @@ class RunConfig(
             limit=limit,
             seed=seed,
         )
+        try:
+            document = msgspec.to_builtins(whole, str_keys=True, enc_hook=_plain_text)
+            json_values(document, "config")
+        except (TypeError, ValueError, RecursionError) as error:
+            raise DataError(
+                f"the config of the run cannot be kept ({in_one_line(error)}); change that setting"
+            ) from error
         return msgspec.json.decode(whole._encode(), type=type(self))
 
     @property

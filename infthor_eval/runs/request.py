@@ -8,11 +8,13 @@ from typing import Any, Generic
 from infthor_eval.errors import UsageError, unknown_name
 from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit
 from infthor_eval.runs.suite import Evaluation, Suite, TaskRequest
-from infthor_eval.storage.files import require_writable
+from infthor_eval.storage.files import file_name, plain_name, require_writable
 from infthor_eval.workers import WorkerSettings
 from model_adapters import check_options, is_known, label, names
 
 __all__ = ["PreparedRun", "RunRequest", "prepare", "run_folder"]
+
+_LONGEST_TASKS = 80  # characters of their names in a folder's
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,11 @@ class RunRequest:
 
 def run_folder(output: Path, header: RunHeader, tasks: Iterable[str]) -> Path:
     """Return the folder of a run of these tasks, `<output>/<name>/<tasks>-<config hash>`."""
-    return output / header.name / f"{'+'.join(tasks)[:80]}-{header.config.hash}"
+    return output / file_name(header.name) / f"{_names_of(tasks)}-{header.config.hash}"
+
+
+def _names_of(tasks: Iterable[str]) -> str:
+    return plain_name("+".join(tasks))[:_LONGEST_TASKS]
 
 
 @dataclass(frozen=True)
@@ -89,5 +95,5 @@ def prepare(
         raise UsageError(
             f"{request.model} has no option {next(iter(request.model_options))}, nor any other"
         )
-    require_writable(request.output / request.label, "--output")
+    require_writable(request.output / file_name(request.label), "--output")
     return PreparedRun(request, suite, suite.prepare(request.tasks))

@@ -144,7 +144,7 @@ class Session(Protocol[Payload]):
     def find_record(self, unit: Unit[Payload], fingerprint: str) -> UnitRecord[Payload] | None:
         """Return the record of a unit that already has a result from these very inputs, or None."""
 
-    def describe_failure(self, unit: Unit[Payload], error: Exception) -> str:
+    def describe_failure(self, unit: Unit[Payload], error: BaseException) -> str:
         """Return why an exception made a unit fail, and keep an unexpected one's traceback."""
 
     def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:

@@ -1,22 +1,16 @@
-"""Counts as journals have them, and usage: number, tokens and cost of requests."""
+"""Usage: number, tokens and cost of requests."""
 
 import math
 from collections.abc import Iterable
-from typing import Annotated
 
 import msgspec
-from msgspec import Meta
 
+from infthor_eval.quantities import Amount, Count
 from model_adapters import Reply
 
-__all__ = ["NOTHING", "Count", "Total", "Usage"]
+__all__ = ["NOTHING", "Usage"]
 
 _DIGITS = 9  # of dollars; further digits depend on the order of the sum
-# A float holds it exactly: means and sums of larger numbers would fail, or be wrong.
-_MOST = 2**53
-
-Count = Annotated[int, Meta(ge=0, le=_MOST)]
-Total = Annotated[int, Meta(ge=1, le=_MOST)]  # what a count is a share of
 
 
 class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -34,7 +28,7 @@ class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
     context: Count = 0
     cached: Count = 0
     reply: Count = 0
-    cost: float | None = None
+    cost: Amount | None = None
 
     @classmethod
     def of(cls, replies: Iterable[Reply]) -> "Usage":

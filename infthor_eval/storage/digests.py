@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -61,9 +62,53 @@ def canonical_json(value: object) -> str:
     )
 
 
-def json_values(value: object) -> Any:
-    """Return a value as it is read back from JSON: tuples become lists, keys strings."""
-    return json.loads(json.dumps(value))
+def json_values(value: object, name: str = "it") -> Any:
+    """Return a value as it is read back from JSON: tuples become lists.
+
+    Args:
+        value: a value that code of others gives.
+        name: what it is, for messages.
+
+    Raises:
+        ValueError: something in it is none of JSON's values; the message names the field.
+    """
+    try:
+        return _json_value(value, name)
+    except RecursionError as error:
+        raise ValueError(f"{name} is nested too deep, or in a circle") from error
+
+
+def _json_value(value: Any, path: str) -> Any:
+    # Of a class of its own, such as torch's version, as a plain one.
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, str):
+        return _plain_text(value, path)
+    if isinstance(value, int):
+        return int.__int__(value)
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError(f"{path} is {value!r}, which JSON cannot hold")
+        return float.__float__(value)
+    if isinstance(value, list | tuple):
+        return [_json_value(item, f"{path}[{index}]") for index, item in enumerate(value)]
+    if isinstance(value, Mapping):
+        items = {}
+        for key, item in value.items():
+            if not isinstance(key, str):
+                raise ValueError(f"{path} has the key {key!r:.60}, which is no text")
+            name = _plain_text(key, f"a key of {path}")
+            items[name] = _json_value(item, f"{path}[{name!r:.60}]")
+        return items
+    raise ValueError(f"{path} is a {type(value).__name__}, which JSON cannot hold")
+
+
+def _plain_text(text: str, path: str) -> str:
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise ValueError(f"{path} is {text!r:.60}, which is no valid Unicode") from error
+    return str.__str__(text)
 
 
 def fingerprint(value: Mapping[str, Any]) -> str:

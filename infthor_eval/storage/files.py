@@ -2,6 +2,7 @@
 
 import lzma
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -9,10 +10,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.storage.digests import digest
 
 __all__ = [
     "OVERWRITE_HINT",
     "PACKED",
+    "file_name",
+    "plain_name",
     "prepare_file",
     "prepare_folder",
     "refuse_overwrite",
@@ -24,7 +28,30 @@ __all__ = [
 PACKED = ".xz"  # ends the name of a packed file
 OVERWRITE_HINT = "give another --out, or --overwrite if nobody edited it"
 _HINT = "make room, or give another place with"
+# Other characters, and these names with any ending, mean something to some system.
+_NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9 _.@+-]+")
+_DEVICES = re.compile(r"(?:con|prn|aux|nul|com\d|lpt\d)(?:\.|$)", re.IGNORECASE)
+_LONGEST_NAME = 150  # characters; systems take 255 bytes, and endings follow
 _PROBE = b"x" * 4096  # a full disk still creates an empty file, so content is written too
+
+
+def file_name(text: str) -> str:
+    """Return the name of a file or folder for any text; most names are their own.
+
+    Names come from data and journals of others, which must write nothing outside an output: the
+    result is one part of a path, short, and the same on every system. A hash is appended if
+    anything is changed (the ids of ALFRED have a slash), so that two texts never share a name.
+    """
+    name = plain_name(text)
+    if name == text and name:
+        return name
+    return f"{name}-{digest(text.encode('utf-8', 'backslashreplace'), 4)}"
+
+
+def plain_name(text: str) -> str:
+    """Return what of a text can be in a name, without what tells it from others; may be empty."""
+    name = _NOT_IN_NAMES.sub("_", text).lstrip(". ")[:_LONGEST_NAME].rstrip(". ")
+    return f"_{name}" if _DEVICES.match(name) else name
 
 
 def prepare_folder(path: Path, option: str = "--out") -> Path:

@@ -10,12 +10,14 @@ from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
 
+from infthor_eval.errors import Terminated
 from infthor_eval.workers.host import WorkerHost, to_portable_error
 from infthor_eval.workers.link import Connect, OpenWorker, WorkerLostError
 
 __all__ = ["ProcessLink", "processes"]
 
 _STOP = "stop"
+_TERMINATED = 143  # exit status
 _EXIT_WAIT_S = 10.0  # for a process to end
 # Spawned, not forked: a fork of a process with threads, a GPU or a simulator does not work.
 _SPAWN = get_context("spawn")
@@ -113,7 +115,7 @@ def _serve(connection: "Connection[Any, Any]", number: int, count: int) -> None:
     """Run a worker's process: create the worker it is sent; do jobs until the driver is gone."""
     # A terminal sends Ctrl-C to all processes; the driver decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    signal.signal(signal.SIGTERM, _raise_terminated)
     _limit_devices(number, count)  # before imports that read them only once
     Thread(target=_end_with_driver, daemon=True).start()
     try:
@@ -127,6 +129,10 @@ def _serve(connection: "Connection[Any, Any]", number: int, count: int) -> None:
             _do(host, job, connection)
     finally:
         host.close()
+
+
+def _raise_terminated(*_: object) -> None:
+    raise Terminated(_TERMINATED)
 
 
 def _do(host: WorkerHost, job: Any, connection: "Connection[Any, Any]") -> None:

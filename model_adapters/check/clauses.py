@@ -1,6 +1,5 @@
 """What the checks share: clauses, their error, and the questions that are asked."""
 
-import json
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,6 +9,7 @@ from typing import Any, Generic, Protocol
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.storage.digests import json_values
 from model_adapters.protocols import Conversation, Decoding, Model, Part, Policy, Reply
 
 __all__ = [
@@ -72,9 +72,9 @@ def check_identity(adapter: Model | Policy) -> None:
     """Check name, identity and capabilities; `ContractError` for a clause that does not hold."""
     identity = adapter.identity()
     try:
-        again = json.loads(json.dumps(identity))
-    except TypeError as error:
-        raise ContractError(f"identity() is not made of JSON values: {error}") from error
+        again = json_values(identity, "identity()")
+    except ValueError as error:
+        raise ContractError(str(error)) from error
     require(again == identity, "identity() changes when written as JSON and read back")
     require(adapter.identity() == identity, "identity() differs from call to call")
     require(bool(adapter.name), "the name is empty")

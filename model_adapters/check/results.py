@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from infthor_eval.errors import InfthorError, describe_exception
+from infthor_eval.errors import STOPS, InfthorError, describe_exception
 from model_adapters.check.clauses import ContractError
 
 __all__ = ["MEMBERS", "CheckResult", "run_each"]
@@ -41,6 +41,8 @@ def _violation(check: Callable[[], None]) -> str | None:
         return str(error)
     except InfthorError as error:
         return f"it raises {type(error).__name__}: {error}"
-    except Exception as error:  # noqa: BLE001 - it is anybody's code, and its error is the result
+    except STOPS:
+        raise
+    except BaseException as error:  # noqa: BLE001 - anybody's code; its error is the result
         return f"it raises {describe_exception(error)}"
     return None

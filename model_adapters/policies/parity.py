@@ -15,6 +15,7 @@ from infthor_eval.tables import Column, Row, Table
 from model_adapters.options.policies import VlaHttpOptions
 from model_adapters.policies.http.adapter import HttpPolicy
 from model_adapters.protocols import ArmDelta, Policy
+from model_adapters.refusals import check_chunk
 from model_adapters.registry import has_option, load
 
 __all__ = [
@@ -161,6 +162,8 @@ def _row(ours: Policy, theirs: Policy, frames: Sequence[FrameRef], instruction: 
         ours.reset()
         theirs.reset()
         pair = ours.act(frame, instruction), theirs.act(frame, instruction)
+        for policy, chunk in zip((ours, theirs), pair, strict=True):
+            check_chunk(policy.name, chunk)  # NaN would count as equal
         n_steps = len(pair[0]), len(pair[1])
         differences.append(_difference(*pair))
     largest = np.max(differences, axis=0).tolist()

@@ -60,7 +60,7 @@ from infthor_eval.cli import main
 from infthor_eval.nieh.asking import answering
 
 def print_modules(*_):
-    print(*sorted(sys.modules), flush=True)
+    print(*sorted(sys.modules), file=sys.__stdout__, flush=True)  # not that of a run
     os._exit(0)
 
 answering.OpenModel.answer = answering.OpenBaseline.answer = print_modules

@@ -1,3 +1,4 @@
+import csv
 from dataclasses import replace
 
 import pytest
@@ -156,3 +157,16 @@ def test_a_file_that_is_no_text_is_refused(tmp_path):
         read_questions(path)
     with pytest.raises(DataError, match="cannot be read"):
         read_questions(tmp_path / "none.csv")
+
+
+def test_no_cell_is_a_formula_and_all_are_read_as_they_were(tmp_path):
+    texts = ["=1+1", "+A1 is it?", "-A1", "@SUM(A1)", "'=A1", "-3.2"]
+    questions = [Question("=traj", text, (1,), ("=mug",)) for text in texts]
+    path = tmp_path / "qa.csv"
+    write_questions(path, questions)
+    rows = list(csv.reader(path.read_text().splitlines()))[1:]
+    assert [row[0][0] for row in rows] == ["'"] * len(texts)
+    assert [row[1] for row in rows] == [*(f"'{text}" for text in texts[:-1]), "-3.2"]
+    assert [(item.traj_id, item.text) for item in read_questions(path)] == [
+        ("=traj", text) for text in texts
+    ]

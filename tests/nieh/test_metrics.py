@@ -87,17 +87,17 @@ BAD_REPLIES = [
     ("    return {'letters': 1.0}\n", "KeyError in metrics.py:", "no 'plain'"),
     (
         "    return {'letters': 'many', 'plain': 1}\n",
-        "ValueError in metrics.py:",
+        "ValueError in quantities.py:",
         "could not convert string to float: 'many'",
     ),
     (
         "    return {'letters': float('nan'), 'plain': 1}\n",
-        "ValueError in metrics.py:",
+        "ValueError in quantities.py:",
         "letters is nan",
     ),
     (
         "    return {'letters': 1, 'plain': float('inf')}\n",
-        "ValueError in metrics.py:",
+        "ValueError in quantities.py:",
         "plain is inf",
     ),
     ("    pass\nmeasure = 3\n", "TypeError in metrics.py:", "'int' object is not callable"),

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from infthor_eval.formats.csv_files import unshield
 from infthor_eval.rates import Rate, format_number
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
@@ -30,7 +31,16 @@ def read_csv(*tables):
 @given(TABLES)
 def test_csv_reads_back(rows):
     texts = Table("", (Column("name", False), Column("text", False)), tuple(map(Row, rows)))
-    assert read_csv(texts) == [["name", "text"], *map(list, rows)]
+    cells = [[unshield(cell) for cell in row] for row in read_csv(texts)]
+    assert cells == [["name", "text"], *map(list, rows)]
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+A1", "-A1", "@SUM(A1)", '=HYPERLINK("x")', "-3.2+A1"])
+def test_no_cell_of_csv_is_a_formula(text):
+    rows = (Row((text, text)), Row(("-3.2", "-3.2")), Row(("-", "+1e5")))
+    heading, *lines = read_csv(Table("", (Column(text, False), Column("number")), rows))
+    assert heading[0] == f"'{text}"
+    assert lines == [[f"'{text}"] * 2, ["-3.2", "-3.2"], ["-", "+1e5"]]
 
 
 @given(st.lists(st.tuples(st.none() | st.floats(-1e6, 1e6), st.floats(0, 10)), max_size=4))

@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from infthor_eval.errors import DataError
 from infthor_eval.nieh.config import MetricsConfig, NiehConfig, NiehTaskConfig
 from infthor_eval.plans.config import PlansConfig, PlansTaskConfig
-from infthor_eval.runs import RunConfig
+from infthor_eval.runs import RunConfig, TaskConfig
 
 TASK = {
     "config": {"task": "nieh_gt", "dataset_kwargs": {"context": "clues"}},
@@ -59,7 +60,7 @@ def test_tuples_and_texts_of_other_types_are_written_plainly():
     config = RunConfig().complete("toy", {"name": "m", "sizes": (1, 2), "torch": Version("2.1")})
     assert config.model == {"name": "m", "sizes": [1, 2], "torch": "2.1"}
     assert type(config.model["torch"]) is str
-    with pytest.raises(TypeError, match="cannot be written into a run's config"):
+    with pytest.raises(DataError, match="cannot be written into a run's config"):
         RunConfig().complete("toy", {"name": object()})
 
 
@@ -114,3 +115,19 @@ def test_a_config_that_tables_could_not_read_is_refused(place, value):
     parent[place[-1]] = value
     with pytest.raises(msgspec.ValidationError):
         msgspec.convert(document, NiehConfig)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"dataset_kwargs": {"ctx_size": float("nan")}}, "['ctx_size'] is nan, which JSON cannot"),
+        ({"doc_to_text": "a\ud800"}, "['doc_to_text'] is 'a\\ud800', which is no valid Unicode"),
+        ({"f": len}, "cannot be written into a run's config"),
+    ],
+)
+def test_a_config_that_json_cannot_hold_is_refused_with_the_fields_name(settings, words):
+    config = RunConfig(tasks={"t": TaskConfig(settings=settings)})
+    with pytest.raises(DataError) as error:
+        config.complete("toy", {"name": "m"})
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)

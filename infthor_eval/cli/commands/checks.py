@@ -33,15 +33,18 @@ def check_adapter(model: str, model_args: str) -> int:
     The model gets a few dozen short requests with frames of one colour. Each clause of the contract
     has a line of output; docs/own-models.md explains them. Exit code 1 if a clause is broken.
     """
+    from infthor_eval.cli.progress.notes import prints_as_notes
     from model_adapters import run_checks
+    from model_adapters.refusals import wrap_adapter_errors
     from model_adapters.registry import build
 
-    adapter = build(model, parse_model_args(model_args), seed=0)
-    try:
-        return _print_checks(model, run_checks(adapter))
-    finally:
-        if hasattr(adapter, "close"):  # an adapter without it has been reported as broken
+    with prints_as_notes():
+        adapter = build(model, parse_model_args(model_args), seed=0)
+    code = _print_checks(model, run_checks(adapter))
+    if hasattr(adapter, "close"):  # an adapter without it has been reported as broken
+        with prints_as_notes(), wrap_adapter_errors(f"model {model}: close() fails"):
             adapter.close()
+    return code
 
 
 @click.command(
@@ -61,11 +64,13 @@ def check_memory(memory: str, memory_args: str) -> int:
     contract has a line of output; docs/memories.md explains them. Exit code 1 if a clause is
     broken.
     """
+    from infthor_eval.cli.progress.notes import prints_as_notes
     from infthor_eval.memory import check, open_memory, parse_options
 
     options = parse_options(memory_args) or {}
-    results = check.check_memory(open_memory(memory, tuple(sorted(options.items()))))
-    return _print_checks(memory, results)
+    with prints_as_notes():
+        opened = open_memory(memory, tuple(sorted(options.items())))
+    return _print_checks(memory, check.check_memory(opened))
 
 
 @click.command(
@@ -111,6 +116,7 @@ def check_parity(
 
     Exit code 1 if one differs.
     """
+    from infthor_eval.cli.progress.notes import prints_as_notes
     from infthor_eval.report.terminal import print_table, table_console
     from model_adapters.policies.parity import (
         INSTRUCTIONS,
@@ -123,7 +129,8 @@ def check_parity(
 
     options = parse_model_args(model_args)
     theirs = reference_policy(reference_url, options.get("unnorm_key"))
-    with nullcontext(frames_in_folder(frames)) if frames else synthetic_frames() as images:
+    synthetic = nullcontext(frames_in_folder(frames)) if frames else synthetic_frames()
+    with synthetic as images, prints_as_notes():
         ours = load_policy(model, options)
         try:
             comparison = compare_policies(
@@ -137,10 +144,16 @@ def check_parity(
 
 def _print_checks(name: str, results: Iterable[CheckResult]) -> int:
     """Print a line a result and one for all; return the exit code, 1 if a clause is broken."""
+    from infthor_eval.cli.progress.notes import prints_as_notes
     from infthor_eval.terminal import print_line
 
     n_broken = 0
-    for result in results:
+    each = iter(results)
+    while True:
+        with prints_as_notes():
+            result = next(each, None)
+        if result is None:
+            break
         verdict = "holds" if result.violation is None else "broken"
         print_line(f"{verdict:8}{result.name:16}{result.violation or ''}".rstrip())
         n_broken += result.violation is not None

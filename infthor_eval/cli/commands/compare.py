@@ -22,6 +22,7 @@ def command(first: Path, second: Path) -> None:
 
     Units that both evaluated are paired; intervals and p values are clustered by trajectory.
     """
+    from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.errors import UsageError
     from infthor_eval.report.comparison import compare, comparison_table
     from infthor_eval.report.runs import label_report_runs
@@ -38,7 +39,7 @@ def command(first: Path, second: Path) -> None:
             f"{first} is a run of {name}, {second} of {other}; compare runs of one suite"
         )
     suite = find_suite(name)
-    records = [read_run(folder, suite.records)[1] for folder in folders]
+    records = [read_run(folder, suite.records, print_failure)[1] for folder in folders]
     comparisons = compare(suite, find_presenter(name), *records)
     print_table(
         comparison_table(comparisons, *label_report_runs(folders, headers)), table_console()

@@ -12,7 +12,7 @@ from rich.table import Table as RichTable
 
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
 from infthor_eval.cli.options.values import PATH, SCENE_KINDS, floor_plans_option, include_option
-from infthor_eval.cli.progress.notes import print_note
+from infthor_eval.cli.progress.notes import print_failure, print_note
 from infthor_eval.errors import InfthorError, ModelError, unknown_name
 from infthor_eval.memory import MEMORIES, accepted_options, memory_class
 from infthor_eval.report.terminal import print_table, table_console
@@ -206,7 +206,7 @@ def _scenes(data: Path | None) -> None:
 @click.argument("folder", metavar="[DIR]", type=PATH, default=Path("results"))
 def _runs(folder: Path) -> None:
     """Runs below DIR (default: results): units done, missing, failed; primary metrics of tasks."""
-    runs = list(find_runs(folder))
+    runs = list(find_runs(folder, print_failure))
     stored = [run for run in runs if isinstance(run, StoredRun)]
     if not runs:
         print_line(f"no runs in {folder}; `infthor-eval --model MODEL --tasks TASKS` starts one")

@@ -10,7 +10,7 @@ import click
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.run import RunOptions, run_options
 from infthor_eval.cli.options.values import FiniteFloat, WholeNumber
-from infthor_eval.cli.progress.notes import NOTES, print_note
+from infthor_eval.cli.progress.notes import NOTES, print_note, prints_as_notes
 from infthor_eval.cli.progress.pace import format_duration
 from infthor_eval.cli.progress.runs import print_workload
 from infthor_eval.errors import ModelError
@@ -66,7 +66,7 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
     Raises:
         ModelError: every measured sample failed.
     """
-    with progress_bar(NOTES) as progress:
+    with progress_bar(NOTES) as progress, prints_as_notes():
         bar = progress.add_task(f"{request.label}: measuring", total=None)
         estimate = estimate_run(request, suite, measure, lambda: progress.advance(bar))
     print_workload(estimate.workload)

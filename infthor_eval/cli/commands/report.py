@@ -100,6 +100,7 @@ def command(
 
 
 def _write_page(folders: tuple[Path, ...], request: PageRequest, out: Path) -> None:
+    from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.errors import UsageError
     from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.web.build import build_page
@@ -110,7 +111,7 @@ def _write_page(folders: tuple[Path, ...], request: PageRequest, out: Path) -> N
     if out.suffix.lower() not in (".html", ".htm"):
         raise UsageError(f"--out {out}: the page is an .html file; name one")
     path = prepare_file(out)
-    runs = read_report_runs(folders)
+    runs = read_report_runs(folders, print_failure)
     with progress_bar(error_console()) as progress:
         page = build_page(runs, request, _PageBars(progress))
     size = write_page(page, path)
@@ -137,6 +138,7 @@ class _PageBars:
 
 
 def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Path) -> None:
+    from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.errors import UsageError
     from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.terminal import print_table, table_console
@@ -153,7 +155,7 @@ def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Pat
         raise UsageError(
             f"--figure {name}: is none that can be drawn; there are {', '.join(abouts)}"
         )
-    runs = read_report_runs(folders)
+    runs = read_report_runs(folders, print_failure)
     figure = _require_figure(runs, name, owners)
     if request.panels is not None and not figure.has_panels:
         raise UsageError(f"--panels: figure {name} has panels of its own; leave it out")

@@ -87,6 +87,7 @@ def command(
     Neither the set nor the model is needed. Replies that are not there stay failed. The exit code
     is 1 if your scorer fails on a reply, or the judge cannot be asked.
     """
+    from infthor_eval.cli.progress.notes import print_failure, prints_as_notes
     from infthor_eval.nieh.own_scorers import find_scorer
     from infthor_eval.nieh.rescoring.rescore import read_source, score_again
 
@@ -96,25 +97,28 @@ def command(
         raise click.UsageError("--judge-prompt is how a judge is asked; give one with --judge")
     if judge is not None and len(judge) > 1:
         raise click.UsageError(f"--judge names {len(judge)} models; give one")
-    source = read_source(folder)
-    own = find_scorer(scorer) if scorer is not None else None
+    source = read_source(folder, print_failure)
     prompt = judge_prompt or _JUDGE_PROMPT
     settings = (judge_tokens or _JUDGE_TOKENS[prompt], seed, prompt)
     with _load_judge(judge[0], judge_args, *settings) if judge else nullcontext() as loaded:
-        rescoring = score_again(source, own, loaded)
-        rescored = _store(rescoring, output)
-    _print(rescoring, rescored)
-    return int(_print_failures(rescored) > 0)
+        with prints_as_notes():
+            own = find_scorer(scorer) if scorer is not None else None
+            rescoring = score_again(source, own, loaded)
+            rescored = _store(rescoring, output)
+        _print(rescoring, rescored)
+        n_failed = _print_failures(rescored)
+    return int(n_failed > 0)
 
 
 def _load_judge(
     judge: ModelSpec, more: Mapping[str, str], max_new_tokens: int, seed: int, prompt: str
 ) -> AbstractContextManager[Judge]:
-    from infthor_eval.cli.progress.notes import print_note
+    from infthor_eval.cli.progress.notes import print_note, prints_as_notes
     from infthor_eval.nieh.rescoring.judging import Judge
     from model_adapters import model_note
 
-    loaded = Judge.load(judge.name, {**more, **judge.options}, max_new_tokens, seed, prompt)
+    with prints_as_notes():
+        loaded = Judge.load(judge.name, {**more, **judge.options}, max_new_tokens, seed, prompt)
     if note := model_note(judge.name):
         print_note(f"{judge.name}: {note}", "yellow")
     return closing(loaded)

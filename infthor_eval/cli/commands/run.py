@@ -16,7 +16,13 @@ from infthor_eval.cli.options.show import (
     tracker_options,
 )
 from infthor_eval.cli.options.values import WholeNumber
-from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note, quiet_notes
+from infthor_eval.cli.progress.notes import (
+    NOTES,
+    print_failure,
+    print_note,
+    prints_as_notes,
+    quiet_notes,
+)
 from infthor_eval.cli.progress.runs import execute_with_progress
 from infthor_eval.cli.results import RunResults, print_results
 from infthor_eval.errors import DataError
@@ -115,8 +121,8 @@ def evaluate(
             for none.
 
     Returns:
-        Exit code: 130 where a run was stopped, 1 where a unit failed, all units of a run were
-        excluded, or a tracker refused a run, else 0.
+        Exit code: 130 where a run was stopped, 2 where a model's code failed after its units, 1
+        where a unit failed, all units of a run were excluded, or a tracker refused a run, else 0.
     """
     from infthor_eval.harness.export import export
     from infthor_eval.harness.trackers import Trackers
@@ -124,7 +130,7 @@ def evaluate(
     senders = Trackers(**(trackers or {}))
     with quiet_notes(show.quiet):
         # Retrieval embeds every frame, which takes minutes.
-        with NOTES.status("reading the tasks and their data"):
+        with NOTES.status("reading the tasks and their data"), prints_as_notes():
             runs = [prepare(request, suite) for request, suite in requests]
         for model in dict.fromkeys(request.model for request, _ in requests):
             if note := model_note(model):
@@ -145,7 +151,12 @@ def evaluate(
     n_failed = sum(map(_print_failures, outcomes))  # every run prints its failures
     n_void = sum(map(_print_if_void, outcomes))
     n_unsent = sum(not _send(outcome, senders) for outcome in outcomes if not outcome.n_missing)
-    return 130 if outcomes[-1].n_missing else int(n_failed + n_void + n_unsent > 0)
+    close_failures = [outcome.close_failure for outcome in outcomes if outcome.close_failure]
+    for failure in close_failures:
+        print_failure(failure)
+    if outcomes[-1].n_missing:
+        return 130
+    return 2 if close_failures else int(n_failed + n_void + n_unsent > 0)
 
 
 def _print_if_void(outcome: RunOutcome) -> bool:

@@ -9,6 +9,7 @@ import click
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.show import ShowOptions, sample_options
 from infthor_eval.cli.options.values import PATH
+from infthor_eval.cli.progress.notes import print_failure
 from infthor_eval.cli.results import print_results, read_run_results
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import is_trajectory_file
@@ -76,5 +77,5 @@ def _print_samples(folders: tuple[Path, ...], options: ShowOptions) -> None:
         raise UsageError(
             "--format parquet: is not for a terminal; write it into a file, `> samples.parquet`"
         )
-    table = sample_table(read_report_runs(folders))
+    table = sample_table(read_report_runs(folders, print_failure))
     sys.stdout.buffer.write(encode_samples(table, options.format))

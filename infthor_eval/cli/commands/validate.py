@@ -10,7 +10,7 @@ from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.run import RunOptions
 from infthor_eval.cli.options.values import PATH, ModelList, ModelSpec, WholeNumber
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
-from infthor_eval.cli.progress.notes import print_note
+from infthor_eval.cli.progress.notes import print_note, prints_as_notes
 from infthor_eval.cli.progress.runs import execute_with_progress
 from infthor_eval.errors import UsageError
 from infthor_eval.nieh.results.tables import clues_table
@@ -111,7 +111,8 @@ def validate(
     data = find_set(str(requests[0][0].tasks.data))
     check_decisions(decisions, data.questions)
     check_output(out, data)
-    runs = [prepare(request, suite) for request, suite in requests]
+    with prints_as_notes():
+        runs = [prepare(request, suite) for request, suite in requests]
     outcomes = []
     for run in runs:
         outcomes.append(execute_with_progress(run))

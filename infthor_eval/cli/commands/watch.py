@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -83,6 +82,7 @@ def command(
     RUN is the run's folder. A journal has every action and no frame: the actions are replayed in
     the simulator of the run. Where an action ends otherwise than recorded, a line says so.
     """
+    from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.errors import UsageError
     from infthor_eval.formats.animations import require_animation_name
     from infthor_eval.report.presented import read_report_runs
@@ -93,7 +93,7 @@ def command(
         require_animation_name(out)
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise UsageError(f"--sheet {sheet}: a sheet is a PNG; give a file whose name ends in .png")
-    (recorded,) = read_report_runs([run])
+    (recorded,) = read_report_runs([run], print_failure)
     replay = _require_replay(recorded)
     _refuse_options(recorded, replay, {"--plans": plans, "--episode": episode, "--sheet": sheet})
     if sheet is not None and out is not None:
@@ -135,8 +135,9 @@ def _refuse_options(run: PresentedRun, replay: Replay, options: Mapping[str, obj
 
 def _default_file(parts: Sequence[str]) -> Path:
     """Return a file of its own for each choice."""
-    name = "-".join(re.sub(r"[^\w.-]", "_", part) for part in parts)
-    return _FOLDER / f"{name:.200}.mp4"
+    from infthor_eval.storage.files import file_name
+
+    return _FOLDER / f"{file_name('-'.join(parts))}.mp4"
 
 
 def _write(

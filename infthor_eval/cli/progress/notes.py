@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +20,7 @@ __all__ = [
     "print_left_out",
     "print_note",
     "print_refused",
+    "prints_as_notes",
     "quiet_notes",
 ]
 
@@ -44,6 +46,13 @@ def quiet_notes(quiet: bool) -> Iterator[None]:
         yield
     finally:
         NOTES.quiet = False
+
+
+@contextlib.contextmanager
+def prints_as_notes() -> Iterator[None]:
+    """Send what code of others prints to standard error: other programs read our results."""
+    with contextlib.redirect_stdout(sys.stderr):
+        yield
 
 
 def print_left_out(root: Path, skipped: Iterable[SkippedQuestion]) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 from rich.progress import Progress
 
 from infthor_eval.cli.progress.bar import PacedBar
-from infthor_eval.cli.progress.notes import NOTES, print_note
+from infthor_eval.cli.progress.notes import NOTES, print_note, prints_as_notes
 from infthor_eval.cli.progress.stopping import Stop, stop_on_sigint
 from infthor_eval.reasons import count_reasons
 from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, execute
@@ -50,7 +50,7 @@ def print_workload(workload: Workload) -> None:
 
 def execute_with_progress(run: PreparedRun) -> RunOutcome:
     """Execute a run, with a bar on a terminal and lines elsewhere."""
-    with progress_bar(NOTES) as progress, stop_on_sigint(print_note) as stop:
+    with progress_bar(NOTES) as progress, stop_on_sigint(print_note) as stop, prints_as_notes():
         observer = _ProgressObserver(run.request.label, progress, stop)
         outcome = execute(run, observer, stop)
     pace = observer.bar.pace

@@ -10,12 +10,12 @@ import msgspec
 
 from infthor_eval.errors import DataError, InfthorError
 from infthor_eval.formats.reading import read_json
-from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, folder_name
+from infthor_eval.formats.trajectory import Trajectory, TrajectorySource
 from infthor_eval.generation.replay_set import wrap_malformed
 from infthor_eval.generation.simulator_jobs import freeze_existing_objects
 from infthor_eval.generation.twins.drafting import TwinDraft, TwinSettings
 from infthor_eval.generation.twins.final_tasks import FinalTaskDraft
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import file_name, write_atomically
 
 __all__ = ["DRAFTS", "DraftOutcome", "Item", "count_edits", "draft_item", "failure_line"]
 
@@ -49,7 +49,7 @@ def draft_item(
     """
     source, trajectory = item
     # Not `.json`, so that the set may be read as a folder of trajectories.
-    file = out / DRAFTS / f"{folder_name(trajectory.traj_id)}.draft"
+    file = out / DRAFTS / f"{file_name(trajectory.traj_id)}.draft"
     try:
         if file.exists():
             return DraftOutcome(_read(file, source.digest, settings, form), is_resumed=True)

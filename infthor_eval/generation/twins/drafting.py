@@ -14,7 +14,7 @@ import msgspec
 
 from infthor_eval.formats.shared_frames import store_picture, write_frame_names
 from infthor_eval.formats.step_log import read_steps
-from infthor_eval.formats.trajectory import Trajectory, encode_trajectory, folder_name
+from infthor_eval.formats.trajectory import Trajectory, encode_trajectory
 from infthor_eval.formats.twins import PairedQuestion, TwinPair
 from infthor_eval.generation.replay import replay
 from infthor_eval.generation.twins.comparison import Difference, World, compare
@@ -25,7 +25,7 @@ from infthor_eval.generation.twins.pictures import are_clearly_unlike
 from infthor_eval.generation.twins.rewriting import without_traces
 from infthor_eval.generation.twins.tolerance import tolerance_of
 from infthor_eval.storage.digests import digest, digest_of_file
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import file_name, write_atomically
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.simulator import Simulator
 
@@ -274,5 +274,5 @@ def is_flipped(pair_id: str) -> bool:
 
 def name_worlds(rooms: str, pair_id: str) -> tuple[str, str]:
     """Return the names of a pair's trajectories, which tell nothing but the rooms."""
-    first, second = (f"{folder_name(rooms)}-{digest(f'{pair_id}/{side}', 4)}" for side in (0, 1))
+    first, second = (f"{file_name(rooms)}-{digest(f'{pair_id}/{side}', 4)}" for side in (0, 1))
     return first, second

@@ -38,7 +38,7 @@ from infthor_eval.household.first_place import FirstPlace, first_place, is_looke
 from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.tasks import Task, TaskType, sub_task
 from infthor_eval.storage.digests import digest
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import file_name, write_atomically
 from infthor_eval.thor.recorder import object_log
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose
@@ -159,7 +159,7 @@ class _Maker:
         names = name_worlds(self._draft.rooms, pair_id)
         same = [frame.same for frame in frames]
         for trajectory in self._with_final_task(worlds, histories, same, kind, pair_id):
-            path = self._out / TRAJECTORIES / f"{trajectory.traj_id}.json"
+            path = self._out / TRAJECTORIES / f"{file_name(trajectory.traj_id)}.json"
             with write_atomically(path) as partial:
                 partial.write_bytes(encode_trajectory(trajectory))
         return names

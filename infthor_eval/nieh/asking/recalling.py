@@ -25,6 +25,7 @@ from infthor_eval.memory import (
     check_recalled,
     memory_identity,
     open_memory,
+    pieces_of,
     wrap_memory_errors,
 )
 from infthor_eval.nieh.contexts import Sample
@@ -117,7 +118,7 @@ class Recaller:
         )
         start = time.perf_counter()
         with wrap_memory_errors(settings.memory):
-            recalled = list(memory.recall(query, settings.budget))
+            recalled = pieces_of(memory.recall(query, settings.budget), settings.memory)
         recall_s = time.perf_counter() - start
         check_recalled(recalled, past, settings.memory, settings.budget, settings.tokens_per_frame)
         result = NiehRecall(

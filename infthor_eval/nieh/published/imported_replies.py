@@ -25,7 +25,7 @@ __all__ = ["ImportedRun", "Refusal", "import_logs"]
 _PUBLISHED_NAME = re.compile(
     r"eval_(?P<file>qa_set_.+?_clue)_(?P<model>.+?)_(?:full_traj.*)\.log(?:\.gz)?$"
 )
-_RATE = re.compile(r"_fps(?P<fps>\d+)")
+_RATE = re.compile(r"_fps(?P<fps>\d{1,4})(?!\d)")
 # Begins the names of tasks that ask as published logs were asked.
 _PUBLISHED_TASK = "nieh_published_"
 # Published modes: the task of ours, and its context.

@@ -110,7 +110,7 @@ def _read_score(answer: str) -> float | None:
     match = _OBJECT.search(answer)
     try:
         value = json.loads(match[0]).get("score") if match else None
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     if not isinstance(value, int | float) or isinstance(value, bool) or not 0 <= value <= 1:
         return None

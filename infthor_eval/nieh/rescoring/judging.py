@@ -23,13 +23,14 @@ from infthor_eval.nieh.rescoring.unsure import KnownAnswers
 from infthor_eval.nieh.results.summary import is_open_ended
 from infthor_eval.runs import Session, Unit, UnitKey, UnitRecord, Usage
 from infthor_eval.runs.limiting import limit_items
-from infthor_eval.storage.digests import fingerprint, json_values
+from infthor_eval.storage.digests import fingerprint
 from model_adapters import (
     Decoding,
     Model,
     adapter_identity,
     answer_of,
     check_options,
+    identity_of,
     is_known,
     label,
     load,
@@ -118,7 +119,7 @@ class Judge:
         self._form = JUDGE_PROMPTS[prompt]
         self._model = model
         self._decoding = Decoding(max_new_tokens=max_new_tokens)
-        self._identity = json_values({"name": model.name, **model.identity(), "adapter": code})
+        self._identity = {"name": model.name, **identity_of(model), "adapter": code}
         self._conversation = model.conversation()
         if self._form.system:
             self._conversation.append(self._form.system, role="system")

@@ -8,7 +8,7 @@ from infthor_eval.plans.actors.model import ModelActor
 from infthor_eval.plans.actors.person import PersonActor
 from infthor_eval.plans.actors.protocols import PlanActor, PlanBaseline
 from infthor_eval.plans.task import PlansTask
-from model_adapters import Attended, Model, Subject
+from model_adapters import Attended, Model, Subject, identity_of
 
 __all__ = ["ActorFactory", "actor_factory"]
 
@@ -36,6 +36,6 @@ def actor_factory(subject: Subject, trajectories: Sequence[Trajectory]) -> Actor
     if isinstance(subject, Attended):
         return ActorFactory(True, lambda task, _: PersonActor(subject, task.agent_config()))
     if isinstance(subject, Model):
-        trained = subject.identity().get("trained_words")
+        trained = identity_of(subject).get("trained_words")
         return ActorFactory(True, lambda task, _: ModelActor(subject, task.agent_config()), trained)
     raise TypeError(f"{subject.name} is neither a model nor a baseline of plans")

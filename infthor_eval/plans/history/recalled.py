@@ -17,6 +17,7 @@ from infthor_eval.memory import (
     memory_identity,
     open_memory,
     parse_options,
+    pieces_of,
     read_budget,
     wrap_memory_errors,
 )
@@ -91,7 +92,7 @@ class RecalledHistory:
         size = self._tokens_per_frame(present, count)
         with self._in_use, wrap_memory_errors(self._name):
             self._observe(steps, size)
-            recalled = self._memory.recall(query, self._budget)
+            recalled = pieces_of(self._memory.recall(query, self._budget), self._name)
         check_recalled(recalled, steps, self._name, self._budget, size)
         frames = past.frames
         return [item if isinstance(item, str) else frames[item.number] for item in recalled]

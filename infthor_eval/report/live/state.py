@@ -80,7 +80,7 @@ class LiveState(msgspec.Struct, frozen=True, kw_only=True):
             journal; "done" and "stopped" by its results; "ended" if it has none; "unknown" where
             the system has no list of locks.
         folder: folder of the run, or the one where it is waited for.
-        problem: why the journal cannot be read; empty if it can.
+        problem: why the journal, or a line of it, cannot be read; empty if all of it can.
         age: seconds since something was written; None before the first line.
         n_units: samples of the run; None if that is not known.
         measure: what the primary metric measures, in words.
@@ -169,6 +169,7 @@ class LiveRun:
         self._update_metrics(run, self._journal)
         return LiveState(
             status=_status(held, results),
+            problem=next(iter(self._journal.bad_lines), ""),
             folder=str(self._run),
             name=header.name,
             tasks=tuple(run.tasks),

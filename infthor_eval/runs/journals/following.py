@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from infthor_eval.errors import DataError
 from infthor_eval.runs.journals.records import RunHeader, UnitRecord
 from infthor_eval.runs.journals.shards import (
     Decoder,
@@ -36,6 +37,7 @@ class FollowedJournal:
         suite: suite of the run; None before the header is there.
         log: what has been read.
         newest: the last records that were read, the newest last.
+        bad_lines: a message for each bad line, which is left out.
     """
 
     def __init__(
@@ -57,6 +59,7 @@ class FollowedJournal:
         self.suite: Suite[Any, Any] | None = None
         self.log: RunLog[Any] = RunLog()
         self.newest: deque[UnitRecord[Any]] = deque(maxlen=self._newest)
+        self.bad_lines: list[str] = []
         self._decoder: Decoder | None = None
         self._positions: dict[Path, _Position] = {}
 
@@ -69,7 +72,7 @@ class FollowedJournal:
         """Read what is new; return whether there was any. A line without its end is left for later.
 
         Raises:
-            DataError: a line is bad.
+            DataError: the first line of a shard is no header.
             OSError: a shard cannot be read, or was moved away meanwhile.
             UsageError: the suite of the run is not known here.
         """
@@ -106,7 +109,11 @@ class FollowedJournal:
             self.log.header = parse_header(path, line, self.suite.records)
         assert self._decoder is not None  # the first line of a shard is its header
         if number > 1:
-            record = parse_record(path, number, line, self._decoder)
+            try:
+                record = parse_record(path, number, line, self._decoder)
+            except DataError as error:
+                self.bad_lines.append(str(error))
+                return
             self.log.add(record)
             if isinstance(record, UnitRecord):
                 self.newest.append(record)

@@ -25,6 +25,7 @@ import msgspec
 
 from infthor_eval.errors import DataError, UsageError, in_one_line, wrap_errors
 from infthor_eval.formats.reading import NOT_JSON, require_file
+from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.records import (
     ArtifactRecord,
     Payload,
@@ -45,11 +46,13 @@ from infthor_eval.runs.journals.shards import (
 )
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.limits import FILE_MB
 
 __all__ = ["Journal", "recover", "set_aside"]
 
 
 _SHARD = "worker-{:d}.jsonl"
+_MB = 2**20
 _RETRY_S = 0.1  # between two attempts to lock
 _BAD_LINES = "bad_lines.txt"
 
@@ -92,6 +95,7 @@ class Journal(Generic[Payload]):
         try:
             _lock(self._file, path, wait_s)
             self._types = types
+            self._gate = Gate(types)
             self._log: RunLog[Payload] = read_shards(run, types)
             self._start_shard()
         except (DataError, UsageError):
@@ -153,6 +157,7 @@ class Journal(Generic[Payload]):
         """Write a record to disk before returning it with the number of its attempt.
 
         Raises:
+            RefusedRecordError: a reader would refuse it; nothing is written.
             DataError: it cannot be written, or the shard was deleted or replaced.
         """
         self.check_file()
@@ -174,7 +179,12 @@ class Journal(Generic[Payload]):
         return [self._log.artifacts[key] for key in sorted(self._log.artifacts)]
 
     def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
-        """Cache an artifact; it is on disk when this returns."""
+        """Cache an artifact; it is on disk when this returns.
+
+        Raises:
+            RefusedRecordError: a reader would refuse it; nothing is written.
+            DataError: it cannot be written.
+        """
         record: ArtifactRecord[Any] = ArtifactRecord(
             fingerprint=fingerprint, payload=artifact, usage=usage
         )
@@ -194,7 +204,9 @@ class Journal(Generic[Payload]):
             self._write(self.header)
 
     def _write(self, record: msgspec.Struct) -> None:
-        line = memoryview(msgspec.json.encode(record) + b"\n")
+        line = memoryview(self._gate.line_of(record) + b"\n")
+        if os.fstat(self._file.fileno()).st_size + len(line) > FILE_MB.value * _MB:
+            raise DataError(f"{self._path}: holds {FILE_MB.value} MiB, the most; {FILE_MB.hint}")
         hint = "make room and run the same command again, which resumes it"
         # Threads must not mix their lines.
         with self._writing, wrap_errors(f"{self._path}: cannot be written", hint):
@@ -260,7 +272,7 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes[Any]) -> in
         if not bad:
             return 0
         if not (good and isinstance(decoder.decode(good[0]), RunHeader)):
-            good.insert(0, msgspec.json.encode(header))
+            good.insert(0, Gate(types).line_of(header))
         # The bad lines first: a crash between the two leaves them twice, not lost.
         with (path.parent / _BAD_LINES).open("ab") as file_of_bad:
             file_of_bad.write(b"".join(line + b"\n" for line in bad))

@@ -6,13 +6,14 @@ suite. Its payload is the suite's own, and tagged in turn.
 
 from dataclasses import dataclass
 from types import UnionType
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Annotated, Any, Generic, NamedTuple, TypeVar
 
 import msgspec
 
 from infthor_eval.errors import InfthorError, describe_exception
+from infthor_eval.quantities import Amount, Count, Total
 from infthor_eval.runs.config import Config, RunConfig
-from infthor_eval.runs.usage import NOTHING, Count, Usage
+from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = [
     "FORMAT",
@@ -30,6 +31,8 @@ __all__ = [
 ]
 
 FORMAT = 3
+
+_Name = Annotated[str, msgspec.Meta(min_length=1)]
 
 Artifact = TypeVar("Artifact")  # what a suite caches
 Payload = TypeVar("Payload")  # the payload of a suite's records
@@ -118,18 +121,18 @@ class UnitRecord(
         usage: usage of all its requests.
     """
 
-    task: str
-    id: str
-    cluster: str
+    task: _Name
+    id: _Name
+    cluster: _Name
     fingerprint: str
     payload: Payload
     variant: str = ""
-    repeat: Count = 1
-    attempt: Count = 1
+    repeat: Total = 1
+    attempt: Total = 1
     failure: str | None = None
     excluded: str | None = None
     faults: tuple[str, ...] = ()
-    seconds: float = 0.0
+    seconds: Amount = 0.0
     tokens: Tokens = Tokens()
     usage: Usage = NOTHING
 
@@ -188,7 +191,7 @@ class RecordTypes(Generic[Payload_co]):
         return msgspec.json.Decoder(RunHeader[self.config])  # type: ignore[name-defined]
 
 
-def describe_failure(error: Exception) -> str:
+def describe_failure(error: BaseException) -> str:
     """Return an expected error's message; another's type, place and message, in one line."""
     if isinstance(error, InfthorError):
         return str(error)

@@ -23,7 +23,7 @@ class JournalSession(Generic[Payload]):
         """See `Session`."""
         return self.journal.find_record(unit.key, fingerprint)
 
-    def describe_failure(self, unit: Unit[Payload], error: Exception) -> str:
+    def describe_failure(self, unit: Unit[Payload], error: BaseException) -> str:
         """See `Session`."""
         attempt = 1 + max(
             (record.attempt for record in self.journal.latest_records([unit.key])), default=0

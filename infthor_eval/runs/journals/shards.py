@@ -1,5 +1,7 @@
 """Reading the shards of a run's journal."""
 
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic
@@ -23,6 +25,7 @@ __all__ = [
     "FOLDER",
     "Decoder",
     "RunLog",
+    "Tell",
     "check_format",
     "find_shards",
     "parse_header",
@@ -39,6 +42,8 @@ __all__ = [
 
 FOLDER = "journal"  # within the run's folder
 Decoder = msgspec.json.Decoder[Any]
+# Called with a message for each bad line of a journal, which is then left out.
+Tell = Callable[[str], None]
 _FORMAT_1 = "journal.jsonl"  # the single file of format 1, in the run's folder
 _HINT = (
     "run the same command with --recover to resume without such lines, or with --fresh to restart"
@@ -99,24 +104,33 @@ def read_header(run: Path) -> RunHeader:
     raise DataError(f"{run}: no journal in it; give the folder of a run")
 
 
-def read_run(run: Path, types: RecordTypes[Payload]) -> tuple[RunHeader, list[UnitRecord[Payload]]]:
+def read_run(
+    run: Path, types: RecordTypes[Payload], tell: Tell | None = None
+) -> tuple[RunHeader, list[UnitRecord[Payload]]]:
     """Read the header of the run in a folder, and the latest record of each unit of all shards.
+
+    Args:
+        run: the folder.
+        types: types of the suite's records.
+        tell: told of each bad line, which is left out; None to refuse a journal that has one.
 
     Raises:
         DataError: there is no journal, or one with a bad line, of another format or suite.
     """
-    header, log = read_run_log(run, types)
+    header, log = read_run_log(run, types, tell)
     return header, log.records
 
 
-def read_run_log(run: Path, types: RecordTypes[Payload]) -> tuple[RunHeader, RunLog[Payload]]:
-    """Read the header of the run in a folder, and the contents of all its shards.
+def read_run_log(
+    run: Path, types: RecordTypes[Payload], tell: Tell | None = None
+) -> tuple[RunHeader, RunLog[Payload]]:
+    """Read the header of the run in a folder, and the contents of all its shards; see `read_run`.
 
     Raises:
         DataError: there is no journal, or one with a bad line, of another format or suite.
     """
     any_header = read_header(run)  # or says that there is no journal
-    log = read_shards(run, types)
+    log = read_shards(run, types, tell)
     return log.header or any_header, log
 
 
@@ -139,8 +153,12 @@ class _AnyHeader(msgspec.Struct, tag_field="type", tag="run"):
     """A header; no field of it is read."""
 
 
-def read_failures(run: Path) -> dict[UnitKey, bool]:
+def read_failures(run: Path, tell: Tell | None = None) -> dict[UnitKey, bool]:
     """Return for each unit with a record whether its latest attempt failed; needs no suite.
+
+    Args:
+        run: the folder.
+        tell: see `read_run`.
 
     Raises:
         DataError: a line is bad.
@@ -149,11 +167,10 @@ def read_failures(run: Path) -> dict[UnitKey, bool]:
     latest: dict[UnitKey, tuple[int, bool]] = {}
     for path in find_shards(run):
         for number, line in enumerate(read_lines(path), 1):
-            with wrap_errors(
-                f"{path}, line {number}: not a line of a journal", _HINT, catch=NOT_JSON
-            ):
+            with _told(tell), _naming(path, number):
                 unit = decoder.decode(line)
-            if isinstance(unit, _UnitOutcome):
+                if not isinstance(unit, _UnitOutcome):
+                    continue
                 key = UnitKey(unit.task, unit.id, unit.variant, unit.repeat)
                 rank = (unit.attempt, unit.failure is None)
                 latest[key] = max(latest.get(key, rank), rank)
@@ -172,20 +189,24 @@ def find_shards(run: Path) -> list[Path]:
     return shards
 
 
-def read_shards(run: Path, types: RecordTypes[Payload]) -> RunLog[Payload]:
-    """Read all shards of a run; an empty log if there is none.
+def read_shards(
+    run: Path, types: RecordTypes[Payload], tell: Tell | None = None
+) -> RunLog[Payload]:
+    """Read all shards of a run, see `read_run`; an empty log if there is none.
 
     Raises:
         DataError: a shard has a bad line, is of another format, or of another run than the others.
     """
     log: RunLog[Payload] = RunLog()
     for path in find_shards(run):
-        read_shard(path, types, log)
+        read_shard(path, types, log, tell)
     return log
 
 
-def read_shard(path: Path, types: RecordTypes[Payload], log: RunLog[Payload]) -> None:
-    """Add the contents of a shard to a log."""
+def read_shard(
+    path: Path, types: RecordTypes[Payload], log: RunLog[Payload], tell: Tell | None = None
+) -> None:
+    """Add the contents of a shard to a log, see `read_run`."""
     lines = read_lines(path)
     if not lines:
         return  # created by a worker that was killed before it wrote the header
@@ -197,7 +218,23 @@ def read_shard(path: Path, types: RecordTypes[Payload], log: RunLog[Payload]) ->
     log.header = header
     decoder = types.decoder()
     for number, line in enumerate(lines[1:], 2):
-        log.add(parse_record(path, number, line, decoder))
+        with _told(tell):
+            log.add(parse_record(path, number, line, decoder))
+
+
+@contextmanager
+def _told(tell: Tell | None) -> Iterator[None]:
+    """Tell of a bad line instead of refusing it, if there is whom to tell."""
+    try:
+        yield
+    except DataError as error:
+        if tell is None:
+            raise
+        tell(f"left out: {error}")
+
+
+def _naming(path: Path, number: int) -> AbstractContextManager[None]:
+    return wrap_errors(f"{path}, line {number}: not a line of a journal", _HINT, catch=NOT_JSON)
 
 
 def parse_record(
@@ -208,7 +245,7 @@ def parse_record(
     Raises:
         DataError: the line is bad, or a header.
     """
-    with wrap_errors(f"{path}, line {number}: not a line of a journal", _HINT, catch=NOT_JSON):
+    with _naming(path, number):
         record: UnitRecord[Any] | ArtifactRecord[Any] | RunHeader = decoder.decode(line)
     if isinstance(record, RunHeader):
         raise DataError(

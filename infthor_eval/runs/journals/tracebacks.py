@@ -31,7 +31,7 @@ class TracebackFile:
         self._units: dict[str, str] = {}  # traceback to the first unit that has it
         self._lock = Lock()
 
-    def append(self, key: UnitKey, attempt: int, error: Exception) -> str:
+    def append(self, key: UnitKey, attempt: int, error: BaseException) -> str:
         """Append the traceback of an unexpected exception, or of a `UserCodeError`'s cause.
 
         Returns:
@@ -49,7 +49,7 @@ class TracebackFile:
             entry = text if first == unit else f"{_SAME}{first}\n"
             # One write in append mode: workers share the file, and must not interleave.
             with self._path.open("ab", buffering=0) as file:
-                file.write(f"== {unit}\n{entry}\n".encode())
+                file.write(f"== {unit}\n{entry}\n".encode("utf-8", "backslashreplace"))
         return f"{self._path.parent.name}/{_NAME}"
 
 

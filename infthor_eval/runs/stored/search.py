@@ -10,7 +10,7 @@ from infthor_eval.errors import DataError, InfthorError, wrap_errors
 from infthor_eval.formats.reading import NOT_JSON, read_bytes
 from infthor_eval.rates import Rate
 from infthor_eval.runs.journals.records import RunHeader
-from infthor_eval.runs.journals.shards import FOLDER, read_failures, read_header
+from infthor_eval.runs.journals.shards import FOLDER, Tell, read_failures, read_header
 from infthor_eval.runs.results import RESULTS
 
 __all__ = ["BrokenRun", "Results", "StoredRun", "find_runs", "read_results", "run_folders"]
@@ -54,8 +54,12 @@ class Results(msgspec.Struct, frozen=True):
     primary_metrics: dict[str, Rate] = {}
 
 
-def find_runs(folder: Path) -> Iterator[StoredRun | BrokenRun]:
+def find_runs(folder: Path, tell: Tell | None = None) -> Iterator[StoredRun | BrokenRun]:
     """Yield the runs below a folder, in the order of their paths.
+
+    Args:
+        folder: the folder.
+        tell: told of bad lines of journals, see `read_run`.
 
     Raises:
         DataError: there is no such folder, or it cannot be searched.
@@ -66,7 +70,7 @@ def find_runs(folder: Path) -> Iterator[StoredRun | BrokenRun]:
         )
     for run in run_folders(folder):
         try:
-            yield _read_run(run)
+            yield _read_run(run, tell)
         except InfthorError as error:
             yield BrokenRun(run, str(error))
 
@@ -104,9 +108,9 @@ def run_folders(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
             yield from run_folders(path, depth - 1)
 
 
-def _read_run(folder: Path) -> StoredRun:
+def _read_run(folder: Path, tell: Tell | None) -> StoredRun:
     header = read_header(folder)
-    failures = read_failures(folder)
+    failures = read_failures(folder, tell)
     results = read_results(folder)
     return StoredRun(
         folder=folder,

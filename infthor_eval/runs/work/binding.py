@@ -4,11 +4,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Generic
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import UsageError, wrap_user_code
 from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import BoundEvaluation, Need, Suite, Workload
-from model_adapters import Model, Policy, Subject, adapter_identity, load
+from model_adapters import Model, Policy, Subject, adapter_identity, identity_of, load
 
 __all__ = ["BoundRun", "bind_run", "require_capability"]
 
@@ -28,9 +28,14 @@ class BoundRun(Generic[SuiteUnit, Payload]):
     header: RunHeader
 
     def close(self) -> None:
-        """Release the evaluation, then the subject."""
+        """Release the evaluation, then the subject.
+
+        Raises:
+            UserCodeError: one of them fails; both were tried.
+        """
         with ExitStack() as stack:
             stack.callback(self.subject.close)
+            stack.enter_context(wrap_user_code(f"{self.header.suite}: close() fails", "fix it"))
             stack.callback(self.evaluation.close)
 
 
@@ -60,7 +65,7 @@ def _header(
     is_baseline = request.model in run.suite.baselines
     config = workload.config.complete(
         run.suite.name,
-        {"name": subject.name, **subject.identity()},
+        {"name": subject.name, **identity_of(subject)},
         adapter={} if is_baseline else adapter_identity(request.model),
         suite_code=request.suite_code,
         limit=request.tasks.limit,

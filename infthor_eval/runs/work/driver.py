@@ -2,13 +2,14 @@
 
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import closing
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, Protocol
 
 import msgspec
 
+from infthor_eval.errors import UserCodeError
 from infthor_eval.runs.journals import journal as journals
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.records import Payload, SuiteUnit, Unit, UnitRecord
@@ -58,6 +59,7 @@ class RunOutcome(Generic[SuiteUnit, Payload]):
         n_missing: number of units that were not attempted, as the run was stopped.
         usage: usage of all requests, those for cached artifacts included.
         samples: the records in their order, converted for other readers.
+        close_failure: why the subject or the suite could not be closed; None if it was.
     """
 
     folder: Path
@@ -67,6 +69,7 @@ class RunOutcome(Generic[SuiteUnit, Payload]):
     n_missing: int
     usage: Usage
     samples: Iterable[UnitSample]
+    close_failure: str | None = None
 
 
 def execute(
@@ -93,32 +96,49 @@ def execute(
         DataError: the journal has a bad line, or the results cannot be written.
     """
     observer = observer or Silent()
-    with closing(_start_executor(run, observer.note)) as executor:
-        header = executor.header
-        workload = executor.workload
-        folder = run.request.folder(header)
-        if run.request.fresh:
-            journals.set_aside(folder)
-        n_recovered = (
-            journals.recover(folder, header, run.suite.records) if run.request.recover else 0
-        )
-        with Journal(folder, header, run.suite.records) as journal:
-            write_command(folder, run.request)
-            observer.begin(workload, n_recovered)
-            try:
-                for record, resumed in executor.evaluate(folder, journal, should_stop):
-                    observer.done(record, resumed)
-            except Exception:
-                raise
-            # Stopped at once: the units that are done have their results all the same.
-            except BaseException:
-                _write_results(run, folder, workload, journal)
-                raise
-            summary, records, usage = _write_results(run, folder, workload, journal)
-        samples = StoredSamples(executor.samples(records))
-        return RunOutcome(
-            folder, run, summary, records, workload.n_units - len(records), usage, samples
-        )
+    executor = _start_executor(run, observer.note)
+    try:
+        outcome = _evaluate(run, executor, observer, should_stop)
+    except BaseException:
+        with suppress(UserCodeError):  # what ended the run is told, not what failed after it
+            executor.close()
+        raise
+    try:
+        executor.close()
+    except UserCodeError as error:  # all results are there
+        return replace(outcome, close_failure=str(error))
+    return outcome
+
+
+def _evaluate(
+    run: PreparedRun[SuiteUnit, Payload],
+    executor: Executor[Payload],
+    observer: Observer,
+    should_stop: Callable[[], bool],
+) -> RunOutcome[SuiteUnit, Payload]:
+    header = executor.header
+    workload = executor.workload
+    folder = run.request.folder(header)
+    if run.request.fresh:
+        journals.set_aside(folder)
+    n_recovered = journals.recover(folder, header, run.suite.records) if run.request.recover else 0
+    with Journal(folder, header, run.suite.records) as journal:
+        write_command(folder, run.request)
+        observer.begin(workload, n_recovered)
+        try:
+            for record, resumed in executor.evaluate(folder, journal, should_stop):
+                observer.done(record, resumed)
+        except Exception:
+            raise
+        # Stopped at once: the units that are done have their results all the same.
+        except BaseException:
+            _write_results(run, folder, workload, journal)
+            raise
+        summary, records, usage = _write_results(run, folder, workload, journal)
+    samples = StoredSamples(executor.samples(records))
+    return RunOutcome(
+        folder, run, summary, records, workload.n_units - len(records), usage, samples
+    )
 
 
 def _start_executor(

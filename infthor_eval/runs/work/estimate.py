@@ -16,6 +16,7 @@ from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.records import (
     Payload,
     SuiteUnit,
@@ -118,7 +119,7 @@ def estimate_run(
     with closing(bind_run(prepare(request, suite))) as bound:
         workload = bound.evaluation.workload
         groups = []
-        for group in _measure(bound.evaluation, n_units):
+        for group in _measure(bound.evaluation, n_units, Gate(suite.records)):
             groups.append(group)
             progress()
     failures = [failure for group in groups for failure in group.failures]
@@ -127,7 +128,7 @@ def estimate_run(
 
 
 def _measure(
-    evaluation: BoundEvaluation[SuiteUnit, Payload], n_units: int
+    evaluation: BoundEvaluation[SuiteUnit, Payload], n_units: int, gate: Gate[Payload]
 ) -> Iterator[_MeasuredGroup]:
     """Do a few units of each task: of groups of all sizes, the first, middle and last unit."""
     session = UnrecordedSession()
@@ -140,7 +141,7 @@ def _measure(
         failures = []
         few = replace(group, units=[units[n] for n in part])
         start = time.perf_counter()
-        for record in group_records(evaluation, few, session):
+        for record in group_records(evaluation, few, session, gate):
             now = time.perf_counter()
             if record.failure is None:
                 quantities.append((record.task, Quantities.of(record, now - start)))

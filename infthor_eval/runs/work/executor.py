@@ -1,12 +1,11 @@
 """Who does a run's work: this process, or several workers; either way the same records."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Generic, Protocol
 
-import msgspec
-
-from infthor_eval.errors import ModelError
+from infthor_eval.errors import STOPS, ModelError
+from infthor_eval.runs.journals.gate import Gate, RefusedRecordError
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.records import (
     Artifact,
@@ -14,6 +13,7 @@ from infthor_eval.runs.journals.records import (
     RunHeader,
     SuiteUnit,
     Unit,
+    UnitKey,
     UnitRecord,
     describe_failure,
 )
@@ -64,6 +64,7 @@ class LocalExecutor(Generic[SuiteUnit, Payload]):
             InfthorError: see `bind_run`.
         """
         self._bound = bind_run(run)
+        self._gate = Gate(run.suite.records)
         self.header = self._bound.header
         self.workload = self._bound.evaluation.workload
 
@@ -75,7 +76,9 @@ class LocalExecutor(Generic[SuiteUnit, Payload]):
         evaluation = self._bound.evaluation
         in_flight = self._bound.subject.capabilities.max_in_flight
         for record in run_groups(
-            self.workload.groups, lambda group: group_records(evaluation, group, session), in_flight
+            self.workload.groups,
+            lambda group: group_records(evaluation, group, session, self._gate),
+            in_flight,
         ):
             yield session.append_new(record)
             if should_stop():
@@ -99,7 +102,7 @@ class UnrecordedSession:
     def find_record(self, unit: Unit[Any], fingerprint: str) -> None:
         """Return None: there are no records."""
 
-    def describe_failure(self, unit: Unit[Any], error: Exception) -> str:
+    def describe_failure(self, unit: Unit[Any], error: BaseException) -> str:
         """See `Session`; nothing is written."""
         return describe_failure(error)
 
@@ -116,24 +119,58 @@ def group_records(
     evaluation: BoundEvaluation[SuiteUnit, Payload],
     group: Group[SuiteUnit],
     session: Session[Payload],
+    gate: Gate[Payload],
 ) -> Iterator[UnitRecord[Payload]]:
     """Yield the records of a group; units without a record when it ends have failed.
+
+    So has a unit whose record the journal cannot hold: that is the fault of who gave what is in it,
+    and of no other unit.
 
     Raises:
         MemoryError: the machine has no more memory; the run ends.
     """
-    waiting = {unit.key: unit for unit in group.units}
-    fault: Exception = ModelError("the suite gives no record of it; fix the suite")
+    units = {unit.key: unit for unit in group.units}
+    waiting = dict(units)
+    records: Iterator[UnitRecord[Payload]] | None = None
+    fault: BaseException
+    # No loop over the records with a `yield` in the `try`: it would catch what ends this generator.
+    while True:
+        try:
+            records = records or iter(evaluation.run(group, session))
+            record = next(records)
+            unit = _unit_of(record, units)
+        except StopIteration:
+            fault = ModelError("the suite gives no record of it; fix the suite")
+            break
+        except (MemoryError, *STOPS):  # the next group would have no more memory than this one
+            raise
+        except BaseException as error:  # noqa: BLE001 - a suite is anybody's code, see STOPS
+            fault = error
+            break
+        waiting.pop(record.key, None)
+        yield _kept(record, unit, session, gate)
+    for unit in waiting.values():
+        yield unit.record_failure(session.describe_failure(unit, fault))
+
+
+def _unit_of(record: UnitRecord[Payload], units: Mapping[UnitKey, Unit[Payload]]) -> Unit[Payload]:
+    unit = units.get(record.key)
+    if unit is None:
+        raise ModelError(
+            f"the suite gives a record of {record.key!r:.200}, no unit of its group; fix the suite"
+        )
+    return unit
+
+
+def _kept(
+    record: UnitRecord[Payload],
+    unit: Unit[Payload],
+    session: Session[Payload],
+    gate: Gate[Payload],
+) -> UnitRecord[Payload]:
+    """Return a record that the journal can hold, or else that of its unit's failure."""
     try:
-        for record in evaluation.run(group, session):
-            # A record that cannot be written must fail here, not in the journal.
-            msgspec.json.encode(record)
-            waiting.pop(record.key, None)
-            yield record
-    except MemoryError:  # the next group would have no more memory than this one
-        raise
-    except Exception as error:  # noqa: BLE001 - a suite is anybody's code, and may raise anything
-        fault = error
-    yield from (
-        unit.record_failure(session.describe_failure(unit, fault)) for unit in waiting.values()
-    )
+        gate.line_of(record)
+    except RefusedRecordError as error:
+        return unit.record_failure(session.describe_failure(unit, error))
+    return record

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Generic
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import UsageError, UserCodeError
 from infthor_eval.runs.config import RunConfig
+from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.records import (
     Payload,
@@ -26,6 +27,7 @@ from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Group, UnitSample, Workload
 from infthor_eval.runs.work.binding import bind_run
 from infthor_eval.runs.work.executor import group_records
+from infthor_eval.terminal import print_error
 from infthor_eval.workers import (
     Event,
     JobFailed,
@@ -107,6 +109,7 @@ class _Evaluator(Generic[SuiteUnit, Payload]):
 
     def __init__(self, run: PreparedRun[SuiteUnit, Payload], number: int) -> None:
         self._records = run.suite.records
+        self._gate = Gate(run.suite.records)
         self._number = number
         self._bound = bind_run(run)
         self._session: JournalSession[Payload] | None = None
@@ -129,12 +132,15 @@ class _Evaluator(Generic[SuiteUnit, Payload]):
         for record in job.earlier:
             session.journal.add(record)
         for record in group_records(
-            evaluation, job.portion.select(evaluation.workload.groups), session
+            evaluation, job.portion.select(evaluation.workload.groups), session, self._gate
         ):
             yield session.append_new(record)
 
     def close(self) -> None:
-        self._bound.close()
+        try:
+            self._bound.close()
+        except UserCodeError as error:  # all results are sent
+            print_error(str(error))
 
     def _open_session(self, folder: Path) -> JournalSession[Payload]:
         if self._session is None:

@@ -123,6 +123,6 @@ def test_a_memory_that_fails_fails_its_questions_alone(tmp_path, run_cli):
     assert 0 < len(failed) < 12
     assert {len(unit["payload"]["question"]) % 2 for unit in failed} == {1}
     assert {unit["failure"].partition(";")[0] for unit in failed} == {
-        f"the memory {path}:Changes fails (no 'mug')"
+        f"the memory {path}:Changes fails (KeyError in mine.py:31 (recall): no 'mug')"
     }
     assert "Traceback" not in err

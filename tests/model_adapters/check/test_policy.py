@@ -82,5 +82,5 @@ def test_an_episode_that_is_remembered_is_named_unless_chance_is_admitted() -> N
 def test_a_policy_without_reset_or_with_a_bad_identity_is_named() -> None:
     with pytest.raises(ContractError, match=r"Lost lacks a member of Policy: .*reset"):
         check_adapter(type("Lost", (), {"act": None})())  # type: ignore[arg-type]
-    with pytest.raises(ContractError, match="JSON values"):
+    with pytest.raises(ContractError, match="is a set, which JSON cannot hold"):
         check_adapter(type("Broken", (Scripted,), {"identity": lambda self: {"a": {1}}})())

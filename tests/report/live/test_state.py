@@ -157,7 +157,9 @@ def test_a_bad_line_is_told_in_one_line(live, open_journal, tmp_path) -> None:
     shard = folder_of(tmp_path) / "journal" / "worker-0.jsonl"
     shard.write_bytes(shard.read_bytes() + b"no record\n")
     for _ in range(2):
-        assert "worker-0.jsonl, line 3: not a line of a journal" in live.state().problem
+        state = live.state()
+        assert "worker-0.jsonl, line 3: not a line of a journal" in state.problem
+        assert (state.totals.n_done, state.newest[0].reply) == (1, "Sofa")
 
 
 def test_watching_leaves_the_folder_as_it_was_and_holds_no_lock(

@@ -10,11 +10,13 @@ from infthor_eval.runs import (
     RecordTypes,
     RunConfig,
     RunHeader,
+    Tokens,
     UnitKey,
     UnitRecord,
     read_header,
     read_run,
 )
+from infthor_eval.runs.journals.gate import RefusedRecordError
 from infthor_eval.runs.journals.journal import Journal, recover, set_aside
 
 
@@ -150,12 +152,49 @@ def test_a_bad_line_is_named_with_its_number_and_a_way_on_and_costs_its_own_unit
             DataError, match=r"worker-0\.jsonl, line 2: not a line of a journal .*--recover"
         ):
             read()
+    told = []
+    assert read_run(tmp_path, TYPES, told.append) == (HEADER, [record("q2")])
+    (message,) = told
+    assert message.startswith(f"left out: {shard(tmp_path)}, line 2: ")
     assert recover(tmp_path, HEADER, TYPES) == 1
     with opened(tmp_path) as journal:
         assert journal.records == [record("q2")]
         assert journal.find_artifact("inputs") == Note("a mug")
     assert (tmp_path / "journal" / "bad_lines.txt").read_bytes() == line + b"\n"
     assert recover(tmp_path, HEADER, TYPES) == 0
+
+
+def test_a_record_that_cannot_be_kept_leaves_the_journal_as_it_was(tmp_path):
+    with opened(tmp_path) as journal:
+        before = shard(tmp_path).read_bytes()
+        for bad in (
+            record(seconds=float("nan")),
+            record(seconds=-1.0),
+            record(reply="\ud800"),
+            record(reply=b"mug"),
+            record(repeat=True),
+            record(tokens=Tokens(reply=2**53 + 1)),
+        ):
+            with pytest.raises(RefusedRecordError, match="the record cannot be kept") as error:
+                journal.append(bad)
+            assert "\n" not in str(error.value)
+        with pytest.raises(RefusedRecordError, match="read as"):
+            journal.cache_artifact("inputs", Note(b"a mug"))
+        assert journal.records == []
+    assert shard(tmp_path).read_bytes() == before
+
+
+def test_what_a_reader_would_refuse_for_its_size_is_not_written(tmp_path, monkeypatch):
+    monkeypatch.setenv("INFTHOR_EVAL_MAX_LINE_MB", "1")
+    monkeypatch.setenv("INFTHOR_EVAL_MAX_FILE_MB", "2")
+    with opened(tmp_path) as journal:
+        with pytest.raises(RefusedRecordError, match="longer than 1 MiB"):
+            journal.append(record(reply="x" * 2**20))
+        for number in (1, 2):
+            journal.append(record(f"q{number}", reply="x" * 900_000))
+        with pytest.raises(DataError, match="holds 2 MiB, the most"):
+            journal.append(record("q3", reply="x" * 900_000))
+    assert len(read_run(tmp_path, TYPES)[1]) == 2
 
 
 def test_a_bad_first_line_is_made_anew(tmp_path):

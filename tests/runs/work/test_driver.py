@@ -13,7 +13,7 @@ from queue import SimpleQueue
 import msgspec
 import pytest
 
-from infthor_eval.errors import DataError, ModelError, UsageError
+from infthor_eval.errors import DataError, ModelError, Terminated, UsageError
 from infthor_eval.runs import (
     Group,
     RunRequest,
@@ -107,6 +107,8 @@ def broken_by(error, answered=0):
 
 
 FAULTS = {
+    "an exit": (SystemExit(0), "SystemExit in test_driver.py:", ": 0; fix the suite"),
+    "an exit of a generator": (GeneratorExit(), "GeneratorExit in ", ": GeneratorExit; fix"),
     "a value": (
         ValueError("no such\nsum"),
         "ValueError in test_driver.py:",
@@ -184,11 +186,12 @@ def test_a_record_that_cannot_be_written_fails_alone(tmp_path):
 
     outcome, _ = run(request(tmp_path), make_suite(Odd))
     assert outcome.summary.summary.numbers == (2, 2)
-    assert outcome.records[3].failure.startswith("TypeError in ")
-    assert "Encoding objects of type object is unsupported" in outcome.records[3].failure
+    assert outcome.records[3].failure.startswith(
+        "the record cannot be kept (Encoding objects of type object is unsupported); fix "
+    )
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, MemoryError])
+@pytest.mark.parametrize("error", [KeyboardInterrupt, Terminated, MemoryError])
 def test_what_is_no_fault_of_the_suite_ends_the_run_and_keeps_what_is_done(tmp_path, error):
     with pytest.raises(error):
         run(request(tmp_path), broken_by(error()))

@@ -1,0 +1,241 @@
+"""Adapters that are not this package's, behind a guard: what they raise and give is checked.
+
+Whatever the code of others does on a request is a failure of this request, in one line: it raises
+anything (`sys.exit` too), or gives no `Reply`, counts that are none, texts that no file can hold, a
+generator without end.
+
+To add or change what an adapter may give: here; the contract in words is `docs/own-models.md`.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import msgspec
+
+from infthor_eval.errors import ModelError, in_one_line
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.quantities import Amount, Count
+from infthor_eval.storage.digests import json_values
+from model_adapters.protocols import (
+    ArmDelta,
+    Capabilities,
+    Conversation,
+    Decoding,
+    Mark,
+    Model,
+    Notice,
+    Part,
+    Policy,
+    Reply,
+    Role,
+    Subject,
+)
+from model_adapters.refusals import wrap_adapter_errors, wrap_request_errors
+
+__all__ = ["guard", "identity_of"]
+
+
+class _ReplyLimits(msgspec.Struct):
+    """The fields of a `Reply` as a journal can hold them."""
+
+    text: str
+    n_reply_tokens: Count | None
+    n_context_tokens: Count | None
+    n_cached_tokens: Count | None
+    token_ids: tuple[Count, ...] | None
+    faults: tuple[str, ...]
+    cost: Amount | None
+    thinking: str | None
+    n_watched: Count | None
+
+
+def guard(name: str, adapter: Any) -> Model | Policy:
+    """Return an adapter behind a guard; it has all members of its protocol.
+
+    Args:
+        name: the name by which the user asked for it, for messages.
+        adapter: a model, or a policy.
+
+    Raises:
+        ModelError: its name or its capabilities are not what they should be.
+    """
+    with wrap_adapter_errors(f"model {name}: its name or capabilities fail"):
+        own_name = adapter.name
+        capabilities = adapter.capabilities
+    if not isinstance(own_name, str) or not own_name.strip():
+        raise ModelError(f"model {name}: its name is {own_name!r:.60}; make it a text")
+    if not isinstance(capabilities, Capabilities):
+        given = f"{capabilities!r:.60}"
+        raise ModelError(f"model {name}: its capabilities are {given}; make them Capabilities")
+    kind: type[Any] = _GuardedPerson if hasattr(adapter, "tell") else _GuardedModel
+    if hasattr(adapter, "act"):
+        kind = _GuardedPolicy
+    guarded: Model | Policy = kind(own_name, capabilities, adapter)
+    return guarded
+
+
+def identity_of(subject: Subject) -> dict[str, Any]:
+    """Return the identity of a subject, as JSON values.
+
+    Raises:
+        ModelError: it fails, or a value in it is none of JSON's; the message names the field.
+    """
+    with wrap_adapter_errors(f"{subject.name}: identity() fails"):
+        identity = subject.identity()
+    try:
+        return dict(json_values(identity, "identity()"))
+    except (TypeError, ValueError) as error:
+        hint = "give numbers, texts, lists and dicts"
+        raise ModelError(f"{subject.name}: {in_one_line(error)}; {hint}") from error
+
+
+class _Guarded:
+    """What models and policies have in common; members beyond the protocol are the adapter's."""
+
+    def __init__(self, name: str, capabilities: Capabilities, adapter: Any) -> None:
+        self.name = name
+        self.capabilities = capabilities
+        self._adapter = adapter
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "_adapter":  # not there yet, while a copy is made
+            raise AttributeError(name)
+        return getattr(self._adapter, name)
+
+    def identity(self) -> dict[str, Any]:
+        """See `Subject`."""
+        with wrap_adapter_errors(f"{self.name}: identity() fails"):
+            identity: dict[str, Any] = self._adapter.identity()
+            return identity
+
+    def close(self) -> None:
+        """See `Subject`."""
+        with wrap_adapter_errors(f"{self.name}: close() fails"):
+            self._adapter.close()
+
+
+class _GuardedModel(_Guarded):
+    """See `Model`."""
+
+    def tokens_per_frame(self, frame: FrameRef) -> int | None:
+        """See `Model`."""
+        with wrap_request_errors(self.name):
+            count = self._adapter.tokens_per_frame(frame)
+        return _require_count(self.name, "tokens_per_frame", count)
+
+    def conversation(self) -> Conversation:
+        """See `Model`."""
+        with wrap_request_errors(self.name):
+            return _GuardedConversation(self.name, self._adapter.conversation())
+
+
+class _GuardedPerson(_GuardedModel):
+    """See `Attended`."""
+
+    def tell(self, notice: Notice) -> None:
+        """See `Attended`."""
+        with wrap_request_errors(self.name):
+            self._adapter.tell(notice)
+
+
+class _GuardedConversation:
+    """See `Conversation`."""
+
+    def __init__(self, name: str, conversation: Conversation) -> None:
+        self._name = name
+        self._conversation = conversation
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "_conversation":
+            raise AttributeError(name)
+        return getattr(self._conversation, name)
+
+    @property
+    def n_tokens(self) -> int | None:
+        """See `Conversation`."""
+        with wrap_request_errors(self._name):
+            count = self._conversation.n_tokens
+        return _require_count(self._name, "n_tokens", count)
+
+    def append(self, *parts: Part, role: Role = "user") -> None:
+        """See `Conversation`."""
+        self._call(lambda: self._conversation.append(*parts, role=role))
+
+    def mark(self) -> Mark:
+        """See `Conversation`."""
+        mark: Mark = self._call(self._conversation.mark)
+        return mark
+
+    def rewind(self, mark: Mark) -> None:
+        """See `Conversation`."""
+        self._call(lambda: self._conversation.rewind(mark))
+
+    def reply(self, decoding: Decoding) -> Reply:
+        """See `Conversation`."""
+        reply = self._call(lambda: self._conversation.reply(decoding))
+        return _require_reply(self._name, reply)
+
+    def replies(self, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
+        """See `Conversation`."""
+        # A list of its own: the adapter may change what it is given.
+        given = [list(parts) for parts in continuations]
+        replies = self._call(lambda: self._conversation.replies(given, decoding))
+        if not isinstance(replies, list | tuple) or len(replies) != len(continuations):
+            raise ModelError(
+                f"{self._name} gives {_in_words(replies)} for {len(continuations)} continuations; "
+                "give a list with a Reply to each"
+            )
+        return [_require_reply(self._name, reply) for reply in replies]
+
+    def _call(self, call: Callable[[], Any]) -> Any:
+        with wrap_request_errors(self._name):
+            return call()
+
+
+class _GuardedPolicy(_Guarded):
+    """See `Policy`."""
+
+    def reset(self) -> None:
+        """See `Policy`."""
+        with wrap_request_errors(self.name):
+            self._adapter.reset()
+
+    def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
+        """See `Policy`; what its steps hold is checked where they are executed."""
+        with wrap_request_errors(self.name):
+            chunk = self._adapter.act(frame, instruction)
+        if not isinstance(chunk, list | tuple):
+            raise ModelError(
+                f"{self.name} gives {_in_words(chunk)} for its next steps; give a tuple of ArmDelta"
+            )
+        return tuple(chunk)
+
+
+def _require_reply(name: str, reply: Any) -> Reply:
+    if not isinstance(reply, Reply):
+        raise ModelError(f"{name} gives {_in_words(reply)} for a reply; give a Reply")
+    try:
+        checked = msgspec.convert(reply, _ReplyLimits, from_attributes=True)
+        for text in (checked.text, checked.thinking or "", *checked.faults):
+            text.encode()
+    except ValueError as error:  # of msgspec, and of lone surrogates
+        raise ModelError(
+            f"{name} gives a reply that cannot be kept ({in_one_line(error)}); fix the adapter"
+        ) from error
+    return reply
+
+
+def _require_count(name: str, what: str, count: Any) -> int | None:
+    try:
+        checked: int | None = msgspec.convert(count, Count | None)
+    except msgspec.ValidationError as error:
+        raise ModelError(
+            f"{name} gives {count!r:.60} for {what} ({in_one_line(error)}); fix the adapter"
+        ) from error
+    return checked
+
+
+def _in_words(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return f"{len(value)} items"
+    return "nothing" if value is None else f"a {type(value).__name__}"
