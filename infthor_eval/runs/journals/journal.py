@@ -44,7 +44,7 @@ from infthor_eval.runs.journals.shards import (
     read_shards,
 )
 from infthor_eval.runs.usage import NOTHING, Usage
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import write_atomically, writing_hint
 
 __all__ = ["Journal", "recover", "set_aside"]
 
@@ -195,7 +195,7 @@ class Journal(Generic[Payload]):
 
     def _write(self, record: msgspec.Struct) -> None:
         line = memoryview(msgspec.json.encode(record) + b"\n")
-        hint = "make room and run the same command again, which resumes it"
+        hint = writing_hint(" and run the same command again, which resumes it")
         # Threads must not mix their lines.
         with self._writing, wrap_errors(f"{self._path}: cannot be written", hint):
             while line:  # an unbuffered write may take a part of the line only
