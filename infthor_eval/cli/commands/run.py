@@ -16,7 +16,7 @@ from infthor_eval.cli.options.show import (
     tracker_options,
 )
 from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note, quiet_notes
-from infthor_eval.cli.progress.runs import execute_with_progress
+from infthor_eval.cli.progress.runs import execute_runs
 from infthor_eval.cli.results import RunResults, print_results
 from infthor_eval.errors import DataError
 from infthor_eval.reasons import count_reasons
@@ -75,12 +75,7 @@ def evaluate(
         for model in dict.fromkeys(request.model for request, _ in requests):
             if note := model_note(model):
                 print_note(f"{model}: {note}", "yellow")
-        outcomes = []
-        for run in runs:
-            outcomes.append(execute_with_progress(run))
-            export(outcomes[-1])
-            if outcomes[-1].n_missing:
-                break
+        outcomes, is_stopped = execute_runs(runs, finish=export)
     results = [
         RunResults(
             outcome.folder, outcome.run.suite, outcome.summary, outcome.usage, outcome.n_missing
@@ -91,7 +86,7 @@ def evaluate(
     n_failed = sum(map(_print_failures, outcomes))  # every run prints its failures
     n_void = sum(map(_print_if_void, outcomes))
     n_unsent = sum(not _send(outcome, senders) for outcome in outcomes if not outcome.n_missing)
-    return 130 if outcomes[-1].n_missing else int(n_failed + n_void + n_unsent > 0)
+    return 130 if is_stopped else int(n_failed + n_void + n_unsent > 0)
 
 
 def _print_if_void(outcome: RunOutcome) -> bool:
