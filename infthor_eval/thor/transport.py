@@ -55,6 +55,7 @@ class SafeFifoServer(FifoServer):
 
     server_pipe: Any
     client_pipe: Any
+    tmp_dir: Any
 
     def __init__(
         self,
