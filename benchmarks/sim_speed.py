@@ -83,7 +83,7 @@ def echo(scene: str, full: bool) -> None:
     server, client = (
         Path(os.environ[f"AI2THOR_FIFO_{side}_PIPE_PATH"]) for side in ("SERVER", "CLIENT")
     )
-    with closing(FifoPipes(server, client)) as pipes:
+    with closing(FifoPipes(server, client, os.getppid())) as pipes:
         pipes.send(replies[0])
         while (message := pipes.receive()) is not None:
             if message["action"] in {"GetScenesInBuild", "Initialize"}:

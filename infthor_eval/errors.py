@@ -10,7 +10,7 @@ To add a library's error as one line: `with wrap_errors(...)` around the call.
 
 import difflib
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -136,7 +136,7 @@ def describe_exception(error: BaseException) -> str:
 @contextmanager
 def wrap_errors(
     problem: str,
-    hint: str,
+    hint: str | Callable[[BaseException], str],
     *,
     catch: type[BaseException] | tuple[type[BaseException], ...] = OSError,
     raise_as: type[InfthorError] = DataError,
@@ -145,7 +145,7 @@ def wrap_errors(
 
     Args:
         problem: the problem and its place ("set.json: not JSON").
-        hint: the way to fix it.
+        hint: the way to fix it; a function if that depends on the error.
 
     Raises:
         InfthorError: an instance of `raise_as`, with the message "PROBLEM (REASON); HINT".
@@ -155,7 +155,8 @@ def wrap_errors(
     except InfthorError:
         raise
     except catch as error:
-        raise raise_as(f"{problem} ({in_one_line(error)}); {hint}") from error
+        remedy = hint if isinstance(hint, str) else hint(error)
+        raise raise_as(f"{problem} ({in_one_line(error)}); {remedy}") from error
 
 
 @contextmanager

@@ -12,7 +12,7 @@ import ai2thor.controller
 from ai2thor.fifo_server import FifoServer
 
 from infthor_sim.errors import SimulatorError
-from infthor_sim.launch import player_command
+from infthor_sim.launch import own_player, player_command
 
 __all__ = ["Controller"]
 
@@ -82,8 +82,7 @@ class Controller(ai2thor.controller.Controller):
         """Return the command line of the simulator's process."""
         # ai2thor takes one from CUDA_VISIBLE_DEVICES, and would run vulkaninfo to find it.
         self.gpu_device = None
-        command: list[str] = super().unity_command(width, height, headless)
-        return command
+        return own_player(super().unity_command(width, height, headless))
 
     def stop(self) -> None:
         """End the simulator's process and remove its files. Calling it again does nothing."""

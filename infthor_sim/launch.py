@@ -1,10 +1,11 @@
 """The command line that starts the simulator as the player behind an ai2thor Controller."""
 
+import os
 import shlex
 import sys
 from pathlib import Path
 
-__all__ = ["player_command"]
+__all__ = ["own_player", "player_command"]
 
 
 def player_command(data: Path | str | None = None, supplement: Path | str | None = None) -> str:
@@ -20,3 +21,11 @@ def player_command(data: Path | str | None = None, supplement: Path | str | None
     if supplement is not None:
         words += ["--supplement", str(Path(supplement).resolve())]
     return shlex.join(words)
+
+
+def own_player(command: list[str]) -> list[str]:
+    """Return the command line of a simulator that this process starts, and that ends with it.
+
+    Without it, a simulator whose Controller is killed while it imports would wait for ever.
+    """
+    return [*command, "--controller", str(os.getpid())]

@@ -1,6 +1,5 @@
 """Writing pictures as an MP4 or GIF file; the same pictures give the same bytes."""
 
-import tempfile
 from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
@@ -11,7 +10,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from infthor_eval.errors import DataError, UsageError, wrap_errors
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import write_atomically, writing_hint
+from infthor_eval.storage.scratch import ScratchFolder
 
 if TYPE_CHECKING:
     import cv2
@@ -24,7 +24,7 @@ _CODECS = ("vp09", "mp4v")
 _COLOURS = 255  # colours of a GIF; one more is for what stays as it was
 _SHADES = 32  # of red, green and blue: pixels are counted in cubes of colours, by their mean
 _COUNTED = 1 << 18  # votes of all pixels on the palette
-_HINT = "make room, or give another place with --out"
+_HINT = writing_hint(", or give another place with --out")
 
 
 def require_animation_name(path: Path) -> None:
@@ -57,10 +57,10 @@ def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: flo
     with (
         wrap_errors(f"{path}: cannot be written", _HINT),
         write_atomically(path) as partial,
-        tempfile.TemporaryDirectory(dir=path.parent, prefix=".recording-") as folder,
+        ScratchFolder(path.parent) as folder,
     ):
         # OpenCV chooses by the suffix, which `partial` lacks.
-        file = Path(folder) / f"animation{path.suffix.lower()}"
+        file = folder / f"animation{path.suffix.lower()}"
         n_pictures = write(file, pictures, per_second)
         file.replace(partial)
     return n_pictures

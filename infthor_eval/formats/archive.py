@@ -8,12 +8,13 @@ the target.
 import gzip
 import shutil
 import tarfile
-import tempfile
 from pathlib import Path, PurePosixPath
 from typing import Self
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import DAMAGED, require_file
+from infthor_eval.storage.files import writing_hint
+from infthor_eval.storage.scratch import ScratchFolder
 
 __all__ = ["unpack_tar"]
 
@@ -44,20 +45,21 @@ def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> Non
     damaged = (tarfile.TarError, gzip.BadGzipFile, *DAMAGED)
     with (
         wrap_errors(
-            f"{archive}: cannot be unpacked to {target}", "make room, or fetch the archive again"
+            f"{archive}: cannot be unpacked to {target}",
+            writing_hint(", or fetch the archive again"),
         ),
         wrap_errors(f"{archive}: a damaged archive", "delete it and fetch it again", catch=damaged),
     ):
         target.parent.mkdir(parents=True, exist_ok=True)
         with (
             tarfile.open(archive, tarinfo=_BoundedInfo) as tar,
-            tempfile.TemporaryDirectory(dir=target.parent, prefix=".unpacking-") as scratch,
+            ScratchFolder(target.parent) as scratch,
         ):
             members = _check_members(
                 tar, archive, target.name, min(max_bytes, shutil.disk_usage(target.parent).free)
             )
             tar.extractall(scratch, members=members, filter="data")
-            (Path(scratch) / target.name).rename(target)
+            (scratch / target.name).rename(target)
 
 
 class _BoundedInfo(tarfile.TarInfo):

@@ -1,6 +1,5 @@
 """Blank frames for the frame ablation: plain grey, of the size of the frames that they replace."""
 
-import tempfile
 from functools import cache
 from pathlib import Path
 
@@ -8,6 +7,7 @@ from PIL import Image
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.storage.files import write_atomically, writing_hint
 from infthor_eval.storage.folders import user_cache
 
 __all__ = ["blank_like"]
@@ -29,7 +29,7 @@ def blank_like(frame: FrameRef) -> FrameRef:
         return frame
     path = user_cache("blank_frames") / f"{size[0]}x{size[1]}.png"
     if not path.is_file():
-        with wrap_errors(f"{path}: cannot be written", "make room, or set XDG_CACHE_HOME"):
+        with wrap_errors(f"{path}: cannot be written", writing_hint(", or set XDG_CACHE_HOME")):
             _write(path, size)
     return FrameRef(path)
 
@@ -46,9 +46,5 @@ def _size(frame: FrameRef) -> tuple[int, int] | None:
 def _write(path: Path, size: tuple[int, int]) -> None:
     """Write the file atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    # A folder with a random name, not `write_atomically`: workers may write the same file at the
-    # same time.
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix="partial-") as partial:
-        file = Path(partial) / path.name
-        Image.new("RGB", size, _GREY).save(file)
-        file.replace(path)
+    with write_atomically(path) as partial:
+        Image.new("RGB", size, _GREY).save(partial, format="PNG")

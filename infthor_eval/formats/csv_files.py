@@ -5,11 +5,13 @@ import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.reading import read_text
+from infthor_eval.formats.reading import read_text, require_file
 from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.limits import CSV_LINE_MB
 
 __all__ = ["CsvRow", "read_rows", "shield", "unshield", "write_sheet"]
 
@@ -50,6 +52,7 @@ def read_rows(
         DataError: the file cannot be read, lacks a column or has it twice, or has a quote that is
             never closed.
     """
+    _check_lines(path, hint)
     text = read_text(path, hint)
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     with wrap_errors(f"{path}: not a UTF-8 CSV file", hint, catch=csv.Error):
@@ -70,6 +73,19 @@ def read_rows(
             yield CsvRow(reader.line_num, row, problem)
 
 
+def _check_lines(path: Path, hint: str) -> None:
+    """Refuse a line that is too long before the whole file is in memory, and several times over."""
+    require_file(path, hint)
+    limit = CSV_LINE_MB.value
+    longest = limit * 2**20
+    with wrap_errors(f"{path}: cannot be read", hint), path.open("rb") as file:
+        for number, line in enumerate(iter(partial(file.readline, longest + 1), b""), 1):
+            if len(line) > longest:
+                raise DataError(
+                    f"{path}, line {number}: is longer than {limit} MiB; {CSV_LINE_MB.hint}"
+                )
+
+
 def _check_header(path: Path, header: Sequence[str], columns: Sequence[str], hint: str) -> None:
     missing = [name for name in columns if name not in header]
     if missing:
@@ -85,7 +101,10 @@ def write_sheet(path: Path, columns: Sequence[str], rows: Iterable[Sequence[obje
     Raises:
         OSError: the file cannot be written.
     """
-    with write_atomically(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
+    with (
+        write_atomically(path) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         for row in rows:

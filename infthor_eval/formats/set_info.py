@@ -7,6 +7,7 @@ from typing import Any
 import infthor_eval
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import read_json
+from infthor_eval.storage.files import write_atomically, writing_hint
 
 __all__ = ["FORMAT", "claim_for_simulator", "simulator_of"]
 
@@ -40,8 +41,11 @@ def claim_for_simulator(root: Path, simulator: str) -> None:
     version = infthor_eval.__version__
     if not path.exists():
         info = {"format": FORMAT, "simulator": simulator, "infthor_eval": version}
-        with wrap_errors(f"{path}: cannot be written", "make room, or give another folder"):
-            path.write_text(json.dumps(info) + "\n", encoding="utf-8")
+        with (
+            wrap_errors(f"{path}: cannot be written", writing_hint(", or give another folder")),
+            write_atomically(path) as partial,
+        ):
+            partial.write_text(json.dumps(info) + "\n", encoding="utf-8")
         return
     info = _read(path)
     theirs = info.get("simulator")

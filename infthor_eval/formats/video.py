@@ -9,7 +9,6 @@ import json
 import math
 import os
 import shutil
-import tempfile
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +19,9 @@ from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.reading import require_file
 from infthor_eval.storage.digests import digest_of_file
+from infthor_eval.storage.files import writing_hint
 from infthor_eval.storage.folders import user_cache
+from infthor_eval.storage.scratch import ScratchFolder
 
 __all__ = ["FILM_FPS", "Video", "read_video", "sample_positions"]
 
@@ -93,7 +94,7 @@ def read_video(path: Path, fps: float) -> Video:
         digest = digest_of_file(path)
     folder = user_cache("video_frames") / f"{digest}-spread-{fps:g}fps-opencv{cv2.__version__}"
     if not _is_complete(folder):
-        with wrap_errors(f"{folder}: cannot be written", "make room, or set XDG_CACHE_HOME"):
+        with wrap_errors(f"{folder}: cannot be written", writing_hint(", or set XDG_CACHE_HOME")):
             _extract(path, fps, folder)
     sampled = json.loads((folder / _SAMPLED).read_text())
     return Video(tuple(FrameRef(file) for file in sorted(folder.glob("*.png"))), sampled["fps"])
@@ -111,8 +112,8 @@ def _extract(path: Path, fps: float, folder: Path) -> None:
     """Decode the frames into a temporary folder and rename it when it is complete."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix="partial-") as partial:
-        frames = Path(partial) / "frames"
+    with ScratchFolder(folder.parent) as scratch:
+        frames = scratch / "frames"
         frames.mkdir()
         _decode(path, fps, frames)
         try:

@@ -3,11 +3,15 @@
 The manifest has the trajectories to generate and how questions are sampled, or how twins are made
 of them. The copy of it in the set also has the digest of every file, so that a test can check that
 the same files are built again.
+
+A set is built in a hidden folder within the new one, and moved out of it when it is whole. A build
+that was stopped goes on there with the trajectories that it had.
 """
 
-from collections.abc import Callable
-from contextlib import ExitStack
-from pathlib import Path
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, TypeVar
 
 import msgspec
@@ -25,8 +29,8 @@ from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.twins.drafting import TwinSettings
 from infthor_eval.generation.twins.pairing import ScoreReply
 from infthor_eval.generation.twins.twin_set import TwinSummary, make_twins
-from infthor_eval.storage.digests import digest_of_file
-from infthor_eval.storage.scratch import ScratchFolder
+from infthor_eval.storage.digests import digest_of_file, fingerprint
+from infthor_eval.storage.files import remove
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings
@@ -45,6 +49,11 @@ __all__ = [
 MANIFEST = "manifest.json"
 _HINT = "give a manifest"
 _NOT_SHIPPED = "replay.json"  # has wall times, which differ from build to build
+_WORK = ".building-"  # of the hidden folder; the fingerprint of the manifest follows
+# In the hidden folder: what is kept of a stopped build, and the set, which is made anew.
+_TRAJECTORIES = "trajectories"
+_REPLAYED = "replayed"
+_SET = "set"
 
 
 class TrajectoryRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -130,7 +139,7 @@ def build_bundle(
     Args:
         manifest: the manifest; its digests are not used.
         simulator: the embedded simulator.
-        out: folder of the set, new or empty.
+        out: folder of the set: new, empty, or with a build that was stopped.
         progress: called twice for each trajectory, with True if it is of an earlier run.
 
     Returns:
@@ -139,23 +148,23 @@ def build_bundle(
     Raises:
         DataError: the folder is not empty, or a trajectory could not be generated or replayed.
     """
-    _require_new(out)
-    with ScratchFolder() as folder:
-        _generate(manifest, simulator, folder, progress)
-        replayed = replay_set(select([folder]), simulator, out, progress)
-    _raise_first([failure.message for failure in replayed.failures])
-    generated = generate_questions(
-        out,
-        seed=manifest.question_seed,
-        per_trajectory=manifest.per_trajectory,
-        further=manifest.further,
-    )
-    write_questions(out / f"qa_set_{manifest.name}.csv", generated.questions)
-    for frame in sorted(out.rglob("img/*.png")):
-        _reduce_colors(frame, manifest.colors)
-    for path in out.rglob(_NOT_SHIPPED):
-        path.unlink()
-    return _write_manifest(manifest, out), generated
+    with _building(manifest, out) as work:
+        _generate(manifest, simulator, work / _TRAJECTORIES, progress)
+        selection = select([work / _TRAJECTORIES])
+        replayed = replay_set(selection, simulator, work / _REPLAYED, progress)
+        _raise_first([failure.message for failure in replayed.failures])
+        generated = generate_questions(
+            work / _REPLAYED,
+            seed=manifest.question_seed,
+            per_trajectory=manifest.per_trajectory,
+            further=manifest.further,
+        )
+        whole = work / _SET
+        shutil.copytree(work / _REPLAYED, whole, ignore=shutil.ignore_patterns(_NOT_SHIPPED))
+        write_questions(whole / f"qa_set_{manifest.name}.csv", generated.questions)
+        for frame in sorted(whole.rglob("img/*.png")):
+            _reduce_colors(frame, manifest.colors)
+        return _write_manifest(manifest, whole), generated
 
 
 def build_twins(
@@ -169,7 +178,7 @@ def build_twins(
     Args:
         manifest: the manifest; its digests are not used.
         score: the strict score of a reply.
-        out: folder of the set, new or empty.
+        out: folder of the set: new, empty, or with a build that was stopped.
         progress: called twice for each trajectory, with True if it is of an earlier run.
 
     Returns:
@@ -179,17 +188,13 @@ def build_twins(
         DataError: the folder is not empty, a trajectory could not be generated, or twins could not
             be made of it.
     """
-    _require_new(out)
-    out.mkdir(exist_ok=True)
-    with ExitStack() as stack:
-        trajectories = stack.enter_context(ScratchFolder())
-        whole = stack.enter_context(ScratchFolder())
+    with _building(manifest, out) as work:
         with Simulator(embedded_launch(), image=False) as simulator:
-            _generate(manifest, simulator, trajectories, progress)
+            _generate(manifest, simulator, work / _TRAJECTORIES, progress)
         summary = make_twins(
-            select([trajectories]),
+            select([work / _TRAJECTORIES]),
             embedded_launch(),
-            whole,
+            work / _REPLAYED,
             manifest.twins,
             score,
             per_trajectory=manifest.per_trajectory,
@@ -197,8 +202,10 @@ def build_twins(
             progress=progress,
         )
         _raise_first(summary.failures)
-        copy_compactly(whole, out, manifest.colors)
-    return _write_manifest(manifest, out), summary
+        whole = work / _SET
+        whole.mkdir()
+        copy_compactly(work / _REPLAYED, whole, manifest.colors)
+        return _write_manifest(manifest, whole), summary
 
 
 def differing_files(
@@ -209,9 +216,35 @@ def differing_files(
     return sorted(name for name in names if expected.files.get(name) != built.files.get(name))
 
 
-def _require_new(out: Path) -> None:
-    if out.exists() and any(out.iterdir()):
+@contextmanager
+def _building(manifest: Manifest | TwinsManifest, out: Path) -> Iterator[Path]:
+    """Yield the hidden folder of a build; what is in its `_SET` at the end is moved to `out`.
+
+    Raises:
+        DataError: `out` has other files than those of a build that was stopped.
+    """
+    recipe = msgspec.to_builtins(msgspec.structs.replace(manifest, files={}))
+    work = out / f"{_WORK}{fingerprint(recipe)}"
+    out.mkdir(parents=True, exist_ok=True)
+    whole = work / _SET
+    if (whole / MANIFEST).is_file():  # stopped while the set was moved
+        for name in _top_names(read_json(whole / MANIFEST, _HINT, type(manifest)).files):
+            remove(out / name)
+    if any(not path.name.startswith(".") for path in out.iterdir()):
         raise DataError(f"{out}: not empty; give a new folder")
+    for other in out.glob(f"{_WORK}*"):
+        if other != work:
+            remove(other)
+    remove(whole)
+    work.mkdir(exist_ok=True)
+    yield work
+    for path in sorted(whole.iterdir(), key=lambda path: path.name == MANIFEST):  # that one last
+        path.replace(out / path.name)
+    remove(work)
+
+
+def _top_names(files: dict[str, str]) -> set[str]:
+    return {PurePosixPath(name).parts[0] for name in files}
 
 
 def _generate(

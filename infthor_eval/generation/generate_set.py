@@ -18,7 +18,7 @@ from infthor_eval.generation.simulator_jobs import (
 )
 from infthor_eval.generation.statistics import AttemptStatistics
 from infthor_eval.household.pddl import DOMAIN
-from infthor_eval.storage.files import file_name, write_atomically
+from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings, run_jobs
@@ -218,7 +218,7 @@ def _generate_one(job: TrajectorySettings, simulator: Simulator, out: Path) -> _
 
 def _write(generated: GeneratedTrajectory, path: Path) -> None:
     folder = path.with_suffix(".pddl")
-    hint = "make room and run the same command again, which resumes"
+    hint = writing_hint(" and run the same command again, which resumes")
     with wrap_errors(f"{path}: cannot be written", hint):
         folder.mkdir(exist_ok=True)
         (folder / "domain.pddl").write_text(DOMAIN)

@@ -6,9 +6,13 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.generation.settings import MAX_FAIL, TrajectorySettings
 from infthor_eval.scene_types import BATHROOM, scene_type
-from infthor_eval.storage.limits import TRAJECTORIES
+from infthor_eval.storage.limits import STEPS, TRAJECTORIES
 
 __all__ = ["trajectory_jobs", "without_bathrooms"]
+
+# Of one action: processor time at 10,000 actions (benchmarks/generation.md), and size in the file.
+_STEP_S = 0.0275
+_STEP_BYTES = 860
 
 
 def trajectory_jobs(
@@ -42,8 +46,10 @@ def trajectory_jobs(
         scene_goal_filter: False to sample task types that a scene's room type has not, too.
 
     Raises:
-        UsageError: the number of trajectories exceeds the limit.
+        UsageError: the number of trajectories, or of their actions or sub-goals, exceeds the limit.
     """
+    _check_length("--min-steps", min_steps)
+    _check_length("--min-subgoals", min_subgoals)
     if count * len(scenes) > TRAJECTORIES.value:
         raise UsageError(
             f"{count} trajectories for each of {len(scenes)} scenes are too many; "
@@ -66,6 +72,16 @@ def trajectory_jobs(
         for scene in scenes
         for k in seeds
     ]
+
+
+def _check_length(option: str, length: int) -> None:
+    """Refuse a trajectory that would take days; a sub-goal takes one action or more."""
+    if length > STEPS.value:
+        days = length * _STEP_S / 86_400
+        raise UsageError(
+            f"{option} {length}: takes {days:,.0f} days of a processor and "
+            f"{length * _STEP_BYTES / 1e9:,.0f} GB for each trajectory, or more; {STEPS.hint}"
+        )
 
 
 def without_bathrooms(scenes: Sequence[str]) -> tuple[list[str], list[str]]:

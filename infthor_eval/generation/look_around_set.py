@@ -22,7 +22,7 @@ from infthor_eval.generation.look_around import (
     level_walks,
     with_looks,
 )
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import write_atomically, writing_hint
 
 __all__ = ["LookAroundSummary", "add_look_around", "look_around_files"]
 
@@ -94,7 +94,7 @@ def _document(source: TrajectorySource) -> dict[str, Any]:
 
 
 def _write(document: dict[str, Any], path: Path) -> None:
-    with wrap_errors(f"{path}: cannot be written", "make room, or give another place"):
+    with wrap_errors(f"{path}: cannot be written", writing_hint(", or give another place")):
         path.parent.mkdir(parents=True, exist_ok=True)
         with write_atomically(path) as partial:
             partial.write_text(json.dumps(document))

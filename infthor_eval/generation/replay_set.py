@@ -31,7 +31,7 @@ from infthor_eval.generation.simulator_jobs import (
     collect_outcomes,
     freeze_existing_objects,
 )
-from infthor_eval.storage.files import file_name, write_atomically
+from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import agent_path
@@ -295,17 +295,15 @@ def _replay_or_check(
     if final.exists():
         return _ReplayOutcome(_check_earlier(final, source.digest, form), is_resumed=True)
     started = time.monotonic()
-    try:
-        with write_atomically(final) as folder:
-            folder.mkdir()
-            report = form.write(source, trajectory, simulator, folder)
-            report.seconds = round(time.monotonic() - started, 3)
-            (folder / _REPORT).write_bytes(msgspec.json.encode(report) + b"\n")
-    except OSError as error:
-        message = (
-            f"{final}: cannot be written ({error.strerror}); make room or choose another --out"
-        )
-        raise SimulatorError(message) from error
+    hint = writing_hint(", or choose another --out")
+    with (
+        wrap_errors(f"{final}: cannot be written", hint, raise_as=SimulatorError),
+        write_atomically(final) as folder,
+    ):
+        folder.mkdir()
+        report = form.write(source, trajectory, simulator, folder)
+        report.seconds = round(time.monotonic() - started, 3)
+        (folder / _REPORT).write_bytes(msgspec.json.encode(report) + b"\n")
     return _ReplayOutcome(report)
 
 

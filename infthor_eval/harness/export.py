@@ -16,7 +16,7 @@ from infthor_eval.harness.registration import NAME
 from infthor_eval.runs import RunOutcome, TaskFile, UnitRecord, UnitSample
 from infthor_eval.statistics import clustered_mean
 from infthor_eval.storage.digests import canonical_json
-from infthor_eval.storage.files import file_name, write_atomically
+from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
 __all__ = ["Exported", "convert_run", "export"]
 
@@ -65,7 +65,8 @@ def export(outcome: RunOutcome) -> Path:
     converted = convert_run(outcome)
     folder = outcome.folder / "lm_eval" / file_name(converted.model)
     stamp = datetime.now().isoformat().replace(":", "-")
-    with wrap_errors(f"{folder}: cannot be written", "make room, the journal holds it all"):
+    hint = writing_hint("; the journal holds it all")
+    with wrap_errors(f"{folder}: cannot be written", hint):
         folder.mkdir(parents=True, exist_ok=True)
         for task, rows in converted.samples.items():
             with write_atomically(folder / f"samples_{file_name(task)}_{stamp}.jsonl") as partial:

@@ -9,7 +9,6 @@ import importlib.util
 import inspect
 import logging
 import os
-import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -18,6 +17,7 @@ from infthor_eval.errors import UsageError, in_one_line, wrap_errors
 from infthor_eval.harness.export import Exported, convert_run
 from infthor_eval.harness.registration import NAME
 from infthor_eval.runs import RunOutcome
+from infthor_eval.storage.scratch import ScratchFolder
 
 __all__ = ["Trackers"]
 
@@ -90,10 +90,10 @@ class Trackers:
         from lm_eval.loggers import EvaluationTracker
 
         with (
-            tempfile.TemporaryDirectory() as folder,
+            ScratchFolder() as folder,
             _raise_failures("lm_eval.loggers.evaluation_tracker"),
         ):
-            tracker = EvaluationTracker(output_path=folder, **(self._hub or {}))
+            tracker = EvaluationTracker(output_path=str(folder), **(self._hub or {}))
             tracker.general_config_tracker.log_experiment_args(
                 NAME, {"model": name}, None, None, False
             )

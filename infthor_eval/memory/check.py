@@ -3,13 +3,14 @@
 To add or change a rule of memories' contract: a check here, and in `docs/memories.md`.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from PIL import Image
 
+from infthor_eval.errors import UserCodeError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.step_log import ObjectLog
 from infthor_eval.memory.protocol import (
@@ -20,7 +21,9 @@ from infthor_eval.memory.protocol import (
     TrajectoryFacts,
     tokens_of,
 )
+from infthor_eval.storage.deadlines import limit_time
 from infthor_eval.storage.digests import json_values
+from infthor_eval.storage.limits import MEMORY_SECONDS
 from infthor_eval.storage.scratch import ScratchFolder
 from model_adapters.check.clauses import ContractError, require
 from model_adapters.check.results import MEMBERS, CheckResult, run_each
@@ -40,17 +43,23 @@ def check_memory(memory: Memory) -> Iterator[CheckResult]:
     A model that it may ask answers with the number of frames it was given.
     """
     with ScratchFolder() as folder:
-        yield from run_each(
-            {
-                MEMBERS: partial(_check_members, memory),
-                "identity": partial(_check_identity, memory),
-                "recalls": partial(_check_recalls, memory, folder),
-                "empty": partial(_check_empty, memory, folder),
-                "budget": partial(_check_budget, memory, folder),
-                "repeats": partial(_check_repeats, memory, folder),
-                "forgets": partial(_check_forgets, memory, folder),
-            }
-        )
+        checks: dict[str, Callable[[], None]] = {
+            MEMBERS: partial(_check_members, memory),
+            "identity": partial(_check_identity, memory),
+            "recalls": partial(_check_recalls, memory, folder),
+            "empty": partial(_check_empty, memory, folder),
+            "budget": partial(_check_budget, memory, folder),
+            "repeats": partial(_check_repeats, memory, folder),
+            "forgets": partial(_check_forgets, memory, folder),
+        }
+        yield from run_each({name: partial(_in_time, check) for name, check in checks.items()})
+
+
+def _in_time(check: Callable[[], None]) -> None:
+    seconds = MEMORY_SECONDS.value
+    late = f"it is not done after {seconds} s; {MEMORY_SECONDS.hint}"
+    with limit_time(seconds, UserCodeError(late)):
+        check()
 
 
 def _check_members(memory: Any) -> None:

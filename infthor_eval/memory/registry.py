@@ -5,17 +5,26 @@ To add a memory: a class in this package and its line in `MEMORIES` (`docs/memor
 
 import inspect
 import typing
-from collections.abc import Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import ModelError, UsageError, in_one_line, unknown_name, wrap_user_code
+from infthor_eval.errors import (
+    ModelError,
+    UsageError,
+    UserCodeError,
+    in_one_line,
+    unknown_name,
+    wrap_user_code,
+)
 from infthor_eval.memory.protocol import Memory, MemoryCapabilities
 from infthor_eval.plugins import PluginTable
+from infthor_eval.storage.deadlines import limit_time
 from infthor_eval.storage.digests import json_values
+from infthor_eval.storage.limits import MEMORY_SECONDS
 from model_adapters.adapter_identity import package_identity
 from model_adapters.options.parsing import read_pairs
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
@@ -107,9 +116,19 @@ def parse_options(text: str | None) -> dict[str, str] | None:
     return None if text is None else read_pairs(text.split(","), "--memory-args")
 
 
-def wrap_memory_errors(name: str) -> AbstractContextManager[None]:
-    """Turn whatever a memory raises into an error of one line; ours pass unchanged."""
-    return wrap_user_code(f"the memory {name} fails", "fix it")
+@contextmanager
+def wrap_memory_errors(name: str) -> Iterator[None]:
+    """Turn whatever a memory raises into an error of one line; ours pass unchanged.
+
+    A memory that takes longer than `limits.MEMORY_SECONDS` for one call fails, too.
+    """
+    seconds = MEMORY_SECONDS.value
+    late = f"the memory {name} is not done after {seconds} s; fix it; {MEMORY_SECONDS.hint}"
+    with (
+        wrap_user_code(f"the memory {name} fails", "fix it"),
+        limit_time(seconds, UserCodeError(late)),
+    ):
+        yield
 
 
 @lru_cache(maxsize=8)  # by the class: an edited file has another one

@@ -20,7 +20,9 @@ from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.scoring import SCORERS, STRICT_RULES, scores
 from infthor_eval.quantities import require_number
 from infthor_eval.runs.catalog import TaskFile
+from infthor_eval.storage.deadlines import limit_time
 from infthor_eval.storage.digests import digest_of_file
+from infthor_eval.storage.limits import SCORER_SECONDS
 
 __all__ = ["PUBLISHED", "MetricError", "Metrics", "metrics_of", "wrap_metric_errors"]
 
@@ -72,11 +74,15 @@ def wrap_metric_errors(problem: str) -> Iterator[None]:
         problem: the function and the question that it fails on.
 
     Raises:
-        MetricError: the function raises an exception.
+        MetricError: the function raises an exception, or takes longer than
+            `limits.SCORER_SECONDS`.
     """
+    seconds = SCORER_SECONDS.value
+    late = f"{problem}: it is not done after {seconds} s; {SCORER_SECONDS.hint}"
     try:
-        yield
-    except STOPS:
+        with limit_time(seconds, MetricError(late)):
+            yield
+    except (MetricError, *STOPS):
         raise
     except BaseException as error:  # it is anybody's code, and may call `sys.exit`
         raise MetricError(f"{problem}: {describe_exception(error)}") from error

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from starlette.routing import BaseRoute, Route
     from uvicorn import Server
 
-__all__ = ["PageServer", "file_route", "require_page_extra", "serve_pages"]
+__all__ = ["PageServer", "file_route", "listen", "require_page_extra", "serve_pages"]
 
 _HOST = "127.0.0.1"
 _TOKEN_BYTES = 24
@@ -44,7 +44,9 @@ class PageServer:
 
 
 @contextmanager
-def serve_pages(routes: Sequence[BaseRoute], *, port: int = 0) -> Iterator[PageServer]:
+def serve_pages(
+    routes: Sequence[BaseRoute], *, port: int = 0, listening: socket.socket | None = None
+) -> Iterator[PageServer]:
     """Serve pages from a thread until the context ends.
 
     Pages name their parts by relative addresses ("state.json"), which hold the token as the page's
@@ -53,17 +55,18 @@ def serve_pages(routes: Sequence[BaseRoute], *, port: int = 0) -> Iterator[PageS
     Args:
         routes: Starlette's routes; the one with path "/" is the first page.
         port: port on 127.0.0.1; 0 for a free one.
+        listening: a socket of `listen` to use instead; it is closed at the end.
 
     Raises:
         UsageError: the extra `page` is not installed, or the port cannot be had.
     """
     require_page_extra()
     token = secrets.token_urlsafe(_TOKEN_BYTES)
-    with _listen(port) as listening:
+    with listening or listen(port) as taken:
         # Requests wait in the socket's queue from here on, so nobody must wait for the thread.
-        port = listening.getsockname()[1]
+        port = taken.getsockname()[1]
         server = _server(routes, token)
-        thread = threading.Thread(target=server.run, args=([listening],), name="pages", daemon=True)
+        thread = threading.Thread(target=server.run, args=([taken],), name="pages", daemon=True)
         thread.start()
         try:
             yield PageServer(f"http://{_HOST}:{port}/{token}/", port, thread)
@@ -98,7 +101,12 @@ def require_page_extra() -> None:
         import uvicorn  # noqa: F401
 
 
-def _listen(port: int) -> socket.socket:
+def listen(port: int) -> socket.socket:
+    """Take a port on 127.0.0.1, 0 for a free one, before there is something to serve on it.
+
+    Raises:
+        UsageError: the port cannot be had.
+    """
     problem = f"--port {port}: cannot be had"
     hint = "give another, or none for a free one"
     with wrap_errors(problem, hint, catch=(OSError, OverflowError), raise_as=UsageError):

@@ -12,7 +12,7 @@ from infthor_eval.errors import wrap_errors
 from infthor_eval.runs.journals.records import UnitRecord
 from infthor_eval.runs.suite import RunSummary, Suite
 from infthor_eval.runs.usage import Usage
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import write_atomically, writing_hint
 
 __all__ = [
     "RESULTS",
@@ -135,7 +135,7 @@ def write_document(path: Path, document: Any) -> None:
 @contextmanager
 def _atomic_file(path: Path) -> Iterator[Path]:
     with (
-        wrap_errors(f"{path}: cannot be written", "make room, the journal holds it all"),
+        wrap_errors(f"{path}: cannot be written", writing_hint("; the journal holds it all")),
         write_atomically(path) as partial,
     ):
         yield partial

@@ -1,37 +1,50 @@
 """Writing files and folders atomically, and checking the output paths before the work starts."""
 
+import errno
 import lzma
 import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.storage.digests import digest
+from infthor_eval.storage.locks import hold_lock
 
 __all__ = [
     "OVERWRITE_HINT",
     "PACKED",
     "file_name",
+    "hold_folder",
     "plain_name",
     "prepare_file",
     "prepare_folder",
     "refuse_overwrite",
+    "remove",
     "require_writable",
     "write_atomically",
     "write_packed",
+    "writing_hint",
 ]
 
 PACKED = ".xz"  # ends the name of a packed file
 OVERWRITE_HINT = "give another --out, or --overwrite if nobody edited it"
-_HINT = "make room, or give another place with"
 # Other characters, and these names with any ending, mean something to some system.
 _NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9 _.@+-]+")
 _DEVICES = re.compile(r"(?:con|prn|aux|nul|com\d|lpt\d)(?:\.|$)", re.IGNORECASE)
 _LONGEST_NAME = 150  # characters; systems take 255 bytes, and endings follow
+_LOCK = ".lock"
+_WAIT_S = 60.0  # for another process that writes the same file
+_REMEDIES: dict[int | None, str] = {
+    errno.ENOSPC: "make room",
+    errno.EDQUOT: "make room",
+    errno.EACCES: "allow writing there",
+    errno.EPERM: "allow writing there",
+    errno.EROFS: "make it writable",
+}
 _PROBE = b"x" * 4096  # a full disk still creates an empty file, so content is written too
 
 
@@ -61,9 +74,40 @@ def prepare_folder(path: Path, option: str = "--out") -> Path:
         DataError: the path is a file, or the folder cannot be created or written to.
     """
     require_writable(path, option)
-    with wrap_errors(f"{path}: cannot be written to", f"{_HINT} {option}"):
+    with wrap_errors(f"{path}: cannot be written to", _other_place(option)):
         path.mkdir(parents=True, exist_ok=True)
     return path
+
+
+@contextmanager
+def hold_folder(path: Path, option: str = "--out") -> Iterator[Path]:
+    """Prepare an option's folder, and keep other commands from writing into it meanwhile.
+
+    Raises:
+        UsageError: another command is writing into it.
+        DataError: see `prepare_folder`.
+    """
+    prepare_folder(path, option)
+    with hold_lock(path / _LOCK, path):
+        yield path
+
+
+def writing_hint(then: str) -> Callable[[BaseException], str]:
+    """Return the hint for what cannot be written: a remedy for the error's reason, and `then`.
+
+    Example: `writing_hint(", or give another --out")` says "make room, or give another --out" of a
+    full disk, and "allow writing there, or ..." where a permission is missing.
+    """
+
+    def hint(error: BaseException) -> str:
+        reason = error.errno if isinstance(error, OSError) else None
+        return _REMEDIES.get(reason, "check it") + then
+
+    return hint
+
+
+def _other_place(option: str) -> Callable[[BaseException], str]:
+    return writing_hint(f", or give another place with {option}")
 
 
 def require_writable(path: Path, option: str = "--out") -> None:
@@ -73,7 +117,7 @@ def require_writable(path: Path, option: str = "--out") -> None:
         DataError: the folder cannot be written to or created.
     """
     catch = (OSError, ValueError)  # ValueError: a null character in the name
-    with wrap_errors(f"{path}: cannot be written to", f"{_HINT} {option}", catch=catch):
+    with wrap_errors(f"{path}: cannot be written to", _other_place(option), catch=catch):
         nearest = next(folder for folder in (path, *path.absolute().parents) if _is_there(folder))
         with tempfile.TemporaryFile(dir=nearest) as probe:
             probe.write(_PROBE)
@@ -98,7 +142,7 @@ def prepare_file(path: Path, option: str = "--out") -> Path:
         DataError: the path is a folder, a pipe or a device, or its folder cannot be written to.
     """
     prepare_folder(path.parent, option)
-    with wrap_errors(f"{path}: cannot be written to", f"{_HINT} {option}"):
+    with wrap_errors(f"{path}: cannot be written to", _other_place(option)):
         if path.exists() and not path.is_file():
             raise DataError(f"{path}: not a file; give another place with {option}")
     return path
@@ -126,20 +170,22 @@ def write_atomically(path: Path) -> Iterator[Path]:
         The temporary path, at which nothing exists. After an error nothing remains there.
 
     Raises:
+        UsageError: another process is writing the same path, and does not end within a minute.
         OSError: the temporary path cannot be renamed.
     """
-    # The name is fixed, so that what a killed process left is found and removed by the next one. A
-    # second process that writes the same path at the same time is not provided for.
+    # The name is fixed, so that what a killed process left is found and removed by the next one.
     partial = path.with_name(f".{path.name}.partial")
-    _remove(partial)
-    try:
-        yield partial
-        partial.replace(path)  # atomic, as both are on one file system
-    finally:
-        _remove(partial)
+    with hold_lock(path.with_name(f".{path.name}{_LOCK}"), path, _WAIT_S):
+        remove(partial)
+        try:
+            yield partial
+            partial.replace(path)  # atomic, as both are on one file system
+        finally:
+            remove(partial)
 
 
-def _remove(path: Path) -> None:
+def remove(path: Path) -> None:
+    """Remove a file or a folder with all that is in it, if it is there."""
     if path.is_dir():
         shutil.rmtree(path)
     else:

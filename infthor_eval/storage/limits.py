@@ -13,11 +13,16 @@ from infthor_eval.errors import UsageError
 __all__ = [
     "ACTION_SECONDS",
     "ALIAS_NODES",
+    "CSV_LINE_MB",
     "FILE_MB",
     "IMAGE_ASPECT",
     "IMAGE_MEGAPIXELS",
+    "JUDGE_SECONDS",
     "LINE_MB",
+    "MEMORY_SECONDS",
     "OBJECT_POSES",
+    "SCORER_SECONDS",
+    "STEPS",
     "TEMPLATE_CHARACTERS",
     "TEMPLATE_MB",
     "TEMPLATE_SECONDS",
@@ -59,6 +64,8 @@ class Limit:
 FILE_MB = Limit("INFTHOR_EVAL_MAX_FILE_MB", 2048)  # size of a file, unpacked
 # Size of one line in files that are read line by line.
 LINE_MB = Limit("INFTHOR_EVAL_MAX_LINE_MB", 256)
+# Size of one line of a CSV file, whose reader takes several times that of memory.
+CSV_LINE_MB = Limit("INFTHOR_EVAL_MAX_CSV_LINE_MB", 16)
 IMAGE_MEGAPIXELS = Limit("INFTHOR_EVAL_MAX_IMAGE_MEGAPIXELS", 50)
 # Longer side over shorter; image processors refuse 200.
 IMAGE_ASPECT = Limit("INFTHOR_EVAL_MAX_IMAGE_ASPECT", 100)
@@ -66,14 +73,21 @@ IMAGE_ASPECT = Limit("INFTHOR_EVAL_MAX_IMAGE_ASPECT", 100)
 ALIAS_NODES = Limit("INFTHOR_EVAL_MAX_YAML_NODES", 100_000)
 # Recorded poses of one scene; real ones have up to 60.
 OBJECT_POSES = Limit("INFTHOR_EVAL_MAX_OBJECT_POSES", 1000)
+# Low-level actions, at least, that a trajectory may be asked to have.
+STEPS = Limit("INFTHOR_EVAL_MAX_STEPS", 100_000)
 # Trajectories that one command may generate.
 TRAJECTORIES = Limit("INFTHOR_EVAL_MAX_TRAJECTORIES", 1_000_000)
-# Processor time of a chat template, per text.
+# Time of a chat template, per text.
 TEMPLATE_SECONDS = Limit("INFTHOR_EVAL_MAX_TEMPLATE_SECONDS", 60)
 TEMPLATE_MB = Limit("INFTHOR_EVAL_MAX_TEMPLATE_MB", 2048)  # memory of a chat template, per text
 # Length of the text it produces.
 TEMPLATE_CHARACTERS = Limit("INFTHOR_EVAL_MAX_TEMPLATE_CHARACTERS", 16_000_000)
 # Time of one action in the embedded simulator.
 ACTION_SECONDS = Limit("INFTHOR_EVAL_MAX_ACTION_SECONDS", 30)
+# Time of a memory for one step, or to recall, without what it asks the model.
+MEMORY_SECONDS = Limit("INFTHOR_EVAL_MAX_MEMORY_SECONDS", 600)
+# Time of a scorer, or of a task's own metrics, for one reply.
+SCORER_SECONDS = Limit("INFTHOR_EVAL_MAX_SCORER_SECONDS", 60)
+JUDGE_SECONDS = Limit("INFTHOR_EVAL_MAX_JUDGE_SECONDS", 600)  # time of a judge for one verdict
 # In Unity; AI2-THOR's own limit.
 UNITY_ACTION_SECONDS = Limit("INFTHOR_EVAL_MAX_UNITY_ACTION_SECONDS", 100)

@@ -24,14 +24,22 @@ class ScratchFolder:
         path: the folder, initially empty.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, parent: Path | None = None) -> None:
         """Create the folder.
+
+        Args:
+            parent: existing folder that it is hidden in, for files that are renamed to there; None
+                for the system's folder of temporary files.
 
         Raises:
             OSError: there is no room, or no place for temporary files.
         """
-        _remove_abandoned(Path(tempfile.gettempdir()))
-        self._outer = tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
+        prefix = _PREFIX if parent is None else f".{_PREFIX}"
+        parent = Path(tempfile.gettempdir()) if parent is None else parent
+        _remove_abandoned(parent, prefix)
+        self._outer = tempfile.TemporaryDirectory(
+            prefix=prefix, dir=parent, ignore_cleanup_errors=True
+        )
         outer = Path(self._outer.name)
         # The file is locked before it gets the name of a lock: an unlocked one means that the
         # folder is abandoned.
@@ -54,8 +62,8 @@ class ScratchFolder:
 
 
 @cache
-def _remove_abandoned(parent: Path) -> None:
-    for lock in parent.glob(f"{_PREFIX}*/{_LOCK}"):
+def _remove_abandoned(parent: Path, prefix: str) -> None:
+    for lock in parent.glob(f"{prefix}*/{_LOCK}"):
         try:
             with lock.open("rb") as file:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -35,7 +35,7 @@ class SafeController(ai2thor.controller.Controller):
             SimulatorError: the simulator does not start.
         """
         self.server: SafeFifoServer | None = None
-        self._embedded = launch.label == "embedded"
+        self._launch = launch
         self._folder = None if launch.executable is None else ScratchFolder()
         try:
             super().__init__(
@@ -81,7 +81,7 @@ class SafeController(ai2thor.controller.Controller):
     @property
     def scenes_in_build(self) -> set[str]:
         """Scenes that can be loaded; none for all: the embedded simulator has no last one."""
-        if self._embedded:
+        if self._launch.is_embedded:
             return set()
         listed: set[str] = super().scenes_in_build
         return listed
@@ -129,7 +129,8 @@ class SafeController(ai2thor.controller.Controller):
             self.gpu_device = (
                 None  # for a GPU number ai2thor would run vulkaninfo, which many machines lack
             )
-        return super().unity_command(width, height, headless)
+        command: list[str] = super().unity_command(width, height, headless)
+        return self._launch.owned(command)
 
     def _build_server(self, host: str, port: int, width: int, height: int) -> None:
         if self.server is None:

@@ -3,9 +3,10 @@
 from pathlib import Path
 from typing import Protocol
 
-from infthor_eval.errors import DataError, SimulatorError
+from infthor_eval.errors import SimulatorError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.png import write_png
+from infthor_eval.storage.files import writing_hint
 from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["FrameFolder", "FrameKeeper", "NoFrames"]
@@ -44,10 +45,6 @@ class FrameFolder:
             raise SimulatorError("the simulator sent no frame; start it with rendering on")
         path = self._folder / f"{self._n_frames:09d}.png"
         self._n_frames += 1
-        try:
+        with wrap_errors(f"{path}: cannot be written", writing_hint(", or set TMPDIR")):
             write_png(path, view.frame, level=1)  # temporary: speed matters more than size
-        except OSError as error:
-            raise DataError(
-                f"{path}: cannot be written ({error.strerror}); make room, or set TMPDIR"
-            ) from error
         return FrameRef(path)

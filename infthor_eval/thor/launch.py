@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from infthor_eval.storage.limits import ACTION_SECONDS, UNITY_ACTION_SECONDS
-from infthor_sim.launch import player_command
+from infthor_sim.launch import own_player, player_command
 
 __all__ = ["Launch", "embedded_launch", "unity_launch"]
 
@@ -30,6 +30,15 @@ class Launch:
     timeout: float = 100.0
     timeout_hint: str = ""
     start_timeout: float = 300.0
+
+    @property
+    def is_embedded(self) -> bool:
+        """Whether it is the embedded simulator."""
+        return self.label == "embedded"
+
+    def owned(self, command: list[str]) -> list[str]:
+        """Return a command line of it, with what ends the embedded one with this process."""
+        return own_player(command) if self.is_embedded else command
 
 
 def embedded_launch(

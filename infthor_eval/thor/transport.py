@@ -19,6 +19,7 @@ from ai2thor.fifo_server import FieldType, FifoServer
 from ai2thor.server import DepthFormat, MultiAgentEvent
 
 from infthor_eval.errors import SimulatorError
+from infthor_eval.storage.scratch import ScratchFolder
 
 __all__ = ["PeerFault", "SafeFifoServer"]
 
@@ -54,6 +55,7 @@ class SafeFifoServer(FifoServer):
 
     server_pipe: Any
     client_pipe: Any
+    tmp_dir: Any
 
     def __init__(
         self,
@@ -64,6 +66,11 @@ class SafeFifoServer(FifoServer):
         add_depth_noise: bool = False,
     ) -> None:
         super().__init__(width, height, timeout, depth_format, add_depth_noise)
+        # In place of ai2thor's own folder, which would stay for ever after a SIGKILL.
+        self.tmp_dir.cleanup()
+        self.tmp_dir = ScratchFolder()
+        self.server_pipe_path = str(self.tmp_dir.path / "server.pipe")
+        self.client_pipe_path = str(self.tmp_dir.path / "client.pipe")
         self.fault: PeerFault | None = None
         self.current_action = "starting"
         self._deadline = float("inf")

@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,7 @@ import torch.distributed as dist
 
 from infthor_eval.errors import UsageError, wrap_errors
 from infthor_eval.storage.digests import digest
-from infthor_eval.storage.files import prepare_folder, write_atomically
+from infthor_eval.storage.files import hold_folder, write_atomically
 from infthor_eval.training.batches import collate
 from infthor_eval.training.data import TrainingData, read_training_data
 from infthor_eval.training.encoding import Encoder
@@ -101,10 +101,10 @@ def fine_tune(run: TrainingRun, out: Path, on_step: StepCallback) -> Path:
         DataError: a file cannot be read or written.
         ModelError: the model cannot be trained in this way.
     """
-    with _processes():
+    with _processes(), ExitStack() as held:
         is_first = not dist.is_initialized() or dist.get_rank() == 0
         if is_first:
-            _claim_folder(prepare_folder(out), run.document())
+            _claim_folder(held.enter_context(hold_folder(out)), run.document())
         network = SequenceModel(run.loaded)
         freeze(network, run.recipe.freeze)
         adapters = add_adapters(network, run.recipe.lora) if run.recipe.lora is not None else None

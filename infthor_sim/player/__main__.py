@@ -1,4 +1,5 @@
-"""`python -m infthor_sim.player [--data DIR] [--supplement FILE] <arguments of a Unity player>`.
+"""`python -m infthor_sim.player [--data DIR] [--supplement FILE] [--controller PID] <arguments of a
+Unity player>`.
 
 The Controller starts this process as if it were Unity and names the pipes in the environment. Of
 Unity's own arguments only the screen's size and the quality have an effect.
@@ -43,13 +44,14 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--data", type=Path)
     parser.add_argument("--supplement", type=Path)
+    parser.add_argument("--controller", type=int, default=os.getppid())
     parser.add_argument("-screen-width", dest="width", type=int, default=300)
     parser.add_argument("-screen-height", dest="height", type=int, default=300)
     parser.add_argument("-screen-quality", dest="quality", type=int, default=max(SMOOTH_LEVELS))
     options, _ = parser.parse_known_args(arguments)
     try:
         paths = _pipe("AI2THOR_FIFO_SERVER_PIPE_PATH"), _pipe("AI2THOR_FIFO_CLIENT_PIPE_PATH")
-        with closing(FifoPipes(*paths)) as pipes:
+        with closing(FifoPipes(*paths, options.controller)) as pipes:
             display = Display(
                 options.width, options.height, antialias=options.quality in SMOOTH_LEVELS
             )

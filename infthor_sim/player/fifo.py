@@ -53,10 +53,12 @@ class FifoPipes:
     Args:
         server_pipe: path of the pipe that states are written to.
         client_pipe: path of the pipe that actions are read from.
+        controller: process id of the Controller, which is this process's parent as long as it
+            lives. Asked here, the system would name another parent if it has died already.
     """
 
-    def __init__(self, server_pipe: Path, client_pipe: Path) -> None:
-        self._parent = os.getppid()
+    def __init__(self, server_pipe: Path, client_pipe: Path, controller: int) -> None:
+        self._controller = controller
         # Opened only after the first state is sent, as Unity does.
         self._client_path = client_pipe
         self._out = self._open_out(server_pipe)
@@ -117,7 +119,7 @@ class FifoPipes:
                     raise SimulatorError(
                         f"{path}: the pipe of states cannot be opened ({error.strerror})"
                     ) from error
-                if not self._parent_lives():
+                if not self._controller_lives():
                     raise SimulatorError("the controller died before it opened its pipe") from error
                 time.sleep(_PAUSE)
             else:
@@ -131,14 +133,14 @@ class FifoPipes:
         poll = select.poll()
         poll.register(pipe, select.POLLIN)
         while not poll.poll(_PAUSE * 1000):
-            if not self._parent_lives():
+            if not self._controller_lives():
                 os.close(pipe)
                 return None
         os.set_blocking(pipe, True)
         return pipe
 
-    def _parent_lives(self) -> bool:
-        return os.getppid() == self._parent  # an orphan is given another parent
+    def _controller_lives(self) -> bool:
+        return os.getppid() == self._controller  # an orphan is given another parent
 
     def _write(self, data: bytes | memoryview) -> None:
         view = memoryview(data)

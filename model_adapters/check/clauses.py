@@ -1,15 +1,14 @@
 """What the checks share: clauses, their error, and the questions that are asked."""
 
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, Generic, Protocol
 
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.storage.digests import json_values
+from infthor_eval.storage.scratch import ScratchFolder
 from model_adapters.protocols import Conversation, Decoding, Model, Part, Policy, Reply
 
 __all__ = [
@@ -85,9 +84,9 @@ def check_identity(adapter: Model | Policy) -> None:
 @contextmanager
 def frames_of_one_colour(size: tuple[int, int]) -> Iterator[tuple[FrameRef, FrameRef]]:
     """Yield a black and a white frame of this width and height, with files in the context."""
-    with tempfile.TemporaryDirectory() as folder:
-        black = Path(folder) / "black.png"
-        white = Path(folder) / "white.png"
+    with ScratchFolder() as folder:
+        black = folder / "black.png"
+        white = folder / "white.png"
         for path in (black, white):
             Image.new("RGB", size, path.stem).save(path)
         yield FrameRef(black), FrameRef(white)

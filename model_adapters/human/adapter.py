@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from infthor_eval.errors import UsageError
-from infthor_eval.pages.server import require_page_extra
+from infthor_eval.pages.server import listen, require_page_extra
 
 if TYPE_CHECKING:
     from model_adapters.human.model import HumanModel
@@ -47,12 +47,13 @@ class Human:
 
     @classmethod
     def build(cls, name: str, options: HumanOptions, seed: int) -> "HumanModel":  # noqa: ARG003
-        """Build the model; the page opens with the first question.
+        """Build the model and take its port; the page opens with the first question.
 
         Raises:
-            UsageError: the extra `page` is not installed.
+            UsageError: the extra `page` is not installed, or the port cannot be had.
         """
         require_page_extra()
         from model_adapters.human.model import HumanModel
 
-        return HumanModel(name, options)
+        # A port that is taken must end the run here; later it would fail each question.
+        return HumanModel(name, options, listen(options.port))

@@ -56,7 +56,8 @@ class Desk:
         self._version = 0
         self._has_readers = False
         self._is_told = False
-        self._n_answered = 0
+        self._n_kept = 0
+        self._in_hand: int | None = None  # number of an answer that may not be on disk yet
         self._is_closed = self._is_stopped = False
 
     @property
@@ -71,8 +72,8 @@ class Desk:
 
     @property
     def n_answered(self) -> int:
-        """Number of questions answered so far."""
-        return self._n_answered
+        """Number of questions whose answers the run has kept so far."""
+        return self._n_kept
 
     @property
     def is_stopped(self) -> bool:
@@ -87,11 +88,16 @@ class Desk:
     def ask(self, inquiry: Inquiry) -> Answer:
         """Put a question, and wait until it is answered.
 
+        A run that asks again has kept the answer before: it writes a record to disk before it goes
+        on. (The actions of a plan are one record, at the end of the plan.)
+
         Raises:
             KeyboardInterrupt: the person stops the run from the page.
         """
         with self._changed:
-            self._question = Question(next(self._numbers), inquiry, time.monotonic())
+            self._settle(is_kept=True)
+            number = next(self._numbers)
+            self._question = Question(number, inquiry, time.monotonic())
             self._answer = None
             self._change()
             try:
@@ -99,7 +105,7 @@ class Desk:
                     self._changed.wait(_WAKE_S)
                 if self._answer is None:
                     raise KeyboardInterrupt
-                self._n_answered += 1
+                self._in_hand = number
                 return self._answer
             finally:
                 self._question = None
@@ -120,6 +126,12 @@ class Desk:
                 raise StaleError
             self._answer = answer
             self._changed.notify_all()
+
+    def wait_until_kept(self, number: int) -> bool:
+        """Wait until the answer to a question is kept; False if the run has ended before."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._n_kept >= number or self._is_closed)
+            return self._n_kept >= number
 
     def wait_for_change(self, version: int, timeout_s: float) -> None:
         """Wait until there is another version than this one, or for so many seconds."""
@@ -145,11 +157,17 @@ class Desk:
             self._is_stopped = True
             self._changed.notify_all()
 
-    def close(self) -> None:
-        """Say that nothing will be asked any more."""
+    def close(self, *, is_kept: bool = True) -> None:
+        """Say that nothing will be asked any more, and whether the last answer is on disk."""
         with self._changed:
+            self._settle(is_kept=is_kept)
             self._is_closed = True
             self._change()
+
+    def _settle(self, *, is_kept: bool) -> None:
+        if self._in_hand is not None and is_kept:
+            self._n_kept = self._in_hand
+        self._in_hand = None
 
     def _change(self) -> None:
         self._version += 1

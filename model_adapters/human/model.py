@@ -1,7 +1,9 @@
 """A person as a `Model`."""
 
+import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
+from socket import socket
 from typing import Any
 
 from infthor_eval.formats.frames import FrameRef
@@ -18,12 +20,14 @@ __all__ = ["HumanModel"]
 class HumanModel:
     """A person, who answers on a page of this machine; the page opens with the first request."""
 
-    def __init__(self, name: str, options: HumanOptions) -> None:
+    def __init__(self, name: str, options: HumanOptions, listening: socket) -> None:
         self.name = name
         self._options = options
         self._desk = Desk()
         self._notice = Notice()
+        self._listening = listening
         self._page = ExitStack()
+        self._page.enter_context(listening)
         self._is_open = False
 
     @property
@@ -69,10 +73,11 @@ class HumanModel:
 
     def close(self) -> None:
         """Tell the page that it is over, and close it."""
-        self._desk.close()
+        # An error that ends the run may have come before the last answer was on disk.
+        self._desk.close(is_kept=sys.exc_info()[0] is None)
         self._page.close()
 
     def _open(self) -> None:
         if not self._is_open:
-            self._page.enter_context(serve_desk(self._desk, self._options))
+            self._page.enter_context(serve_desk(self._desk, self._options, self._listening))
             self._is_open = True

@@ -5,14 +5,16 @@ import sys
 import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
+from socket import socket
 
 import msgspec
 from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Route
 
+from infthor_eval.formats.frames import FrameRef
 from infthor_eval.pages.server import file_route, serve_pages
 from model_adapters.human.adapter import HumanOptions
 from model_adapters.human.desk import Answer, Desk, StaleError
@@ -23,6 +25,7 @@ __all__ = ["desk_routes", "serve_desk"]
 _WAIT_S = 20.0  # a page asks again after so long without a change
 _LAST_LOOK_S = 3.0  # for open pages to learn that it is over
 _LONGEST = 2000  # characters of an answer
+_DIGITS = 15  # of a number of a question, frame or version
 _PACKAGE = "model_adapters.human"
 
 
@@ -35,13 +38,9 @@ class _AnswerForm(msgspec.Struct):
 
 
 @contextmanager
-def serve_desk(desk: Desk, options: HumanOptions) -> Iterator[None]:
-    """Serve the page of a desk until the context ends, and say where it is.
-
-    Raises:
-        UsageError: the web server is not installed, or the port cannot be had.
-    """
-    with serve_pages(desk_routes(desk), port=options.port) as server:
+def serve_desk(desk: Desk, options: HumanOptions, listening: socket) -> Iterator[None]:
+    """Serve the page of a desk on a socket until the context ends, and say where it is."""
+    with serve_pages(desk_routes(desk), listening=listening) as server:
         print(f"human: answer at {server.address}", file=sys.stderr, flush=True)
         if options.browser and _has_screen():
             webbrowser.open(server.address)
@@ -56,7 +55,7 @@ def desk_routes(desk: Desk) -> list[BaseRoute]:
         file_route("/", _PACKAGE, "page.html"),
         *(file_route(f"/{name}", _PACKAGE, name) for name in ("page.css", "page.js", "strip.js")),
         Route("/state.json", page.state),
-        Route("/frames/{number:int}/{index:int}", page.frame),
+        Route("/frames/{number}/{index}", page.frame),
         Route("/answer", page.answer, methods=["POST"]),
         Route("/stop", page.stop, methods=["POST"]),
     ]
@@ -70,9 +69,9 @@ class _Page:
 
     async def state(self, request: Request) -> Response:
         """What is asked now; waits for another version than the one that the page has."""
-        seen = request.query_params.get("seen", "")
-        if seen.isdecimal():
-            await run_in_threadpool(self._desk.wait_for_change, int(seen), _WAIT_S)
+        seen = _number(request.query_params.get("seen", ""))
+        if seen is not None:
+            await run_in_threadpool(self._desk.wait_for_change, seen, _WAIT_S)
         state = state_of(self._desk)
         told = BackgroundTask(self._desk.tell_closed) if state["closed"] else None
         return JSONResponse(state, background=told)
@@ -80,18 +79,13 @@ class _Page:
     async def frame(self, request: Request) -> Response:
         """One frame of the question of a number."""
         question = self._desk.question
-        if question is None or question.number != request.path_params["number"]:
+        if question is None or question.number != _number(request.path_params["number"]):
             return _problem("this question is not asked any more", 409)
         frames = frames_of(question.inquiry.turns)
-        index = request.path_params["index"]
-        if index >= len(frames):
+        index = _number(request.path_params["index"])
+        if index is None or index >= len(frames):
             return _problem("there is no such frame", 404)
-        frame = frames[index]
-        if not frame.path.is_file():
-            return _problem(f"{frame.name}: the frame is not there", 404)
-        if frame.patches:
-            return Response(await run_in_threadpool(frame.png), media_type="image/png")
-        return FileResponse(frame.path)
+        return await run_in_threadpool(_picture, frames[index])
 
     async def answer(self, request: Request) -> Response:
         """Take an answer."""
@@ -99,7 +93,7 @@ class _Page:
             form = msgspec.json.decode(await request.body(), type=_AnswerForm)
         except (msgspec.ValidationError, msgspec.DecodeError):
             return _problem("not an answer", 400)
-        return _take(self._desk, form)
+        return await run_in_threadpool(_take, self._desk, form)
 
     async def stop(self, _request: Request) -> Response:
         """End the run, which can go on later."""
@@ -120,11 +114,28 @@ def _take(desk: Desk, form: _AnswerForm) -> Response:
         and text not in question.inquiry.decoding.choices
     ):
         return _problem("only the listed replies are possible here", 400)
+    n_frames = 0 if question is None else len(frames_of(question.inquiry.turns))
     try:
-        desk.give(form.number, Answer(text, max(0, form.watched)))
+        desk.give(form.number, Answer(text, min(max(0, form.watched), n_frames)))
     except StaleError:
         return _problem("this question was answered already, perhaps in another tab", 409)
+    if not desk.wait_until_kept(form.number):
+        return _problem("the run ended before the answer was on disk; start it again", 500)
     return JSONResponse({})
+
+
+def _picture(frame: FrameRef) -> Response:
+    """Return a frame, named as the image that it is, whatever the name of its file."""
+    problem = frame.problem()
+    if problem is not None:
+        return _problem(problem, 404)
+    content = frame.png() if frame.patches else frame.path.read_bytes()
+    return Response(content, media_type=f"image/{'png' if content[1:4] == b'PNG' else 'jpeg'}")
+
+
+def _number(text: str) -> int | None:
+    """Return a number of a request; None for what is none, or longer than any there is."""
+    return int(text) if text.isdecimal() and len(text) <= _DIGITS else None
 
 
 def _problem(text: str, status: int) -> JSONResponse:

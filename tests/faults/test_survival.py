@@ -441,3 +441,21 @@ def test_sigterm_leaves_no_temporary_folder(tmp_path):
     assert process.returncode == 143
     assert "stopped; run the same command to continue" in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_during_the_imports_is_one_line(tmp_path):
+    # A module of the same name as one that the command imports, which is interrupted.
+    (tmp_path / "click.py").write_text("import os, signal; os.kill(os.getpid(), signal.SIGINT)")
+    program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    program += "from infthor_eval.cli import main; main()"
+    root = Path(__file__).parents[2]
+    done = subprocess.run(
+        [sys.executable, "-c", program, "--version"],
+        env=os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{root}"},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr == "infthor-eval: stopped; run the same command to continue\n"

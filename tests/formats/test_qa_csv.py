@@ -1,4 +1,6 @@
 import csv
+import subprocess
+import sys
 from dataclasses import replace
 
 import pytest
@@ -170,3 +172,29 @@ def test_no_cell_is_a_formula_and_all_are_read_as_they_were(tmp_path):
     assert [(item.traj_id, item.text) for item in read_questions(path)] == [
         ("=traj", text) for text in texts
     ]
+
+
+def test_a_cell_of_200_mb_is_refused_with_its_line_in_a_small_memory(tmp_path):
+    path = tmp_path / "qa_set.csv"
+    with path.open("wb") as file:
+        file.write(b"traj_id,question,gt_img_idx,answer\nt,q,[1],['a']\nt,")
+        for _ in range(200):
+            file.write(b"x" * 10**6)
+        file.write(b",[1],['a']\n")
+    code = (
+        "import resource, sys\n"
+        "from pathlib import Path\n"
+        "from infthor_eval.errors import DataError\n"
+        "from infthor_eval.formats.csv_files import read_rows\n"
+        "pages = int(open('/proc/self/statm').read().split()[0])\n"
+        "small = pages * resource.getpagesize() + 150 * 2**20\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (small, small))\n"
+        "try:\n"
+        "    list(read_rows(Path(sys.argv[1]), ['question'], 'fix it'))\n"
+        "except DataError as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True
+    )
+    assert "qa_set.csv, line 3: is longer than 16 MiB; if this is intended, set" in done.stdout

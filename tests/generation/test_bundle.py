@@ -1,9 +1,17 @@
+from pathlib import Path
+
 import msgspec
 import pytest
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.generation.bundle import MANIFEST, build_bundle, read_manifest
+from infthor_eval.generation.bundle import (
+    MANIFEST,
+    Manifest,
+    TrajectoryRecipe,
+    build_bundle,
+    read_manifest,
+)
 from infthor_eval.generation.questions.generate import generate_questions
 from infthor_eval.storage.digests import digest_of_file
 from infthor_eval.storage.folders import packaged_folder
@@ -57,6 +65,41 @@ def test_a_folder_that_is_not_empty_and_a_scene_that_is_not_there_are_refused(tm
         )
         with pytest.raises(DataError, match="attic-1"):
             build_bundle(nowhere, simulator, tmp_path / "set")
+
+
+def test_a_build_that_was_stopped_goes_on_with_what_it_had(tmp_path, monkeypatch):
+    manifest = Manifest("small", (TrajectoryRecipe("kitchen-1", 0, 1),), per_trajectory=2)
+    out, undisturbed = tmp_path / "set", tmp_path / "undisturbed"
+    done = []
+
+    def stop(is_resumed):
+        done.append(is_resumed)
+        if len(done) == 1:  # generated, not replayed
+            raise KeyboardInterrupt
+
+    with Simulator(embedded_launch()) as simulator:
+        expected, _ = build_bundle(manifest, simulator, undisturbed)
+        with pytest.raises(KeyboardInterrupt):
+            build_bundle(manifest, simulator, out, stop)
+        assert [path.name[0] for path in out.iterdir()] == ["."]
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "replace", _stop_at_manifest(Path.replace))
+            with pytest.raises(KeyboardInterrupt):
+                build_bundle(manifest, simulator, out, done.append)
+        assert done[1:] == [True, False]
+        again, _ = build_bundle(manifest, simulator, out)
+    assert again == expected
+    assert [path.name for path in out.iterdir() if path.name.startswith(".")] == []
+    assert digest_of_file(out / MANIFEST) == digest_of_file(undisturbed / MANIFEST)
+
+
+def _stop_at_manifest(replace):
+    def stop(self, target):
+        if self.name == MANIFEST:  # the last that is moved
+            raise KeyboardInterrupt
+        return replace(self, target)
+
+    return stop
 
 
 @pytest.mark.parametrize(

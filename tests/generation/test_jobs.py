@@ -38,3 +38,17 @@ def test_a_room_is_asked_for_what_is_usual_there_unless_the_filter_is_off():
     assert usual.sampled_types() == {TaskType.PLACE, TaskType.PLACE_TWO, TaskType.CLEAN}
     assert all_types.sampled_types() == set(SAMPLED)
     assert usual.document() != all_types.document()
+
+
+@pytest.mark.parametrize("option", ["min_steps", "min_subgoals"])
+def test_a_length_that_takes_months_is_told_at_once(option, monkeypatch):
+    length = {"min_steps": 5, "min_subgoals": 1, "final_task": False, option: 10**9}
+    with pytest.raises(UsageError) as refused:
+        trajectory_jobs(["kitchen-1"], seed=0, count=1, **length)
+    assert str(refused.value) == (
+        f"--{option.replace('_', '-')} 1000000000: takes 318 days of a processor and 860 GB for "
+        "each trajectory, or more; if this is intended, set INFTHOR_EVAL_MAX_STEPS to more than "
+        "100000"
+    )
+    monkeypatch.setenv("INFTHOR_EVAL_MAX_STEPS", str(10**9))
+    assert len(trajectory_jobs(["kitchen-1"], seed=0, count=1, **length)) == 1

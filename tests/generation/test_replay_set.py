@@ -6,6 +6,7 @@ import pytest
 from PIL import Image
 
 from infthor_eval.errors import SimulatorError
+from infthor_eval.formats.set_info import claim_for_simulator, simulator_of
 from infthor_eval.formats.step_log import iter_object_states, read_steps
 from infthor_eval.formats.trajectory import iter_sources, iter_trajectories
 from infthor_eval.generation.generate_set import generate_set
@@ -183,6 +184,20 @@ def test_overlap_of_boxes():
     assert box_iou((0, 0, 9, 9), (0, 0, 9, 9)) == 1.0
     assert box_iou((0, 0, 9, 9), (5, 0, 14, 9)) == pytest.approx(50 / 150)
     assert box_iou((0, 0, 1, 1), (5, 5, 6, 6)) == 0.0
+
+
+def test_a_set_that_was_claimed_half_is_claimed_again(tmp_path, monkeypatch):
+    def stop(self, *_arguments, **_options):
+        self.write_bytes(b"{")
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "write_text", stop)
+        with pytest.raises(KeyboardInterrupt):
+            claim_for_simulator(tmp_path, "embedded")
+    assert simulator_of(tmp_path) is None
+    claim_for_simulator(tmp_path, "embedded")
+    assert simulator_of(tmp_path) == "embedded"
 
 
 def test_the_simulator_error_is_told(tmp_path):

@@ -89,3 +89,44 @@ def test_it_goes_when_its_parent_dies_before_the_handshake(pipes):
     parent.stdout.close()
     # it waits for no dead controller
     wait_until(lambda: not status.exists() or "(zombie)" in status.read_text())
+
+
+def test_it_goes_when_its_controller_died_before_it_looked(pipes):
+    # the number of a process that is not there any more, as if it had died during the imports
+    with subprocess.Popen([sys.executable, "-c", ""]) as gone:
+        pass
+    done = subprocess.run(
+        [*COMMAND, "--controller", str(gone.pid)],
+        env=os.environ | pipes,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "the controller died before it opened its pipe" in done.stderr
+
+
+@pytest.mark.parametrize("start", ["ours", "ai2thor's"])
+def test_a_controller_that_is_killed_at_once_leaves_no_simulator(start, tmp_path):
+    pid = tmp_path / "pid"
+    script = (
+        "import os, pathlib, signal, subprocess\n"
+        "popen = subprocess.Popen\n"
+        "def start_and_die(*arguments, **options):\n"
+        "    process = popen(*arguments, **options)\n"
+        f"    pathlib.Path({str(pid)!r}).write_text(str(process.pid))\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    ) + {
+        "ours": "from infthor_eval.thor.launch import embedded_launch\n"
+        "from infthor_eval.thor.simulator import Simulator\n"
+        "subprocess.Popen = start_and_die\n"
+        "Simulator(embedded_launch()).reset('kitchen-1')\n",
+        "ai2thor's": "from infthor_sim import Controller\n"
+        "subprocess.Popen = start_and_die\n"
+        "Controller()\n",
+    }[start]
+    died = subprocess.run([sys.executable, "-c", script], timeout=PATIENCE_S, check=False)
+    assert died.returncode == -9
+    status = Path("/proc", pid.read_text(), "status")
+    wait_until(lambda: not status.exists() or "(zombie)" in status.read_text())

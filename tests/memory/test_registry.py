@@ -1,10 +1,14 @@
 """Memories by name, with options, and from a user's file."""
 
+import time
+
 import pytest
 
-from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.errors import ModelError, UsageError, UserCodeError
 from infthor_eval.memory import MEMORIES, memory_identity, open_memory, parse_options
 from infthor_eval.memory.frames import Last
+from infthor_eval.memory.registry import wrap_memory_errors
+from infthor_eval.storage.limits import MEMORY_SECONDS
 
 MINE = """
 from infthor_eval.memory import MemoryCapabilities
@@ -96,3 +100,10 @@ def test_an_edited_file_is_another_memory_in_the_same_process(mine):
     assert open_memory(f"{mine}:Mine") is first
     mine.write_text(MINE.replace("n: int = 3", "n: int = 4"))
     assert open_memory(f"{mine}:Mine").n == 4
+
+
+def test_a_call_of_a_memory_has_a_limit(monkeypatch):
+    monkeypatch.setenv(MEMORY_SECONDS.name, "1")
+    late = f"mine is not done after 1 s; fix it; if this is intended, set {MEMORY_SECONDS.name} to"
+    with pytest.raises(UserCodeError, match=late), wrap_memory_errors("mine"):
+        time.sleep(600)

@@ -1,11 +1,44 @@
+import errno
+import os
+import subprocess
+import sys
+from contextlib import contextmanager
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from infthor_eval.errors import DataError, UsageError, wrap_errors
+from infthor_eval.storage import files
 from infthor_eval.storage.digests import digest, digest_of_file
-from infthor_eval.storage.files import file_name, write_atomically
+from infthor_eval.storage.files import file_name, hold_folder, write_atomically, writing_hint
 
 _TEXTS = st.text(st.characters(codec=None))  # with lone surrogates
+
+_WRITE = (
+    "import sys\n"
+    "from pathlib import Path\n"
+    "from infthor_eval.storage.files import hold_folder, write_atomically\n"
+    "path = Path(sys.argv[1])\n"
+    "with hold_folder(path.parent), write_atomically(path) as partial:\n"
+    "    partial.write_text('theirs')\n"
+    "    print('writing', flush=True)\n"
+    "    sys.stdin.read()\n"
+)
+
+
+@contextmanager
+def _other_writer(path):
+    """Another process that has written a part of a file; it ends when its input is closed."""
+    with subprocess.Popen(
+        [sys.executable, "-c", _WRITE, str(path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "writing\n"
+        yield process
 
 
 def test_a_file_replaces_the_earlier_one_when_it_is_whole(tmp_path):
@@ -75,3 +108,67 @@ def test_a_name_of_any_text_is_one_part_of_a_path_and_its_own(one, other):
 def test_names_that_are_safe_stay_and_others_say_what_they_were(text, expected):
     name = file_name(text)
     assert name == text if expected is None else name[:-8] == expected
+
+
+def test_a_file_that_another_process_writes_is_left_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "_WAIT_S", 0.2)
+    path = tmp_path / "a.txt"
+    with _other_writer(path):
+        with pytest.raises(UsageError, match=r"a\.txt: another process is writing it; wait"):
+            _write(path)
+        assert (tmp_path / ".a.txt.partial").read_text() == "theirs"
+    assert path.read_text() == "theirs"
+
+
+def test_a_writer_waits_for_another_that_ends_soon(tmp_path):
+    path = tmp_path / "a.txt"
+    with _other_writer(path) as process:
+        process.stdin.close()
+        _write(path)
+        assert path.read_text() == "ours"
+    assert process.returncode == 0
+    assert [item.name for item in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_a_writer_that_was_killed_holds_nothing(tmp_path):
+    path = tmp_path / "a.txt"
+    with _other_writer(path) as process:
+        process.kill()
+    with hold_folder(tmp_path):
+        _write(path)
+    assert path.read_text() == "ours"
+    assert [item.name for item in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_one_command_at_a_time_writes_into_a_folder(tmp_path):
+    with (
+        _other_writer(tmp_path / "set" / "a.txt"),
+        pytest.raises(UsageError, match="set: another process is writing it"),
+        hold_folder(tmp_path / "set"),
+    ):
+        pytest.fail("it is held")
+    with hold_folder(tmp_path / "set"):
+        pass
+    assert [item.name for item in (tmp_path / "set").iterdir()] == ["a.txt"]
+
+
+def _write(path):
+    with write_atomically(path) as partial:
+        partial.write_text("ours")
+
+
+@pytest.mark.parametrize(
+    ("reason", "remedy"),
+    [
+        (errno.ENOSPC, "make room, or go"),
+        (errno.EACCES, "allow writing there, or go"),
+        (errno.EROFS, "make it writable, or go"),
+        (errno.EIO, "check it, or go"),
+    ],
+)
+def test_what_cannot_be_written_is_told_with_the_remedy_of_its_reason(reason, remedy):
+    with (
+        pytest.raises(DataError, match=f"; {remedy}$"),
+        wrap_errors("a.txt: cannot be written", writing_hint(", or go")),
+    ):
+        raise OSError(reason, os.strerror(reason))

@@ -71,6 +71,21 @@ def test_what_a_living_process_uses_stays(place):
         process.wait()
 
 
+def test_it_may_be_hidden_in_a_folder_and_is_removed_there_too(place):
+    code = (
+        "import os, signal, sys; from pathlib import Path\n"
+        "from infthor_eval.storage.scratch import ScratchFolder\n"
+        "folder = ScratchFolder(Path(sys.argv[1])); os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    subprocess.run([sys.executable, "-c", code, str(place)], check=False)
+    (left,) = place.iterdir()
+    assert left.name.startswith(".infthor-")
+    with ScratchFolder(place) as folder:
+        assert not left.exists()
+        assert folder.is_relative_to(place)
+    assert list(place.iterdir()) == []
+
+
 def test_folders_of_others_stay(place):
     (place / "infthor-results").mkdir()
     with ScratchFolder():

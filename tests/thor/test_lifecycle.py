@@ -2,6 +2,8 @@
 
 import gc
 import os
+import subprocess
+import sys
 import tempfile
 import threading
 from pathlib import Path
@@ -14,6 +16,7 @@ from infthor_eval.thor.launch import Launch, embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 from ..helpers.processes import find_children
+from ..helpers.waiting import PATIENCE_S
 from .test_simulator import open_files, scripted
 
 SCENE = "kitchen-3"
@@ -185,3 +188,20 @@ def _counted(step, calls):
         return step(*args, **kwargs)
 
     return counted
+
+
+def test_the_pipes_of_a_killed_process_go_with_the_next_one(tmp_path):
+    code = (
+        "import os, signal, sys\n"
+        "from infthor_eval.thor.transport import SafeFifoServer\n"
+        "server = SafeFifoServer(300, 300)\n"
+        "server.start()\n"
+        "if sys.argv[1:]: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "server.stop()\n"
+    )
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    command = [sys.executable, "-c", code]
+    subprocess.run([*command, "die"], env=environment, check=False, timeout=PATIENCE_S)
+    assert list(tmp_path.rglob("*.pipe"))
+    subprocess.run(command, env=environment, check=True, timeout=PATIENCE_S)
+    assert list(tmp_path.iterdir()) == []

@@ -24,7 +24,12 @@ __all__ = ["command"]
     example="infthor-eval bundle infthor_eval/sets/nieh_mini/manifest.json --out build/nieh_mini",
 )
 @click.argument("manifest", type=PATH)
-@click.option("--out", type=PATH, required=True, help="Folder of the set, new or empty.")
+@click.option(
+    "--out",
+    type=PATH,
+    required=True,
+    help="Folder of the set, new, empty, or with a build that was stopped.",
+)
 def command(manifest: Path, out: Path) -> int:
     """Build the set that MANIFEST describes: trajectories, frames, questions or twins.
 
@@ -33,19 +38,18 @@ def command(manifest: Path, out: Path) -> int:
     """
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.generation.bundle import Manifest, differing_files, read_manifest
-    from infthor_eval.storage.files import prepare_folder
+    from infthor_eval.storage.files import hold_folder
     from infthor_eval.terminal import error_console, print_line, progress_bar
 
     expected = read_manifest(manifest)
-    prepare_folder(out)
-    with progress_bar(error_console()) as progress:
+    with hold_folder(out), progress_bar(error_console()) as progress:
         bar = PacedBar(progress, expected.name, 2 * len(expected.trajectories))
         built: Manifest | TwinsManifest
         if isinstance(expected, Manifest):
             built, lines = _build_questions(expected, out, bar.advance)
         else:
             built, lines = _build_twins(expected, out, bar.advance)
-    size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
+    size = sum((out / name).stat().st_size for name in built.files)
     print_line(f"{lines[0]}, {size / 1e6:.1f} MB: {out}")
     print_line(lines[1])
     if not expected.files:

@@ -22,9 +22,10 @@ def command(what: str, folder: Path | None, token: str | None, endpoint: str | N
     """
     from infthor_eval.cli.progress.notes import print_left_out
     from infthor_eval.nieh.published.hub_data import default_folder, fetch_nieh
-    from infthor_eval.storage.files import prepare_folder
+    from infthor_eval.storage.files import hold_folder
     from infthor_eval.terminal import print_line
 
-    data = fetch_nieh(prepare_folder(folder or default_folder(), "--dir"), token, endpoint)
+    with hold_folder(folder or default_folder(), "--dir") as target:
+        data = fetch_nieh(target, token, endpoint)
     print_line(f"{what}: {len(data.questions)} questions in {data.root}")
     print_left_out(data.root, data.skipped)

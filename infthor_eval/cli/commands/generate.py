@@ -134,7 +134,7 @@ def command(
     from infthor_eval.formats.object_ids import Words
     from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
-    from infthor_eval.storage.files import prepare_folder
+    from infthor_eval.storage.files import hold_folder
     from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor.launch import embedded_launch
 
@@ -156,8 +156,7 @@ def command(
         words=Words(words),
         scene_goal_filter=not no_scene_goal_filter,
     )
-    prepare_folder(out)
-    with progress_bar(notes) as progress:
+    with hold_folder(out), progress_bar(notes) as progress:
         bar = PacedBar(progress, "generate", len(jobs))
         result = generate_with_workers(
             jobs, embedded_launch(data), out, worker_settings, bar.advance, notes.print

@@ -46,17 +46,17 @@ def command(
     model that the training started from.
     """
     from infthor_eval.formats.object_ids import Words
-    from infthor_eval.storage.files import prepare_folder
+    from infthor_eval.storage.files import hold_folder
     from infthor_eval.terminal import print_line
     from infthor_eval.training.export import export
     from infthor_eval.training.published import find_weights, import_weights
     from infthor_eval.training.starting_model import load_starting_model
 
-    prepare_folder(out)
-    folder = find_weights(checkpoint, revision)
-    loaded = load_starting_model(model, parse_model_args(model_args), prompt, seed=0)
-    weights = import_weights(loaded, folder)
-    export(loaded, out, title=f"{model}, weights of {folder.name}", words=Words.PUBLISHED)
+    with hold_folder(out):
+        folder = find_weights(checkpoint, revision)
+        loaded = load_starting_model(model, parse_model_args(model_args), prompt, seed=0)
+        weights = import_weights(loaded, folder)
+        export(loaded, out, title=f"{model}, weights of {folder.name}", words=Words.PUBLISHED)
     counts = (
         f"{weights.n_imported} weights imported, {weights.n_kept} kept, {weights.n_ignored} other "
         "tensors ignored"

@@ -1,5 +1,6 @@
 """`infthor-eval look-around`: level the camera in the long walks of trajectories that exist."""
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import click
@@ -32,14 +33,15 @@ def command(trajectories: Path, out: Path, min_run: int) -> int:
     the actions before; a replay makes new ones.
     """
     from infthor_eval.generation.look_around_set import look_around_files
-    from infthor_eval.storage.files import prepare_file, prepare_folder
+    from infthor_eval.storage.files import hold_folder, prepare_file
     from infthor_eval.terminal import print_line
 
-    if trajectories.is_dir():
-        prepare_folder(out, "OUT")
-    else:
-        prepare_file(out, "OUT")
-    summary = look_around_files(trajectories, out, min_run)
+    with ExitStack() as held:
+        if trajectories.is_dir():
+            held.enter_context(hold_folder(out, "OUT"))
+        else:
+            prepare_file(out, "OUT")
+        summary = look_around_files(trajectories, out, min_run)
     print_line(
         f"{summary.trajectories} trajectories ({summary.changed} changed), {summary.inserted} "
         f"camera actions inserted, {summary.steps} steps: {out}"

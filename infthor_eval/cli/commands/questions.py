@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -174,7 +175,7 @@ def twins(
     from infthor_eval.generation.twins.final_task_set import make_final_tasks
     from infthor_eval.generation.twins.twin_set import make_twins
     from infthor_eval.nieh.scoring import score
-    from infthor_eval.storage.files import prepare_folder
+    from infthor_eval.storage.files import hold_folder
     from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor import launch
     from infthor_eval.thor.supplement import supplement_file
@@ -182,12 +183,13 @@ def twins(
     worker_settings = parse_worker_settings(**workers)
     settings = TwinSettings(_parse_kinds(kinds, final_tasks), seed, per_kind)
     notes = error_console()
-    prepare_folder(out)
-    selection = select(trajectories, limit)
-    with (
-        supplement_file(trajectory for _, trajectory in selection.items) as supplement,
-        progress_bar(notes) as progress,
-    ):
+    with ExitStack() as held:
+        held.enter_context(hold_folder(out))
+        selection = select(trajectories, limit)
+        supplement = held.enter_context(
+            supplement_file(trajectory for _, trajectory in selection.items)
+        )
+        progress = held.enter_context(progress_bar(notes))
         make: Callable[..., TwinSummary | FinalTaskSummary] = make_final_tasks
         if not final_tasks:
             make = partial(

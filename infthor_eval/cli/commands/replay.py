@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,7 +69,7 @@ def command(
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.generation.replay_set import replay_with_workers, select
     from infthor_eval.generation.replay_summary import summarise
-    from infthor_eval.storage.files import prepare_folder
+    from infthor_eval.storage.files import hold_folder
     from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor import launch
     from infthor_eval.thor.supplement import supplement_file
@@ -76,9 +77,12 @@ def command(
     worker_settings = parse_worker_settings(workers, ray_address, gpus_per_worker)
     form = parse_form(frames=frames, unity=unity, **rendering)
     notes = error_console()
-    prepare_folder(out)
-    selection = select(trajectories, limit, per_floor_plan)
-    with supplement_file(trajectory for _, trajectory in selection.items) as supplement:
+    with ExitStack() as held:
+        held.enter_context(hold_folder(out))
+        selection = select(trajectories, limit, per_floor_plan)
+        supplement = held.enter_context(
+            supplement_file(trajectory for _, trajectory in selection.items)
+        )
         start = launch.unity_launch() if unity else launch.embedded_launch(data, supplement)
         with progress_bar(notes) as progress:
             bar = PacedBar(progress, "replay", len(selection.items))

@@ -23,7 +23,7 @@ from infthor_eval.cli.progress.notes import (
     prints_as_notes,
     quiet_notes,
 )
-from infthor_eval.cli.progress.runs import execute_with_progress
+from infthor_eval.cli.progress.runs import execute_runs
 from infthor_eval.cli.results import RunResults, print_results
 from infthor_eval.errors import DataError
 from infthor_eval.reasons import count_reasons
@@ -135,12 +135,7 @@ def evaluate(
         for model in dict.fromkeys(request.model for request, _ in requests):
             if note := model_note(model):
                 print_note(f"{model}: {note}", "yellow")
-        outcomes = []
-        for run in runs:
-            outcomes.append(execute_with_progress(run))
-            export(outcomes[-1])
-            if outcomes[-1].n_missing:
-                break
+        outcomes, is_stopped = execute_runs(runs, finish=export)
     results = [
         RunResults(
             outcome.folder, outcome.run.suite, outcome.summary, outcome.usage, outcome.n_missing
@@ -154,7 +149,7 @@ def evaluate(
     close_failures = [outcome.close_failure for outcome in outcomes if outcome.close_failure]
     for failure in close_failures:
         print_failure(failure)
-    if outcomes[-1].n_missing:
+    if is_stopped:
         return 130
     return 2 if close_failures else int(n_failed + n_void + n_unsent > 0)
 

@@ -96,15 +96,14 @@ def dump(
 
     Other commands take that folder as --data, to run these scenes in the embedded simulator.
     """
-    from infthor_eval.storage.files import prepare_folder
+    from infthor_eval.storage.files import hold_folder
     from infthor_eval.terminal import print_line
     from infthor_eval.thor import launch
     from infthor_eval.thor.scenes import dump_scene
     from infthor_eval.thor.simulator import Simulator
 
-    prepare_folder(out)
     start = launch.embedded_launch(data) if is_embedded else launch.unity_launch(unity)
-    with Simulator(start) as simulator:
+    with hold_folder(out), Simulator(start) as simulator:
         for name in names:
             print_line(f"{name}: {dump_scene(simulator, name, out, overwrite)} objects in {out}")
 
@@ -123,7 +122,7 @@ def fetch(names: tuple[str, ...], out: Path, overwrite: bool, endpoint: str | No
 
     Other commands take that folder as --data, to run these scenes in the embedded simulator.
     """
-    from infthor_eval.storage.files import prepare_folder
+    from infthor_eval.storage.files import hold_folder
     from infthor_eval.terminal import print_line
     from infthor_eval.thor.published_scenes import HOST, PUBLISHED_SCENES, fetch_scene
 
@@ -133,8 +132,7 @@ def fetch(names: tuple[str, ...], out: Path, overwrite: bool, endpoint: str | No
             f"{unknown[0]}: not published; there are FloorPlan1 to 30, 201 to 230, 301 to 330 and "
             "401 to 430"
         )
-    prepare_folder(out)
-    for name in names or PUBLISHED_SCENES:
-        print_line(
-            f"{name}: {fetch_scene(name, out, endpoint or HOST, overwrite)} objects in {out}"
-        )
+    with hold_folder(out):
+        for name in names or PUBLISHED_SCENES:
+            n_objects = fetch_scene(name, out, endpoint or HOST, overwrite)
+            print_line(f"{name}: {n_objects} objects in {out}")

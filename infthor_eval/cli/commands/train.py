@@ -216,20 +216,20 @@ def _train_small_model(
 ) -> None:
     """Train the small model on replayed sets with questions; without any, generate one in `out`."""
     from infthor_eval.cli.training_data import generate_training_data
-    from infthor_eval.storage.files import prepare_folder
+    from infthor_eval.storage.files import hold_folder
     from infthor_eval.training.export import export
     from infthor_eval.training.nano.stages import train_small_model
 
-    prepare_folder(out)
-    sets = list(folders) or generate_training_data(
-        recipe.scenes, recipe.seed, out / "data", worker_settings
-    )
-    with progress_bar(NOTES) as progress:
-        bars = StepBars(progress)
+    with hold_folder(out):
+        sets = list(folders) or generate_training_data(
+            recipe.scenes, recipe.seed, out / "data", worker_settings
+        )
+        with progress_bar(NOTES) as progress:
+            bars = StepBars(progress)
 
-        def observe(step: NanoProgress) -> None:
-            bars.advance(_STAGES[step.stage], step.step, step.n_steps, f"loss {step.loss:.3f}")
+            def observe(step: NanoProgress) -> None:
+                bars.advance(_STAGES[step.stage], step.step, step.n_steps, f"loss {step.loss:.3f}")
 
-        loaded = train_small_model(recipe, sets, out / "states", observe, print_note)
-    export(loaded, out / "checkpoint", title=recipe.title, words=recipe.words)
-    console().print(f"{out / 'checkpoint'}")
+            loaded = train_small_model(recipe, sets, out / "states", observe, print_note)
+        export(loaded, out / "checkpoint", title=recipe.title, words=recipe.words)
+        console().print(f"{out / 'checkpoint'}")

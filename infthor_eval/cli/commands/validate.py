@@ -11,7 +11,7 @@ from infthor_eval.cli.options.run import RunOptions
 from infthor_eval.cli.options.values import PATH, ModelList, ModelSpec, WholeNumber
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.cli.progress.notes import print_note, prints_as_notes
-from infthor_eval.cli.progress.runs import execute_with_progress
+from infthor_eval.cli.progress.runs import execute_runs
 from infthor_eval.errors import UsageError
 from infthor_eval.nieh.results.tables import clues_table
 from infthor_eval.nieh.samples import find_set
@@ -113,11 +113,9 @@ def validate(
     check_output(out, data)
     with prints_as_notes():
         runs = [prepare(request, suite) for request, suite in requests]
-    outcomes = []
-    for run in runs:
-        outcomes.append(execute_with_progress(run))
-        if outcomes[-1].n_missing:
-            return 130
+    outcomes, is_stopped = execute_runs(runs)
+    if is_stopped:
+        return 130
     answered = {record.id for record in outcomes[0].records}
     questions = [question for question in data.questions if question.id in answered]
     by_model = dict(zip(_model_names(outcomes), map(_replies, outcomes), strict=True))

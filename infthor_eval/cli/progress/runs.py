@@ -1,5 +1,6 @@
 """Progress of a run, on standard error."""
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rich.progress import Progress
@@ -11,7 +12,7 @@ from infthor_eval.reasons import count_reasons
 from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, execute
 from infthor_eval.terminal import progress_bar
 
-__all__ = ["execute_with_progress", "print_workload"]
+__all__ = ["execute_runs", "print_workload"]
 
 
 class _ProgressObserver:
@@ -48,8 +49,37 @@ def print_workload(workload: Workload) -> None:
         print_note(f"{cost.task}: {cost.description}")
 
 
-def execute_with_progress(run: PreparedRun) -> RunOutcome:
-    """Execute a run, with a bar on a terminal and lines elsewhere."""
+def execute_runs(
+    runs: Sequence[PreparedRun], finish: Callable[[RunOutcome], object] = lambda _: None
+) -> tuple[list[RunOutcome], bool]:
+    """Execute runs one after another, each with a bar on a terminal and lines elsewhere.
+
+    Args:
+        runs: the runs.
+        finish: called after each.
+
+    Returns:
+        The runs that were begun, and whether Ctrl-C left something undone: units of the last one,
+        or the runs after it.
+    """
+    outcomes: list[RunOutcome] = []
+    for run in runs:
+        outcome, is_requested = _execute(run)
+        outcomes.append(outcome)
+        finish(outcome)
+        if outcome.n_missing:
+            return outcomes, True
+        left = len(runs) - len(outcomes)
+        if is_requested and left:
+            print_note(
+                f"stopped, {left} run(s) not begun; run the same command to continue", "yellow"
+            )
+            return outcomes, True
+    return outcomes, False
+
+
+def _execute(run: PreparedRun) -> tuple[RunOutcome, bool]:
+    """Execute a run; return whether Ctrl-C was pressed, too."""
     with progress_bar(NOTES) as progress, stop_on_sigint(print_note) as stop, prints_as_notes():
         observer = _ProgressObserver(run.request.label, progress, stop)
         outcome = execute(run, observer, stop)
@@ -64,4 +94,4 @@ def execute_with_progress(run: PreparedRun) -> RunOutcome:
             "command to continue",
             "yellow",
         )
-    return outcome
+    return outcome, stop.is_requested

@@ -32,6 +32,7 @@ from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.contexts.base import RecallSettings
 from infthor_eval.nieh.records import NiehRecall
 from infthor_eval.nieh.samples import TaskSamples
+from infthor_eval.storage.deadlines import not_counted
 from infthor_eval.storage.digests import fingerprint
 
 __all__ = ["FindRecall", "KeepRecall", "Recaller", "apply_recall", "recall_all"]
@@ -179,17 +180,28 @@ class Recaller:
                 name=question.cluster,
                 tokens_per_frame=settings.tokens_per_frame,
                 seed=settings.seed,
-                write=write,
+                write=None if write is None else _uncounted(write),
             )
             seen = _visible(steps, memory)
             start = time.perf_counter()
             with wrap_memory_errors(settings.memory):
                 memory.begin(facts)
-                for step in seen[:-1]:
+            for step in seen[:-1]:
+                with wrap_memory_errors(settings.memory):
                     memory.observe(step)
             built = _Built(steps, settings, memory, seen, time.perf_counter() - start)
             self._built = built
         return built
+
+
+def _uncounted(write: Write) -> Write:
+    """Return what asks the model; the model's time is none of the memory's, which is limited."""
+
+    def ask(*arguments: Any, **options: Any) -> Any:
+        with not_counted():
+            return write(*arguments, **options)
+
+    return ask
 
 
 def apply_recall(sample: Sample, recall: NiehRecall) -> Sample:

@@ -23,7 +23,9 @@ from infthor_eval.nieh.rescoring.unsure import KnownAnswers
 from infthor_eval.nieh.results.summary import is_open_ended
 from infthor_eval.runs import Session, Unit, UnitKey, UnitRecord, Usage
 from infthor_eval.runs.limiting import limit_items
+from infthor_eval.storage.deadlines import limit_time
 from infthor_eval.storage.digests import fingerprint
+from infthor_eval.storage.limits import JUDGE_SECONDS
 from model_adapters import (
     Decoding,
     Model,
@@ -177,7 +179,9 @@ class Judge:
         if known is not None:
             return known.score
         start = time.perf_counter()
-        with wrap_request_errors(self.name):
+        seconds = JUDGE_SECONDS.value
+        late = f"{self.name} gives no verdict within {seconds} s; {JUDGE_SECONDS.hint}"
+        with wrap_request_errors(self.name), limit_time(seconds, ModelError(late)):
             self._conversation.rewind(self._start)
             self._conversation.append(text)
             reply = self._conversation.reply(self._decoding)

@@ -90,9 +90,10 @@ class RecalledHistory:
         clues = (() if past.clue is None else (past.clue,)) if self._privileged else None
         query = Query(text=f"{past.goal} {past.present.plan}", present=present, clues=clues)
         size = self._tokens_per_frame(present, count)
-        with self._in_use, wrap_memory_errors(self._name):
+        with self._in_use:
             self._observe(steps, size)
-            recalled = pieces_of(self._memory.recall(query, self._budget), self._name)
+            with wrap_memory_errors(self._name):
+                recalled = pieces_of(self._memory.recall(query, self._budget), self._name)
         check_recalled(recalled, steps, self._name, self._budget, size)
         frames = past.frames
         return [item if isinstance(item, str) else frames[item.number] for item in recalled]
@@ -111,9 +112,12 @@ class RecalledHistory:
         n_known = len(self._observed)
         if not n_known or list(steps[:n_known]) != self._observed:
             n_known = 0
-            self._memory.begin(TrajectoryFacts(name="episode", tokens_per_frame=tokens_per_frame))
+            with wrap_memory_errors(self._name):
+                facts = TrajectoryFacts(name="episode", tokens_per_frame=tokens_per_frame)
+                self._memory.begin(facts)
         for step in steps[n_known:]:
-            self._memory.observe(step)
+            with wrap_memory_errors(self._name):
+                self._memory.observe(step)
         self._observed = list(steps)
 
 

@@ -19,6 +19,7 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.sequence_text import goal_part, plan_part
 from infthor_eval.plans.history.past import CountTokens, Past
 from infthor_eval.plans.history.segments import Part
+from infthor_eval.storage.files import writing_hint
 
 __all__ = ["RetrievedFrames", "require_retrieved", "retrieved_steps"]
 
@@ -124,6 +125,6 @@ def _resized(frame: FrameRef) -> FrameRef:
     path = frame.path.with_name(f"{Path(frame.name).stem}-{_SIDE}.png")
     if not path.is_file():
         image = frame.load().resize((_SIDE, _SIDE), resample=Image.Resampling.LANCZOS)
-        with wrap_errors(f"{path}: cannot be written", "make room, or set TMPDIR", catch=OSError):
+        with wrap_errors(f"{path}: cannot be written", writing_hint(", or set TMPDIR")):
             image.save(path, compress_level=1)
     return FrameRef(path)

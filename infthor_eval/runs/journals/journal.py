@@ -45,7 +45,7 @@ from infthor_eval.runs.journals.shards import (
     read_shards,
 )
 from infthor_eval.runs.usage import NOTHING, Usage
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import write_atomically, writing_hint
 from infthor_eval.storage.limits import FILE_MB
 
 __all__ = ["Journal", "recover", "set_aside"]
@@ -207,7 +207,7 @@ class Journal(Generic[Payload]):
         line = memoryview(self._gate.line_of(record) + b"\n")
         if os.fstat(self._file.fileno()).st_size + len(line) > FILE_MB.value * _MB:
             raise DataError(f"{self._path}: holds {FILE_MB.value} MiB, the most; {FILE_MB.hint}")
-        hint = "make room and run the same command again, which resumes it"
+        hint = writing_hint(" and run the same command again, which resumes it")
         # Threads must not mix their lines.
         with self._writing, wrap_errors(f"{self._path}: cannot be written", hint):
             while line:  # an unbuffered write may take a part of the line only

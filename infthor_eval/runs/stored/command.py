@@ -11,7 +11,7 @@ import yaml
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.runs.request import RunRequest
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import write_atomically, writing_hint
 
 __all__ = ["StoredCommand", "read_options", "read_stored_command", "write_command"]
 
@@ -64,7 +64,7 @@ def write_command(folder: Path, request: RunRequest) -> None:
     with (
         wrap_errors(
             f"{path}: cannot be written",
-            "make room and run the same command again, which resumes it",
+            writing_hint(" and run the same command again, which resumes it"),
         ),
         write_atomically(path) as partial,
     ):

@@ -9,6 +9,7 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 
 from infthor_eval.errors import UsageError
+from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.records import Payload, SuiteUnit, UnitKey
 from infthor_eval.runs.request import RunRequest, prepare
 from infthor_eval.runs.suite import Suite
@@ -77,18 +78,19 @@ def check_equality(request: RunRequest, suite: Suite[SuiteUnit, Payload], n_unit
     limit = request.tasks.limit
     few = n_units if limit is None else min(n_units, limit)
     request = replace(request, tasks=replace(request.tasks, limit=few))
+    gate = Gate(suite.records)
     with closing(_bind(request, suite, switched)) as bound:
-        ours = _replies(bound)
+        ours = _replies(bound, gate)
     with closing(_bind(request, suite, {})) as bound:
-        plain = _replies(bound)
+        plain = _replies(bound, gate)
         n_differing = _n_differing(ours, plain)
         if not n_differing:
             return Equality(switched, len(plain), 0)
-        n_unstable = _n_differing(_replies(bound, backwards=True), plain)
+        n_unstable = _n_differing(_replies(bound, gate, backwards=True), plain)
     alone = {}
     for option, value in switched.items() if len(switched) > 1 else ():
         with closing(_bind(request, suite, {option: value})) as bound:
-            alone[option] = _n_differing(_replies(bound), plain)
+            alone[option] = _n_differing(_replies(bound, gate), plain)
     return Equality(switched, len(plain), n_differing, n_unstable, alone)
 
 
@@ -101,17 +103,21 @@ def _bind(
     return bind_run(prepare(replace(request, model_options={**others, **switched}), suite))
 
 
-def _replies(bound: BoundRun[SuiteUnit, Payload], *, backwards: bool = False) -> _Replies:
+def _replies(
+    bound: BoundRun[SuiteUnit, Payload], gate: Gate[Payload], *, backwards: bool = False
+) -> _Replies:
     """Return the replies by unit; a failure in its place, as it has to be the same."""
-    return dict(_each_reply(bound, -1 if backwards else 1))
+    return dict(_each_reply(bound, gate, -1 if backwards else 1))
 
 
-def _each_reply(bound: BoundRun[SuiteUnit, Payload], step: int) -> Iterator[tuple[UnitKey, str]]:
+def _each_reply(
+    bound: BoundRun[SuiteUnit, Payload], gate: Gate[Payload], step: int
+) -> Iterator[tuple[UnitKey, str]]:
     session = UnrecordedSession()
     evaluation = bound.evaluation
     for group in evaluation.workload.groups[::step]:
         ordered = replace(group, units=group.units[::step])
-        for record in group_records(evaluation, ordered, session):
+        for record in group_records(evaluation, ordered, session, gate):
             reply = evaluation.to_sample(record).reply
             yield record.key, reply if record.failure is None else f"failed: {record.failure}"
 

@@ -7,7 +7,6 @@ of giving wrong results.
 - Without shared prefixes, `generate` gives a reply of the tokens that are chosen here.
 """
 
-import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +18,7 @@ from PIL import Image
 
 from infthor_eval.errors import ModelError, in_one_line, wrap_errors
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.storage.scratch import ScratchFolder
 from model_adapters.hf.adapter import wrap_mismatch_errors
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
@@ -48,8 +48,8 @@ def check_loaded(model: TransformersModel | UncachedModel, processor: Any, pretr
         ModelError: the checkpoint's parts do not belong together, or it is run otherwise than its
             own code runs it; the message says which option to use.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        turns = [Turn("user", _sample(Path(folder)))]
+    with ScratchFolder() as folder:
+        turns = [Turn("user", _sample(folder))]
         if isinstance(model, TransformersModel):
             _check_shared(model, turns, processor, pretrained)
             _check_together(model, turns[0].parts[1], pretrained)
@@ -68,8 +68,8 @@ def require_same_ids(loaded: LoadedCheckpoint, processor: Any, pretrained: str, 
         ModelError: the ids differ; the message ends in `hint`.
     """
     prompter = Prompter(loaded.tokenizer, loaded.template, loaded.family)
-    with tempfile.TemporaryDirectory() as folder, wrap_mismatch_errors(pretrained):
-        turns = [Turn("user", _sample(Path(folder)))]
+    with ScratchFolder() as folder, wrap_mismatch_errors(pretrained):
+        turns = [Turn("user", _sample(folder))]
         _compare_ids(prompter.pieces(turns), process_turns(processor, loaded.template, turns), hint)
 
 

@@ -10,13 +10,9 @@ from jinja2 import TemplateError
 
 from infthor_eval.errors import ModelError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.storage.deadlines import limit_time
 from infthor_eval.storage.limits import TEMPLATE_CHARACTERS, TEMPLATE_MB, TEMPLATE_SECONDS
-from model_adapters.hf.prompting.template_limits import (
-    OutOfMemoryError,
-    OutOfTimeError,
-    limit_memory,
-    limit_time,
-)
+from model_adapters.hf.prompting.memory_limit import OutOfMemoryError, limit_memory
 from model_adapters.protocols import Part, Turn, Video
 
 __all__ = ["Marks", "prompt_end", "render", "starts_with_bos", "writes_videos"]
@@ -164,15 +160,14 @@ def _apply(
     problem = f"the chat template refuses {_roles(turns)}"
     # A template is code that comes with the checkpoint: it must neither run forever nor use up the
     # memory.
+    seconds = TEMPLATE_SECONDS.value
+    late = f"{problem} (it is not done after {seconds} s); fix it; {TEMPLATE_SECONDS.hint}"
     with (
-        wrap_errors(
-            problem, f"fix it; {TEMPLATE_SECONDS.hint}", catch=OutOfTimeError, raise_as=ModelError
-        ),
+        limit_time(seconds, ModelError(late)),
         wrap_errors(
             problem, f"fix it; {TEMPLATE_MB.hint}", catch=OutOfMemoryError, raise_as=ModelError
         ),
         wrap_errors(problem, "use other turns, or fix it", catch=_REFUSALS, raise_as=ModelError),
-        limit_time(TEMPLATE_SECONDS.value),
         limit_memory(TEMPLATE_MB.value),
     ):
         text: str = tokenizer.apply_chat_template(

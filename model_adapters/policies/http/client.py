@@ -8,6 +8,7 @@ import urllib.request
 from typing import Any
 
 from infthor_eval.errors import ModelError, in_one_line
+from infthor_eval.storage.deadlines import limit_time
 
 __all__ = ["JsonClient"]
 
@@ -71,6 +72,11 @@ class JsonClient:
         )
 
     def _send_once(self, body: bytes) -> bytes:
+        # Of the whole request: a socket's timeout begins again with each byte that arrives.
+        with limit_time(self._timeout_s, self._timeout_error()):
+            return self._exchange(body)
+
+    def _exchange(self, body: bytes) -> bytes:
         request = urllib.request.Request(self._url, body, {"Content-Type": "application/json"})
         try:
             with self._opener.open(request, timeout=self._timeout_s) as reply:
@@ -87,13 +93,10 @@ class JsonClient:
             raise self._timeout_error() from error
 
     def _read(self, reply: http.client.HTTPResponse) -> bytes:
-        """Read the whole reply within the limit; a socket's timeout restarts with each piece."""
+        """Read the whole reply."""
         content = b""
-        end = time.monotonic() + self._timeout_s
         while piece := reply.read1(_PIECE):
             content += piece
-            if time.monotonic() > end:
-                raise self._timeout_error()
             if len(content) > _LARGEST:
                 raise ModelError(
                     f"{self._url} answers more than {_LARGEST} bytes; is it a policy's?"

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.memory import MEMORIES
+from infthor_eval.storage.limits import MEMORY_SECONDS
 
 from ...helpers.command_line import option_words
 
@@ -126,3 +127,19 @@ def test_a_memory_that_fails_fails_its_questions_alone(tmp_path, run_cli):
         f"the memory {path}:Changes fails (KeyError in mine.py:31 (recall): no 'mug')"
     }
     assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("where", ["observe", "recall"])
+def test_a_memory_that_does_not_end_is_not_waited_for(tmp_path, run_cli, monkeypatch, where):
+    monkeypatch.setenv(MEMORY_SECONDS.name, "1")
+    path = tmp_path / "mine.py"
+    path.write_text(
+        "import time\n"
+        "from infthor_eval.memory.frames import Last\n"
+        "class Slow(Last):\n"
+        f"    def {where}(self, *arguments):\n"
+        "        time.sleep(600)\n"
+    )
+    code, out, _ = run_cli("check-memory", f"{path}:Slow")
+    assert code == 1
+    assert "it is not done after 1 s" in out

@@ -9,6 +9,7 @@ import pytest
 from infthor_eval.nieh.config import RescoredConfig, SourceRun
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
+from infthor_eval.storage.limits import SCORER_SECONDS
 
 from ...helpers.command_line import option_words
 from ...helpers.nieh_runs import make_record
@@ -210,6 +211,18 @@ def test_an_exception_fails_the_reply_alone_and_its_traceback_is_kept(source, re
     lines = read_journal_lines(new)
     rescore(folder, "--scorer", "own.py:third")
     assert read_journal_lines(new) == lines
+
+
+def test_a_scorer_that_does_not_end_fails_the_reply_alone(source, rescore, own, monkeypatch):
+    monkeypatch.setenv(SCORER_SECONDS.name, "1")
+    own("def f(reply, answers):\n    while reply == 'Sofa':\n        pass\n    return 1\n")
+    code, output, new = rescore(source(REPLIES[:2]), "--scorer", "own.py:f")
+    assert code == 1
+    assert f"f fails: it is not done after 1 s; if this is intended, set {SCORER_SECONDS.name}" in (
+        output
+    )
+    records = {one.id: one for one in read_run(new, RECORDS)[1]}
+    assert [records[name].failure is None for name in ("q0", "q1")] == [False, True]
 
 
 @pytest.mark.parametrize(

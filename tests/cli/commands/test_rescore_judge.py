@@ -1,11 +1,13 @@
 """A judge on the replies of a run: where it decides, what it is asked, and how it is measured."""
 
 import json
+from pathlib import Path
 
 import pytest
 
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
+from infthor_eval.storage.limits import JUDGE_SECONDS
 
 from ...helpers.nieh_runs import make_record
 from .rescored import REPLIES, read_journal_lines, read_report, read_row, read_scores
@@ -163,6 +165,17 @@ def test_a_judge_that_cannot_be_asked_is_counted_and_asked_again_next_time(
     requests()
     rescore(folder, *WITH_JUDGE, "--judge-args", "soft=raise")
     assert len(requests()) == 1
+
+
+def test_a_judge_that_does_not_answer_is_not_waited_for(source, rescore, requests, monkeypatch):
+    monkeypatch.setenv(JUDGE_SECONDS.name, "1")
+    waits = 'if "soft" in data["reply"]:\n            import time; time.sleep(600)'
+    Path("judge.py").write_text(JUDGE.replace('if "soft" in data["reply"]:', waits))
+    code, output, new = rescore(source(), *WITH_JUDGE)
+    assert code == 1
+    assert "judge: not asked about 1 replies, whose strict score stands: " in output
+    assert f"no verdict within 1 s; if this is intended, set {JUDGE_SECONDS.name}" in output
+    assert read_scores(new, "judged")["q1"] == 0.0
 
 
 def test_a_reply_is_data_for_the_judge(source, rescore, requests):

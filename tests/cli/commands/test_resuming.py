@@ -1,6 +1,8 @@
 """Runs that are resumed, restarted, recovered or named."""
 
 import json
+import os
+import signal
 
 import pytest
 
@@ -151,3 +153,25 @@ def test_two_journals_in_one_file_are_named_and_recovered_from(ask, tmp_path):
     assert code == 0
     assert "oracle: 1 bad line(s) of the journal set aside" in err
     assert "0 evaluated now, 5 resumed from the journal" in err
+
+
+def test_ctrl_c_at_the_last_sample_of_a_model_begins_no_other(ask, tmp_path, monkeypatch):
+    append = Journal.append
+
+    def append_and_interrupt(self, record):
+        written = append(self, record)
+        if len(self.records) == 5:
+            os.kill(os.getpid(), signal.SIGINT)
+        return written
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Journal, "append", append_and_interrupt)
+        code, out, err = ask(model="oracle,blind")
+    assert code == 130
+    assert "stopped, 1 run(s) not begun; run the same command to continue" in err
+    assert [line.split()[0] for line in out.splitlines() if " nieh_gt " in line] == ["oracle"]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["oracle"]
+    code, _, err = ask(model="oracle,blind")
+    assert code == 0
+    assert "oracle: 0 evaluated now, 5 resumed" in err
+    assert "blind: 5 evaluated now" in err

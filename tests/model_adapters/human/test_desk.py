@@ -42,7 +42,29 @@ def test_a_question_waits_for_its_answer_and_is_gone_then() -> None:
     assert desk.question is not None and desk.question.number == 1
     desk.give(1, Answer("Fridge", 7))
     thread.join()
-    assert (answers, desk.question, desk.n_answered) == ([Answer("Fridge", 7)], None, 1)
+    assert (answers, desk.question) == ([Answer("Fridge", 7)], None)
+
+
+@pytest.mark.parametrize("is_kept", [True, False])
+def test_an_answer_counts_once_the_run_has_kept_it(is_kept: bool) -> None:
+    desk = Desk()
+    thread, _ = asking(desk)
+    desk.give(1, Answer("Fridge", 7))
+    thread.join()
+    kept: list[bool] = []
+    telling = threading.Thread(target=lambda: kept.append(desk.wait_until_kept(1)), daemon=True)
+    telling.start()
+    telling.join(0.05)
+    assert (kept, desk.n_answered) == ([], 0)
+    if is_kept:
+        thread, _ = asking(desk)  # the run goes on when the record is on disk
+        telling.join(60.0)
+        desk.stop()
+        thread.join()
+    else:
+        desk.close(is_kept=False)
+        telling.join(60.0)
+    assert (kept, desk.n_answered) == ([is_kept], int(is_kept))
 
 
 def test_an_answer_to_another_question_is_refused_and_the_first_of_two_counts() -> None:

@@ -3,6 +3,7 @@
 import socket
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from http.server import BaseHTTPRequestHandler
 from typing import Any
 
@@ -140,16 +141,28 @@ def test_a_redirect_is_not_followed(plain_frames: Frames) -> None:
     assert "answers 302" in _refused(answer, plain_frames[0])
 
 
-@pytest.mark.parametrize("slow", ["before it answers", "while it answers"])
+_SLOW_PIECES = {
+    "before it answers": b"",
+    "in its head": b"X-More: 1\r\n",
+    "in a line of its head": b"x",
+    "with 100 Continue": b"HTTP/1.1 100 Continue\r\n\r\n",
+    "while it answers": b"0.1,",
+    "while it says what is wrong": b" ",
+}
+
+
+@pytest.mark.parametrize("slow", _SLOW_PIECES)
 def test_a_server_that_takes_too_long_is_not_waited_for(slow: str, plain_frames: Frames) -> None:
     done = threading.Event()
 
     def answer(_request: Any, handler: BaseHTTPRequestHandler) -> None:
-        if slow == "while it answers":
-            send(handler, 200, b"[0.1,", length=10_000)
+        if slow.startswith("while"):
+            send(handler, 500 if "wrong" in slow else 200, b"[0.1,", length=10_000)
+        elif slow.startswith("in"):
+            handler.wfile.write(b"HTTP/1.1 200 OK\r\n")
         while not done.wait(0.05):
-            if slow == "while it answers":
-                handler.wfile.write(b"0.1,")
+            with suppress(OSError):  # the client has gone
+                handler.wfile.write(_SLOW_PIECES[slow])
 
     try:
         message = _refused(answer, plain_frames[0], timeout_s="0.3")

@@ -1,15 +1,12 @@
-"""Limits on memory and computing time of code that comes with a checkpoint (chat templates)."""
+"""A limit on the memory of code that comes with a checkpoint (chat templates)."""
 
 import resource
-import signal
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
-from types import FrameType
 
-__all__ = ["OutOfMemoryError", "OutOfTimeError", "limit_memory", "limit_time"]
+__all__ = ["OutOfMemoryError", "limit_memory"]
 
 _SIZE = Path("/proc/self/statm")  # its first number is the process's address space in pages
 _MB = 1024 * 1024
@@ -54,33 +51,3 @@ def _bound(megabytes: int, others: list[int]) -> int | None:
         return None
     # setrlimit cannot represent larger values.
     return min(pages * resource.getpagesize() + megabytes * _MB, 2**62, *others)
-
-
-class OutOfTimeError(Exception):
-    """Code computed for longer than allowed."""
-
-
-@contextmanager
-def limit_time(seconds: int) -> Iterator[None]:
-    """Stop code that computes for longer; only in the main thread, because signals reach no other.
-
-    The processor time of the process counts, so the limit does not depend on the load of the
-    machine.
-
-    Raises:
-        OutOfTimeError: the time is used up.
-    """
-
-    def stop(_number: int, _frame: FrameType | None) -> None:
-        raise OutOfTimeError(f"it is not done after {seconds} s")
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGVTALRM, stop)
-    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
-        signal.signal(signal.SIGVTALRM, before)
