@@ -52,7 +52,7 @@ class Exchange:
                 for obj, other in zip(both, both[::-1], strict=True)
             },
         )
-        words = {}, types if is_handled else {}
+        words: tuple[dict[str, str], dict[str, str]] = ({}, types if is_handled else {})
         first, second = (
             in_world(episode.trajectory, scene, exchange_ids(role), renamed)
             for scene, role, renamed in zip(scenes, roles, words, strict=True)

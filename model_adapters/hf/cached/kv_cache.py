@@ -74,7 +74,8 @@ class BufferedCache(Cache):
         one: for measuring memory, not for replies."""
         for layer in self.layers:
             if isinstance(layer, BufferedLayer) and layer.keys is not None:
-                layer.update(*(_repeated(last, n_tokens) for last in (layer.keys, layer.values)))
+                assert layer.values is not None  # both or none
+                layer.update(_repeated(layer.keys, n_tokens), _repeated(layer.values, n_tokens))
 
     @property
     def needs_marks(self) -> bool:

@@ -13,7 +13,7 @@ from PIL import Image
 from infthor_eval.errors import ModelError, UsageError
 from model_adapters.hf.families.hf_vlm import HfVlm, ProcessorFamily, family_of
 from model_adapters.hf.families.plain import PlainFamily, three_axis_positions
-from model_adapters.hf.family import Family, Shape, Size
+from model_adapters.hf.family import Family, Pixels, Shape, Size
 from model_adapters.hf.loading.checkpoint import (
     LocatedCheckpoint,
     build_meta_model,
@@ -22,6 +22,7 @@ from model_adapters.hf.loading.checkpoint import (
 )
 from model_adapters.hf.loading.processors import load_processor
 from model_adapters.hf.loading.rope import apply_rope
+from model_adapters.hf.prompting.ahead import Ahead, PixelsAhead, read_pixels
 from model_adapters.hf.prompting.embedding import Embed
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.native import EncodedImage, NativeEmbedder
@@ -55,11 +56,12 @@ class _TextFamily(PlainFamily):
             return three_axis_positions(core, ids, -1, None, start)
         return super().positions(ids, shapes, start)
 
-    def make_embed(self, max_bytes: int) -> Embed:
+    def make_embed(self, max_bytes: int, ahead: Ahead) -> Embed:
         """Return what prepares spans of text."""
-        return NativeEmbedder(self._model, self, FeatureCache(self.encode, max_bytes))
+        pixels = PixelsAhead(partial(read_pixels, self), ahead)
+        return NativeEmbedder(self._model, self, FeatureCache(pixels, self.encode, max_bytes))
 
-    def encode(self, images: Sequence[Image.Image]) -> list[EncodedImage]:
+    def encode(self, frames: Sequence[Pixels]) -> list[EncodedImage]:
         """Refuse frames."""
         raise NotImplementedError
 

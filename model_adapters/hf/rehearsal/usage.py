@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import torch
@@ -19,6 +20,7 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.hf.cached.batch import encode_together
 from model_adapters.hf.cached.branch_attention import layer_windows
 from model_adapters.hf.cached.prefix import Prefix, chunks
+from model_adapters.hf.prompting.ahead import Ahead
 from model_adapters.hf.prompting.prompt import Frame, Piece, n_tokens
 from model_adapters.hf.rehearsal.flash import flash_attention, flash_problem
 from model_adapters.hf.rehearsal.kernels import Attention
@@ -106,7 +108,7 @@ class Rehearsal:
         options = rehearsed.options
         cache_bytes = options.feature_cache_mb * _MIB if options.share_prefix else 0
         self._features = 0 if rehearsed.problem else cache_bytes
-        self._embed = rehearsed.family.make_embed(cache_bytes)
+        self._embed = rehearsed.family.make_embed(cache_bytes, Ahead(n_threads=0))
         self._prefix = Prefix(
             rehearsed.model, rehearsed.family, self._embed, chunk_tokens=options.chunk_tokens
         )
@@ -238,7 +240,7 @@ class Rehearsal:
             self._start(n_context, n_tokens(self._chunk) + _QUESTION + 1)
             device.reset_peak()
             kernels = {
-                name: self._attention(lambda pieces=pieces: self._prefix.feed(pieces))
+                name: self._attention(partial(self._prefix.feed, pieces))
                 for name, pieces in self.parts.items()
             }
             cache = device.allocated - held
