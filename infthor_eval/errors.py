@@ -100,7 +100,8 @@ STOPS = (KeyboardInterrupt, Terminated)
 def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
     """Return the error for an unknown name of a kind ("task"); it suggests the closest, or all."""
     names = sorted(known)
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    longer = [each for each in names if name and each.startswith(name)]
+    near = longer or difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names)}"
     return UsageError(f"unknown {what} {name!r}; {hint}")
 
@@ -128,6 +129,8 @@ def _as_unicode(text: str) -> str:
 
 def describe_exception(error: BaseException) -> str:
     """Return type, place and message of an unexpected exception, in one line."""
+    if isinstance(error, SyntaxError) and error.filename:  # of what was to be imported
+        return f"{type(error).__name__} in {Path(error.filename).name}:{error.lineno}: {error.msg}"
     frame = traceback.extract_tb(error.__traceback__)[-1]
     where = f"{Path(frame.filename).name}:{frame.lineno} ({frame.name})"
     return f"{type(error).__name__} in {where}: {in_one_line(error)}"

@@ -223,4 +223,4 @@ def _published_evaluation(work: Work) -> list[str]:
         for line in done.output.splitlines()
         if line.split()[:2] == ["all", "qwen2.5-vl"]
     )
-    return [f"the published evaluation of it: {row[2]} h on one GPU, {row[3]} h on 8"]
+    return [f"the published evaluation: {row[2]} h on one GPU, {row[3]} h on 8"]

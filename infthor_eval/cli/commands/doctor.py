@@ -55,8 +55,7 @@ _EXTRAS = {
 @click.command(
     "doctor",
     cls=ExampleCommand,
-    example="infthor-eval doctor --data SET\n"
-    "infthor-eval doctor --rehearse --model qwen2.5-vl --tasks nieh",
+    example="infthor-eval doctor --rehearse --model qwen2.5-vl --tasks nieh",
 )
 @click.option(
     "--data",

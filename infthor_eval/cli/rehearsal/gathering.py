@@ -167,7 +167,7 @@ def _frames(data: Path | None, files: Sequence[TaskFile]) -> tuple[Frames, list[
     trajectories, longest, median = _PUBLISHED
     total = trajectories * median
     disk = int(known.disk / known.total * total)
-    source = "published numbers; files like those of the bundled set (`infthor-eval fetch nieh`)"
+    source = "published numbers; files as large as ours (`infthor-eval fetch nieh`)"
     return Frames(source, trajectories, longest, None, total, known.size, disk), samples
 
 
@@ -201,8 +201,6 @@ def _settings(file: TaskFile) -> Mapping[str, Any]:
 def _tokens(file: TaskFile, frames: Frames, per_frame: int | None) -> int | None:
     """Return the tokens of a task's longest context."""
     settings = _settings(file)
-    if file.suite != "nieh":
-        return None
     if "ctx_size" in settings:
         return int(settings["ctx_size"] * 1000) + _TEXT
     by_context = {"trajectory": frames.longest, "clues": frames.most_clues}

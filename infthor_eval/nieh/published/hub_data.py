@@ -47,15 +47,18 @@ def fetch_nieh(folder: Path, token: str | None = None, endpoint: str | None = No
 
 
 def _download(folder: Path, token: str | None, endpoint: str | None) -> None:
-    from huggingface_hub import snapshot_download
+    from huggingface_hub import HfApi, snapshot_download
+    from huggingface_hub.constants import DEFAULT_REVISION
     from huggingface_hub.errors import (
         GatedRepoError,
-        HfHubHTTPError,
-        LocalEntryNotFoundError,
         RepositoryNotFoundError,
     )
 
     try:
+        # A download takes what is in the folder for the data if the hub does not answer.
+        HfApi(endpoint, token=token).repo_info(
+            NIEH_REPOSITORY, repo_type="dataset", revision=DEFAULT_REVISION
+        )
         snapshot_download(
             NIEH_REPOSITORY,
             repo_type="dataset",
@@ -69,7 +72,8 @@ def _download(folder: Path, token: str | None, endpoint: str | None) -> None:
             f"{NIEH_REPOSITORY}: no access; request it on the hub's page, then log in with `hf "
             "auth login`"
         ) from error
-    except (LocalEntryNotFoundError, HfHubHTTPError, OSError) as error:
+    # Each version of the hub's library has another one of the network.
+    except Exception as error:
         cause = " ".join(str(error).split())[:120]
         raise DataError(
             f"{NIEH_REPOSITORY}: cannot be fetched ({cause}); go online, or copy the set to "

@@ -16,6 +16,7 @@ import PIL
 import tokenizers
 import torch
 import transformers
+from transformers.utils import is_torchvision_available
 
 from infthor_eval.errors import ModelError, UsageError, wrap_errors
 from infthor_eval.formats.reading import require_plain_files
@@ -182,7 +183,8 @@ def assemble(
         "chat_template": digest(template),
         "versions": versions(),
     }
-    if image_backend(image_processor) == "torchvision":
+    # Where it is not installed, the same is computed without it.
+    if image_backend(image_processor) == "torchvision" and is_torchvision_available():
         identity["image_backend"] = f"torchvision {version('torchvision')}"
     return LoadedCheckpoint(
         model=model.eval(),

@@ -112,11 +112,11 @@ class _QuickResize:
         if key not in known and len(known) < _MOST:
             noise = np.random.default_rng(_SEED).integers(0, _LEVELS, image.shape, np.uint8)
             resample = kwargs.get("resample")
-            known[key] = find_resize(
-                noise,
-                self._resize_slowly(noise, *args, **kwargs),
-                int(resample) if resample in FILTERS else None,
-            )
+            resized = self._resize_slowly(noise, *args, **kwargs)
+            number = int(resample) if resample in FILTERS else None
+            # Some return more than the image.
+            is_image = isinstance(resized, np.ndarray)
+            known[key] = find_resize(noise, resized, number) if is_image else None
         quick = known.get(key)
         return self._resize_slowly(image, *args, **kwargs) if quick is None else quick(image)
 

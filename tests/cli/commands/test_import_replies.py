@@ -182,7 +182,10 @@ BAD = {
     "swapped": ({**ROWS[1], "qidx": 3}, "answers another question than row 3"),
     "another answer": ({**ROWS[1], "gt_answer": ["No"]}, "answers another question than row 1"),
     "beyond the end": ({**ROWS[1], "qidx": 4}, "answers question 4; the file has 4"),
-    "before the start": ({**ROWS[1], "qidx": -1}, "answers question -1; the file has 4"),
+    "before the start": (
+        {**ROWS[1], "qidx": -1},
+        "is not a reply (Expected `int` >= 0 - at `$.qidx`)",
+    ),
     "the same again": (ROWS[0], "answers qsingle0 again; the first reply is kept"),
     "too long": (
         {**ROWS[1], "llm_response": "yes " * 2_500_000},

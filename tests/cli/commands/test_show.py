@@ -124,7 +124,7 @@ def test_runs_are_listed_with_counts_and_primary_metrics(ran, run_cli, tmp_path)
     assert str(folders[0]) in oracle
 
 
-def test_a_killed_run_is_listed_without_results_and_a_broken_one_is_named(ran, run_cli, tmp_path):
+def test_a_killed_run_is_listed_without_results_and_a_broken_line_is_named(ran, run_cli, tmp_path):
     (oracle, blind), _ = ran()
     (oracle / "results.json").unlink()
     journal = blind / "journal" / "worker-0.jsonl"
@@ -133,7 +133,7 @@ def test_a_killed_run_is_listed_without_results_and_a_broken_one_is_named(ran, r
     assert code == 0
     (row,) = [line.split() for line in out.splitlines() if line.split()[:1] == ["oracle"]]
     assert row[1:5] == ["nieh", "10", "?", "0"]
-    assert f"{blind}: cannot be read: " in err.replace("\n", "")
+    assert f"left out: {journal}, line 12 " in err.replace("\n", "")
 
 
 def test_a_folder_without_runs_says_how_to_make_one(run_cli, tmp_path):

@@ -131,7 +131,7 @@ def test_a_memory_sees_the_steps_before_the_question_and_metadata_only_if_privil
         ("query.present", "which is neither a text nor a step that it has observed"),
         ("3", "recalls 3, which is neither a text nor a step"),
         ('" "', "recalls an empty text"),
-        ("1 / 0", "fails (division by zero); fix it"),
+        ("1 / 0", "(recall): division by zero); fix it"),
         ('"x" * 400', "recalls 100 tokens where the budget is 50"),
     ],
 )
