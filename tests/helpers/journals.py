@@ -1,5 +1,6 @@
 """Journals: those of runs that nobody ran, and what is in those of runs."""
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -8,7 +9,7 @@ from infthor_eval.runs import RecordTypes, RunHeader, UnitRecord, read_header, r
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.suites import find_suite
 
-__all__ = ["RecordedRun", "read_records", "write_journal", "write_run"]
+__all__ = ["RecordedRun", "read_records", "spoil_config", "write_journal", "write_run"]
 
 
 class RecordedRun(Protocol):
@@ -27,6 +28,15 @@ def write_journal(
         for record in records:
             journal.append(record)
     return folder
+
+
+def spoil_config(folder: Path) -> None:
+    """Leave nothing of what a run's journal says of its tasks, as another version's may."""
+    path = folder / "journal" / "worker-0.jsonl"
+    header, *lines = path.read_bytes().splitlines(keepends=True)
+    content = json.loads(header)
+    content["config"]["tasks"] = {name: {} for name in content["config"]["tasks"]}
+    path.write_bytes(json.dumps(content).encode() + b"\n" + b"".join(lines))
 
 
 def write_run(run: RecordedRun, output: Path, name: str | None = None) -> Path:

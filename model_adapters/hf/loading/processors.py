@@ -50,6 +50,8 @@ def load_processor(located: LocatedCheckpoint[Any]) -> Any:
             processor.image_processor = load_image_processor(
                 located.folder, options, **remote, **options.image_settings()
             )
+        except ModelError:
+            raise
         # Without torchvision, its classes are missing in many ways.
         except Exception as error:
             package = _missing_package(error)

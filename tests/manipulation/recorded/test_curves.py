@@ -1,6 +1,5 @@
 """Curves of arms, with numbers made by hand."""
 
-import msgspec
 import pytest
 
 from infthor_eval.episodes.curves import AT_MOST
@@ -8,10 +7,10 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.manipulation.recorded.curves import ALL, arm_curves
 from infthor_eval.manipulation.recorded.runs import ArmRun, label_by_radius
 from infthor_eval.manipulation.records import RECORDS
-from infthor_eval.runs import RunConfig
 from infthor_eval.runs.journals.journal import Journal
 
 from ...helpers.arm_runs import make_arm_planner_run, make_arm_run, make_episode_record
+from ...helpers.journals import spoil_config
 
 T = 12.7062  # quantile of the t interval over two trajectories
 # Two trajectories: of a pick-up and a put, and of a pick-up.
@@ -181,9 +180,8 @@ def test_what_cannot_be_drawn_together_is_refused(case):
 
 def test_a_journal_of_another_form_is_refused(tmp_path):
     run = make_arm_run("m", EPISODES)
-    config = RunConfig(tasks={task: {} for task in run.config.tasks})
-    header = msgspec.structs.replace(run.header, config=config)
-    with Journal(tmp_path, header, RECORDS):
+    with Journal(tmp_path, run.header, RECORDS):
         pass
+    spoil_config(tmp_path)
     with pytest.raises(DataError, match="line 1: not the config of a run of manipulation"):
         ArmRun.read(tmp_path)

@@ -9,9 +9,8 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.plans.recorded.curves import Axis, plan_curves
 from infthor_eval.plans.recorded.runs import PlansRun
 from infthor_eval.plans.records import RECORDS
-from infthor_eval.runs import RunConfig
 
-from ...helpers.journals import write_journal
+from ...helpers.journals import spoil_config, write_journal
 from ...helpers.plan_runs import TASK, make_plan_record, make_planner_run, make_plans_run
 
 T = 12.7062  # quantile of the t interval over two trajectories
@@ -252,7 +251,7 @@ def test_of_several_shared_tasks_one_is_to_be_named():
 
 def test_a_journal_of_another_form_is_refused(tmp_path):
     run = make_plans_run("m", PLANS)
-    other = msgspec.structs.replace(run.header, config=RunConfig(tasks={TASK: {}}))
-    folder = write_journal(tmp_path / "run", other, run.records, RECORDS)
+    folder = write_journal(tmp_path / "run", run.header, run.records, RECORDS)
+    spoil_config(folder)
     with pytest.raises(DataError, match="line 1: not the config of a run of plans"):
         PlansRun.read(folder)

@@ -62,8 +62,9 @@ def _n_threads() -> int:
 
 @pytest.fixture
 def reader(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Reader]:
-    others = {*threading.enumerate()}  # of models that other tests have loaded
-    monkeypatch.setattr(threading, "enumerate", lambda: [*{*_all_threads()} - others])
+    all_threads = threading.enumerate
+    others = {*all_threads()}  # of models that other tests have loaded
+    monkeypatch.setattr(threading, "enumerate", lambda: [*{*all_threads()} - others])
     reader = _Reader()
     yield reader
     reader.go.set()

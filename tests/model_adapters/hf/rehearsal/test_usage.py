@@ -15,6 +15,7 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import load
 from model_adapters.hf.cached.prefix import Prefix
+from model_adapters.hf.prompting.ahead import Ahead
 from model_adapters.hf.prompting.prompt import Piece
 from model_adapters.hf.rehearsal.model import load_shapes
 from model_adapters.hf.rehearsal.usage import Rehearsal
@@ -89,7 +90,7 @@ def test_parameters_and_cache_are_those_of_the_real_model(
 
 def _fed(real: Any, pieces: Sequence[Piece], n_context: int) -> tuple[Prefix, Any]:
     """A real model's sequence of so many pieces, with room for so many tokens."""
-    embed = real.loaded.family.make_embed(0)
+    embed = real.loaded.family.make_embed(0, Ahead(n_threads=0))
     prefix = Prefix(real.loaded.model, real.loaded.family, embed, chunk_tokens=CHUNK)
     prefix.feed(pieces, reserve=n_context - len(pieces))
     return prefix, embed
