@@ -101,8 +101,8 @@ def _images(images: Images) -> str:
         waits = f"it waits unless {ratio:.1f} cores prepare them"
     return (
         f"pictures     {images.here:.0f} frames/s are read and scaled on a core here "
-        f"({images.measured} timed); an H100 encodes about {images.by_gpu:.0f} (rates of "
-        f"docs/cost.md): {waits}"
+        f"({images.measured} timed); an H100 encodes about {images.by_gpu:.1f} half-way along the "
+        f"longest context (rates of docs/cost.md): {waits}"
     )
 
 
