@@ -169,7 +169,7 @@ def wrap_user_code(
     """Turn whatever code of others raises into an error of one line, with its place; ours pass.
 
     `sys.exit` in it is an error like any other: it must not end a run, nor choose the exit code.
-    There may be no `yield` within the context.
+    A generator may not yield to its reader within the context: to close it raises in it, too.
 
     Args:
         problem: the code and what it fails to do ("the memory NAME fails").

@@ -71,14 +71,19 @@ class _Mover:
         self._scene = scene
         self._simulator = simulator
         self._items = items
+        self._waiting = {key: _above(number) for number, key in enumerate(items)}
         restore(simulator, scene)
         self._before = simulator.view.objects
-        for item in items.values():
-            self._lift(item)
+        self._clear()
 
-    def _lift(self, item: ThorObject) -> None:
+    def _clear(self) -> None:
+        """Take all that is moved out of the way."""
+        for item in self._items.values():
+            self._take_away(item)
+
+    def _take_away(self, item: ThorObject) -> None:
         """Take an object out of the way, in the rotation that it has."""
-        _lift(self._simulator, item, _above([*self._items].index(item.object_id)))
+        _lift(self._simulator, item, self._waiting[item.object_id])
 
     def offset_for_both(self, where: ThorObject, other: ThorObject) -> _Offset:
         """Return how far from a place, at least, both the object there and another have room.
@@ -97,8 +102,7 @@ class _Mover:
         Raises:
             EditRefused: they are in each other's way, or move another object.
         """
-        for item in self._items.values():
-            self._lift(item)
+        self._clear()
         for item, where, offset in standing:
             if not self._try(item, where, offset):
                 raise EditRefused("no room for both at once")
@@ -111,13 +115,13 @@ class _Mover:
     def _stands(self, item: ThorObject, where: ThorObject, offset: _Offset) -> bool:
         """Return True if an object can stand beside a place; it is taken away again."""
         stands = self._try(item, where, offset)
-        self._lift(item)
+        self._take_away(item)
         return stands
 
     def _try(self, item: ThorObject, where: ThorObject, offset: _Offset) -> bool:
         """Stand an object beside a place, in line with what is there; return whether it can."""
         simulator = self._simulator
-        self._lift(_turned(item, where))
+        self._take_away(_turned(item, where))
         waiting = simulator.view.objects[item.object_id]
         container = _container(where, self._before)
         if container is None:
