@@ -31,6 +31,7 @@ from tiny_families.tiles import TILES
 from tiny_families.trial import (
     PEERS,
     WAYS,
+    Reference,
     Replies,
     Trial,
     Work,
@@ -41,7 +42,17 @@ from tiny_families.trial import (
 
 from infthor_eval.errors import InfthorError, ModelError, wrap_errors
 
-__all__ = ["FAMILIES", "Row", "main", "report", "try_families"]
+__all__ = [
+    "FAMILIES",
+    "QUESTIONS",
+    "Row",
+    "family_names",
+    "main",
+    "make",
+    "report",
+    "try_families",
+    "write_frames",
+]
 
 _ALL = {**GRIDS, **SQUARES, **TILES, **CROPS}
 # In the order of those that people bring.
@@ -80,7 +91,7 @@ _ORDER = (
     "video_llama_3",
 )
 FAMILIES = {name: _ALL[name] for name in _ORDER}
-_QUESTIONS = (
+QUESTIONS = (
     "Did you see a mug on the table?",
     "What object did you put on the dresser?",
     "How many plates did you see in the kitchen?",
@@ -133,7 +144,10 @@ def main(words: Sequence[str] | None = None) -> None:
 def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
-        "--families", type=_names, default=list(FAMILIES), help="names with commas between them"
+        "--families",
+        type=family_names,
+        default=list(FAMILIES),
+        help="names with commas between them",
     )
     parser.add_argument("--frames", type=int, default=24)
     parser.add_argument("--new-tokens", type=int, default=8)
@@ -144,7 +158,8 @@ def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
     return parser.parse_args(words)
 
 
-def _names(text: str) -> list[str]:
+def family_names(text: str) -> list[str]:
+    """Return the names of families that an option gives with commas between them."""
     names = text.split(",")
     unknown = [name for name in names if name not in FAMILIES]
     if unknown:
@@ -173,8 +188,8 @@ def try_families(
     Raises:
         ModelError: the process of transformers' own way failed.
     """
-    work = Work(_write_frames(root, n_frames), _QUESTIONS, new_tokens)
-    unmade = {name: _make(name, root / name) for name in names}
+    work = Work(write_frames(root, n_frames), QUESTIONS, new_tokens)
+    unmade = {name: make(name, root / name) for name in names}
     made = {name: root / name for name in names if unmade[name] is None}
     expected = reference_replies(made, work)
     return [
@@ -185,7 +200,7 @@ def try_families(
     ]
 
 
-def _write_frames(folder: Path, count: int) -> list[Path]:
+def write_frames(folder: Path, count: int) -> list[Path]:
     """Write different frames of coarse coloured noise."""
     draw = np.random.default_rng(0)
     paths = [folder / f"{number:02d}.png" for number in range(count)]
@@ -195,7 +210,7 @@ def _write_frames(folder: Path, count: int) -> list[Path]:
     return paths
 
 
-def _make(name: str, folder: Path) -> str | None:
+def make(name: str, folder: Path) -> str | None:
     """Write a checkpoint; return one line if that failed."""
     try:
         with wrap_errors(name, "see its config", catch=Exception, raise_as=ModelError):
@@ -206,25 +221,25 @@ def _make(name: str, folder: Path) -> str | None:
 
 
 def _unmade_row(name: str, reason: str | None) -> Row:
-    return Row(name, False, dict.fromkeys(WAYS), len(_QUESTIONS), (f"not made: {reason}",))
+    return Row(name, False, dict.fromkeys(WAYS), len(QUESTIONS), (f"not made: {reason}",))
 
 
-def _row(name: str, trial: Trial, reference: Replies | str) -> Row:
+def _row(name: str, trial: Trial, reference: Reference | str) -> Row:
     notes = list(dict.fromkeys(trial.errors.values()))
     if isinstance(reference, str):
         notes.append(f"transformers' own way fails: {reference}")
         expected = trial.replies.get("unshared", [])
         compared = "unshared" if expected else "-"
     else:
-        *expected, inverted = reference
+        expected = reference.replies
         compared = "generate"
-        if inverted == expected[0]:
+        if reference.inverted == expected[0]:
             notes.append("replies do not depend on the frames")
     return Row(
         name,
         loads=bool(trial.replies),
         equal={way: _n_equal(trial.replies.get(way), expected) for way in WAYS},
-        asked=len(_QUESTIONS),
+        asked=len(QUESTIONS),
         notes=tuple(notes),
         reference=compared,
     )

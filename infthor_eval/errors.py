@@ -20,6 +20,7 @@ __all__ = [
     "DataError",
     "InfthorError",
     "ModelError",
+    "OutputClosed",
     "SceneError",
     "SimulatorError",
     "Terminated",
@@ -92,9 +93,13 @@ class Terminated(SystemExit):
     """SIGTERM arrived: temporary folders and simulators are removed as on Ctrl-C."""
 
 
+class OutputClosed(SystemExit):
+    """Nobody reads standard output any more: `infthor-eval ls tasks | head` has its lines."""
+
+
 # What ends the program from outside. Whoever catches whatever code of others raises (it may call
 # `sys.exit`) lets these pass.
-STOPS = (KeyboardInterrupt, Terminated)
+STOPS = (KeyboardInterrupt, Terminated, OutputClosed)
 
 
 def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:

@@ -13,6 +13,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
+from infthor_eval.errors import OutputClosed
+
 __all__ = [
     "PlainConsole",
     "console",
@@ -56,6 +58,13 @@ class PlainConsole(Console):
         settings |= {"markup": False, "emoji": False, "highlight": False}
         return super().render_str(printable(text), **settings)
 
+    def on_broken_pipe(self) -> None:
+        """See `rich.console.Console.on_broken_pipe`, which ends the program as well."""
+        try:
+            super().on_broken_pipe()
+        except SystemExit as error:
+            raise OutputClosed(error.code) from error
+
 
 def console(**settings: Any) -> PlainConsole:
     """Return a console on standard output."""
@@ -86,7 +95,10 @@ def progress_bar(on: Console) -> Progress:
 
 def print_line(text: str) -> None:
     """Print a line on standard output."""
-    click.echo(printable(text))
+    try:
+        click.echo(printable(text))
+    except BrokenPipeError as error:
+        raise OutputClosed(1) from error
 
 
 def print_error(text: str) -> None:

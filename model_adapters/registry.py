@@ -2,10 +2,12 @@
 
 Adapters are "module:Class" strings that are imported only when a model is needed, so that listing
 names, and the options of built-in models, is fast. Packages add theirs by the entry point group
-`infthor_eval.models`. A name may also be a file and a class in it, `./my_adapter.py:MyModel`.
+`infthor_eval.models`. A name may also be a file and a class or a function in it,
+`./my_adapter.py:MyModel`.
 """
 
 import dataclasses
+import inspect
 import re
 from collections.abc import Mapping
 from importlib.metadata import EntryPoint, entry_points
@@ -17,6 +19,7 @@ from infthor_eval.plugins import import_target
 from model_adapters.adapter_identity import package_identity
 from model_adapters.built_in import BUILT_IN
 from model_adapters.check.clauses import ContractError, check_members
+from model_adapters.functions import function_adapter
 from model_adapters.guarded import guard
 from model_adapters.options import describe, parse
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
@@ -274,6 +277,8 @@ def _adapter(name: str) -> type[Adapter]:
         adapter = load_from_file(name) if names_a_file(name) else import_target(target)
     except (ImportError, AttributeError) as error:
         raise ModelError(f"model {name} cannot be imported from {target} ({error})") from error
+    if names_a_file(name) and inspect.isfunction(adapter):
+        return cast(type[Adapter], function_adapter(name, adapter))
     missing = [member for member in ("Options", "build") if not hasattr(adapter, member)]
     if missing:
         raise ModelError(f"model {name}: {target} has no {' and '.join(missing)}; {_HELP}")

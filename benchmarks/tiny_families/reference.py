@@ -2,13 +2,15 @@
 
 Many processors need torchvision, which is kept out of the environment: the caller puts it on the
 path of this process. Reads a JSON object from the standard input and writes one as its last line:
-the ids of each family's replies, the last of them on inverted frames, or one line of error.
+each family's replies, the last of them on inverted frames, or one line of error. A reply has the
+ids of its tokens, and by how much the logit of each is above that of the next likely one.
 """
 
 import json
 import sys
 from typing import Any, cast
 
+import torch
 import transformers
 from PIL import Image, ImageOps
 
@@ -29,7 +31,7 @@ def main() -> None:
 
 def _answer(
     folder: str, paths: list[str], questions: list[str], new_tokens: int
-) -> list[list[int]]:
+) -> list[dict[str, list[Any]]]:
     processor = _AUTO.AutoProcessor.from_pretrained(folder)
     # As in the project: torchvision's resize gives other pixels.
     processor.image_processor = _AUTO.AutoImageProcessor.from_pretrained(folder, backend="pil")
@@ -42,7 +44,7 @@ def _answer(
 
 def _reply(
     processor: Any, model: Any, frames: list[Any], question: str, new_tokens: int
-) -> list[int]:
+) -> dict[str, list[Any]]:
     content = [*({"type": "image"} for _ in frames), {"type": "text", "text": question}]
     text = processor.apply_chat_template(
         [{"role": "user", "content": content}], add_generation_prompt=True
@@ -56,11 +58,18 @@ def _reply(
     )
     inputs.pop("labels", None)  # PaliGemma's, for training
     output = model.generate(
-        **inputs.to(model.device, model.dtype), do_sample=False, max_new_tokens=new_tokens
+        **inputs.to(model.device, model.dtype),
+        do_sample=False,
+        max_new_tokens=new_tokens,
+        return_dict_in_generate=True,
+        output_logits=True,
     )
-    reply: list[int] = output[0, inputs["input_ids"].shape[1] :].tolist()
-    ends = model.generation_config.eos_token_id
-    return reply[:-1] if reply and reply[-1] in ends else reply
+    best = torch.cat(output.logits).float().topk(2).values
+    margins = (best[:, 0] - best[:, 1]).tolist()
+    tokens: list[int] = output.sequences[0, inputs["input_ids"].shape[1] :].tolist()
+    if tokens and tokens[-1] in model.generation_config.eos_token_id:
+        tokens = tokens[:-1]
+    return {"tokens": tokens, "margins": margins}
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from infthor_eval.errors import InfthorError, ModelError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
@@ -16,10 +17,12 @@ from model_adapters import Decoding, load
 __all__ = [
     "PEERS",
     "WAYS",
+    "Reference",
     "Replies",
     "Trial",
     "Work",
     "ask",
+    "converse",
     "reference_replies",
     "torchvision_path",
 ]
@@ -60,6 +63,21 @@ class Trial:
     errors: dict[str, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Reference:
+    """What transformers' own processor and `generate` reply.
+
+    Attributes:
+        replies: a reply to each question.
+        margins: by how much the logit of each token is above that of the next likely one.
+        inverted: the reply to the first question on inverted frames.
+    """
+
+    replies: Replies
+    margins: Sequence[Sequence[float]]
+    inverted: tuple[int, ...]
+
+
 def ask(folder: Path, work: Work) -> Trial:
     """Ask a checkpoint through `hf-vlm` in each way; a way that fails leaves one line."""
     trial = Trial()
@@ -76,12 +94,23 @@ def ask(folder: Path, work: Work) -> Trial:
 
 def _ask_in(way: str, folder: Path, work: Work) -> Replies:
     settings = {"share_prefix": "false"} if way == "unshared" else {}
+    return converse("hf-vlm", folder, settings, work, together=way == "together")
+
+
+def converse(
+    name: str, folder: Path, settings: Mapping[str, str], work: Work, *, together: bool = False
+) -> Replies:
+    """Return the replies of a checkpoint that this adapter loads, one after the other or together.
+
+    Raises:
+        InfthorError: the adapter does not load it, or fails.
+    """
     decoding = Decoding(max_new_tokens=work.new_tokens)
-    model = load("hf-vlm", {"pretrained": str(folder), **settings}, 0)
+    model = load(name, {"pretrained": str(folder), **settings}, 0)
     with closing(model):
         talk = model.conversation()  # type: ignore[union-attr]
         talk.append(*map(FrameRef, work.frames))
-        if way == "together":
+        if together:
             replies = talk.replies([[question] for question in work.questions], decoding)
         else:
             mark = talk.mark()
@@ -93,9 +122,9 @@ def _ask_in(way: str, folder: Path, work: Work) -> Replies:
     return [reply.token_ids or () for reply in replies]
 
 
-def reference_replies(folders: Mapping[str, Path], work: Work) -> dict[str, Replies | str]:
+def reference_replies(folders: Mapping[str, Path], work: Work) -> dict[str, Reference | str]:
     """Return the replies of transformers' own processor and `generate`, or one line of error, by
-    family; the last reply is that to the first question on inverted frames.
+    family.
 
     torchvision is on the path if it was set aside for tests.
 
@@ -120,9 +149,14 @@ def reference_replies(folders: Mapping[str, Path], work: Work) -> dict[str, Repl
         raise ModelError(f"transformers' own way failed: {done.stderr.strip().splitlines()[-1]}")
     answers = json.loads(done.stdout.splitlines()[-1])
     return {
-        name: answer if isinstance(answer, str) else list(map(tuple, answer))
+        name: answer if isinstance(answer, str) else _read_reference(answer)
         for name, answer in answers.items()
     }
+
+
+def _read_reference(answer: Sequence[Mapping[str, Any]]) -> Reference:
+    *replies, inverted = (tuple(reply["tokens"]) for reply in answer)
+    return Reference(replies, [reply["margins"] for reply in answer[:-1]], inverted)
 
 
 def torchvision_path() -> dict[str, str]:

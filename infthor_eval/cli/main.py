@@ -18,6 +18,7 @@ from infthor_eval.cli.options.repeated import refuse_repeated_options
 from infthor_eval.cli.progress.stopping import handle_signal
 from infthor_eval.errors import (
     InfthorError,
+    OutputClosed,
     Terminated,
     describe_exception,
     in_one_line,
@@ -82,7 +83,7 @@ _SHARED_MODULES = {
 }
 _NAMES = tuple(name for group in _COMMANDS.values() for name in group)
 _DEFAULT = "run"
-_TERMINATED = 143  # exit code
+_INTERRUPTED, _TERMINATED = 130, 143  # exit codes
 _COLLECT_AFTER = 50_000  # new objects between two collections of garbage
 
 
@@ -149,6 +150,7 @@ def main(args: list[str] | None = None) -> None:
         if isinstance(stream, io.TextIOWrapper):
             # No name in the data may end a run, whatever the encoding.
             stream.reconfigure(errors="backslashreplace")
+    output = sys.stdout
     try:
         with handle_signal(signal.SIGTERM, _raise_terminated), _collecting_seldom():
             code = _infthor_eval.main(args, prog_name="infthor-eval", standalone_mode=False)
@@ -167,16 +169,20 @@ def main(args: list[str] | None = None) -> None:
         _exit(error.format_message(), error.exit_code)
     except InfthorError as error:
         _exit(str(error), error.exit_code)
-    except Terminated:
-        _exit("stopped; run the same command to continue", _TERMINATED)
-    except (click.Abort, KeyboardInterrupt):
-        _exit("stopped; run the same command to continue", 130)
+    except (click.Abort, KeyboardInterrupt, Terminated) as error:
+        code = _TERMINATED if isinstance(error, Terminated) else _INTERRUPTED
+        _exit("stopped; run the same command to continue", code)
     except OSError as error:  # that no command expects: a full disk, a file removed during the work
         _discard_output()
         path = error.filename if error.filename is not None else "standard output or a file"
         problem = f"{path}: cannot be read or written ({in_one_line(error)})"
         _exit(f"{problem}; fix that and run the same command again", 2)
-    except (SystemExit, GeneratorExit) as error:  # of code of others, where no command expects it
+    except (SystemExit, GeneratorExit) as error:
+        # click ends the program, too, if nobody reads its help, and replaces the output.
+        if isinstance(error, OutputClosed) or sys.stdout is not output:
+            _discard_output()
+            sys.exit(1)
+        # Of code of others, where no command expects it.
         _exit(f"{describe_exception(error)}; your own code must not end the program: fix it", 2)
     else:
         sys.exit(code if isinstance(code, int) else 0)

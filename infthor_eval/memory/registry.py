@@ -20,6 +20,7 @@ from infthor_eval.errors import (
     unknown_name,
     wrap_user_code,
 )
+from infthor_eval.memory.functions import function_memory
 from infthor_eval.memory.protocol import Memory, MemoryCapabilities
 from infthor_eval.plugins import PluginTable
 from infthor_eval.storage.deadlines import limit_time
@@ -65,7 +66,7 @@ def open_memory(name: str, options: MemoryOptions = ()) -> Memory:
     """Return a memory, the same object each time for a class and its options.
 
     Args:
-        name: a name of the table, or FILE.py:CLASS.
+        name: a name of the table, or FILE.py:NAME with a class or a function.
         options: options of its class; texts are converted to the types of its constructor.
 
     Raises:
@@ -156,14 +157,15 @@ def _build(name: str, kind: Any, options: MemoryOptions) -> Memory:
 
 
 def memory_class(name: str) -> Any:
-    """Return the class of a memory.
+    """Return the class of a memory, or what makes one of a function.
 
     Raises:
         UsageError: there is none of this name.
         ModelError: its file does not define it, or cannot be imported.
     """
     if names_a_file(name):
-        return load_from_file(name)
+        own = load_from_file(name)
+        return function_memory(name, own) if inspect.isfunction(own) else own
     if name not in MEMORIES.names:
         raise unknown_name("memory", name, MEMORIES.names)
     return MEMORIES.load(name, Memory)
@@ -177,7 +179,7 @@ def _code(name: str) -> dict[str, Any]:
 
 def _converted(name: str, kind: Any, options: Mapping[str, Any]) -> dict[str, Any]:
     known = inspect.signature(kind).parameters
-    hints = typing.get_type_hints(kind.__init__)
+    hints = typing.get_type_hints(kind.__init__ if isinstance(kind, type) else kind)
     values = {}
     for key, value in options.items():
         if key not in known:

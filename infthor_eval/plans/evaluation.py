@@ -8,6 +8,7 @@ from itertools import groupby
 from infthor_eval.episodes.evaluation import BoundEpisodes, EpisodeEvaluation, EpisodeUnit
 from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.episodes.running import EpisodeResult
+from infthor_eval.errors import UsageError
 from infthor_eval.plans.actors.factory import ActorFactory, actor_factory
 from infthor_eval.plans.config import PlansConfig
 from infthor_eval.plans.options import PlansOptions
@@ -19,7 +20,7 @@ from infthor_eval.plans.task import PlansTask
 from infthor_eval.plans.trajectories import PlanTrajectory
 from infthor_eval.runs import Group, Session, TaskRequest, UnitRecord, UnitSample
 from infthor_eval.storage.scratch import ScratchFolder
-from model_adapters import Subject
+from model_adapters import Model, Subject
 
 __all__ = ["BoundPlans", "PlanUnit", "PlansEvaluation"]
 
@@ -48,7 +49,13 @@ class PlansEvaluation(EpisodeEvaluation[PlansOptions, PlansTask, PlanUnit]):
         return PlansConfig(**self._shared_config, constrained=self.options.constrained)
 
     def bind(self, subject: Subject) -> "BoundPlans":
-        """See `infthor_eval.runs.Evaluation.bind`."""
+        """See `infthor_eval.runs.Evaluation.bind`.
+
+        Raises:
+            UsageError: the model cannot decode as its tasks want it.
+        """
+        if isinstance(subject, Model):
+            _refuse_decoding(subject, self.options, self.tasks.values())
         return BoundPlans(self, actor_factory(subject, self.trajectories))
 
 
@@ -146,6 +153,18 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
             settings=task.file.settings["generation_kwargs"],
             reply=", ".join(step.action or (step.reply or "") for step in payload.steps),
         )
+
+
+def _refuse_decoding(model: Model, options: PlansOptions, tasks: Iterable[PlansTask]) -> None:
+    """Refuse a model every reply of which would fail."""
+    if options.constrained and not model.capabilities.choices:
+        raise UsageError(f"--constrained: {model.name} cannot be held to choices; leave it out")
+    for task in tasks:
+        if not (task.decoding.greedy or model.capabilities.sampling):
+            raise UsageError(
+                f"{model.name} draws no replies, as {task.name} does at temperature "
+                f"{task.decoding.temperature:g}; add --greedy"
+            )
 
 
 def _warnings(trained: str | None, tasks: Iterable[PlansTask]) -> list[str]:

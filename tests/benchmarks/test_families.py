@@ -95,13 +95,12 @@ def test_a_family_that_cannot_be_made_stops_no_other(families, tmp_path, monkeyp
 
     bad = replace(families.FAMILIES["llava"], config=fail)
     monkeypatch.setitem(families.FAMILIES, "llava", bad)
-    replies = [(1,)] * 6
+    replies = [(1,)] * 5
+    reference = families.Reference(replies, [(0.5,)] * 5, (2,))
     monkeypatch.setattr(
-        families, "reference_replies", lambda made, work: dict.fromkeys(made, replies)
+        families, "reference_replies", lambda made, work: dict.fromkeys(made, reference)
     )
-    monkeypatch.setattr(
-        families, "ask", lambda folder, work: families.Trial({"alone": replies[:5]})
-    )
+    monkeypatch.setattr(families, "ask", lambda folder, work: families.Trial({"alone": replies}))
     bad_row, good_row = families.try_families(["llava", "vipllava"], tmp_path, n_frames=1)
     assert bad_row.notes == ("not made: llava (no such layer); see its config",)
     assert (bad_row.loads, good_row.loads) == (False, True)

@@ -368,6 +368,22 @@ def test_where_no_trajectory_has_a_final_task_that_is_said(prepare_run, run_cli,
     )
 
 
+def test_a_model_that_draws_nothing_is_refused_before_it_is_asked_to(run_cli, data, tmp_path):
+    (tmp_path / "mine.py").write_text("def answer(images, text):\n    return 'MoveAhead'\n")
+    words = option_words(
+        model=f"{tmp_path}/mine.py:answer", tasks="infthor_plans", data=data, output=tmp_path / "o"
+    )
+    assert_refused(
+        run_cli(*words),
+        "answer draws no replies, as infthor_plans does at temperature 1; add --greedy",
+    )
+    assert_refused(
+        run_cli(*words, "--greedy", "--constrained"),
+        "--constrained: answer cannot be held to choices; leave it out",
+    )
+    assert run_cli(*words, "--greedy", "--limit", 1)[0] == 0
+
+
 # -- after a failure
 
 

@@ -1,0 +1,52 @@
+"""A function of a user's own file as a policy: `def act(image, instruction)`."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from infthor_eval.errors import ModelError, in_one_line
+from infthor_eval.formats.frames import FrameRef
+from model_adapters.policies.policy import arm_deltas
+from model_adapters.protocols import ArmDelta, Capabilities
+
+__all__ = ["FunctionPolicy"]
+
+
+class FunctionPolicy:
+    """A function that returns seven numbers, or several rows of them, for each view.
+
+    Args:
+        name: name of the policy.
+        call: the function.
+        options: values of its further parameters.
+    """
+
+    capabilities = Capabilities(counts_tokens=False, token_ids=False, deterministic=False)
+
+    def __init__(self, name: str, call: Callable[..., Any], options: dict[str, Any]) -> None:
+        self.name = name
+        self._call = call
+        self._options = options
+
+    def identity(self) -> dict[str, Any]:
+        """Return the options; the file's content is known by its digest."""
+        return dict(self._options)
+
+    def reset(self) -> None:
+        """Do nothing: a function has no episodes."""
+
+    def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
+        """Return the next steps; see `Policy.act`."""
+        steps = self._call(frame.load(), instruction, **self._options)
+        try:
+            numbers = np.asarray(steps, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise ModelError(
+                f"{self.name} returned {steps!r:.60} ({in_one_line(error)}); return seven numbers: "
+                "x, y, z in metres, roll, pitch, yaw in radians, gripper 0 to 1"
+            ) from error
+        return arm_deltas(self.name, numbers[None] if numbers.ndim == 1 else numbers)
+
+    def close(self) -> None:
+        """Do nothing: what the function keeps ends with the process."""
