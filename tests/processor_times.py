@@ -38,7 +38,7 @@ KEPT = (
     "tests/nieh/asking/test_notebook.py::test_a_note_is_what_the_model_says_to_its_window_alone",
     "tests/training/test_fine_tuning.py::test_adapters_are_trained_and_merged",
     "tests/harness/test_host.py::test_our_model_under_lm_evals_own_command_gives_the_samples_of_our_own",
-    "tests/cli/commands/test_data_commands.py::test_the_three_commands_make_a_set",
+    "tests/cli/commands/data/test_data_commands.py::test_the_three_commands_make_a_set",
     "tests/plans/actors/test_planner.py::test_every_plan_is_carried_out[bedroom-2-seed7]",
     "tests/report/figures/test_curves.py::test_the_six_panels_are_drawn_over_thousands_of_tokens_with_the_planner_in_each",
     "tests/report/web/test_browser.py::test_it_opens_without_errors_and_fetches_nothing",

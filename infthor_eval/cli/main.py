@@ -56,6 +56,7 @@ _COMMANDS = {
         "twins": "Make twins of trajectories: questions with another answer in another world.",
         "validate": "Keep the questions of a set that one of several models answers.",
         "bundle": "Build a question set from a manifest of scenes and seeds.",
+        "card": "Write a data set card and a Croissant file of a set.",
         "scenes": "Draw a scene, or export it for machines without Unity.",
     },
     "Own models": {
@@ -71,10 +72,12 @@ _COMMANDS = {
         "lm-eval": "Run lm-eval's own command with these models.",
     },
 }
-# Commands that share a module of infthor_eval.cli.commands; the others are `command` of their own.
+# Commands of one group have a folder of infthor_eval.cli.commands, and some share a module of it;
+# the others are `command` of their own.
+_FOLDERS = {"Make data": "data."}
 _SHARED_MODULES = {
-    "questions": "questions:questions",
-    "twins": "questions:twins",
+    "questions": "data.questions:questions",
+    "twins": "data.questions:twins",
     "table4": "tables:table4",
     "table-final": "tables:table_final",
     "check-adapter": "checks:check_adapter",
@@ -96,7 +99,11 @@ class _Commands(ExampleGroup):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _NAMES:
             return None
-        target = _SHARED_MODULES.get(cmd_name, f"{cmd_name.replace('-', '_')}:command")
+        folder = next(
+            (prefix for group, prefix in _FOLDERS.items() if cmd_name in _COMMANDS[group]), ""
+        )
+        own = f"{folder}{cmd_name.replace('-', '_')}:command"
+        target = _SHARED_MODULES.get(cmd_name, own)
         command = import_target(f"infthor_eval.cli.commands.{target}")
         assert isinstance(command, click.Command)
         return command

@@ -179,7 +179,8 @@ def _code(name: str) -> dict[str, Any]:
 
 def _converted(name: str, kind: Any, options: Mapping[str, Any]) -> dict[str, Any]:
     known = inspect.signature(kind).parameters
-    hints = typing.get_type_hints(kind.__init__ if isinstance(kind, type) else kind)
+    maker = kind.__init__ if isinstance(kind, type) else kind  # type: ignore[misc]
+    hints = typing.get_type_hints(maker)
     values = {}
     for key, value in options.items():
         if key not in known:

@@ -146,7 +146,7 @@ def test_making_data_loads_nothing_of_runs(typed: str, tmp_path: Path) -> None:
         env=os.environ | {"PYTHONPATH": str(ROOT)},
     )
     loaded = done.stdout.split()
-    assert "infthor_eval.cli.commands." + typed.split(maxsplit=1)[0] in loaded
+    assert "infthor_eval.cli.commands.data." + typed.split(maxsplit=1)[0] in loaded
     assert not [
         name for name in loaded if name.startswith(("infthor_eval.runs", "infthor_eval.nieh"))
     ]

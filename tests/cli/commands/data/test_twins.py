@@ -11,8 +11,8 @@ from infthor_eval.formats.twins import read_pairs
 from infthor_eval.thor import launch
 from infthor_eval.thor.launch import embedded_launch
 
-from ...helpers.command_line import assert_refused
-from ...helpers.trajectories import FORK, MUG, cut_trajectory, write_trajectories
+from ....helpers.command_line import assert_refused
+from ....helpers.trajectories import FORK, MUG, cut_trajectory, write_trajectories
 
 OPTIONS = ("--kinds", "state,replace", "--per-kind", 1, "--per-trajectory", 3)
 

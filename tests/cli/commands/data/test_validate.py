@@ -10,7 +10,7 @@ from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.storage.folders import packaged_folder
 from model_adapters import Capabilities
 
-from ...helpers.questions import make_question
+from ....helpers.questions import make_question
 
 # Of known skill: which answers each scripted model gets right.
 SKILLS = {

@@ -14,7 +14,7 @@ from infthor_eval.cli.options.rendering import QUALITIES, parse_form
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import read_questions
 
-from ...helpers.command_line import option_words
+from ....helpers.command_line import option_words
 
 
 def _print(*arguments: object) -> dict:
