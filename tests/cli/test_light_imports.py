@@ -162,8 +162,9 @@ def test_every_command_is_listed_by_name():
     context = click.Context(_infthor_eval)
     listed = {name: _infthor_eval.get_command(context, name) for name in _NAMES}
     modules = [
-        importlib.import_module(f"{commands.__name__}.{module.name}")
-        for module in pkgutil.iter_modules(commands.__path__)
+        importlib.import_module(module.name)
+        for module in pkgutil.walk_packages(commands.__path__, f"{commands.__name__}.")
+        if not module.ispkg
     ]
     public = [getattr(module, name) for module in modules for name in module.__all__]
     there = {command.name: command for command in public if isinstance(command, click.Command)}
