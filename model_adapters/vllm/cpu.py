@@ -3,7 +3,8 @@
 import importlib
 import os
 import sys
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import torch
@@ -39,14 +40,37 @@ def set_threads(n_threads: int) -> None:
     os.environ["OMP_NUM_THREADS"] = str(n_threads)
 
 
-def readable_globals() -> AbstractContextManager[Any]:
-    """Return a context in which vLLM may see all loaded modules' values, as it does at its start.
+@contextmanager
+def readable_globals() -> Iterator[None]:
+    """Let vLLM see all loaded modules' values within the context, as it does at its start.
 
     flask, which ai2thor imports, has values that raise an error outside a request; here they are in
-    one.
+    one. llvmlite, which numba imports, has one that claims any attribute, `__dict__` too.
     """
-    flask = sys.modules.get("flask")
-    return nullcontext() if flask is None else flask.Flask(__name__).test_request_context()
+    flask, ffi = (sys.modules.get(name) for name in ("flask", "llvmlite.binding.ffi"))
+    with ExitStack() as stack:
+        if flask is not None:
+            stack.enter_context(flask.Flask(__name__).test_request_context())
+        if ffi is not None:
+            stack.enter_context(_without_dict(type(ffi.lib)))
+        yield
+
+
+@contextmanager
+def _without_dict(kind: Any) -> Iterator[None]:
+    """Let a class's `__getattr__` find no `__dict__` within the context."""
+    own = kind.__getattr__
+
+    def get(instance: object, name: str) -> Any:
+        if name == "__dict__":
+            raise AttributeError(name)
+        return own(instance, name)
+
+    kind.__getattr__ = get
+    try:
+        yield
+    finally:
+        kind.__getattr__ = own
 
 
 def check_head_size(name: str, text_config: Any) -> None:
