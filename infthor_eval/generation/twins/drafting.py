@@ -15,15 +15,15 @@ import msgspec
 from infthor_eval.formats.shared_frames import store_picture, write_frame_names
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import Trajectory, encode_trajectory
-from infthor_eval.formats.twins import PairedQuestion, TwinPair
+from infthor_eval.formats.twins import TwinPair
 from infthor_eval.generation.replay import replay
 from infthor_eval.generation.twins.comparison import Difference, World, compare
 from infthor_eval.generation.twins.episode import Episode, read_episode
 from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Proposal, Worlds
 from infthor_eval.generation.twins.pairing import AskedWorld, ScoreReply, pair_questions
-from infthor_eval.generation.twins.pictures import are_clearly_unlike
 from infthor_eval.generation.twins.rewriting import without_traces
 from infthor_eval.generation.twins.tolerance import tolerance_of
+from infthor_eval.generation.twins.visibility import check_insertions, is_shown
 from infthor_eval.storage.digests import digest, digest_of_file
 from infthor_eval.storage.files import file_name, write_atomically
 from infthor_eval.storage.scratch import ScratchFolder
@@ -197,7 +197,7 @@ class _Maker:
         first, second = (replayed.world for replayed in replays)
         frames, displaced = compare(worlds, first, second, tolerance)
         for world in (first, second):
-            _check_seen(world, worlds.inserted)
+            check_insertions(world, worlds.inserted)
         seed = self._draft.settings.seed
         asked = (
             AskedWorld(first.steps, worlds.changed, seed),
@@ -217,7 +217,7 @@ class _Maker:
             displaced=tuple(sorted(displaced)),
             types=tuple(sorted(worlds.types)),
             frames=frames,
-            questions=tuple(paired for paired in questions if _is_seen(paired, first, second)),
+            questions=tuple(one for one in questions if is_shown(one, worlds, first, second)),
         )
         if pair.questions:
             self._write(worlds, pair, replays)
@@ -245,26 +245,6 @@ class _Maker:
                 write_frame_names(
                     folder, [store_picture(self._out, image, name) for image in pictures[side]]
                 )
-
-
-def _check_seen(world: World, inserted: range) -> None:
-    """Check that each inserted action changes the picture: a door may open out of the frame.
-
-    Raises:
-        Difference: one does not.
-    """
-    for index in inserted:
-        if not are_clearly_unlike(world.files[index], world.files[index + 1]):
-            raise Difference("an action that is added cannot be seen")
-
-
-def _is_seen(question: PairedQuestion, first: World, second: World) -> bool:
-    """Return True if a clue frame shows an eye which of the two worlds it is."""
-    return any(
-        first.pictures[clue] != second.pictures[clue]
-        and are_clearly_unlike(first.files[clue], second.files[clue])
-        for clue in question.clues
-    )
 
 
 def is_flipped(pair_id: str) -> bool:

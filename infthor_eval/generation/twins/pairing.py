@@ -20,7 +20,7 @@ from infthor_eval.generation.questions.generate import candidates_of, further_ca
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
 from infthor_eval.household.wording import answer_of, canonical_type
 
-__all__ = ["AskedWorld", "ScoreReply", "pair_questions"]
+__all__ = ["AskedWorld", "ScoreReply", "pair_questions", "types_of_fact"]
 
 # Returns the strict score of a reply for gold answers, from 0 to 1.
 ScoreReply = Callable[[str, Sequence[Answer]], float]
@@ -212,14 +212,20 @@ def _paired(
     first, second = sides
     subjects = {canonical_type(name) for name in (*first.subjects, *second.subjects)}
     topic = first.question_type.removesuffix("_further")
+    about = sorted((_types_asked_of(first) & types) or subjects & types)
     return PairedQuestion(
         text=first.text,
         form=first.form,
         question_type=first.question_type,
-        fact=f"{topic}: {', '.join(sorted((_types_asked_of(first) & types) or subjects & types))}",
+        fact=f"{topic}: {', '.join(about)}",
         answers=(first.answers, second.answers),
         clues=clues,
         own_clues=(first.clues, second.clues),
         absence=(first.absence, second.absence),
         overlap=overlap,
     )
+
+
+def types_of_fact(fact: str) -> set[str]:
+    """Return the object types in a paired question's fact."""
+    return set(fact.partition(": ")[2].split(", "))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from infthor_eval.formats.step_log import ObjectInFrame
 from infthor_eval.generation.twins.pictures import are_clearly_unlike, channel_differences
 
 SIZE = 300
@@ -36,3 +37,17 @@ def test_differences_are_of_each_channel(tmp_path):
 def test_an_eye_needs_enough_pixels_that_differ_enough(edge, by, unlike, tmp_path):
     one, other = picture(tmp_path / "a.png"), picture(tmp_path / "b.png", edge, by)
     assert are_clearly_unlike(one, other) is unlike
+
+
+@pytest.mark.parametrize(
+    ("box", "pixels", "unlike"),
+    [
+        ((0, 0, 99, 99), 2000, True),  # 400 of its pixels differ
+        ((0, 0, 99, 99), 4100, False),  # the edge of a door: less than a tenth
+        ((50, 50, 99, 99), 2000, False),  # what differs is another object
+        ((19, 0, 99, 99), 200, True),  # 20 of 200
+    ],
+)
+def test_what_is_asked_about_must_differ_itself(box, pixels, unlike, tmp_path):
+    one, other = picture(tmp_path / "a.png"), picture(tmp_path / "b.png", 20, 50)
+    assert are_clearly_unlike(one, other, [ObjectInFrame(pixels, box)]) is unlike

@@ -1,0 +1,54 @@
+"""Whether an eye sees in the pictures what differs: an action, and the answer to a question."""
+
+from collections.abc import Iterator
+
+from infthor_eval.formats.object_ids import object_type_of
+from infthor_eval.formats.step_log import ObjectInFrame
+from infthor_eval.formats.twins import PairedQuestion
+from infthor_eval.generation.twins.comparison import Difference, World
+from infthor_eval.generation.twins.kinds import Worlds
+from infthor_eval.generation.twins.pairing import types_of_fact
+from infthor_eval.generation.twins.pictures import are_clearly_unlike
+from infthor_eval.household.wording import canonical_type
+
+__all__ = ["check_insertions", "is_shown"]
+
+
+def check_insertions(world: World, inserted: range) -> None:
+    """Check that each inserted action changes the picture: a door may open out of the frame.
+
+    Raises:
+        Difference: one does not.
+    """
+    for index in inserted:
+        if not are_clearly_unlike(world.files[index], world.files[index + 1]):
+            raise Difference("an action that is added cannot be seen")
+
+
+def is_shown(question: PairedQuestion, worlds: Worlds, first: World, second: World) -> bool:
+    """Return True if a clue frame shows an eye which of the two worlds it is.
+
+    It must show that by the changed object that is asked about, if any frame that differs shows it:
+    another one that is changed with it may be beside it.
+    """
+    differing = [
+        clue for clue in question.clues if first.pictures[clue] != second.pictures[clue]
+    ]
+    shown = {clue: list(_asked(question, worlds, first, second, clue)) for clue in differing}
+    any_shown = any(shown.values())
+    return any(
+        bool(seen) == any_shown and are_clearly_unlike(first.files[clue], second.files[clue], seen)
+        for clue, seen in shown.items()
+    )
+
+
+def _asked(
+    question: PairedQuestion, worlds: Worlds, first: World, second: World, clue: int
+) -> Iterator[ObjectInFrame]:
+    """Yield how both pictures of a clue frame show the changed objects that are asked about."""
+    types = types_of_fact(question.fact)
+    for world, changed in ((first, worlds.changed), (second, worlds.changed_in_second)):
+        seen = world.steps[clue].seen or {}
+        for key in changed & seen.keys():
+            if canonical_type(object_type_of(key)) in types:
+                yield seen[key]
