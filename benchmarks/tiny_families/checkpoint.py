@@ -17,6 +17,11 @@ from tiny_families.chats import Chat
 __all__ = ["Family", "Vocabulary", "save"]
 
 _VIDEO_FILE = "video_preprocessor_config.json"
+# Published files say so; vLLM neither scales nor normalises pixels where they do not.
+_PIXELS = {
+    **dict.fromkeys(("do_resize", "do_rescale", "do_normalize"), True),
+    **dict.fromkeys(("image_mean", "image_std"), [0.5, 0.5, 0.5]),
+}
 _QUERY_NORMS = ("q_norm.weight", "q_layernorm.weight")
 _SHARPER = 4.0
 
@@ -75,7 +80,8 @@ class Family:
 
     def files(self) -> dict[str, Mapping[str, Any]]:
         """Return the processors' files, name to JSON content."""
-        files = {"preprocessor_config.json": self.images, "processor_config.json": self.processor}
+        images = {**_PIXELS, **self.images}
+        files = {"preprocessor_config.json": images, "processor_config.json": self.processor}
         if self.video is not None:
             files[_VIDEO_FILE] = self.video
         return files
