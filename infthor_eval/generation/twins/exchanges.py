@@ -124,11 +124,17 @@ class ExchangeKind:
         raise NotImplementedError
 
     def _may_exchange(self, episode: Episode, one: ThorObject, other: ThorObject) -> bool:
-        """Return True if each could as well be where the other is, and is put."""
+        """Return True if each could as well be where the other is, and is put.
+
+        Where they are must be in the published table, too, as where they go is: simulators put some
+        things elsewhere, and no exchange does, so that such a place would tell the original.
+        """
         if canonical_type(one.object_type) == canonical_type(other.object_type):
             return False
         places = [episode.holder(obj.object_id) for obj in (one, other)]
         at_one, at_other = (place.object_type if place is not None else "" for place in places)
+        if not (goes_into(one.object_type, at_one) and goes_into(other.object_type, at_other)):
+            return False
         if self.needs_other_place and canonical_type(at_one) == canonical_type(at_other):
             return False
         return self._fits(episode, one, other, at_other) and self._fits(episode, other, one, at_one)

@@ -8,8 +8,9 @@ import pytest
 
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.generation.twins.episode import read_episode
-from infthor_eval.generation.twins.exchanges import Move, Swap
+from infthor_eval.generation.twins.exchanges import Move, Swap, Untouched
 from infthor_eval.generation.twins.task_shares import task_shares
+from infthor_eval.household.affordances import goes_into
 from infthor_eval.thor.restore import restore
 
 
@@ -68,3 +69,16 @@ def test_a_world_half_as_likely_is_proposed_half_as_often(episode):
 def test_only_swaps_are_drawn_by_how_likely_they_are(episode):
     one, other = episode.loose[:2]
     assert Move().chance(episode, one, other) == 1.0
+
+
+def test_the_reverse_of_each_exchange_could_be_proposed_as_well(episode):
+    rng = random.Random(0)
+    pairs = [pair for kind in (Move(), Swap(), Untouched()) for pair in kind.pairs(episode, rng)]
+    assert pairs
+    places = [(obj, episode.holder(obj.object_id)) for pair in pairs for obj in pair]
+    assert all(goes_into(obj.object_type, place.object_type) for obj, place in places)
+    # A simulator puts some things where the published table has none.
+    others = [obj for obj in episode.loose if episode.holder(obj.object_id)]
+    assert any(
+        not goes_into(obj.object_type, episode.holder(obj.object_id).object_type) for obj in others
+    )
