@@ -1,10 +1,13 @@
-"""A short trajectory in a kitchen."""
+"""Two short trajectories, in a kitchen and in a living room."""
 
 from pathlib import Path
 
 import pytest
 
-from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
+from infthor_eval.formats.trajectory import iter_trajectories
+from infthor_eval.generation.twins.episode import Episode, read_episode
+
+from ...helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
 
 
 @pytest.fixture(scope="module")
@@ -12,3 +15,10 @@ def file(tmp_path_factory) -> Path:
     """Its file."""
     folder = write_trajectories(tmp_path_factory.mktemp("data") / "one", cut_trajectory(FORK, 8))
     return next(folder.iterdir())
+
+
+@pytest.fixture(scope="module")
+def living_room(tmp_path_factory, simulator) -> Episode:
+    """An episode in which things of all kinds of exchange stand where the published table says."""
+    folder = write_trajectories(tmp_path_factory.mktemp("data") / "one", cut_trajectory(CANDLE, 20))
+    return read_episode(next(iter_trajectories(next(folder.iterdir()))), simulator)

@@ -203,11 +203,11 @@ def shape(value):
 @pytest.mark.parametrize(
     "name", ["swap", "move", "replace", "state", "count-open", "count-move", "put-target"]
 )
-def test_both_worlds_are_written_alike(name, episode, simulator):
+def test_both_worlds_are_written_alike(name, living_room, simulator):
     kind = KINDS.load(name, EditKind)()
-    for proposal in kind.propose(episode, random.Random(1)):
+    for proposal in kind.propose(living_room, random.Random(1)):
         try:
-            worlds = proposal.apply(episode, simulator)
+            worlds = proposal.apply(living_room, simulator)
         except EditRefused:
             continue
         documents = [
@@ -232,8 +232,8 @@ def first_worlds(name, episode, simulator):
     raise AssertionError("no room for any")
 
 
-def test_what_is_not_there_is_put_aside_in_both_worlds(episode, simulator):
-    scenes = first_worlds("replace", episode, simulator)
+def test_what_is_not_there_is_put_aside_in_both_worlds(living_room, simulator):
+    scenes = first_worlds("replace", living_room, simulator)
     places = []
     for scene in scenes:
         (gone,) = (state.name for state in scene.object_states or [] if state.is_disabled)
@@ -242,10 +242,10 @@ def test_what_is_not_there_is_put_aside_in_both_worlds(episode, simulator):
     assert places[0]["y"] > 10
 
 
-def test_a_moved_object_stands_in_line_with_what_it_stands_on(episode, simulator):
+def test_a_moved_object_stands_in_line_with_what_it_stands_on(living_room, simulator):
     before, after = (
         {pose.name: pose for pose in scene.object_poses}
-        for scene in first_worlds("move", episode, simulator)
+        for scene in first_worlds("move", living_room, simulator)
     )
     one, other = (name for name, pose in before.items() if pose != after[name])
     assert after[one].rotation == before[other].rotation
@@ -253,9 +253,9 @@ def test_a_moved_object_stands_in_line_with_what_it_stands_on(episode, simulator
 
 
 @pytest.mark.parametrize("name", ["move", "swap", "replace"])
-def test_whichever_object_stands_at_a_place_stands_at_the_same_point(name, episode, simulator):
+def test_whichever_object_stands_at_a_place_stands_at_the_same_point(name, living_room, simulator):
     points = []
-    for scene in first_worlds(name, episode, simulator):
+    for scene in first_worlds(name, living_room, simulator):
         gone = {state.name for state in scene.object_states or [] if state.is_disabled}
         points.append(
             {
@@ -270,12 +270,12 @@ def test_whichever_object_stands_at_a_place_stands_at_the_same_point(name, episo
     assert sorted(before.values()) == sorted(after.values())
 
 
-def test_what_is_replaced_and_what_replaces_it_are_both_seen(episode):
+def test_what_is_replaced_and_what_replaces_it_are_both_seen(living_room):
     kind = KINDS.load("replace", EditKind)()
-    proposals = [*kind.propose(episode, random.Random(1))]
+    proposals = [*kind.propose(living_room, random.Random(1))]
     assert proposals
     for edit in proposals:
-        assert {edit.one.object_id, edit.other.object_id} <= episode.seen
+        assert {edit.one.object_id, edit.other.object_id} <= living_room.seen
 
 
 def test_labels_are_drawn_by_coin():

@@ -7,7 +7,6 @@ from dataclasses import replace
 import pytest
 
 from infthor_eval.formats.trajectory import iter_trajectories
-from infthor_eval.generation.twins.episode import read_episode
 from infthor_eval.generation.twins.exchanges import Move, Swap, Untouched
 from infthor_eval.generation.twins.task_shares import task_shares
 from infthor_eval.household.affordances import goes_into
@@ -20,8 +19,8 @@ def trajectory(file):
 
 
 @pytest.fixture(scope="module")
-def episode(trajectory, simulator):
-    return read_episode(trajectory, simulator)
+def episode(living_room):
+    return living_room
 
 
 def test_tasks_name_what_more_can_be_done_with_more_often(trajectory, simulator):
