@@ -64,6 +64,11 @@ $(VLLM)/.installed: $(REAL)/install.sh pyproject.toml
 	PYTHON=$(PYTHON) $(REAL)/install.sh $(VLLM)
 	touch $@
 
+# Damaged inputs for every reader of the project, so many seconds each; what is found is printed, and ends with 1.
+FUZZ_SECONDS ?= 60
+fuzz: $(INSTALLED)
+	OMP_NUM_THREADS=1 $(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS)
+
 # The figures that no change may move unseen (benchmarks/vitals.py); six minutes. DATA: recorded data, if there is any.
 DATA ?= ../shared/data
 vitals: $(INSTALLED)
