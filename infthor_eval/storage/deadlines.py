@@ -14,12 +14,14 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import cached_property
 from types import FrameType
 from typing import ClassVar
 
-__all__ = ["limit_time", "not_counted"]
+from infthor_eval.storage.limits import Limit
+
+__all__ = ["limit_by", "limit_time", "not_counted"]
 
 _AGAIN_S = 1.0  # after which code that catches everything is interrupted once more
 _SOON_S = 0.001  # after which code that is between two contexts is looked at again
@@ -203,6 +205,19 @@ def limit_time(seconds: float, error: Exception) -> Iterator[None]:
             clocks.remove(clock)
         if not clocks:
             _CLOCKS.pop(clock.thread, None)
+
+
+def limit_by(limit: Limit, problem: str, error: type[Exception]) -> AbstractContextManager[None]:
+    """Stop the code in the context by a limit that people can raise; see `limit_time`.
+
+    Args:
+        limit: the limit, in seconds.
+        problem: the code and what it fails to do, for the message.
+        error: class of the error to raise.
+    """
+    seconds = limit.value
+    late = f"{problem}: it is not done after {seconds} s; {limit.hint}"
+    return limit_time(seconds, error(late))
 
 
 @contextmanager
