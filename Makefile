@@ -14,7 +14,15 @@ COMPILE := $(BIN)/python -m pytest -q tests/infthor_sim/test_questions.py tests/
 VLLM := .venv-vllm
 REAL := tests/model_adapters/vllm/real
 
-.PHONY: demo shell test test-all test-times test-vllm vitals lint docs clean
+# What a release is built and checked with, by hashes, in an environment of its own.
+TOOLS := .venv-release
+# PyTorch has a build for each kind of hardware, each with hashes of its own; it and what it brings are not locked.
+BY_HARDWARE := torch triton cuda-bindings cuda-pathfinder cuda-toolkit $(addprefix nvidia-,cublas cuda-cupti cuda-nvrtc \
+	cuda-runtime cudnn-cu13 cufft cufile curand cusolver cusparse cusparselt-cu13 nccl-cu13 nvjitlink nvshmem-cu13 nvtx)
+COMPILE_LOCK = $(TOOLS)/bin/uv --no-config pip compile --quiet --upgrade --universal --python-version 3.11 \
+	--generate-hashes --no-annotate --custom-compile-command 'make lock'
+
+.PHONY: demo shell test test-all test-times test-vllm fuzz vitals lint docs lock audit release clean
 
 # A trajectory in a procedural kitchen, its frames and questions; then the bundled sets, by the bounds and a small model,
 # which is also asked behind memories.
@@ -56,6 +64,11 @@ $(VLLM)/.installed: $(REAL)/install.sh pyproject.toml
 	PYTHON=$(PYTHON) $(REAL)/install.sh $(VLLM)
 	touch $@
 
+# Damaged inputs for every reader of the project, so many seconds each; what is found is printed, and ends with 1.
+FUZZ_SECONDS ?= 60
+fuzz: $(INSTALLED)
+	OMP_NUM_THREADS=1 $(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS)
+
 # The figures that no change may move unseen (benchmarks/vitals.py); six minutes. DATA: recorded data, if there is any.
 DATA ?= ../shared/data
 vitals: $(INSTALLED)
@@ -72,6 +85,27 @@ lint: $(INSTALLED)
 docs: $(INSTALLED)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
+# Both need the network: versions with hashes of what the core needs, and of the tools here; known vulnerabilities of them.
+lock: $(TOOLS)/.installed
+	$(COMPILE_LOCK) pyproject.toml -c constraints.txt $(addprefix --no-emit-package ,$(BY_HARDWARE)) -o requirements.lock
+	$(COMPILE_LOCK) .ci/release-tools.in -o .ci/release-tools.lock
+
+audit: $(TOOLS)/.installed
+	mkdir -p build && grep '^torch==' constraints.txt > build/torch.txt
+	for file in requirements.lock .ci/release-tools.lock build/torch.txt; do \
+		$(TOOLS)/bin/pip-audit --strict --no-deps --disable-pip --progress-spinner off -r $$file || exit 1; done
+
+# Wheel, source distribution and list of what is in them (SBOM, CycloneDX) of the last commit: dist.
+release: $(INSTALLED) $(TOOLS)/.installed
+	$(BIN)/python .ci/release.py dist
+	{ cat requirements.lock; grep '^torch==' constraints.txt; } | $(TOOLS)/bin/cyclonedx-py requirements \
+		--pyproject pyproject.toml --output-reproducible --of JSON -o dist/infthor-eval.cdx.json -
+
+$(TOOLS)/.installed: .ci/release-tools.lock
+	$(PYTHON) -m venv $(TOOLS)
+	$(TOOLS)/bin/pip install --quiet --disable-pip-version-check --require-hashes -r .ci/release-tools.lock
+	touch $@
+
 $(INSTALLED): pyproject.toml setup.py constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.11 ...")'
 	$(PYTHON) -m venv $(VENV)
@@ -83,4 +117,4 @@ $(PEERS): $(INSTALLED)
 	touch $@
 
 clean:
-	rm -rf $(VENV) $(VLLM) build dist *.egg-info
+	rm -rf $(VENV) $(VLLM) $(TOOLS) build dist *.egg-info

@@ -30,7 +30,7 @@ from model_adapters.protocols import (
     Role,
     Subject,
 )
-from model_adapters.refusals import wrap_adapter_errors, wrap_request_errors
+from model_adapters.refusals import wrap_adapter_errors, wrap_closing, wrap_request_errors
 
 __all__ = ["guard", "identity_of"]
 
@@ -110,7 +110,7 @@ class _Guarded:
 
     def close(self) -> None:
         """See `Subject`."""
-        with wrap_adapter_errors(f"{self.name}: close() fails"):
+        with wrap_closing(self.name):
             self._adapter.close()
 
 

@@ -8,7 +8,9 @@ from types import ModuleType
 from typing import Any
 
 from infthor_eval.errors import AdapterError, ModelError, wrap_errors, wrap_user_code
+from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.digests import digest
+from infthor_eval.storage.limits import OWN_CODE_SECONDS
 
 __all__ = ["file_identity", "load_from_file", "name_in_file", "names_a_file"]
 
@@ -78,6 +80,9 @@ def _module(path: Path, source: bytes) -> ModuleType:
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses resolve annotations through it
     problem = f"{path}: fails when it is imported"
-    with wrap_user_code(problem, "fix it", AdapterError):
+    with (
+        wrap_user_code(problem, "fix it", AdapterError),
+        limit_by(OWN_CODE_SECONDS, problem, AdapterError),
+    ):
         exec(compile(source, path, "exec"), vars(module))
     return module

@@ -1,10 +1,12 @@
 """Checks of requests and of steps, with the same messages for every model."""
 
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 
 from infthor_eval.errors import AdapterError, ModelError, wrap_user_code
 from infthor_eval.quantities import MOST
+from infthor_eval.storage.deadlines import limit_by
+from infthor_eval.storage.limits import OWN_CODE_SECONDS
 from model_adapters.protocols import ArmDelta, Capabilities, Decoding, Turn, Video
 
 __all__ = [
@@ -96,6 +98,21 @@ def wrap_adapter_errors(problem: str) -> AbstractContextManager[None]:
         AdapterError: the adapter raised an error that is not one of ours.
     """
     return wrap_user_code(problem, "fix the adapter, or report it", AdapterError)
+
+
+@contextmanager
+def wrap_closing(name: str) -> Iterator[None]:
+    """Turn any error of an adapter's `close` into one of one line, also if it does not end.
+
+    Args:
+        name: the model, for the message.
+
+    Raises:
+        AdapterError: the adapter fails, or takes longer than `limits.OWN_CODE_SECONDS`.
+    """
+    problem = f"{name}: close() fails"
+    with wrap_adapter_errors(problem), limit_by(OWN_CODE_SECONDS, problem, AdapterError):
+        yield
 
 
 def wrap_request_errors(name: str) -> AbstractContextManager[None]:

@@ -20,7 +20,7 @@ from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.scoring import SCORERS, STRICT_RULES, scores
 from infthor_eval.quantities import require_number
 from infthor_eval.runs.catalog import TaskFile
-from infthor_eval.storage.deadlines import limit_time
+from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.digests import digest_of_file
 from infthor_eval.storage.limits import SCORER_SECONDS
 
@@ -77,10 +77,8 @@ def wrap_metric_errors(problem: str) -> Iterator[None]:
         MetricError: the function raises an exception, or takes longer than
             `limits.SCORER_SECONDS`.
     """
-    seconds = SCORER_SECONDS.value
-    late = f"{problem}: it is not done after {seconds} s; {SCORER_SECONDS.hint}"
     try:
-        with limit_time(seconds, MetricError(late)):
+        with limit_by(SCORER_SECONDS, problem, MetricError):
             yield
     except (MetricError, *STOPS):
         raise

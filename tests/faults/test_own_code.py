@@ -11,9 +11,12 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 from infthor_eval.storage.files import file_name
+from infthor_eval.storage.limits import OWN_CODE_SECONDS
+from model_adapters.policies.parity import load_policy
 
 from ..helpers.journals import write_journal
 from ..helpers.nieh_runs import make_config, make_header, make_record
+from ..model_adapters.policies.servers import policy_answers, serve
 
 MODEL = """
 from dataclasses import dataclass
@@ -90,6 +93,40 @@ def test_a_close_that_fails_is_one_line_below_the_results(run_own, statement):
     assert "Traceback" not in err
 
 
+@pytest.mark.parametrize("endless", ["while True: pass", "import time; time.sleep(600)"])
+def test_a_close_that_does_not_end_is_one_line_below_the_results(run_own, monkeypatch, endless):
+    monkeypatch.setenv(OWN_CODE_SECONDS.name, "1")
+    code, out, err = run_own(close=endless)
+    assert code == 2
+    assert "nieh_mini_gt" in out
+    assert (
+        f"close() fails: it is not done after 1 s; if this is intended, set {OWN_CODE_SECONDS.name}"
+        in (" ".join(err.split()))
+    )
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        ("run", "--tasks", "nieh_mini_gt", "--limit", 1, "--model"),
+        ("run", "--model", "blind", "--tasks", "nieh_mini_memory", "--budget", 200, "--memory"),
+        ("check-adapter",),
+        ("check-memory",),
+        ("check-parity", "--reference-url", "http://127.0.0.1:9"),
+    ],
+    ids=lambda typed: typed[-1],
+)
+def test_a_file_whose_import_does_not_end_is_one_line(run_cli, tmp_path, monkeypatch, typed):
+    monkeypatch.setenv(OWN_CODE_SECONDS.name, "1")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.py").write_text(f"# {typed[0]} {typed[-1]}\nimport time\ntime.sleep(600)\n")
+    code, out, err = run_cli(*typed, f"{tmp_path / 'own.py'}:Own")
+    assert (code, out) == (2, "")
+    assert "fails when it is imported: it is not done after 1 s" in " ".join(err.split())
+    assert "Traceback" not in err
+
+
 @pytest.mark.parametrize(
     ("identity", "words"),
     [
@@ -125,6 +162,48 @@ def test_check_adapter_never_ends_well_after_a_failure(run_own, run_cli, tmp_pat
     code, _, err = run_cli("check-adapter", f"{tmp_path / 'own.py'}:Own")
     assert code in (1, 2)
     assert "Traceback" not in err
+
+
+POLICY = """
+from dataclasses import dataclass
+from model_adapters import ArmDelta
+
+@dataclass(frozen=True)
+class Options:
+    pass
+
+class Own:
+    Options = Options
+    name = "own"
+    chunk_size = 1
+    @classmethod
+    def build(cls, name, options, seed):
+        return cls()
+    def identity(self):
+        return {}
+    def reset(self):
+        pass
+    def act(self, frame, instruction):
+        ACT
+        return [ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0)]
+    def close(self):
+        CLOSE
+"""
+
+
+@pytest.mark.parametrize(
+    ("act", "close"),
+    [("raise SystemExit(0)", "pass"), ("pass", "raise SystemExit(0)"), ("return None", "pass")],
+)
+def test_check_parity_never_ends_well_after_a_failure(run_cli, tmp_path, act, close):
+    source = POLICY.replace("ACT", act).replace("CLOSE", close)
+    (tmp_path / "own.py").write_text(source)
+    with serve(policy_answers(load_policy("openvla-tiny", {}))) as url:
+        name = f"{tmp_path / 'own.py'}:Own"
+        code, _, err = run_cli("check-parity", name, "--reference-url", url)
+    assert code in (1, 2)
+    assert "Traceback" not in err
+    assert "own" in err
 
 
 MEMORY = """

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from infthor_eval.errors import UsageError
-from infthor_eval.pages.server import PageServer, file_route, serve_pages
+from infthor_eval.pages.server import PageServer, file_route, listen, serve_pages
 
 pytest.importorskip(
     "uvicorn", reason="the extra `page` is not installed: pip install 'infthor-eval[page]'"
@@ -128,6 +128,7 @@ def test_every_answer_forbids_what_is_from_elsewhere(server: PageServer, path: s
     policy = headers["Content-Security-Policy"]
     assert policy.startswith("default-src 'none'; ")
     assert "unsafe" not in policy
+    assert "require-trusted-types-for 'script'; trusted-types 'none'" in policy
     assert "http" not in policy
     assert headers["Referrer-Policy"] == "no-referrer"
     assert headers["X-Content-Type-Options"] == "nosniff"
@@ -176,6 +177,14 @@ def test_it_ends_with_its_context_and_frees_its_port() -> None:
         assert second.port == first.port
         assert second.address != first.address  # a new token
         assert ask(second).status == 200
+
+
+def test_no_answer_waits_for_the_one_before_it_to_be_confirmed() -> None:
+    with listen(0) as listening:
+        client = socket.create_connection(listening.getsockname())
+        accepted = listening.accept()[0]
+        with client, accepted:
+            assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 
 def test_a_port_that_is_taken_is_an_error_of_one_line(server: PageServer) -> None:

@@ -1,3 +1,5 @@
+import subprocess
+import sys
 import threading
 import time
 from contextlib import suppress
@@ -66,7 +68,7 @@ def test_code_of_the_main_thread_that_waits_for_ever_is_stopped(code):
 @pytest.mark.parametrize("run", [lambda code: code(), _in_thread], ids=["main", "thread"])
 def test_a_limit_that_is_over_interrupts_nothing_later(run):
     def code():
-        for _ in range(200):  # many end just when their time is up
+        for _ in range(500):  # many end just when their time is up
             with suppress(TimeoutError), limit_time(0.001, TimeoutError("late")):
                 time.sleep(0.001)
         time.sleep(0.01)
@@ -123,3 +125,50 @@ def test_an_error_that_is_made_of_the_interruption_is_the_limits():
 def test_an_error_of_the_code_itself_passes():
     with pytest.raises(ValueError, match="its own"), limit_time(LONG_S, TimeoutError("late")):
         raise ValueError("its own")
+
+
+@pytest.mark.parametrize("run", [lambda code: code(), _in_thread], ids=["main", "thread"])
+def test_a_limit_is_cheap_as_one_thread_watches_all(run, monkeypatch):
+    started = []
+    start = threading.Thread.start
+    run(lambda: _late(_compute))  # the watcher runs
+
+    def count(thread):
+        started.append(thread.name)
+        start(thread)
+
+    def code():
+        for _ in range(2000):
+            with limit_time(LONG_S, TimeoutError("late")):
+                pass
+
+    monkeypatch.setattr(threading.Thread, "start", count)
+    before = time.process_time()
+    code()
+    assert started == []
+    # 0.02 s where it was measured; a thread for each took 0.5 s.
+    assert time.process_time() - before < 0.25
+
+
+def test_a_limit_that_begins_later_and_ends_earlier_is_kept():
+    with limit_time(LONG_S, TimeoutError("outer")):
+        _late_inner()
+
+
+def _late_inner():
+    with pytest.raises(TimeoutError, match="late"), limit_time(SHORT_S, TimeoutError("late")):
+        time.sleep(LONG_S)
+
+
+def test_a_copy_of_the_process_has_a_watcher_of_its_own():
+    code = (
+        "import os, time\nfrom infthor_eval.storage.deadlines import limit_time\n"
+        "with limit_time(600, TimeoutError('outer')):\n    pass\n"
+        "if os.fork() == 0:\n"
+        "    try:\n"
+        "        with limit_time(0.1, TimeoutError('late')): time.sleep(600)\n"
+        "    except TimeoutError:\n        os._exit(7)\n"
+        "print(os.waitstatus_to_exitcode(os.wait()[1]))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "7\n"

@@ -35,14 +35,14 @@ def check_adapter(model: str, model_args: str) -> int:
     """
     from infthor_eval.cli.progress.notes import prints_as_notes
     from model_adapters import run_checks
-    from model_adapters.refusals import wrap_adapter_errors
+    from model_adapters.refusals import wrap_closing
     from model_adapters.registry import build
 
     with prints_as_notes():
         adapter = build(model, parse_model_args(model_args), seed=0)
     code = _print_checks(model, run_checks(adapter))
     if hasattr(adapter, "close"):  # an adapter without it has been reported as broken
-        with prints_as_notes(), wrap_adapter_errors(f"model {model}: close() fails"):
+        with prints_as_notes(), wrap_closing(f"model {model}"):
             adapter.close()
     return code
 

@@ -67,6 +67,9 @@ _PAGE_COLOURS = {
 _PER_INCH = 108  # pixels; letters are then as large as the page's
 # The size of the svg element, which has a viewBox too.
 _SIZE = re.compile(r' (?:width|height)="[^"]*"(?: (?:width|height)="[^"]*")?')
+_TAG = re.compile(r"<[^>]*>")  # in texts matplotlib writes &lt; and &gt;
+_STYLE = re.compile(r' style="([^"]*)"')
+_SHEET = re.compile(r"\s*<style[^>]*>\*\{([^}]*)\}</style>")  # what all elements of a figure have
 LEGEND = 2.3  # inches, beside the panels
 _NAME = 30  # letters in a line of the legend
 _LETTERS = 15  # letters of a note per inch
@@ -129,10 +132,26 @@ def inline_svg(draw: Callable[[], Figure]) -> str:
         width = figure.get_figwidth()
     svg = text.getvalue()
     svg = svg[svg.index("<svg") :]
-    svg = _SIZE.sub(rf' style="max-width: {round(_PER_INCH * width)}px"', svg, count=1)
+    sheet = _SHEET.search(svg)
+    inherited = "" if sheet is None else _as_attributes(sheet[1])
+    svg = _SIZE.sub(f' width="{round(_PER_INCH * width)}"{inherited}', _SHEET.sub("", svg), count=1)
+    return _TAG.sub(lambda tag: _for_page(tag[0]), svg)
+
+
+def _for_page(tag: str) -> str:
     for colour, in_page in _PAGE_COLOURS.items():
-        svg = svg.replace(colour, in_page)
-    return svg
+        tag = tag.replace(colour, in_page)
+    return _STYLE.sub(lambda style: _as_attributes(style[1]), tag)
+
+
+def _as_attributes(declarations: str) -> str:
+    """Return a style's declarations as attributes of an SVG element, each with a space before it.
+
+    A page's policy lets no element have a style, since text could become one.
+    """
+    pairs = (part.partition(":") for part in declarations.split(";") if part.strip())
+    last = {name.strip(): value.strip() for name, _, value in pairs}  # a later one holds
+    return "".join(f' {name}="{value}"' for name, value in last.items())
 
 
 @contextmanager

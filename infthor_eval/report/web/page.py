@@ -1,7 +1,5 @@
 """The page itself: a file that needs no others."""
 
-import base64
-import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +13,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from infthor_eval.errors import wrap_errors
+from infthor_eval.pages.policy import file_policy
 from infthor_eval.report.web.samples import FrameFacts, Numbered, PageSample, Prompt
 from infthor_eval.report.web.sections import Section
 from infthor_eval.storage.files import write_atomically
@@ -118,6 +117,7 @@ def write_page(page: Page, path: Path) -> int:
     Raises:
         DataError: it cannot be written.
     """
+    style = _read("report.css")
     script = "".join(map(_read, _SCRIPTS))
     # Questions and replies come from data files and models: whatever they hold is shown as text.
     environment = Environment(
@@ -125,9 +125,9 @@ def write_page(page: Page, path: Path) -> int:
     )
     text = environment.from_string(_read("report.html")).render(
         page=page,
-        css=Markup(_read("report.css")),
+        css=Markup(style),
         js=Markup(script),
-        script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii"),
+        policy=Markup(file_policy(style=style, script=script)),
         data=_data(page),
         svg=Markup,
     )

@@ -4,10 +4,12 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Generic
 
-from infthor_eval.errors import UsageError, wrap_user_code
+from infthor_eval.errors import UsageError, UserCodeError, wrap_user_code
 from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import BoundEvaluation, Need, Suite, Workload
+from infthor_eval.storage.deadlines import limit_by
+from infthor_eval.storage.limits import OWN_CODE_SECONDS
 from model_adapters import Model, Policy, Subject, adapter_identity, identity_of, load
 
 __all__ = ["BoundRun", "bind_run", "require_capability"]
@@ -35,7 +37,9 @@ class BoundRun(Generic[SuiteUnit, Payload]):
         """
         with ExitStack() as stack:
             stack.callback(self.subject.close)
-            stack.enter_context(wrap_user_code(f"{self.header.suite}: close() fails", "fix it"))
+            problem = f"{self.header.suite}: close() fails"
+            stack.enter_context(wrap_user_code(problem, "fix it"))
+            stack.enter_context(limit_by(OWN_CODE_SECONDS, problem, UserCodeError))
             stack.callback(self.evaluation.close)
 
 

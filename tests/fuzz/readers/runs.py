@@ -14,10 +14,14 @@ import yaml
 from infthor_eval.cli import main
 from infthor_eval.cli.results import read_run_results
 from infthor_eval.generation.replay_set import replay_set, select
+from infthor_eval.nieh.rescoring.rescore import read_source
+from infthor_eval.report.live.state import LiveRun
 from infthor_eval.report.presented import read_report_runs
 from infthor_eval.runs.stored.search import StoredRun, find_runs
 
+from ...helpers.arm_runs import make_arm_run, make_episode_record
 from ...helpers.command_line import option_words
+from ...helpers.journals import write_run
 from ..damage import Form
 from ..reader import Reader
 from .samples import make_set, trajectory_document
@@ -26,7 +30,7 @@ __all__ = ["READERS"]
 
 
 @cache
-def _run(model: str, task: str = "nieh_gt") -> Path:
+def _run(model: str, task: str = "nieh_gt", *more: str) -> Path:
     """Return the folder of a run of a baseline on the small set, or on its trajectories; made
     once."""
     scratch = TemporaryDirectory()
@@ -36,7 +40,7 @@ def _run(model: str, task: str = "nieh_gt") -> Path:
         model=model, tasks=task, data=str(make_set(root / "set")), output=str(root / "out")
     )
     with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
-        main(words)
+        main([*words, *more])
     (folder,) = (root / "out" / model).iterdir()
     return folder
 
@@ -60,6 +64,35 @@ def _make_plans(folder: Path) -> Path:
         shutil.copytree(_run(model, "infthor_plans"), folder / name)
     (file,) = (folder / "damaged").glob("journal/*.jsonl")
     return file
+
+
+def _make_memory(folder: Path) -> Path:
+    """Copy two runs behind a memory, and return the journal of one of them."""
+    for name, model in (("damaged", "oracle"), ("sound", "blind")):
+        more = ("--memory", "last", "--budget", "300", "--tokens-per-frame", "100")
+        shutil.copytree(_run(model, "nieh_memory", *more), folder / name)
+    (file,) = (folder / "damaged").glob("journal/*.jsonl")
+    return file
+
+
+def _make_arms(folder: Path) -> Path:
+    """Write two runs of arms, and return the journal of one of them."""
+    for name in ("damaged", "sound"):
+        records = [make_episode_record(f"t{n}", n, done=bool(n % 2)) for n in range(4)]
+        write_run(make_arm_run(name, records), folder / "made", name)
+        shutil.move(folder / "made" / name / name, folder / name)
+    shutil.rmtree(folder / "made")
+    (file,) = (folder / "damaged").glob("journal/*.jsonl")
+    return file
+
+
+def _rescore(folder: Path) -> None:
+    source = read_source(folder / "damaged")
+    assert all(record.task for record in source.records)
+
+
+def _watch(folder: Path) -> None:
+    LiveRun(folder / "damaged").state()
 
 
 def _find(folder: Path) -> None:
@@ -114,6 +147,12 @@ READERS = (
     Reader("journal, reported", Form.JSON_LINES, partial(_make, "journal/*.jsonl"), _report),
     Reader("journal of plans, shown", Form.JSON_LINES, _make_plans, _show),
     Reader("journal of plans, reported", Form.JSON_LINES, _make_plans, _report),
+    Reader("journal of arms, shown", Form.JSON_LINES, _make_arms, _show),
+    Reader("journal of arms, reported", Form.JSON_LINES, _make_arms, _report),
+    Reader("journal behind a memory, shown", Form.JSON_LINES, _make_memory, _show),
+    Reader("journal behind a memory, reported", Form.JSON_LINES, _make_memory, _report),
+    Reader("journal, rescored", Form.JSON_LINES, partial(_make, "journal/*.jsonl"), _rescore),
+    Reader("journal, watched", Form.JSON_LINES, partial(_make, "journal/*.jsonl"), _watch),
     Reader("results, listed", Form.JSON, partial(_make, "results.json"), _find),
     Reader("results, shown", Form.JSON, partial(_make, "results.json"), _show),
     Reader("stored command", Form.JSON, partial(_make, "run.yaml"), _report),

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.memory.registry import open_memory, parse_options
+from infthor_eval.nieh.rescoring.judge_prompts import JUDGE_PROMPTS
 from infthor_eval.nieh.scoring import scores
 from infthor_eval.thor.actions import UngroundedError, ground, parse_action
 from infthor_eval.thor.launch import embedded_launch
@@ -57,6 +58,11 @@ def _act(folder: Path) -> None:
         assert error.misuse
 
 
+def _judge(name: str, folder: Path) -> None:
+    score = JUDGE_PROMPTS[name].read(_said(folder))
+    assert score is None or 0 <= score <= 1
+
+
 def _remember(folder: Path) -> None:
     for name in ("notes",):
         open_memory(name, tuple((parse_options(_said(folder)) or {}).items()))
@@ -68,6 +74,15 @@ READERS = (
         Form.TEXT,
         partial(_make, "<think>\nso\n</think>\nThe answer is: 2 SideTables, yes.\n"),
         _score,
+    ),
+    *(
+        Reader(
+            f"verdict of a judge, {name}",
+            Form.TEXT,
+            partial(_make, text),
+            partial(_judge, name),
+        )
+        for name, text in (("yes-no", "Yes, both say so.\n"), ("published", "Score: 0.5\n"))
     ),
     Reader("action", Form.TEXT, partial(_make, "PutObject Apple Fridge"), _act),
     Reader("options of a memory", Form.TEXT, partial(_make, "window=20,tokens=64"), _remember),

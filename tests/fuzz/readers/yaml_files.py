@@ -60,6 +60,22 @@ def _make_task(name: str, folder: Path) -> Path:
     )
 
 
+_TASK = """# mine
+include: _nieh.yaml
+task: mine
+dataset_kwargs: &settings
+  context: truncate_head
+  ctx_size: 8
+  seed: 0
+"""
+
+
+def _make_task_text(folder: Path) -> Path:
+    """Write a task as people write it, with a comment and an anchor."""
+    (folder / "a.yaml").write_text(_TASK)
+    return folder / "a.yaml"
+
+
 def _check_task(folder: Path) -> None:
     for task in Catalog(packaged_folder("tasks"), (folder,)).expand(["mine"]):
         find_suite(task.suite).check_task(task)
@@ -84,6 +100,7 @@ READERS = (
         )
         for name in _TASKS
     ),
+    Reader("task file, as text", Form.TEXT, _make_task_text, _check_task),
     *(
         Reader(
             f"recipe {name}",
@@ -91,7 +108,7 @@ READERS = (
             partial(_make_recipe, name),
             lambda folder: read_recipe(str(folder / "a.yaml")),
         )
-        for name in ("infthor_32k", "questions", "tiny")
+        for name in ("infthor_32k", "questions", "tiny", "small")
     ),
     Reader(
         "panels",

@@ -182,3 +182,12 @@ def test_identity_has_options_and_budget():
         "budget": 1000,
     }
     assert isinstance(history_named("full", MemoryChoice()), FullHistory)
+
+
+def test_a_memory_that_changes_its_logs_changes_nobody_elses():
+    logs = [ObjectLog(visible=["Mug"], recep_objs={"Sink": ["Mug"]}) for _ in range(3)]
+    given = replace(past(1), logs=logs).observations(privileged=True)
+    for step in given:
+        step.log.visible.clear()
+        step.log.recep_objs["Sink"].append("Apple")
+    assert logs == [ObjectLog(visible=["Mug"], recep_objs={"Sink": ["Mug"]})] * 3

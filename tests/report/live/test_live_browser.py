@@ -11,8 +11,11 @@ from typing import Any
 import pytest
 
 from infthor_eval.errors import UsageError
+from infthor_eval.nieh.records import RECORDS
 from infthor_eval.pages.server import PageServer, require_page_extra, serve_pages
+from infthor_eval.runs.journals.journal import Journal
 from tests.helpers.nieh_runs import make_record
+from tests.report.live.conftest import header_of
 from tests.report.web.conftest import HOSTILE
 
 try:
@@ -96,13 +99,15 @@ def test_a_killed_run_is_said_to_be_none_that_goes_on(tab: Any, tmp_path: Path) 
     assert tab.locator("#count").text_content() == "1 of 8 (12 %)"
 
 
-def test_hostile_text_is_text(tab: Any, open_journal) -> None:
-    with open_journal(name="m") as journal:
+def test_hostile_text_is_text(tab: Any, tmp_path: Path) -> None:
+    folder = tmp_path / "results" / "m" / "<img src=x onerror=window.hacked=1>"
+    with Journal(folder, header_of(HOSTILE), RECORDS, 0) as journal:
         journal.append(make_record(0, HOSTILE, (HOSTILE,), question=HOSTILE))
         journal.append(make_record(1, None, ("Bed",), failure=HOSTILE))
         wait_for(tab, "#count", "2 of 8")
     assert tab.evaluate("window.hacked") is None
-    assert tab.locator("main img, main script").count() == 0
+    assert tab.locator("body img, main script").count() == 0
+    assert tab.locator("#name").text_content() == HOSTILE
     assert HOSTILE.strip() in tab.locator(".sample .q").last.text_content()
 
 
