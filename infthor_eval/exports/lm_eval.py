@@ -12,7 +12,7 @@ from statistics import fmean
 from typing import Any
 
 from infthor_eval.errors import wrap_errors
-from infthor_eval.harness.registration import NAME
+from infthor_eval.exports import LM_EVAL_MODEL
 from infthor_eval.runs import RunOutcome, TaskFile, UnitRecord, UnitSample
 from infthor_eval.statistics import clustered_mean
 from infthor_eval.storage.digests import canonical_json
@@ -176,7 +176,7 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
             task.name: dict.fromkeys(("original", "effective"), task.n_samples) for task in tasks
         },
         "config": {
-            "model": NAME,
+            "model": LM_EVAL_MODEL,
             "model_args": {"adapter": request.model, **request.model_options},
             "batch_size": None,
             "batch_sizes": [],
@@ -188,7 +188,7 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
         "date": time.time(),
         "lm_eval_version": version("lm_eval"),
         "transformers_version": version("transformers"),
-        "model_source": NAME,
+        "model_source": LM_EVAL_MODEL,
         "model_name": request.model,
     }
 
