@@ -4,11 +4,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 
-from infthor_eval.errors import InfthorError
+from infthor_eval.errors import DataError, InfthorError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.video import Video
 from infthor_eval.nieh.contexts import ContextPart
+from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.rescoring.rebuilt_requests import RebuiltRequest, RequestRebuilder
@@ -17,7 +18,7 @@ from infthor_eval.report.suites.nieh_sets import RunSets
 from infthor_eval.report.web.samples import Prompt, PromptFrames
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["find_prompts"]
+__all__ = ["RequestFrames", "find_prompts"]
 
 Record = UnitRecord[NiehAnswer]
 _OF_BASELINES = "a baseline is not sent it: it answers from the questions alone"
@@ -39,6 +40,26 @@ def find_prompts(run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
         )
         prompts[record.key] = kept.setdefault(prompt, prompt)
     return prompts
+
+
+class RequestFrames:
+    """Finds the frames of a run's requests; see `Presenter.request_frames`."""
+
+    def __init__(self, run: ReportRun, data: Path | None) -> None:
+        sets = RunSets([run], data)
+        self._rebuilders = {task: _rebuilder(run, task, sets) for task in run.tasks}
+
+    def __call__(self, record: Record) -> list[FrameRef]:
+        """Return the frames of a record's request, those of films too.
+
+        Raises:
+            DataError: the request cannot be made again, or not exactly.
+        """
+        rebuilder = self._rebuilders[record.task]
+        if isinstance(rebuilder, str):
+            raise DataError(rebuilder)
+        parts = as_images(rebuilder.rebuild(record).context)
+        return [part for part in parts if isinstance(part, FrameRef)]
 
 
 def _rebuilder(run: ReportRun, task: str, sets: RunSets) -> RequestRebuilder | str:
