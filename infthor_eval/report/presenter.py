@@ -22,6 +22,7 @@ from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.tables import Table
 
 __all__ = [
+    "THOUGHT",
     "Description",
     "EpisodeSelection",
     "Figure",
@@ -38,6 +39,7 @@ __all__ = [
 ]
 
 Record = UnitRecord[Any]
+THOUGHT = "thought"  # name of the detail of a record that a model thought before its reply
 FindFrames = Callable[[Record], Sequence[FrameRef]]
 
 

@@ -12,6 +12,7 @@ from infthor_eval.nieh.results.summary import NiehSummary
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
+    THOUGHT,
     Description,
     Figure,
     FigureRequest,
@@ -136,7 +137,7 @@ class NiehPresenter(PlainPresenter):
                 name: f"{score:+.2f}" for name, score in self.further_scores(record).items()
             }
         if payload.thinking is not None:
-            details["thought"] = payload.thinking
+            details[THOUGHT] = payload.thinking
         return details
 
     def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:

@@ -1,18 +1,93 @@
-"""`infthor-eval import-replies`: replies and counts of plans that others made, as runs."""
+"""`infthor-eval export` and `import-replies`: runs in others' formats, and what others made as
+runs."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
+from infthor_eval.exports.registry import FORMATS
 
 if TYPE_CHECKING:
     from infthor_eval.cli.results import RunResults
 
-__all__ = ["command"]
+__all__ = ["export", "import_replies"]
+
+
+_RELATIONSHIPS = ("first_party", "third_party", "collaborative", "other")
+
+
+@click.command(
+    "export",
+    cls=ExampleCommand,
+    example="infthor-eval export results/*/nieh_mini-* --format every-eval-ever --out exported",
+)
+@click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=PATH)
+@click.option(
+    "--format", "file_format", type=click.Choice(FORMATS), required=True, help="The format."
+)
+@click.option("--out", type=PATH, required=True, help="Folder of the files.")
+@click.option(
+    "--data", type=PATH, metavar="SET", help="Folder of the question set, if the runs name none."
+)
+@click.option(
+    "--frames", is_flag=True, help="Write the frames of requests too, where there is a place."
+)
+@click.option(
+    "--model-id",
+    metavar="OWNER/NAME",
+    help="The model as others know it. Default: its name on the hub, if the runs have it.",
+)
+@click.option("--organization", metavar="NAME", help="Who made the runs.")
+@click.option(
+    "--relationship",
+    type=click.Choice(_RELATIONSHIPS),
+    help="Theirs to the model's developer.  [default: other]",
+)
+@click.option(
+    "--dataset", metavar="OWNER/NAME", help="The data set on the Hugging Face hub, if it is there."
+)
+@click.option("--source-url", metavar="URL", help="Where the runs, or a text on them, are.")
+def export(
+    runs: tuple[Path, ...], file_format: str, out: Path, data: Path | None, **words: Any
+) -> None:
+    """Write the runs in the folders RUN... in a format of others (docs/exports.md).
+
+    What the format has no place for is named in a line, and what a run has not done, or failed at.
+    Nothing is uploaded.
+    """
+    from infthor_eval.cli.progress.notes import print_failure, print_note
+    from infthor_eval.exports.registry import find_writer
+    from infthor_eval.exports.request import ExportRequest
+    from infthor_eval.exports.subjects import require_one_model
+    from infthor_eval.report.presented import read_report_runs
+    from infthor_eval.storage.files import prepare_folder
+    from infthor_eval.terminal import print_line
+
+    for name in ("model_id", "dataset"):
+        _check_hub_name(f"--{name.replace('_', '-')}", words[name])
+    told = {name: value for name, value in words.items() if value is not None}
+    request = ExportRequest(prepare_folder(out), data, **told)
+    found = read_report_runs(runs, print_failure)
+    if request.model_id is not None:
+        require_one_model([run.header for run in found])
+    written = find_writer(file_format)(found, request)
+    for note in written.notes:
+        print_note(note, "yellow")
+    print_note(f"{file_format} has no place for {written.no_place}")
+    for path in written.paths:
+        print_line(str(path))
+
+
+def _check_hub_name(option: str, name: str | None) -> None:
+    from infthor_eval.errors import UsageError
+
+    owner, _, rest = (name or "owner/name").partition("/")
+    if not (owner and rest):
+        raise UsageError(f"{option} {name!r:.60}: is not OWNER/NAME; write both, as on the hub")
 
 
 @click.command(
@@ -32,7 +107,9 @@ __all__ = ["command"]
 @click.option(
     "--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs."
 )
-def command(logs: tuple[Path, ...], data: Path | None, model: str | None, output: Path) -> int:
+def import_replies(
+    logs: tuple[Path, ...], data: Path | None, model: str | None, output: Path
+) -> int:
     """Score replies to NIEH questions that others made, or counts of plans; store them as runs.
 
     LOG is a published log of replies or of plans, lm-eval's samples, or has a JSON object a line
