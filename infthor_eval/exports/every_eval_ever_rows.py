@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from infthor_eval.exports.measures import Measure, Scored
-from infthor_eval.exports.samples import Sample, SampleReader
+from infthor_eval.exports.samples import ACT, Sample, SampleReader, describe_result
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.runs import with_frames
 from infthor_eval.report.web.samples import StepRow
@@ -15,8 +15,6 @@ from infthor_eval.runs import UnitRecord
 __all__ = ["SCHEMA_VERSION", "result_id", "sample_rows"]
 
 SCHEMA_VERSION = "0.3.0"
-_ACT = "act"  # the tool that an agent's or an arm's steps are calls of
-
 Row = dict[str, Any]
 
 
@@ -116,23 +114,18 @@ def _output(sample: Sample) -> Row:
 def _messages(sample: Sample) -> Row:
     messages: list[Row] = [{"role": "user", "content": f"{sample.target}\n{sample.question}"}]
     for number, step in enumerate(sample.steps):
-        call = f"{_ACT}-{number}"
+        call = f"{ACT}-{number}"
         messages += [
             {
                 "role": "assistant",
                 "content": step.reply or step.action,
-                "tool_calls": [{"id": call, "name": _ACT, "arguments": {"action": step.action}}],
+                "tool_calls": [{"id": call, "name": ACT, "arguments": {"action": step.action}}],
             },
-            {"role": "tool", "content": _result(step), "tool_call_id": [call]},
+            {"role": "tool", "content": describe_result(step), "tool_call_id": [call]},
         ]
     for number, message in enumerate(messages):
         message["turn_idx"] = number
     return {"output": None, "messages": messages, "answer_attribution": []}
-
-
-def _result(step: StepRow) -> str:
-    reward = "" if step.reward is None else f"reward {step.reward:g}"
-    return "; ".join(filter(None, (step.error or "done", reward, step.note)))
 
 
 def _turns(steps: Sequence[StepRow]) -> Row:

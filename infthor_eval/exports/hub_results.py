@@ -51,8 +51,8 @@ def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
             notes.append(f"{run.label}: not known: the model's developer; give --model-id")
     paths[_write_tasks(runs, request)] = None
     notes.append(
-        f"the hub takes an eval.yaml only of frameworks in its own list, and {_FRAMEWORK} is not "
-        "in it; ask its team, as the page says"
+        f"the hub takes an eval.yaml only of frameworks in its own list; have {_FRAMEWORK} added "
+        "there first (docs/exports.md)"
     )
     return Written(list(paths), _NO_PLACE, notes)
 

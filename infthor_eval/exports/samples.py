@@ -14,8 +14,9 @@ from infthor_eval.report.presenter import THOUGHT
 from infthor_eval.report.web.samples import Prompt, StepRow
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["FRAME", "Sample", "SampleReader", "TokenCounts"]
+__all__ = ["ACT", "FRAME", "Sample", "SampleReader", "TokenCounts", "describe_result"]
 
+ACT = "act"  # the tool that an agent's or an arm's steps are calls of
 FRAME = "<image>"  # stands for a frame in a text, as in lm-eval's files
 
 Record = UnitRecord[Any]
@@ -129,6 +130,12 @@ class SampleReader:
         if prompt is not None and prompt.shown:
             about["frames"] = ",".join(_stretch(*stretch) for stretch in prompt.shown)
         return {name: value for name, value in about.items() if value}
+
+
+def describe_result(step: StepRow) -> str:
+    """Return what came of a step, in words."""
+    reward = "" if step.reward is None else f"reward {step.reward:g}"
+    return "; ".join(filter(None, (step.error or "done", reward, step.note)))
 
 
 def _stretch(first: int, last: int) -> str:
