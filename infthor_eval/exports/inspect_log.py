@@ -9,7 +9,7 @@ that are known alone, and here a sample is in memory at a time, frames included.
 import json
 import zipfile
 from collections.abc import Mapping, Sequence
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -179,6 +179,8 @@ class _Log:
     ) -> Document:
         gaps = task_gaps(self._run, self._task)
         usage = model_usage(_sum(tokens)) if tokens else None
+        # The journal has no time of the start: as long before the end as all units took together.
+        seconds = sum(record.seconds for record in counted(self._run, self._task))
         return {
             **{name: start[name] for name in ("version", "eval", "plan")},
             "status": "success" if gaps.n_missing == 0 else "cancelled",
@@ -188,6 +190,7 @@ class _Log:
                 "scores": [_score(measure) for measure in self._measures],
             },
             "stats": {
+                "started_at": (self._ran - timedelta(seconds=seconds)).isoformat(),
                 "completed_at": self._ran.isoformat(),
                 "model_usage": {facts.id: usage} if usage else {},
             },

@@ -203,7 +203,7 @@ def _words(frames: PromptFrames) -> str:
     places = ", ".join(
         str(first) if first == last else f"{first} to {last}" for first, last in frames.places
     )
-    return f"[{frames.n} {frames.what}{f': {places}' if places else ''}]"
+    return f"[{frames.what}: {places}]" if places else f"[{frames.n} {frames.what}]"
 
 
 def _joined(content: Sequence[Document]) -> list[Document]:
