@@ -1,6 +1,6 @@
 """Runs in the formats of others, a module or two for each format, and their back way.
 
-What comes back is read by `infthor_eval/formats/reply_logs.py`.
+What comes back is read by `infthor_eval/formats/replies/logs.py`.
 """
 
 __all__ = ["LM_EVAL_MODEL"]

@@ -1,7 +1,7 @@
 """The formats by the names of `export --format`.
 
 To add a format that runs are exported in: a module in this package with `write`, its line here, its
-rows in `docs/exports.md`; what it gives back, in `infthor_eval/formats/reply_logs.py`.
+rows in `docs/exports.md`; what it gives back, in `infthor_eval/formats/replies/logs.py`.
 """
 
 from __future__ import annotations

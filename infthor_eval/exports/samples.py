@@ -127,6 +127,8 @@ class SampleReader:
             "group": self._run.presenter.group(record),
             "context": str(self._run.tasks[record.task].dataset_kwargs.get("context", "")),
         }
+        ablation = self._run.header.config.frames
+        about["frame_ablation"] = "" if ablation == "shown" else ablation
         if prompt is not None and prompt.shown:
             about["frames"] = ",".join(_stretch(*stretch) for stretch in prompt.shown)
         return {name: value for name, value in about.items() if value}

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from infthor_eval.formats.reply_logs import LoggedReply, UnreadRow, read_reply_log
+from infthor_eval.formats.replies.logged import LoggedReply, UnreadRow
+from infthor_eval.formats.replies.logs import read_reply_log
 
 NEUTRAL = {"question_id": "q0", "reply": "yes"}
 PUBLISHED = {
