@@ -127,7 +127,7 @@ def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -
         for part in _parts_of(rows_of[log]):
             first = next(iter(_replies(part)), None)
             of_model = model or (name and name["model"]) or (first.model if first else "")
-            if not of_model:
+            if first and not of_model:
                 raise UsageError(f"{log}: its name has no model; give one with --model")
             (task, settings) = _mode_of(_replies(part), log)
             if any(reply.published for reply in _replies(part)):

@@ -21,6 +21,7 @@ from infthor_eval.runs import UnitKey, UnitRecord
 __all__ = ["RequestFrames", "find_prompts"]
 
 Record = UnitRecord[NiehAnswer]
+_Positions = dict[FrameRef, list[int]]  # of each picture in the trajectory; some are there twice
 _OF_BASELINES = "a baseline is not sent it: it answers from the questions alone"
 
 
@@ -84,7 +85,9 @@ def _prompt(
         return Prompt(problem=str(rebuilder))
     try:
         request = rebuilder.rebuild(record)
-        positions = {frame: position for position, frame in enumerate(data.frames(request.traj_id))}
+        positions: _Positions = {}
+        for position, frame in enumerate(data.frames(request.traj_id)):
+            positions.setdefault(frame, []).append(position)
     except InfthorError as error:
         return Prompt(problem=str(error))
     before = request.text.removesuffix(record.payload.question)
@@ -96,7 +99,7 @@ def _prompt(
 
 
 def _parts(
-    request: RebuiltRequest, positions: Mapping[FrameRef, int], ablation: str
+    request: RebuiltRequest, positions: _Positions, ablation: str
 ) -> Iterator[str | PromptFrames]:
     """Yield texts and frames; neighbours of one kind are one part."""
     for kind, group in groupby(request.context, type):
@@ -114,18 +117,22 @@ def _parts(
             yield from (_film(part, positions, ablation) for part in parts)
 
 
-def _film(part: ContextPart, positions: Mapping[FrameRef, int], ablation: str) -> PromptFrames:
+def _film(part: ContextPart, positions: _Positions, ablation: str) -> PromptFrames:
     assert isinstance(part, Video)
     return _frames(f"video of {part.fps:g} frames per second", part.frames, positions, ablation)
 
 
 def _frames(
-    what: str, frames: Sequence[FrameRef], positions: Mapping[FrameRef, int], ablation: str
+    what: str, frames: Sequence[FrameRef], positions: _Positions, ablation: str
 ) -> PromptFrames:
     """Return frames by their positions; those of other trajectories, blank or decoded have none."""
-    frame_positions = [positions.get(frame) for frame in frames]
-    own = [position for position in frame_positions if position is not None]
-    is_own = len(own) == len(frame_positions)
+    own: list[int] = []
+    for frame in frames:
+        places = positions.get(frame, ())
+        # Of equal pictures the next one: requests are in time order.
+        later = (place for place in places if not own or place > own[-1])
+        own += [next(later, places[0])] if places else []
+    is_own = len(own) == len(frames)
     description = what if ablation == SHOWN else f"{what} ({ablation})"
     return PromptFrames(description, _stretches(own) if is_own else (), len(frames))
 
