@@ -18,7 +18,7 @@ import msgspec
 import infthor_eval
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.exports.every_eval_ever_rows import SCHEMA_VERSION, result_id, sample_rows
-from infthor_eval.exports.gaps import describe_gaps, gap_notes, last_change, task_gaps
+from infthor_eval.exports.gaps import describe_gaps, gap_notes, last_change, task_config, task_gaps
 from infthor_eval.exports.measures import LEVEL, Measure, find_measures
 from infthor_eval.exports.request import ExportRequest, Written
 from infthor_eval.exports.samples import SampleReader
@@ -173,7 +173,7 @@ class _RunExport:
 
     def _source_data(self, task: str) -> Document:
         run = self._run
-        settings = run.tasks[task].dataset_kwargs
+        settings = task_config(run, task).dataset_kwargs
         name = str(settings.get("bundled", task))
         about = {"task": task, "simulator": run.simulator or UNKNOWN}
         if self._request.dataset is None:

@@ -6,9 +6,17 @@ from datetime import UTC, datetime
 
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.presented import PresentedRun
+from infthor_eval.runs import TaskConfig
 from infthor_eval.runs.journals.shards import find_shards
 
-__all__ = ["TaskGaps", "describe_gaps", "gap_notes", "last_change", "task_gaps"]
+__all__ = [
+    "TaskGaps",
+    "describe_gaps",
+    "gap_notes",
+    "last_change",
+    "task_config",
+    "task_gaps",
+]
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,12 @@ class TaskGaps:
         return self.n_missing == 0 and not self.failed
 
 
+def task_config(run: PresentedRun, task: str) -> TaskConfig:
+    """Return the config of a task; an empty one if its suite has configs of another kind."""
+    config = run.tasks[task]
+    return config if isinstance(config, TaskConfig) else TaskConfig()
+
+
 def task_gaps(run: PresentedRun, task: str) -> TaskGaps:
     """Return what is left out of a task."""
     records = [record for record in run.records if record.task == task]
@@ -48,7 +62,7 @@ def task_gaps(run: PresentedRun, task: str) -> TaskGaps:
         n_missing=run.n_missing,
         failed=_count(it.failure for it in records if it.excluded is None),
         excluded=_count(record.excluded for record in records),
-        skipped=_count(run.tasks[task].skip_reasons),
+        skipped=_count(task_config(run, task).skip_reasons),
     )
 
 

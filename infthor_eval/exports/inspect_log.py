@@ -16,7 +16,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.exports.gaps import describe_gaps, gap_notes, last_change, task_gaps
+from infthor_eval.exports.gaps import describe_gaps, gap_notes, last_change, task_config, task_gaps
 from infthor_eval.exports.inspect_samples import SampleWriter, model_usage, sample_summary
 from infthor_eval.exports.measures import Measure, counted, find_measures
 from infthor_eval.exports.request import ExportRequest, Written
@@ -118,7 +118,7 @@ class _Log:
     def _spec(self, facts: ModelFacts) -> Document:
         run = self._run
         config = run.header.config
-        settings: Mapping[str, Any] = run.tasks[self._task].settings
+        settings: Mapping[str, Any] = task_config(run, self._task).settings
         records = counted(run, self._task)
         return {
             "eval_id": self._id,
@@ -129,7 +129,7 @@ class _Log:
             "task_version": str(settings.get("metadata", {}).get("version", 0)),
             "task_args": msgspec.to_builtins(config.tasks[self._task], str_keys=True),
             "dataset": {
-                "name": str(run.tasks[self._task].dataset_kwargs.get("bundled", self._task)),
+                "name": str(task_config(run, self._task).dataset_kwargs.get("bundled", self._task)),
                 "samples": len({record.key.once for record in records}),
                 "sample_ids": list(dict.fromkeys(str(record.key.once) for record in records)),
             },

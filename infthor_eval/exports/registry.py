@@ -1,15 +1,15 @@
 """The formats by the names of `export --format`.
 
 To add a format that runs are exported in: a module in this package with `write`, its line here, its
-rows in `docs/exports.md`; what it gives back, in `infthor_eval/formats/replies/logs.py`.
+row in `docs/exports.md`; how it comes back, in `infthor_eval/formats/replies/logs.py`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING
 
-from infthor_eval.errors import unknown_name
+from infthor_eval.errors import UsageError
 from infthor_eval.plugins import import_target
 
 if TYPE_CHECKING:
@@ -25,16 +25,41 @@ _WRITERS = {
     "lm-eval": "infthor_eval.exports.lm_eval:write",
 }
 FORMATS = tuple(_WRITERS)
+# The options of `export` that change what a format has; it refuses the others.
+_TAKES = {
+    "every-eval-ever": (
+        "data",
+        "model_id",
+        "organization",
+        "relationship",
+        "dataset",
+        "source_url",
+    ),
+    "hf-eval-results": ("model_id", "dataset", "source_url"),
+    "inspect": ("data", "frames", "model_id"),
+    "lm-eval": (),
+}
 
 
-def find_writer(name: str) -> Callable[[Sequence[PresentedRun], ExportRequest], Written]:
+def find_writer(
+    name: str, options: Collection[str]
+) -> Callable[[Sequence[PresentedRun], ExportRequest], Written]:
     """Return what writes runs in a format.
 
+    Args:
+        name: name of the format, one of `FORMATS`.
+        options: the fields of the request that are given.
+
     Raises:
-        UsageError: there is no such format.
+        UsageError: an option changes nothing in this format.
     """
-    if name not in _WRITERS:
-        raise unknown_name("format", name, FORMATS)
+    for option in options:
+        if option not in _TAKES[name]:
+            takers = [other for other in FORMATS if option in _TAKES[other]]
+            raise UsageError(
+                f"--{option.replace('_', '-')}: has no place in {name}; leave it out (it is for "
+                f"{', '.join(takers)})"
+            )
     writer: Callable[[Sequence[PresentedRun], ExportRequest], Written]
     writer = import_target(_WRITERS[name])
     return writer

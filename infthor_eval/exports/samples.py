@@ -8,6 +8,7 @@ from typing import Any
 
 import msgspec
 
+from infthor_eval.exports.gaps import task_config
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.presenter import THOUGHT
@@ -125,7 +126,7 @@ class SampleReader:
             "repeat": str(record.repeat),
             "cluster": record.cluster,
             "group": self._run.presenter.group(record),
-            "context": str(self._run.tasks[record.task].dataset_kwargs.get("context", "")),
+            "context": str(task_config(self._run, record.task).dataset_kwargs.get("context", "")),
         }
         ablation = self._run.header.config.frames
         about["frame_ablation"] = "" if ablation == "shown" else ablation

@@ -51,9 +51,7 @@ _RELATIONSHIPS = ("first_party", "third_party", "collaborative", "other")
     "--dataset", metavar="OWNER/NAME", help="The data set on the Hugging Face hub, if it is there."
 )
 @click.option("--source-url", metavar="URL", help="Where the runs, or a text on them, are.")
-def export(
-    runs: tuple[Path, ...], file_format: str, out: Path, data: Path | None, **words: Any
-) -> None:
+def export(runs: tuple[Path, ...], file_format: str, out: Path, **options: Any) -> None:
     """Write the runs in the folders RUN... in a format of others (docs/exports.md).
 
     What the format has no place for is named in a line, and what a run has not done, or failed at.
@@ -68,13 +66,13 @@ def export(
     from infthor_eval.terminal import print_line
 
     for name in ("model_id", "dataset"):
-        _check_hub_name(f"--{name.replace('_', '-')}", words[name])
-    told = {name: value for name, value in words.items() if value is not None}
-    request = ExportRequest(prepare_folder(out), data, **told)
+        _check_hub_name(f"--{name.replace('_', '-')}", options[name])
+    given = {name: value for name, value in options.items() if value}
+    write = find_writer(file_format, given)
     found = read_report_runs(runs, print_failure)
-    if request.model_id is not None:
+    if "model_id" in given:
         require_one_model([run.header for run in found])
-    written = find_writer(file_format)(found, request)
+    written = write(found, ExportRequest(prepare_folder(out), **given))
     for note in written.notes:
         print_note(note, "yellow")
     print_note(f"{file_format} has no place for {written.no_place}")
@@ -85,8 +83,8 @@ def export(
 def _check_hub_name(option: str, name: str | None) -> None:
     from infthor_eval.errors import UsageError
 
-    owner, _, rest = (name or "owner/name").partition("/")
-    if not (owner and rest):
+    owner, _, rest = (name or "").partition("/")
+    if name is not None and not (owner and rest):
         raise UsageError(f"{option} {name!r:.60}: is not OWNER/NAME; write both, as on the hub")
 
 
@@ -102,7 +100,7 @@ def _check_hub_name(option: str, name: str | None) -> None:
 @click.option(
     "--model",
     metavar="NAME",
-    help="Name of the model. Default: the one in the names of published logs.",
+    help="Name of the model. Default: the one that the log names.",
 )
 @click.option(
     "--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs."
@@ -112,10 +110,11 @@ def import_replies(
 ) -> int:
     """Score replies to NIEH questions that others made, or counts of plans; store them as runs.
 
-    LOG is a published log of replies or of plans, lm-eval's samples, or has a JSON object a line
-    with question_id and reply. SET needs no frames; logs of plans need no SET. Logs of one model in
-    one mode become one run, which `show`, `compare` and `report` read like any other. A row that
-    answers no question of SET is counted and named; the exit code is then 1.
+    LOG is a published log of replies or of plans, has the samples of lm-eval, Every Eval Ever or
+    inspect_ai (docs/exports.md), or a JSON object a line with question_id and reply. SET needs no
+    frames; logs of plans need no SET. Logs of one model in one mode become one run, which `show`,
+    `compare` and `report` read like any other. A row that answers no question of SET is counted and
+    named; the exit code is then 1.
     """
     from infthor_eval.cli.options.show import ShowOptions
     from infthor_eval.cli.results import print_results
