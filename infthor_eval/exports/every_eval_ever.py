@@ -63,7 +63,7 @@ class _RunExport:
     def __init__(self, run: PresentedRun, request: ExportRequest) -> None:
         self._run = run
         self._request = request
-        self._facts = model_facts(run.header, request.model_id)
+        self._facts = model_facts(run, request.model_id)
         self._measures = [it for task in run.tasks for it in find_measures(run, task)]
         if not self._measures:
             raise DataError(f"{run.folder}: no unit of it counts; leave it out, or run it again")
@@ -141,7 +141,7 @@ class _RunExport:
         results = results_document(run.summary, run.suite, run.n_missing, run.usage)
         usage = msgspec.to_builtins(run.usage)
         return {
-            "source_name": run.label,
+            "source_name": "infthor-eval",
             "source_type": "evaluation_run",
             "source_organization_name": self._request.organization,
             **_if_told("source_organization_url", self._request.source_url),

@@ -47,7 +47,7 @@ def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
     for run in runs:
         paths[_write_results(run, request)] = None
         notes += gap_notes(run)
-        if model_facts(run.header, request.model_id).developer == UNKNOWN:
+        if model_facts(run, request.model_id).developer == UNKNOWN:
             notes.append(f"{run.label}: not known: the model's developer; give --model-id")
     paths[_write_tasks(runs, request)] = None
     notes.append(
@@ -58,7 +58,7 @@ def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
 
 
 def _write_results(run: PresentedRun, request: ExportRequest) -> Path:
-    facts = model_facts(run.header, request.model_id)
+    facts = model_facts(run, request.model_id)
     measures = [measure for task in run.tasks for measure in find_measures(run, task)]
     primary = [measure for measure in measures if measure.is_primary]
     if not primary:
@@ -89,7 +89,7 @@ def _entry(run: PresentedRun, measure: Measure, request: ExportRequest) -> dict[
 
 
 def _notes(run: PresentedRun, measure: Measure, factor: int) -> str:
-    facts = model_facts(run.header)
+    facts = model_facts(run)
     unit = "%" if measure.is_share else "points"
     interval = measure.interval
     spread = ""

@@ -79,7 +79,7 @@ class _Log:
 
     def write(self, request: ExportRequest) -> Path:
         """Write the file; returns its path."""
-        facts = model_facts(self._run.header, request.model_id)
+        facts = model_facts(self._run, request.model_id)
         find_frames = None
         if request.frames:
             find_frames = self._run.presenter.request_frames(self._run, request.data)
@@ -148,7 +148,7 @@ class _Log:
         gaps = task_gaps(run, self._task)
         return {
             "suite": run.suite.name,
-            "run": run.label,
+            "run": facts.name,
             "developer": facts.developer,
             "revision": facts.revision,
             "frames": run.header.config.frames,

@@ -6,7 +6,8 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from infthor_eval.errors import UsageError
-from infthor_eval.runs import RunHeader
+from infthor_eval.report.presented import PresentedRun
+from infthor_eval.runs import RunHeader, read_header
 
 __all__ = ["UNKNOWN", "ModelFacts", "model_facts", "require_one_model"]
 
@@ -66,12 +67,14 @@ def require_one_model(headers: Sequence[RunHeader[Any]]) -> None:
             )
 
 
-def model_facts(header: RunHeader[Any], model_id: str | None = None) -> ModelFacts:
-    """Return what a run's header says of its model; `model_id` is its name where that is wrong.
+def model_facts(run: PresentedRun, model_id: str | None = None) -> ModelFacts:
+    """Return what a run says of its model; `model_id` is its name where that is wrong.
 
-    A checkpoint of the hub names its developer and has open weights; of a folder and of a server
-    neither is known.
+    The name is the run's own: the one that tells it from other runs beside it has options, and
+    folders of this machine among them. A checkpoint of the hub names its developer and has open
+    weights; of a folder and of a server neither is known.
     """
+    header = read_header(run.folder)
     identity: Mapping[str, Any] = header.config.model
     engine, engine_version = _engine(identity)
     platform, deployment = _place(identity)

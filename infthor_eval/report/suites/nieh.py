@@ -38,7 +38,6 @@ _BOUNDS = {
     "reference": (0.0, math.inf),
     JUDGED: (0.0, 1.0),
     _PAIR_ACCURACY: (0.0, 1.0),
-    f"strict{_ABOVE_GUESSING}": (-math.inf, 1.0),
 }
 
 
@@ -73,8 +72,8 @@ class NiehPresenter(PlainPresenter):
         return True
 
     def bounds(self, metric: str) -> tuple[float, float]:
-        """See `Presenter.bounds`: the reference scorer exceeds 1 on repetitions, scores above
-        guessing can be below 0, and nothing is known of a task's own metrics."""
+        """See `Presenter.bounds`: the reference scorer exceeds 1 on repetitions; scores above
+        guessing, of a part of a set, can be anything, and so can a task's own metrics."""
         return _BOUNDS.get(metric, (-math.inf, math.inf))
 
     def further_scores(self, record: Record) -> Mapping[str, float]:
