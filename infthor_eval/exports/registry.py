@@ -22,7 +22,7 @@ _WRITERS = {
     "every-eval-ever": "infthor_eval.exports.every_eval_ever:write",
     "hf-eval-results": "infthor_eval.exports.hub_results:write",
     "inspect": "infthor_eval.exports.inspect_log:write",
-    "lm-eval": "infthor_eval.exports.lm_eval:write",
+    "lm-eval": "infthor_eval.exports.lm_eval_files:write",
 }
 FORMATS = tuple(_WRITERS)
 # The options of `export` that change what a format has; it refuses the others.

@@ -158,6 +158,19 @@ def test_a_file_without_replies_is_one_line(twin_set, run_cli, tmp_path, name, c
     assert reason in err
 
 
+def test_an_encrypted_log_is_one_line(questions_run, export, twin_set, run_cli, tmp_path):
+    path = samples_of(export(questions_run, "inspect"))
+    content = bytearray(path.read_bytes())
+    at = content.find(b"PK\x01\x02")
+    while at >= 0:
+        content[at + 8] |= 1
+        at = content.find(b"PK\x01\x02", at + 4)
+    path.write_bytes(content)
+    code, _, err = run_cli("import-replies", path, "--data", twin_set, "--output", tmp_path / "out")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "is encrypted" in err
+
+
 def test_a_log_without_a_header_is_one_line(twin_set, run_cli, tmp_path):
     with zipfile.ZipFile(tmp_path / "run.eval", "w") as archive:
         archive.writestr("samples/a_epoch_1.json", "{}")

@@ -6,6 +6,7 @@ The package writes them packed with zstandard, which Python's own zip reader doe
 
 import struct
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -29,7 +30,8 @@ _HINT = "give a log as inspect_ai writes it"
 _ZSTANDARD = 93
 _LOCAL = struct.Struct("<26xHH")  # up to the lengths of a member's name and extra field
 _MB = 1_000_000
-_DAMAGED = (zipfile.BadZipFile, OSError, EOFError, NotImplementedError, struct.error)
+# RuntimeError: of a member that is encrypted, or packed in a way that is not known.
+_DAMAGED = (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, struct.error)
 
 
 class _Spec(msgspec.Struct, frozen=True):
@@ -93,7 +95,7 @@ def inspect_rows(path: Path) -> Iterator[tuple[int, Callable[[], Sequence[Logged
             samples = [it for name, it in members.items() if name.startswith(_SAMPLES)]
             for number, member in enumerate(samples, start=1):
                 yield number, partial(_read, number, _document(archive, member), spec)
-    except (*_DAMAGED, msgspec.ValidationError, ValueError, RecursionError) as error:
+    except (*_DAMAGED, ValueError) as error:  # msgspec's errors are ValueErrors
         raise DataError(f"{path}: not a log of inspect_ai ({in_one_line(error)}); {_HINT}") from (
             error
         )
