@@ -19,7 +19,7 @@ import infthor_eval
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.exports.every_eval_ever_rows import SCHEMA_VERSION, result_id, sample_rows
 from infthor_eval.exports.gaps import describe_gaps, gap_notes, last_change, task_config, task_gaps
-from infthor_eval.exports.measures import LEVEL, Measure, find_measures
+from infthor_eval.exports.measures import LEVEL, Measure, counted, find_measures
 from infthor_eval.exports.request import ExportRequest, Written
 from infthor_eval.exports.samples import SampleReader
 from infthor_eval.exports.subjects import UNKNOWN, ModelFacts, model_facts
@@ -183,7 +183,7 @@ class _RunExport:
             "source_type": "hf_dataset",
             "hf_repo": self._request.dataset,
             "hf_split": "test",
-            "samples_number": task_gaps(run, task).n_counted,
+            "samples_number": len({record.key.once for record in counted(run, task)}),
             "additional_details": about,
         }
 

@@ -31,9 +31,7 @@ from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 __all__ = ["write"]
 
 _VERSION = 2  # of inspect_ai's logs
-_NO_PLACE = (
-    "excluded samples (their reasons are told), pairs other than as means, and groups of scores"
-)
+_NO_PLACE = "excluded samples (their reasons are told), and pairs of twins other than as a mean"
 
 Document = dict[str, Any]
 
@@ -56,7 +54,7 @@ def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
             paths.append(log.write(request))
             notes += log.problems
         notes += [*gap_notes(run), *reader.problems]
-    frames = "" if request.frames else " (frames have: --frames attaches them)"
+    frames = "" if request.frames else "; it has one for frames, which --frames attaches"
     return Written(paths, f"{_NO_PLACE}{frames}", notes)
 
 

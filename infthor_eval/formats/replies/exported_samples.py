@@ -19,10 +19,6 @@ _STRETCHES = re.compile(r"\d{1,9}(-\d{1,9})?(,\d{1,9}(-\d{1,9})?)*", re.ASCII)
 _LONGEST_STRETCH = 1_000_000  # frames
 
 
-class _Input(msgspec.Struct, frozen=True):
-    raw: str
-
-
 class _Output(msgspec.Struct, frozen=True):
     raw: tuple[str, ...]
     reasoning_trace: tuple[str, ...] | None = None

@@ -57,3 +57,65 @@ def test_frames_that_are_no_whole_numbers_make_a_bad_row(read, row, name, frames
     assert isinstance(bad, UnreadRow)
     assert name in bad.reason
     assert (good.line, good.frames) == (2, None)
+
+
+EVALUATED = {
+    "evaluation_id": "e",
+    "sample_id": "q0",
+    "model_id": "m/n",
+    "output": {"raw": ["yes"]},
+    "evaluation": {"score": 1.0, "is_correct": True},
+}
+
+
+def test_a_reply_that_is_there_for_each_metric_comes_once(read):
+    rows = [{**EVALUATED, "evaluation_name": name} for name in ("exact", "f1")]
+    assert read(*rows) == [LoggedReply(1, "yes", "q0", model="m/n")]
+
+
+def test_several_replies_in_a_row_are_repetitions(read):
+    drawn = read({**EVALUATED, "output": {"raw": ["yes", "no", "yes"]}})
+    assert [(reply.text, reply.repeat) for reply in drawn] == [("yes", 1), ("no", 2), ("yes", 3)]
+
+
+def test_what_exports_say_beside_their_format(read):
+    told = {"question_id": "q7", "task": "t", "context": "clues", "variant": "depth=0.4"}
+    told |= {"repeat": "2", "frames": "0-2,7", "frame_ablation": "blank"}
+    (reply,) = read({**EVALUATED, "sample_id": "q7 depth=0.4 (2)", "metadata": told})
+    assert reply == LoggedReply(
+        1,
+        "yes",
+        "q7",
+        frames=(0, 1, 2, 7),
+        model="m/n",
+        task="t",
+        context="clues",
+        frame_ablation="blank",
+        variant="depth=0.4",
+        repeat=2,
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"output": None}, "an episode, and no reply to a question"),
+        ({"output": {"raw": []}}, "output.raw is empty"),
+        ({"metadata": {"frames": "0-999999999"}}, "are more than 1,000,000"),
+        ({"sample_id": 3}, "Expected `str`, got `int`"),
+    ],
+)
+def test_a_row_without_a_reply_is_a_bad_one(read, changes, reason):
+    bad, good = read({**EVALUATED, **changes}, EVALUATED)
+    assert isinstance(bad, UnreadRow)
+    assert reason in bad.reason
+    assert good.text == "yes"
+
+
+def test_a_failed_sample_has_its_reason(read):
+    (reply,) = read({**EVALUATED, "output": {"raw": []}, "error": "the server says no"})
+    assert (reply.text, reply.failure) == ("", "the server says no")
+
+
+def test_a_pair_is_no_reply(read):
+    assert read({**EVALUATED, "metadata": {"members": '["q0", "q1"]'}}) == []
