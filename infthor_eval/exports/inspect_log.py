@@ -31,6 +31,7 @@ from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 __all__ = ["write"]
 
 _VERSION = 2  # of inspect_ai's logs
+_PROVIDERS = {"transformers": "hf", "vllm": "vllm"}  # its names of engines, which begin a model's
 _NO_PLACE = "excluded samples (their reasons are told), and pairs of twins other than as a mean"
 
 Document = dict[str, Any]
@@ -81,7 +82,7 @@ class _Log:
         find_frames = None
         if request.frames:
             find_frames = self._run.presenter.request_frames(self._run, request.data)
-        writer = SampleWriter(facts.id, self._measures, find_frames)
+        writer = SampleWriter(_model_name(facts), self._measures, find_frames)
         path = request.out / f"{_stamp(self._ran)}_{file_name(self._task)}_{self._id}.eval"
         start = {"version": _VERSION, "eval": self._spec(facts), "plan": self._plan()}
         summaries = []
@@ -131,7 +132,7 @@ class _Log:
                 "samples": len({record.key.once for record in records}),
                 "sample_ids": list(dict.fromkeys(str(record.key.once) for record in records)),
             },
-            "model": facts.id,
+            "model": _model_name(facts),
             "model_args": dict(facts.identity),
             "config": {
                 "limit": config.limit,
@@ -190,9 +191,15 @@ class _Log:
             "stats": {
                 "started_at": (self._ran - timedelta(seconds=seconds)).isoformat(),
                 "completed_at": self._ran.isoformat(),
-                "model_usage": {facts.id: usage} if usage else {},
+                "model_usage": {_model_name(facts): usage} if usage else {},
             },
         }
+
+
+def _model_name(facts: ModelFacts) -> str:
+    """Return a model's name as inspect has it: the engine's, the developer's, its own."""
+    provider = _PROVIDERS.get(facts.engine)
+    return facts.id if provider is None else f"{provider}/{facts.id}"
 
 
 def _score(measure: Measure) -> Document:
