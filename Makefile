@@ -6,6 +6,8 @@ INSTALLED := $(VENV)/.installed
 # lm-eval's own multimodal model insists on torchvision, which has no CPU build; one test loads its Python half from
 # here. It must stay out of the environment itself, where transformers would find it and fail.
 PEERS := $(VENV)/test-peers
+# inspect_ai reads the logs that `export` writes; eighty other packages come with it, so it has an environment of its own.
+INSPECT := $(VENV)/inspect-ai
 # The renderer is compiled once; otherwise each process that finds it missing would compile it.
 COMPILE := $(BIN)/python -m pytest -q tests/infthor_sim/test_questions.py tests/infthor_sim/test_pictures.py -m "not slow" \
 	-k "test_questions or test_ids_frame_names or numba"
@@ -40,16 +42,16 @@ demo: $(INSTALLED)
 shell: $(INSTALLED)
 	@. $(BIN)/activate && exec "$${SHELL:-/bin/sh}"
 
-test: $(INSTALLED) $(PEERS)
+test: $(INSTALLED) $(PEERS) $(INSPECT)
 	$(COMPILE)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 # The slow ones too; half an hour on two cores.
-test-all: $(INSTALLED) $(PEERS)
+test-all: $(INSTALLED) $(PEERS) $(INSPECT)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile
 
 # Measures all tests, and lists those that are slow in tests/slow_tests.txt.
-test-times: $(INSTALLED) $(PEERS)
+test-times: $(INSTALLED) $(PEERS) $(INSPECT)
 	$(COMPILE)
 	rm -rf build/processor_times
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -p tests.processor_times
@@ -114,6 +116,11 @@ $(INSTALLED): pyproject.toml setup.py constraints.txt
 
 $(PEERS): $(INSTALLED)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt --no-deps --upgrade --target $@ torchvision
+	touch $@
+
+$(INSPECT): $(INSTALLED)
+	$(PYTHON) -m venv $@
+	$@/bin/pip install --quiet --disable-pip-version-check 'inspect_ai==0.3.285'
 	touch $@
 
 clean:

@@ -54,6 +54,7 @@ _SECTIONS = {
     "Command line, report, data": (
         "infthor_eval/cli/",
         "infthor_eval/errors.py",
+        "infthor_eval/exports/",
         "infthor_eval/formats/",
         "infthor_eval/harness/",
         "infthor_eval/pages/",

@@ -81,6 +81,10 @@ def test_a_suite_of_another_package_runs_with_its_task_and_its_options(package):
     identity = json.loads(results.read_text())["config"]
     assert identity["suite"] == "sums"
     assert identity["suite_code"].keys() == {"package", "version", "source"}
+    for file_format in ("every-eval-ever", "inspect"):
+        words = ("--format", file_format, "--out", package / file_format)
+        done = command(package, "export", results.parent, *words)
+        assert (done.returncode, "2 of 6 failed" in done.stderr) == (0, True), done.stderr
     helped = command(package, "run", "--help").stdout
     assert "What it is made of. [sums]" in " ".join(helped.split())
 

@@ -20,7 +20,7 @@ _VIDEO_FILE = "video_preprocessor_config.json"
 # Published files say so; vLLM neither scales nor normalises pixels where they do not.
 _PIXELS = {
     **dict.fromkeys(("do_resize", "do_rescale", "do_normalize"), True),
-    **dict.fromkeys(("image_mean", "image_std"), [0.5, 0.5, 0.5]),
+    **{name: [0.5, 0.5, 0.5] for name in ("image_mean", "image_std")},
 }
 _QUERY_NORMS = ("q_norm.weight", "q_layernorm.weight")
 _SHARPER = 4.0

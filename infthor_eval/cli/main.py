@@ -42,6 +42,7 @@ _COMMANDS = {
         "report": "Write a page with results and all samples, or a figure of the paper.",
         "watch-run": "Open a page on a run as it goes.",
         "watch": "Write a video of an agent or an arm.",
+        "export": "Write runs in the formats of others.",
         "import-replies": "Store replies and counts of plans that others made, as runs.",
         "rescore": "Score the replies of a run again, also with your own scorer or a judge.",
         "audit": "Print what a question set gives away without a frame.",
@@ -78,6 +79,8 @@ _FOLDERS = {"Make data": "data."}
 _SHARED_MODULES = {
     "questions": "data.questions:questions",
     "twins": "data.questions:twins",
+    "export": "exchange:export",
+    "import-replies": "exchange:import_replies",
     "table4": "tables:table4",
     "table-final": "tables:table_final",
     "check-adapter": "checks:check_adapter",

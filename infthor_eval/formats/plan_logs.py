@@ -22,7 +22,7 @@ import msgspec
 
 from infthor_eval.errors import DataError, in_one_line
 from infthor_eval.formats.reading import json_value, lines_of
-from infthor_eval.formats.reply_logs import UnreadRow
+from infthor_eval.formats.replies.logs import UnreadRow
 from infthor_eval.storage.digests import digest
 
 __all__ = ["LoggedPlans", "PlanCount", "PlanLog", "is_plan_log", "read_plan_log"]

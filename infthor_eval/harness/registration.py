@@ -1,8 +1,9 @@
 """Registers our model class with lm-eval unimported, and tells our tasks whether it is used."""
 
+from infthor_eval.exports import LM_EVAL_MODEL as NAME
+
 __all__ = ["NAME", "model_takes_references", "register", "say_model_takes_references"]
 
-NAME = "infthor"
 _TARGET = "infthor_eval.harness.model:InfthorLM"
 _references = False
 

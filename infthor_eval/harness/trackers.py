@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from infthor_eval.errors import UsageError, in_one_line, wrap_errors
-from infthor_eval.harness.export import Exported, convert_run
+from infthor_eval.exports.lm_eval import Exported, convert_run
 from infthor_eval.harness.registration import NAME
 from infthor_eval.runs import RunOutcome
 from infthor_eval.storage.scratch import ScratchFolder

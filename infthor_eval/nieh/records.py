@@ -70,9 +70,10 @@ class TwinSide(msgspec.Struct, frozen=True, kw_only=True):
         kind: kind of the edit that made the pair of worlds.
         traj_id: name of this world's trajectory.
         answers: gold answers in the other world.
-        n_frames: number of shown frames.
-        n_differing: number of these that differ between the worlds.
-        n_after_clues: number of shown frames after the last clue.
+        n_frames: number of shown frames; None if they are not known, as of replies that others
+            made.
+        n_differing: number of these that differ between the worlds; likewise.
+        n_after_clues: number of shown frames after the last clue; likewise.
         n_since_change: number of frames of the trajectory since the changed objects were last
             changed by the agent; None if it left them as they were at the start.
     """
@@ -82,9 +83,9 @@ class TwinSide(msgspec.Struct, frozen=True, kw_only=True):
     kind: str
     traj_id: str
     answers: Annotated[_Answers, Meta(min_length=1)]
-    n_frames: Count
-    n_differing: Count
-    n_after_clues: Count
+    n_frames: Count | None
+    n_differing: Count | None
+    n_after_clues: Count | None
     n_since_change: Count | None
 
 

@@ -11,7 +11,7 @@ from infthor_eval.nieh.contexts.base import Sample
 from infthor_eval.nieh.records import TwinSide
 from infthor_eval.nieh.samples import TaskSamples
 
-__all__ = ["twin_side"]
+__all__ = ["twin_of_reply", "twin_side"]
 
 
 def twin_side(task_samples: TaskSamples, sample: Sample) -> TwinSide | None:
@@ -20,27 +20,50 @@ def twin_side(task_samples: TaskSamples, sample: Sample) -> TwinSide | None:
     Raises:
         DataError: the set has no other question of the pair, or no pair of its worlds.
     """
-    data = task_samples.data
-    question = sample.question
-    if not question.pair:
+    if not sample.question.pair:
         return None
+    shown = task_samples.positions(sample)
+    return _side(task_samples.data, sample.question, shown, task_samples.true_positions(sample))
+
+
+def twin_of_reply(
+    data: NiehSet, question: Question, shown: Sequence[int] | None
+) -> TwinSide | None:
+    """Return what a question that others asked is paired with; None if it is no twin.
+
+    Args:
+        data: its set.
+        question: the question.
+        shown: positions of the frames that were shown; None if they are not known.
+
+    Raises:
+        DataError: as `twin_side`.
+    """
+    return _side(data, question, shown, shown) if question.pair else None
+
+
+def _side(
+    data: NiehSet, question: Question, shown: Sequence[int] | None, true: Sequence[int] | None
+) -> TwinSide:
     pair = data.twins.get(question.traj_id)
     if pair is None:
         raise DataError(
             f"{data.root}: twins.jsonl has no pair with {question.traj_id}; make the twins again"
         )
-    shown = task_samples.positions(sample)
-    true = task_samples.true_positions(sample)
     clues = data.clue_positions(question) if data.has_frames else question.clues
+    n_differing = n_after_clues = None
+    if shown is not None and true is not None:
+        n_differing = sum(not pair.frames[at].same for at in true if at < len(pair.frames))
+        n_after_clues = sum(position > max(clues) for position in shown)
     return TwinSide(
         pair=question.pair,
         fact=question.fact,
         kind=pair.kind,
         traj_id=question.traj_id,
         answers=_other(data, question).answers,
-        n_frames=len(shown),
-        n_differing=sum(not pair.frames[position].same for position in true),
-        n_after_clues=sum(position > max(clues) for position in shown),
+        n_frames=None if shown is None else len(shown),
+        n_differing=n_differing,
+        n_after_clues=n_after_clues,
         n_since_change=_frames_since_change(data, question.traj_id),
     )
 

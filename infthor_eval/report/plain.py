@@ -1,13 +1,21 @@
 """The presenter of suites that have none, and a base for those that have one."""
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from infthor_eval.report.presenter import Description, Figure, GroupScore, Replay, Timelines
+from infthor_eval.report.presenter import (
+    Description,
+    Figure,
+    FindFrames,
+    GroupScore,
+    Replay,
+    Timelines,
+)
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.sample_columns import SampleColumn
 from infthor_eval.report.web.samples import Prompt, StepRow
@@ -41,6 +49,10 @@ class PlainPresenter:
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`: a metric with a value below 0 or above 1 is none."""
         return all(0 <= score <= 1 for score in scores)
+
+    def bounds(self, metric: str) -> tuple[float, float]:
+        """See `Presenter.bounds`: none is known."""
+        return -math.inf, math.inf
 
     def further_scores(self, record: UnitRecord[Any]) -> Mapping[str, float]:
         """See `Presenter.further_scores`: none."""
@@ -89,6 +101,10 @@ class PlainPresenter:
     def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
         """See `Presenter.prompts`: none."""
         return {}
+
+    def request_frames(self, run: ReportRun, data: Path | None) -> FindFrames:
+        """See `Presenter.request_frames`: none."""
+        return lambda _: ()
 
     def timelines(
         self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, Protocol
 
 from PIL import Image
 
+from infthor_eval.formats.frames import FrameRef
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.sample_columns import SampleColumn
 from infthor_eval.report.web.samples import FrameFacts, Prompt, StepRow, Timeline
@@ -21,11 +22,13 @@ from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.tables import Table
 
 __all__ = [
+    "THOUGHT",
     "Description",
     "EpisodeSelection",
     "Figure",
     "FigureRequest",
     "FigureResult",
+    "FindFrames",
     "GroupScore",
     "OpenReplay",
     "Presenter",
@@ -36,6 +39,8 @@ __all__ = [
 ]
 
 Record = UnitRecord[Any]
+THOUGHT = "thought"  # name of the detail of a record that a model thought before its reply
+FindFrames = Callable[[Record], Sequence[FrameRef]]
 
 
 class Description(NamedTuple):
@@ -262,6 +267,10 @@ class Presenter(Protocol):
         """Whether a metric with these scores is a share, which is shown in percent; others are
         shown as they are."""
 
+    def bounds(self, metric: str) -> tuple[float, float]:
+        """Return the lowest and the highest possible score of a metric, one of `further_scores` or
+        `group_scores` included; infinite where there is no limit, or none is known."""
+
     def further_scores(self, record: Record) -> Mapping[str, float]:
         """Return scores that only some samples have, by name; runs are compared on those."""
 
@@ -300,6 +309,10 @@ class Presenter(Protocol):
 
     def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
         """Return the requests of a run's records, equal ones once; `data` is as for `timelines`."""
+
+    def request_frames(self, run: ReportRun, data: Path | None) -> FindFrames:
+        """Return what finds the frames of a record's request (`prompts`), in their order; it raises
+        DataError where they cannot be found."""
 
     def timelines(
         self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore

@@ -5,8 +5,8 @@ from collections import Counter
 import pytest
 
 from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.exports.lm_eval import export
 from infthor_eval.formats.question import Question
-from infthor_eval.harness.export import export
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.runs import execute, read_run

@@ -93,7 +93,7 @@ def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepare_run, 
 
 
 def test_what_is_exported_has_a_sample_for_each_plan(prepare_run):
-    from infthor_eval.harness.export import export
+    from infthor_eval.exports.lm_eval import export
 
     outcome = execute(prepare_run())
     export(outcome)

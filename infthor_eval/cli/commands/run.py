@@ -124,7 +124,7 @@ def evaluate(
         Exit code: 130 where a run was stopped, 2 where a model's code failed after its units, 1
         where a unit failed, all units of a run were excluded, or a tracker refused a run, else 0.
     """
-    from infthor_eval.harness.export import export
+    from infthor_eval.exports.lm_eval import export
     from infthor_eval.harness.trackers import Trackers
 
     senders = Trackers(**(trackers or {}))

@@ -31,9 +31,7 @@ def is_shown(question: PairedQuestion, worlds: Worlds, first: World, second: Wor
     It must show that by the changed object that is asked about, if any frame that differs shows it:
     another one that is changed with it may be beside it.
     """
-    differing = [
-        clue for clue in question.clues if first.pictures[clue] != second.pictures[clue]
-    ]
+    differing = [clue for clue in question.clues if first.pictures[clue] != second.pictures[clue]]
     shown = {clue: list(_asked(question, worlds, first, second, clue)) for clue in differing}
     any_shown = any(shown.values())
     return any(

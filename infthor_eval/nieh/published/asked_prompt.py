@@ -9,7 +9,7 @@ without the model's vocabulary.
 
 from collections.abc import Iterable, Mapping
 
-from infthor_eval.formats.reply_logs import LoggedReply
+from infthor_eval.formats.replies.logged import LoggedReply
 from infthor_eval.nieh.prompts import PUBLISHED_LOGS, PUBLISHED_MAIN
 
 __all__ = ["asked_prompt"]

@@ -10,15 +10,18 @@ from typing import Any
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.formats.reply_logs import LoggedReply, UnreadRow, read_reply_log
+from infthor_eval.formats.replies.logged import LoggedReply, UnreadRow
+from infthor_eval.formats.replies.logs import read_reply_log
 from infthor_eval.nieh.config import MetricsConfig, NiehConfig, NiehTaskConfig
+from infthor_eval.nieh.contexts import CONTEXTS
 from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
-from infthor_eval.nieh.options import SHOWN
+from infthor_eval.nieh.options import FRAMES, SHOWN
 from infthor_eval.nieh.published.asked_prompt import asked_prompt
-from infthor_eval.nieh.records import Guess, NiehAnswer, ShownClues
-from infthor_eval.nieh.scoring import SCORERS, scores
-from infthor_eval.runs import Catalog, RunHeader, Session, Tokens, Unit, UnitKey, UnitRecord
-from infthor_eval.storage.digests import digest_of_file, fingerprint
+from infthor_eval.nieh.published.imported_records import WHOLE, Known, imported_record
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.scoring import SCORERS
+from infthor_eval.runs import Catalog, RunHeader, Session, UnitRecord
+from infthor_eval.storage.digests import digest_of_file
 
 __all__ = ["ImportedRun", "Refusal", "import_logs"]
 
@@ -36,7 +39,6 @@ _MODES = {
     "clip_retrieval": ("nieh_clip_retrieval", "clip_retrieval"),
     "video": ("nieh_video", "video"),
 }
-_WHOLE = (None, "full_traj")  # modes that show all frames; early logs name no mode
 _OTHER = ("imported", "imported")  # of logs that name no mode
 
 
@@ -60,6 +62,7 @@ class ImportedRun:
             published logs with the prompt that they were asked with, None if their counts of tokens
             do not tell.
         logs: the logs.
+        frames: the frame ablation that it was asked under.
         records: a record per imported reply.
         refused: the rows that are not imported.
         rescored: rows whose logged score is not that of the reference scorer.
@@ -69,6 +72,7 @@ class ImportedRun:
     model: str
     task: str
     settings: Mapping[str, Any]
+    frames: str = SHOWN
     logs: list[Path] = field(default_factory=list)
     records: list[UnitRecord[NiehAnswer]] = field(default_factory=list)
     refused: list[Refusal] = field(default_factory=list)
@@ -78,7 +82,7 @@ class ImportedRun:
     @property
     def n_missing(self) -> int:
         """Number of questions without a reply."""
-        return len(self.question_ids) - len(self.records)
+        return len(self.question_ids) - len({record.id for record in self.records})
 
     def make_records(self, _: Session[NiehAnswer]) -> list[UnitRecord[NiehAnswer]]:
         """Return the records, see `store_run`."""
@@ -96,7 +100,7 @@ class ImportedRun:
             n_samples=len(self.question_ids),
             skipped=(),
         )
-        config = NiehConfig(tasks={self.task: task}, frames=SHOWN)
+        config = NiehConfig(tasks={self.task: task}, frames=self.frames)
         model = {"name": self.model, "imported": True}
         return RunHeader(suite="nieh", name=self.model, config=config.complete("nieh", model))
 
@@ -105,7 +109,7 @@ def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -
     """Return the runs in logs: those of one model and mode, on different questions, are one run.
 
     Args:
-        logs: files with replies (`infthor_eval.formats.reply_logs`).
+        logs: files with replies (`infthor_eval.formats.replies.logs`).
         data: the set that they answer.
         model: name of the model; None for the one in the names of published logs.
 
@@ -114,25 +118,41 @@ def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -
             the set.
         DataError: a log cannot be read.
     """
-    runs: dict[tuple[str, str, str], ImportedRun] = {}
+    runs: dict[tuple[str, ...], ImportedRun] = {}
     rows_of = {log: list(read_reply_log(log)) for log in dict.fromkeys(logs)}
     replies_of = {log: _replies(rows) for log, rows in rows_of.items()}
     n_frames = _trajectory_lengths(chain.from_iterable(replies_of.values()))
     for log in logs:
         name = _PUBLISHED_NAME.match(log.name)
-        if model is None and name is None:
-            raise UsageError(f"{log}: its name has no model; give one with --model")
-        of_model = model or (name and name["model"]) or ""
-        (task, settings) = _mode_of(replies_of[log], log)
-        if task != _OTHER[0]:
-            settings["prompt"] = asked_prompt(replies_of[log])
-            task = _published_task(settings) or task
-        run = runs.setdefault(
-            (of_model, task, repr(settings)), ImportedRun(of_model, task, settings)
-        )
-        guesses = find_guesses(data, visible_knowledge(settings["context"]))
-        _add_log(run, log, rows_of[log], _questions_of(data, name), _Known(guesses, n_frames))
+        for part in _parts_of(rows_of[log]):
+            first = next(iter(_replies(part)), None)
+            of_model = model or (name and name["model"]) or (first.model if first else "")
+            if first and not of_model:
+                raise UsageError(f"{log}: its name has no model; give one with --model")
+            (task, settings) = _mode_of(_replies(part), log)
+            if any(reply.published for reply in _replies(part)):
+                settings["prompt"] = asked_prompt(_replies(part))
+                task = _published_task(settings) or task
+            frames = first.frame_ablation if first else ""
+            run = runs.setdefault(
+                (of_model, task, repr(settings), frames),
+                ImportedRun(of_model, task, settings, frames if frames in FRAMES else SHOWN),
+            )
+            guesses = find_guesses(data, visible_knowledge(settings["context"]))
+            known = Known(data, guesses, n_frames)
+            _add_log(run, log, part, _questions_of(data, name), known)
     return list(runs.values())
+
+
+def _parts_of(rows: Sequence[LoggedReply | UnreadRow]) -> list[list[LoggedReply | UnreadRow]]:
+    """Return the rows of a log by who asked what; lines that are no replies are with the first."""
+    parts: dict[tuple[str, ...], list[LoggedReply | UnreadRow]] = {}
+    unread = [row for row in rows if isinstance(row, UnreadRow)]
+    for reply in _replies(rows):
+        key = reply.model, reply.task, reply.context, reply.frame_ablation
+        parts.setdefault(key, []).append(reply)
+    first, *others = parts.values() or [[]]
+    return [sorted([*first, *unread], key=lambda row: row.line), *others]
 
 
 def _replies(rows: Sequence[LoggedReply | UnreadRow]) -> list[LoggedReply]:
@@ -144,7 +164,7 @@ def _trajectory_lengths(replies: Iterable[LoggedReply]) -> dict[str, int]:
     lengths: dict[str, int] = {}
     for reply in replies:
         n_frames = None
-        if reply.mode in _WHOLE:
+        if reply.mode in WHOLE:
             n_frames = reply.n_frames
         elif reply.mode == "truncate_head" and reply.frames:
             n_frames = max(reply.frames) + 1
@@ -157,7 +177,9 @@ def _mode_of(replies: Sequence[LoggedReply], log: Path) -> tuple[str, dict[str, 
     """Return task and context settings by a log's first row; general ones if unpublished."""
     first = next((reply for reply in replies if reply.published), None)
     if first is None:
-        return _OTHER[0], {"context": _OTHER[1]}
+        told = next(iter(replies), None)
+        task, context = ("", "") if told is None else (told.task, told.context)
+        return task or _OTHER[0], {"context": context if context in CONTEXTS else _OTHER[1]}
     if first.mode not in _MODES:
         raise UsageError(
             f"{log}: the mode {first.mode!r:.40} is unknown; there are "
@@ -194,37 +216,30 @@ def _questions_of(
     return data.files[name["file"]]
 
 
-@dataclass(frozen=True)
-class _Known:
-    """What is known of the questions: guesses by question, and numbers of frames by trajectory."""
-
-    guesses: Mapping[str, Guess]
-    n_frames: Mapping[str, int]
-
-
 def _add_log(
     run: ImportedRun,
     log: Path,
     rows: Sequence[LoggedReply | UnreadRow],
     questions: Sequence[Question | SkippedQuestion],
-    known: _Known,
+    known: Known,
 ) -> None:
     by_id = {question.id: question for question in questions if isinstance(question, Question)}
-    answered = {record.id for record in run.records}
+    answered = {record.key for record in run.records}
     n_before = len(run.records)
     refused = []
     for row in rows:
         question = _find_question(row, questions, by_id)
         if isinstance(question, str):
             refused.append(Refusal(log, row.line, question))
-        elif question.id in answered:
-            refused.append(
-                Refusal(log, row.line, f"answers {question.id} again; the first reply is kept")
-            )
         elif isinstance(row, LoggedReply):
-            answered.add(question.id)
-            run.records.append(_record(run.task, question, row, known))
-            run.rescored += _compare_scores(log, row, run.records[-1])
+            record = imported_record(run.task, question, row, known)
+            if record.key in answered:
+                reason = f"answers {question.id} again; the first reply is kept"
+                refused.append(Refusal(log, row.line, reason))
+                continue
+            answered.add(record.key)
+            run.records.append(record)
+            run.rescored += _compare_scores(log, row, record)
     if len(run.records) == n_before:
         reasons = (
             "; ".join(dict.fromkeys(refusal.reason for refusal in refused[:3])) or "it is empty"
@@ -267,37 +282,13 @@ def _find_question(
     return question
 
 
-def _record(
-    task: str, question: Question, reply: LoggedReply, known: _Known
-) -> UnitRecord[NiehAnswer]:
-    clues = _shown_clues(question, reply, known.n_frames.get(question.traj_id))
-    payload = NiehAnswer.of(question, known.guesses.get(question.id), clues)
-    unit = Unit(UnitKey(task, question.id), question.traj_id, payload)
-    return unit.record(
-        fingerprint({"question": question.id, "reply": reply.text}),
-        unit.payload.with_reply(reply.text, scores(reply.text, question.answers)),
-        seconds=reply.seconds,
-        tokens=Tokens(context=reply.n_context_tokens, reply=reply.n_reply_tokens),
-    )
-
-
-def _shown_clues(question: Question, reply: LoggedReply, n_frames: int | None) -> ShownClues | None:
-    """Return the clue frames shown; None if the row does not tell, or if no frame is evidence."""
-    clues = set(question.clues)
-    is_whole = reply.published is not None and reply.mode in _WHOLE
-    if question.absence or (reply.frames is None and not is_whole):
-        return None
-    n_shown = len(clues if reply.frames is None else clues.intersection(reply.frames))
-    # A log of a model that takes only some frames counts these alone, and a clue can lie beyond.
-    n_after = None if n_frames is None or n_frames <= max(clues) else n_frames - 1 - max(clues)
-    return ShownClues(n_shown=n_shown, n_clues=len(clues), n_after=n_after)
-
-
 def _compare_scores(
     log: Path, reply: LoggedReply, record: UnitRecord[NiehAnswer]
 ) -> Iterator[Refusal]:
+    if reply.score is None:
+        return
     ours = record.payload.scores["reference"]
-    if reply.score is not None and abs(reply.score - ours) > 1e-9:
+    if abs(reply.score - ours) > 1e-9:
         yield Refusal(
             log, reply.line, f"has the score {reply.score:g}; the reference scorer gives {ours:g}"
         )

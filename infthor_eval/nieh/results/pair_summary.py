@@ -299,17 +299,23 @@ def _tokens(pair: TwinRecords) -> str | None:
         side.record.tokens.context * side.twin.n_after_clues / max(1, side.twin.n_frames)
         for side in pair.sides
         if side.record.tokens.context is not None
+        and side.twin.n_after_clues is not None
+        and side.twin.n_frames is not None
     ]
     return length_class(round(min(tokens))) if tokens else None
 
 
-def _shown(pair: TwinRecords) -> str:
-    most = max(side.twin.n_frames for side in pair.sides)
-    return next((f"<={size}" for size in _SIZES if most <= size), N_SHOWN[-1])
+def _shown(pair: TwinRecords) -> str | None:
+    sizes = [side.twin.n_frames for side in pair.sides]
+    known = [size for size in sizes if size is not None]
+    if len(known) < len(sizes):
+        return None
+    return next((f"<={size}" for size in _SIZES if max(known) <= size), N_SHOWN[-1])
 
 
-def _difference(pair: TwinRecords) -> str:
-    return SHOWN_DIFFERENCE[not all(side.twin.n_differing for side in pair.sides)]
+def _difference(pair: TwinRecords) -> str | None:
+    counts = [side.twin.n_differing for side in pair.sides]
+    return None if None in counts else SHOWN_DIFFERENCE[not all(counts)]
 
 
 def _age(pair: TwinRecords) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from infthor_eval.episodes.records import DONE
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.plan_logs import LoggedPlans, PlanCount, PlanLog
-from infthor_eval.formats.reply_logs import UnreadRow
+from infthor_eval.formats.replies.logs import UnreadRow
 from infthor_eval.plans.config import PlansConfig, PlansTaskConfig
 from infthor_eval.plans.plan import PlanKind
 from infthor_eval.plans.records import PlanRecord

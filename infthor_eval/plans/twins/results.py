@@ -1,6 +1,7 @@
 """Results of pairs of twins: a pair counts only if both worlds are right."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import msgspec
 from msgspec import UNSET, UnsetType
@@ -10,7 +11,7 @@ from infthor_eval.plans.records import PlanRecord, TwinRecord
 from infthor_eval.rates import Rate, clustered_rate, paired_rate
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["TwinResults", "first_place_score", "twin_results"]
+__all__ = ["PairScore", "TwinResults", "first_place_score", "score_pairs", "twin_results"]
 
 Record = UnitRecord[PlanRecord]
 _World = tuple[Record, ...]  # the plans of one final task, in order; the first finds the object
@@ -53,23 +54,47 @@ def first_place_score(plan: PlanRecord) -> dict[str, float]:
     return {"first_place": float(plan.twin.first == FirstPlace.OWN)}
 
 
+class PairScore(NamedTuple):
+    """Whether the place looked at first is right in both worlds of a pair; see `TwinResults`."""
+
+    pair: str
+    base: str
+    is_right: bool
+
+
+def score_pairs(records: Sequence[Record]) -> list[PairScore]:
+    """Return the scores of the pairs of a task of which both worlds count."""
+    return [
+        PairScore(_twin(one).pair, _base(one), _is_right(one) and _is_right(other))
+        for one, other in _whole_pairs(_worlds_of_pairs(records))
+    ]
+
+
 def twin_results(records: Sequence[Record]) -> TwinResults | UnsetType:
     """Return the results of a task's pairs; UNSET if its trajectories are no twins."""
+    pairs = _worlds_of_pairs(records)
+    if not pairs:
+        return UNSET
+    whole = _whole_pairs(pairs)
+    return _Pairs(whole).results(len(pairs) - len(whole))
+
+
+def _worlds_of_pairs(records: Sequence[Record]) -> dict[str, list[_World]]:
+    """Return the worlds of each pair that count."""
     worlds: dict[str, list[Record]] = {}
     for record in sorted(records, key=lambda record: record.payload.index):
         if record.payload.twin is not None:
             worlds.setdefault(record.cluster, []).append(record)
     pairs: dict[str, list[_World]] = {}
     for world in worlds.values():
-        twin = world[0].payload.twin
-        assert twin is not None
-        group = pairs.setdefault(twin.pair, [])
+        group = pairs.setdefault(_twin(tuple(world)).pair, [])
         if all(record.excluded is None for record in world):
             group.append(tuple(world))
-    if not pairs:
-        return UNSET
-    whole = [(worlds[0], worlds[1]) for _, worlds in sorted(pairs.items()) if len(worlds) == 2]
-    return _Pairs(whole).results(len(pairs) - len(whole))
+    return pairs
+
+
+def _whole_pairs(pairs: Mapping[str, Sequence[_World]]) -> list[tuple[_World, _World]]:
+    return [(worlds[0], worlds[1]) for _, worlds in sorted(pairs.items()) if len(worlds) == 2]
 
 
 class _Pairs:

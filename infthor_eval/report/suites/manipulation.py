@@ -1,5 +1,6 @@
 """Presenter of manipulation: an arm's episodes step by step, its reward, its success by radius."""
 
+import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -142,6 +143,10 @@ class ManipulationPresenter(PlainPresenter):
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`."""
         return metric == self.main_metric
+
+    def bounds(self, metric: str) -> tuple[float, float]:
+        """See `Presenter.bounds`: a reward has none."""
+        return (0.0, 1.0) if metric == self.main_metric else (-math.inf, math.inf)
 
     def sections(self, runs: Sequence[ReportRun]) -> Iterator[Section]:
         """See `Presenter.sections`: reward along trajectories, and success by radius where there

@@ -1,19 +1,23 @@
 """Presenter of NIEH: questions with the clue frames that answer them."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from infthor_eval.nieh.records import Guess, NiehAnswer
+from infthor_eval.nieh.rescoring.judging import JUDGED
 from infthor_eval.nieh.results.above_guessing import score_above_guessing
 from infthor_eval.nieh.results.pair_summary import score_pairs
 from infthor_eval.nieh.results.summary import NiehSummary
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
+    THOUGHT,
     Description,
     Figure,
     FigureRequest,
     FigureResult,
+    FindFrames,
     GroupScore,
     Timelines,
 )
@@ -27,6 +31,14 @@ from infthor_eval.runs import UnitKey, UnitRecord
 __all__ = ["NiehPresenter"]
 
 Record = UnitRecord[NiehAnswer]
+_PAIR_ACCURACY = "pair_accuracy"
+_ABOVE_GUESSING = ", above guessing"
+_BOUNDS = {
+    "strict": (0.0, 1.0),
+    "reference": (0.0, math.inf),
+    JUDGED: (0.0, 1.0),
+    _PAIR_ACCURACY: (0.0, 1.0),
+}
 
 
 def _build_pairs_figure(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
@@ -59,11 +71,16 @@ class NiehPresenter(PlainPresenter):
         """See `Presenter.is_share`: all of them, although the reference scorer can exceed 1."""
         return True
 
+    def bounds(self, metric: str) -> tuple[float, float]:
+        """See `Presenter.bounds`: the reference scorer exceeds 1 on repetitions; scores above
+        guessing, of a part of a set, can be anything, and so can a task's own metrics."""
+        return _BOUNDS.get(metric, (-math.inf, math.inf))
+
     def further_scores(self, record: Record) -> Mapping[str, float]:
         """See `Presenter.further_scores`: scores above guessing, where guessing is not right."""
         scores = {scorer: score_above_guessing(record.payload, scorer) for scorer in SCORERS}
         return {
-            f"{scorer}, above guessing": score
+            f"{scorer}{_ABOVE_GUESSING}": score
             for scorer, score in scores.items()
             if score is not None
         }
@@ -79,7 +96,7 @@ class NiehPresenter(PlainPresenter):
         metric = self.main_metric if self.main_metric in metrics else next(iter(metrics), "")
         for pair in score_pairs(records, metric):
             name = " ".join(filter(None, (pair.pair, pair.variant)))
-            yield GroupScore("pair_accuracy", name, pair.cluster, pair.score)
+            yield GroupScore(_PAIR_ACCURACY, name, pair.cluster, pair.score)
 
     def opening(self, runs: Sequence[ReportRun]) -> Section | None:
         """See `Presenter.opening`: pairs of twins, if there are any."""
@@ -119,7 +136,7 @@ class NiehPresenter(PlainPresenter):
                 name: f"{score:+.2f}" for name, score in self.further_scores(record).items()
             }
         if payload.thinking is not None:
-            details["thought"] = payload.thinking
+            details[THOUGHT] = payload.thinking
         return details
 
     def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
@@ -127,6 +144,12 @@ class NiehPresenter(PlainPresenter):
         from infthor_eval.report.suites.nieh_prompts import find_prompts
 
         return find_prompts(run, data)
+
+    def request_frames(self, run: ReportRun, data: Path | None) -> FindFrames:
+        """See `Presenter.request_frames`."""
+        from infthor_eval.report.suites.nieh_prompts import RequestFrames
+
+        return RequestFrames(run, data)
 
     def timelines(
         self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore

@@ -4,11 +4,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 
-from infthor_eval.errors import InfthorError
+from infthor_eval.errors import DataError, InfthorError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.video import Video
 from infthor_eval.nieh.contexts import ContextPart
+from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.rescoring.rebuilt_requests import RebuiltRequest, RequestRebuilder
@@ -17,9 +18,10 @@ from infthor_eval.report.suites.nieh_sets import RunSets
 from infthor_eval.report.web.samples import Prompt, PromptFrames
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["find_prompts"]
+__all__ = ["RequestFrames", "find_prompts"]
 
 Record = UnitRecord[NiehAnswer]
+_Positions = dict[FrameRef, list[int]]  # of each picture in the trajectory; some are there twice
 _OF_BASELINES = "a baseline is not sent it: it answers from the questions alone"
 
 
@@ -39,6 +41,26 @@ def find_prompts(run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
         )
         prompts[record.key] = kept.setdefault(prompt, prompt)
     return prompts
+
+
+class RequestFrames:
+    """Finds the frames of a run's requests; see `Presenter.request_frames`."""
+
+    def __init__(self, run: ReportRun, data: Path | None) -> None:
+        sets = RunSets([run], data)
+        self._rebuilders = {task: _rebuilder(run, task, sets) for task in run.tasks}
+
+    def __call__(self, record: Record) -> list[FrameRef]:
+        """Return the frames of a record's request, those of films too.
+
+        Raises:
+            DataError: the request cannot be made again, or not exactly.
+        """
+        rebuilder = self._rebuilders[record.task]
+        if isinstance(rebuilder, str):
+            raise DataError(rebuilder)
+        parts = as_images(rebuilder.rebuild(record).context)
+        return [part for part in parts if isinstance(part, FrameRef)]
 
 
 def _rebuilder(run: ReportRun, task: str, sets: RunSets) -> RequestRebuilder | str:
@@ -63,7 +85,9 @@ def _prompt(
         return Prompt(problem=str(rebuilder))
     try:
         request = rebuilder.rebuild(record)
-        positions = {frame: position for position, frame in enumerate(data.frames(request.traj_id))}
+        positions: _Positions = {}
+        for position, frame in enumerate(data.frames(request.traj_id)):
+            positions.setdefault(frame, []).append(position)
     except InfthorError as error:
         return Prompt(problem=str(error))
     before = request.text.removesuffix(record.payload.question)
@@ -75,7 +99,7 @@ def _prompt(
 
 
 def _parts(
-    request: RebuiltRequest, positions: Mapping[FrameRef, int], ablation: str
+    request: RebuiltRequest, positions: _Positions, ablation: str
 ) -> Iterator[str | PromptFrames]:
     """Yield texts and frames; neighbours of one kind are one part."""
     for kind, group in groupby(request.context, type):
@@ -93,18 +117,22 @@ def _parts(
             yield from (_film(part, positions, ablation) for part in parts)
 
 
-def _film(part: ContextPart, positions: Mapping[FrameRef, int], ablation: str) -> PromptFrames:
+def _film(part: ContextPart, positions: _Positions, ablation: str) -> PromptFrames:
     assert isinstance(part, Video)
     return _frames(f"video of {part.fps:g} frames per second", part.frames, positions, ablation)
 
 
 def _frames(
-    what: str, frames: Sequence[FrameRef], positions: Mapping[FrameRef, int], ablation: str
+    what: str, frames: Sequence[FrameRef], positions: _Positions, ablation: str
 ) -> PromptFrames:
     """Return frames by their positions; those of other trajectories, blank or decoded have none."""
-    frame_positions = [positions.get(frame) for frame in frames]
-    own = [position for position in frame_positions if position is not None]
-    is_own = len(own) == len(frame_positions)
+    own: list[int] = []
+    for frame in frames:
+        places = positions.get(frame, ())
+        # Of equal pictures the next one: requests are in time order.
+        later = (place for place in places if not own or place > own[-1])
+        own += [next(later, places[0])] if places else []
+    is_own = len(own) == len(frames)
     description = what if ablation == SHOWN else f"{what} ({ablation})"
     return PromptFrames(description, _stretches(own) if is_own else (), len(frames))
 

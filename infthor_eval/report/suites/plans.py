@@ -1,16 +1,20 @@
 """Presenter of plans: what an agent did step by step, and the reward it earned."""
 
+import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from msgspec import UNSET
 from PIL import Image
 
 from infthor_eval.errors import UsageError
 from infthor_eval.plans.recorded.curves import plan_curves
 from infthor_eval.plans.recorded.runs import PlansRun
 from infthor_eval.plans.records import PlanRecord
+from infthor_eval.plans.summary import PlansSummary
+from infthor_eval.plans.twins.results import score_pairs
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
     Description,
@@ -18,6 +22,7 @@ from infthor_eval.report.presenter import (
     Figure,
     FigureRequest,
     FigureResult,
+    GroupScore,
     Recording,
 )
 from infthor_eval.report.recordings.plan_pictures import plan_pictures
@@ -110,6 +115,20 @@ class PlansPresenter(PlainPresenter):
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`."""
         return metric == self.main_metric
+
+    def bounds(self, metric: str) -> tuple[float, float]:
+        """See `Presenter.bounds`: only rewards have none."""
+        return (-math.inf, math.inf) if metric == "reward" else (0.0, 1.0)
+
+    def measure_of(self, task: str, summary: PlansSummary) -> str:
+        """See `Presenter.measure_of`: of twins, pairs count."""
+        return self.measure if summary.tasks[task].twins is UNSET else "pairs right"
+
+    def group_scores(self, records: Sequence[Record]) -> Iterator[GroupScore]:
+        """See `Presenter.group_scores`: whether the place looked at first is right in both
+        worlds of a pair."""
+        for pair in score_pairs(records):
+            yield GroupScore("pair_accuracy", pair.pair, pair.base, float(pair.is_right))
 
     def sections(self, runs: Sequence[ReportRun]) -> Iterator[Section]:
         """See `Presenter.sections`: curves of reward for each task that all runs have."""

@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import tarfile
+import zipfile
 from functools import partial
 from pathlib import Path
 
@@ -96,14 +97,37 @@ def _make_replies(folder: Path) -> Path:
         },
         published,
         {"doc": {"question_id": one.id}, "resps": [["yes"]]},
-    ]
+        {
+            "evaluation_id": "e", "sample_id": one.id, "model_id": "m/n",
+            "output": {"raw": ["yes", "no"], "reasoning_trace": ["a mug"]},
+            "token_usage": {"input_tokens": 9, "output_tokens": 2},
+            "performance": {"latency_ms": 1.5},
+            "metadata": {"repeat": "2", "variant": "v", "frames": "0-1,3", "context": "clues"},
+        },
+    ]  # fmt: skip
     (folder / "log.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     return folder / "log.jsonl"
 
 
-def _import(folder: Path) -> None:
+def _make_inspect_log(folder: Path) -> Path:
+    (one, *_) = NiehSet(make_set(folder)).questions
+    content = [{"type": "reasoning", "reasoning": "a mug"}, {"type": "text", "text": "yes"}]
+    sample = {
+        "id": one.id,
+        "epoch": 2,
+        "output": {"choices": [{"message": {"content": content}}]},
+        "model_usage": {"m/n": {"input_tokens": 9, "output_tokens": 2}},
+        "total_time": 1.5,
+    }
+    with zipfile.ZipFile(folder / "log.eval", "w") as archive:
+        archive.writestr("header.json", json.dumps({"eval": {"task": "t", "model": "m/n"}}))
+        archive.writestr("samples/1.json", json.dumps(sample))
+    return folder / "log.eval"
+
+
+def _import(name: str, folder: Path) -> None:
     data = NiehSet(folder)
-    for run in import_logs([folder / "log.jsonl"], data, "model"):
+    for run in import_logs([folder / name], data, "model"):
         assert all("\n" not in item.reason for item in run.refused)
         run.header(data)
 
@@ -139,7 +163,8 @@ READERS = (
     Reader("film", Form.BYTES, _make_film, _read_film),
     Reader("archive", Form.BYTES, partial(_make_archive, "w"), _unpack),
     Reader("packed archive", Form.BYTES, partial(_make_archive, "w:gz"), _unpack),
-    Reader("reply log", Form.JSON_LINES, _make_replies, _import),
+    Reader("reply log", Form.JSON_LINES, _make_replies, partial(_import, "log.jsonl")),
+    Reader("inspect log", Form.BYTES, _make_inspect_log, partial(_import, "log.eval")),
     Reader("plan log", Form.JSON_LINES, _make_plan_log, _read_plan_log),
     Reader(
         "manifest",

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 import regex
 
-from infthor_eval.formats.reply_logs import LoggedReply, read_reply_log
+from infthor_eval.formats.replies.logged import LoggedReply
+from infthor_eval.formats.replies.logs import read_reply_log
 from infthor_eval.nieh.contexts import CONTEXTS
 from infthor_eval.nieh.prompts import PUBLISHED_LOGS, PUBLISHED_MAIN, question_text
 from infthor_eval.nieh.published import asked_prompt as module

@@ -9,6 +9,7 @@ from infthor_eval.plans.records import StepRecord, TwinRecord
 from infthor_eval.plans.suite import PlansSuite
 from infthor_eval.plans.summary import summarise_plans
 from infthor_eval.plans.twins.results import first_place_score, twin_results
+from infthor_eval.report.suites.plans import PlansPresenter
 from infthor_eval.runs import RunSummary
 
 from ...helpers.plan_runs import TASK, make_plan_record, make_plans_config, make_plans_run
@@ -59,6 +60,24 @@ def test_a_pair_is_right_if_both_worlds_are():
     assert twins.same_place.mean == 0.25
     assert twins.nowhere.mean == 1 / 8
     assert twins.pair_accuracy.low is not None
+
+
+def test_the_scores_of_pairs_have_the_mean_of_the_results():
+    worlds = (
+        world("a1", 0, OWN),
+        world("a1", 1, OWN),
+        world("a2", 0, OWN),
+        world("a2", 1, TWIN),
+        world("b1", 0, OWN),
+        world("b1", 1, OWN, excluded="the object is gone"),
+    )
+    records = [record for plans in worlds for record in plans]
+    scores = list(PlansPresenter().group_scores(records))
+    assert scores == [
+        ("pair_accuracy", "a1", "a", 1.0),
+        ("pair_accuracy", "a2", "a", 0.0),
+    ]
+    assert twin_results(records).pair_accuracy.mean == 0.5
 
 
 def test_intervals_are_of_what_pairs_were_made_of():

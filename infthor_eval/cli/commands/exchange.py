@@ -1,18 +1,91 @@
-"""`infthor-eval import-replies`: replies and counts of plans that others made, as runs."""
+"""`infthor-eval export` and `import-replies`: runs in others' formats, and what others made as
+runs."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
+from infthor_eval.exports.registry import FORMATS
 
 if TYPE_CHECKING:
     from infthor_eval.cli.results import RunResults
 
-__all__ = ["command"]
+__all__ = ["export", "import_replies"]
+
+
+_RELATIONSHIPS = ("first_party", "third_party", "collaborative", "other")
+
+
+@click.command(
+    "export",
+    cls=ExampleCommand,
+    example="infthor-eval export results/*/nieh_mini-* --format every-eval-ever --out exported",
+)
+@click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=PATH)
+@click.option(
+    "--format", "file_format", type=click.Choice(FORMATS), required=True, help="The format."
+)
+@click.option("--out", type=PATH, required=True, help="Folder of the files.")
+@click.option(
+    "--data", type=PATH, metavar="SET", help="Folder of the question set, if the runs name none."
+)
+@click.option(
+    "--frames", is_flag=True, help="Write the frames of requests too, where there is a place."
+)
+@click.option(
+    "--model-id",
+    metavar="OWNER/NAME",
+    help="The model as others know it. Default: its name on the hub, if the runs have it.",
+)
+@click.option("--organization", metavar="NAME", help="Who made the runs.")
+@click.option(
+    "--relationship",
+    type=click.Choice(_RELATIONSHIPS),
+    help="Theirs to the model's developer.  [default: other]",
+)
+@click.option(
+    "--dataset", metavar="OWNER/NAME", help="The data set on the Hugging Face hub, if it is there."
+)
+@click.option("--source-url", metavar="URL", help="Where the runs, or a text on them, are.")
+def export(runs: tuple[Path, ...], file_format: str, out: Path, **options: Any) -> None:
+    """Write the runs in the folders RUN... in a format of others (docs/exports.md).
+
+    What the format has no place for is named in a line, and what a run has not done, or failed at.
+    Nothing is uploaded.
+    """
+    from infthor_eval.cli.progress.notes import print_failure, print_note
+    from infthor_eval.exports.registry import find_writer
+    from infthor_eval.exports.request import ExportRequest
+    from infthor_eval.exports.subjects import require_one_model
+    from infthor_eval.report.presented import read_report_runs
+    from infthor_eval.storage.files import prepare_folder
+    from infthor_eval.terminal import print_line
+
+    for name in ("model_id", "dataset"):
+        _check_hub_name(f"--{name.replace('_', '-')}", options[name])
+    given = {name: value for name, value in options.items() if value}
+    write = find_writer(file_format, given)
+    found = read_report_runs(runs, print_failure)
+    if "model_id" in given:
+        require_one_model([run.header for run in found])
+    written = write(found, ExportRequest(prepare_folder(out), **given))
+    for note in written.notes:
+        print_note(note, "yellow")
+    print_note(f"{file_format} has no place for {written.no_place}")
+    for path in written.paths:
+        print_line(str(path))
+
+
+def _check_hub_name(option: str, name: str | None) -> None:
+    from infthor_eval.errors import UsageError
+
+    owner, _, rest = (name or "").partition("/")
+    if name is not None and not (owner and rest):
+        raise UsageError(f"{option} {name!r:.60}: is not OWNER/NAME; write both, as on the hub")
 
 
 @click.command(
@@ -27,18 +100,21 @@ __all__ = ["command"]
 @click.option(
     "--model",
     metavar="NAME",
-    help="Name of the model. Default: the one in the names of published logs.",
+    help="Name of the model. Default: the one that the log names.",
 )
 @click.option(
     "--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs."
 )
-def command(logs: tuple[Path, ...], data: Path | None, model: str | None, output: Path) -> int:
+def import_replies(
+    logs: tuple[Path, ...], data: Path | None, model: str | None, output: Path
+) -> int:
     """Score replies to NIEH questions that others made, or counts of plans; store them as runs.
 
-    LOG is a published log of replies or of plans, lm-eval's samples, or has a JSON object a line
-    with question_id and reply. SET needs no frames; logs of plans need no SET. Logs of one model in
-    one mode become one run, which `show`, `compare` and `report` read like any other. A row that
-    answers no question of SET is counted and named; the exit code is then 1.
+    LOG is a published log of replies or of plans, has the samples of lm-eval, Every Eval Ever or
+    inspect_ai (docs/exports.md), or a JSON object a line with question_id and reply. SET needs no
+    frames; logs of plans need no SET. Logs of one model in one mode become one run, which `show`,
+    `compare` and `report` read like any other. A row that answers no question of SET is counted and
+    named; the exit code is then 1.
     """
     from infthor_eval.cli.options.show import ShowOptions
     from infthor_eval.cli.results import print_results

@@ -1,6 +1,7 @@
 """Our runs in lm-eval's files, read by lm-eval's own readers."""
 
 import json
+import shutil
 
 from lm_eval.utils import (
     get_results_filenames,
@@ -10,7 +11,7 @@ from lm_eval.utils import (
 )
 
 from tests.harness.conftest import read_samples
-from tests.helpers.command_line import option_words
+from tests.helpers.command_line import assert_refused, option_words
 from tests.helpers.files import find_one
 
 
@@ -68,3 +69,26 @@ def test_a_failed_sample_is_exported_as_wrong(make_nieh_set, tmp_path, run_cli):
     rows = read_samples(tmp_path)["nieh_gt"]
     assert len(rows) == 5
     assert [row["strict"] for row in rows if row["resps"] == [[""]]] == [0.0, 0.0]
+
+
+def test_others_get_the_files_that_the_run_wrote(questions_run, export):
+    out = export(questions_run, "lm-eval")
+    written = sorted(path.name for path in (questions_run / "lm_eval" / "random").iterdir())
+    assert sorted(path.name for path in (out / "random").iterdir()) == written
+    (results,) = out.rglob("results_*.json")
+    about = json.loads(results.read_text())["infthor_eval"]
+    assert (about["n_missing"], about["n_failed"], about["n_excluded"]) == (0, 0, 0)
+
+
+def test_files_older_than_the_journal_are_refused(questions_run, tmp_path, run_cli):
+    run = tmp_path / "run"
+    shutil.copytree(questions_run, run)
+    (samples,) = (run / "lm_eval").rglob("samples_*.jsonl")
+    samples.write_text("".join(samples.read_text().splitlines(keepends=True)[:-1]))
+    ended = run_cli("export", run, "--format", "lm-eval", "--out", tmp_path / "out")
+    assert_refused(ended, "is older than the run's journal; run its command again")
+
+
+def test_a_run_without_them_is_refused(arm_run, tmp_path, run_cli):
+    ended = run_cli("export", arm_run, "--format", "lm-eval", "--out", tmp_path / "out")
+    assert_refused(ended, "has no lm_eval/, which a run writes at its end")

@@ -1,10 +1,14 @@
-"""Replies to NIEH questions that others made, a JSON object a line (`.gz` too), in three forms.
+"""Replies to NIEH questions that others made, in five forms.
+
+Four have a JSON object a line (`.gz` too); inspect_ai's log is a zip of JSON documents.
 
 | form | question | reply |
 |---|---|---|
 | published log | `qidx`, its row in the question file | `llm_response` |
 | neutral | `question_id`, its id or qid | `reply` |
 | lm-eval's `samples_<task>_<time>.jsonl` | `doc`: `question_id` | `resps` |
+| Every Eval Ever's `_samples.jsonl` | `question_id` in `metadata`, or `sample_id` | `output` |
+| inspect_ai's `.eval` | `question_id` in `metadata`, or `id` | `output` |
 
 A published log is named `eval_<question file>_<model>_<mode>.log`; a row
 repeats its question (`question`, `traj_id`, `gt_img_idx`, `gt_answer`) and has a `score`. A neutral
@@ -15,23 +19,26 @@ To add a form of replies that others made: here; a published mode in
 `infthor_eval/nieh/published/imported_replies.py: _MODES`.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import in_one_line
+from infthor_eval.errors import DataError, in_one_line
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import json_value, lines_of
+from infthor_eval.formats.replies.exported_samples import EveryEvalEverRows
+from infthor_eval.formats.replies.inspect_logs import INSPECT_SUFFIX, inspect_rows
+from infthor_eval.formats.replies.logged import LoggedReply, UnreadRow
 from infthor_eval.quantities import Amount, Count, Number, Whole
 
-__all__ = ["LoggedReply", "UnreadRow", "read_reply_log"]
+__all__ = ["read_reply_log"]
 
 # characters of a reply: scoring compares texts in quadratic time, and an answer has a few words
 _LONGEST = 20_000
 _HINT = "give a log with a JSON object a line"
+_WITHOUT_REPLIES = (".yaml", ".yml")  # results for the hub
 
 
 class _PublishedRow(msgspec.Struct, frozen=True):
@@ -60,6 +67,7 @@ class _NeutralRow(msgspec.Struct, frozen=True):
 
 class _Doc(msgspec.Struct, frozen=True):
     question_id: str
+    variant: str = ""
 
 
 class _LmEvalRow(msgspec.Struct, frozen=True):
@@ -67,82 +75,62 @@ class _LmEvalRow(msgspec.Struct, frozen=True):
     resps: tuple[tuple[str, ...], ...]
 
 
-@dataclass(frozen=True)
-class LoggedReply:
-    """A reply to a question, and what the row says of both.
-
-    Attributes:
-        line: number of the line, from 1.
-        text: the reply.
-        question_id: id of the question; None if the row has its number instead.
-        row: number of the question in its file, from 0; None if the row has an id.
-        published: the question as a published row repeats it; None in other forms.
-        score: score in the log; None if there is none.
-        mode: published name of the evaluation mode (`truncate_head`); None if the row names none.
-        size: size of the context in kilo-tokens, in published rows.
-        n_frames: number of frames that the model saw, in published rows.
-        frames: numbers of these frames; None if they are not in the row.
-        n_context_tokens: tokens of the request; None if they are not in the row.
-        n_reply_tokens: tokens of the reply; None likewise.
-        seconds: duration; 0 if it is not in the row.
-    """
-
-    line: int
-    text: str
-    question_id: str | None = None
-    row: int | None = None
-    published: Question | None = None
-    score: float | None = None
-    mode: str | None = None
-    size: float | None = None
-    n_frames: int | None = None
-    frames: tuple[int, ...] | None = None
-    n_context_tokens: int | None = None
-    n_reply_tokens: int | None = None
-    seconds: float = 0.0
-
-
-@dataclass(frozen=True)
-class UnreadRow:
-    """A line that is not a reply, with the reason."""
-
-    line: int
-    reason: str
-
-
 def read_reply_log(path: Path) -> Iterator[LoggedReply | UnreadRow]:
     """Yield the replies of a log in order; a bad line, such as a cut last one, is an `UnreadRow`.
 
+    A row that repeats a reply for another metric yields nothing.
+
     Raises:
-        DataError: the file cannot be read.
+        DataError: the file cannot be read, or has no replies by its form.
     """
-    for number, line in lines_of(path, _HINT):
+    if path.suffix in _WITHOUT_REPLIES:
+        raise DataError(
+            f"{path}: has results, and no replies; give the samples of the run, or a log with a "
+            "JSON object a line"
+        )
+    if path.suffix == INSPECT_SUFFIX:
+        yield from _each(inspect_rows(path))
+        return
+    rows = EveryEvalEverRows()
+    yield from _each(
+        (number, partial(_read_row, number, line, rows)) for number, line in lines_of(path, _HINT)
+    )
+
+
+def _each(
+    rows: Iterable[tuple[int, Callable[[], Sequence[LoggedReply]]]],
+) -> Iterator[LoggedReply | UnreadRow]:
+    for number, read in rows:
         try:
-            row = _read_row(number, json_value(line))
+            replies = read()
         except (ValueError, RecursionError) as error:  # msgspec's errors are ValueErrors
             yield UnreadRow(number, f"is not a reply ({in_one_line(error)})")
             continue
-        if len(row.text) > _LONGEST:
-            yield UnreadRow(
-                number,
-                f"has a reply of {len(row.text):,} characters; at most {_LONGEST:,} can be scored",
-            )
-        else:
-            yield row
+        for reply in replies:
+            yield _of_some_length(reply)
 
 
-def _read_row(number: int, entry: Any) -> LoggedReply:
+def _of_some_length(reply: LoggedReply) -> LoggedReply | UnreadRow:
+    if len(reply.text) <= _LONGEST:
+        return reply
+    return UnreadRow(
+        reply.line,
+        f"has a reply of {len(reply.text):,} characters; at most {_LONGEST:,} can be scored",
+    )
+
+
+def _read_row(number: int, line: bytes, rows: EveryEvalEverRows) -> Sequence[LoggedReply]:
+    entry = json_value(line)
     if not isinstance(entry, dict):
         raise ValueError("not a JSON object")
     if "llm_response" in entry:
-        return _published_reply(number, msgspec.convert(entry, _PublishedRow))
+        return [_published_reply(number, msgspec.convert(entry, _PublishedRow))]
     if "resps" in entry:
-        sample = msgspec.convert(entry, _LmEvalRow)
-        if not sample.resps or not sample.resps[0]:
-            raise ValueError("resps is empty")
-        return LoggedReply(number, sample.resps[0][0], sample.doc.question_id)
+        return _lm_eval_replies(number, msgspec.convert(entry, _LmEvalRow))
+    if "evaluation_id" in entry:
+        return rows.read(number, entry)
     row = msgspec.convert(entry, _NeutralRow)
-    return LoggedReply(
+    reply = LoggedReply(
         number,
         row.reply,
         row.question_id,
@@ -151,6 +139,16 @@ def _read_row(number: int, entry: Any) -> LoggedReply:
         n_reply_tokens=row.n_reply_tokens,
         seconds=row.seconds,
     )
+    return [reply]
+
+
+def _lm_eval_replies(number: int, sample: _LmEvalRow) -> list[LoggedReply]:
+    if not sample.resps or not sample.resps[0]:
+        raise ValueError("resps is empty")
+    return [
+        LoggedReply(number, text, sample.doc.question_id, variant=sample.doc.variant, repeat=repeat)
+        for repeat, text in enumerate(sample.resps[0], start=1)
+    ]
 
 
 def _published_reply(number: int, row: _PublishedRow) -> LoggedReply:

@@ -1,4 +1,7 @@
-"""Our runs in lm-eval's files: results and samples as its own command writes them."""
+"""Our runs in lm-eval's files: results and samples as its own command writes them.
+
+A run writes them at its end, when it still has the requests as they were sent.
+"""
 
 import json
 import time
@@ -12,15 +15,16 @@ from statistics import fmean
 from typing import Any
 
 from infthor_eval.errors import wrap_errors
-from infthor_eval.harness.registration import NAME
+from infthor_eval.exports import LM_EVAL_MODEL
 from infthor_eval.runs import RunOutcome, TaskFile, UnitRecord, UnitSample
 from infthor_eval.statistics import clustered_mean
 from infthor_eval.storage.digests import canonical_json
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
-__all__ = ["Exported", "convert_run", "export"]
+__all__ = ["FOLDER", "Exported", "convert_run", "export"]
 
 _FILTER = "none"
+FOLDER = "lm_eval"  # in a run's folder
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ def export(outcome: RunOutcome) -> Path:
         DataError: they cannot be written.
     """
     converted = convert_run(outcome)
-    folder = outcome.folder / "lm_eval" / file_name(converted.model)
+    folder = outcome.folder / FOLDER / file_name(converted.model)
     stamp = datetime.now().isoformat().replace(":", "-")
     hint = writing_hint("; the journal holds it all")
     with wrap_errors(f"{folder}: cannot be written", hint):
@@ -109,7 +113,7 @@ def _tasks(outcome: RunOutcome[Any, Any]) -> list[_Scored]:
         if record.excluded is None:
             tasks[record.task].records.append(record)
             tasks[record.task].scores.append(outcome.run.suite.scores(record))
-            tasks[record.task].rows.append(_row(sample))
+            tasks[record.task].rows.append(_row(sample) | _failure(record))
     return [task for task in tasks.values() if task.records]
 
 
@@ -155,6 +159,11 @@ def _row(sample: UnitSample) -> dict[str, Any]:
     }
 
 
+def _failure(record: UnitRecord[Any]) -> dict[str, Any]:
+    """Return why a unit counts as wrong without a reply, under a key of our own."""
+    return {} if record.failure is None else {"failure": record.failure}
+
+
 def _hash(text: str) -> str:
     from lm_eval.utils import hash_string
 
@@ -176,7 +185,7 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
             task.name: dict.fromkeys(("original", "effective"), task.n_samples) for task in tasks
         },
         "config": {
-            "model": NAME,
+            "model": LM_EVAL_MODEL,
             "model_args": {"adapter": request.model, **request.model_options},
             "batch_size": None,
             "batch_sizes": [],
@@ -185,10 +194,17 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
             "gen_kwargs": None,
             "random_seed": request.tasks.seed,
         },
+        # A key of our own: of what these scores are.
+        "infthor_eval": {
+            "version": outcome.summary.header.config.infthor_eval,
+            "n_missing": outcome.n_missing,
+            "n_failed": sum(record.failure is not None for record in outcome.records),
+            "n_excluded": sum(record.excluded is not None for record in outcome.records),
+        },
         "date": time.time(),
         "lm_eval_version": version("lm_eval"),
         "transformers_version": version("transformers"),
-        "model_source": NAME,
+        "model_source": LM_EVAL_MODEL,
         "model_name": request.model,
     }
 

@@ -1,0 +1,135 @@
+"""Runs in the Hugging Face hub's files: a model's results, and a data set's list of tasks.
+
+`<developer>/<model>/.eval_results/<file>.yaml` is for the repository of the model,
+`<owner>/<data set>/eval.yaml` for that of the data set (docs/hub/eval-results.md of the hub's
+documentation). Nothing is uploaded.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from infthor_eval.errors import DataError, UsageError, wrap_errors
+from infthor_eval.exports.gaps import describe_gaps, gap_notes, last_change, task_gaps
+from infthor_eval.exports.measures import Measure, find_measures
+from infthor_eval.exports.request import ExportRequest, Written
+from infthor_eval.exports.subjects import UNKNOWN, model_facts
+from infthor_eval.report.presented import PresentedRun
+from infthor_eval.report.runs import with_frames
+from infthor_eval.storage.files import file_name, write_atomically, writing_hint
+
+__all__ = ["write"]
+
+_FOLDER = ".eval_results"
+_FRAMEWORK = "infthor-eval"
+_NO_PLACE = (
+    "samples, other metrics than the primary one, and versions and settings other than in words"
+)
+_DESCRIPTION = (
+    "Needles in an embodied haystack, and tasks for agents and arms, on long trajectories in homes "
+    "(∞-THOR)."
+)
+
+
+def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
+    """Write the results of runs, and the list of their tasks.
+
+    Raises:
+        UsageError: the data set's name on the hub is not given.
+        DataError: a run has no unit that counts, or a file cannot be written.
+    """
+    if request.dataset is None:
+        raise UsageError("--format hf-eval-results: results name their data set; give --dataset")
+    paths: dict[Path, None] = {}
+    notes = []
+    for run in runs:
+        paths[_write_results(run, request)] = None
+        notes += gap_notes(run)
+        if model_facts(run, request.model_id).developer == UNKNOWN:
+            notes.append(f"{run.label}: not known: the model's developer; give --model-id")
+    paths[_write_tasks(runs, request)] = None
+    notes.append(
+        f"the hub takes an eval.yaml only of frameworks in its own list; have {_FRAMEWORK} added "
+        "there first (docs/exports.md)"
+    )
+    return Written(list(paths), _NO_PLACE, notes)
+
+
+def _write_results(run: PresentedRun, request: ExportRequest) -> Path:
+    facts = model_facts(run, request.model_id)
+    measures = [measure for task in run.tasks for measure in find_measures(run, task)]
+    primary = [measure for measure in measures if measure.is_primary]
+    if not primary:
+        raise DataError(f"{run.folder}: no unit of it counts; leave it out, or run it again")
+    owner, name = file_name(facts.developer), file_name(facts.short_name.replace("/", "_"))
+    path = request.out / owner / name / _FOLDER / f"{_FRAMEWORK}_{file_name(run.folder.name)}.yaml"
+    _write_yaml(path, [_entry(run, measure, request) for measure in primary])
+    return path
+
+
+def _entry(run: PresentedRun, measure: Measure, request: ExportRequest) -> dict[str, Any]:
+    """Return a result in the form of the hub's library, which writes the keys."""
+    from huggingface_hub import EvalResultEntry, eval_result_entries_to_yaml
+
+    factor = 100 if measure.is_share else 1  # in percent, as our tables and most of the hub's
+    assert request.dataset is not None
+    entry = EvalResultEntry(
+        dataset_id=request.dataset,
+        task_id=with_frames(measure.task, run.header),
+        value=round(factor * measure.estimate.mean, 4),
+        date=last_change(run).isoformat(timespec="seconds"),
+        source_url=request.source_url,
+        source_name="runs of infthor-eval" if request.source_url else None,
+        notes=_notes(run, measure, factor),
+    )
+    (document,) = eval_result_entries_to_yaml([entry])
+    return document
+
+
+def _notes(run: PresentedRun, measure: Measure, factor: int) -> str:
+    facts = model_facts(run)
+    unit = "%" if measure.is_share else "points"
+    interval = measure.interval
+    spread = ""
+    if interval is not None:
+        low, high = (factor * end for end in interval)
+        spread = f", 95 % interval {low:.1f} to {high:.1f}"
+    measured = run.presenter.measure_of(measure.task, run.summary.summary)
+    left_out = describe_gaps(task_gaps(run, measure.task))
+    config = run.header.config
+    parts = [
+        f"{measured} ({measure.metric}), {unit}{spread}, n = {measure.estimate.n}",
+        f"not whole: {left_out}" if left_out else "",
+        f"frames: {config.frames}" if config.frames not in ("", "shown") else "",
+        f"limit {config.limit}" if config.limit is not None else "",
+        f"frames of the {run.simulator} simulator" if run.simulator else "",
+        f"revision {facts.revision}" if facts.revision else "",
+        f"{facts.engine} {facts.engine_version}".strip(),
+        f"{_FRAMEWORK} {config.infthor_eval}, config {config.hash}",
+    ]
+    return "; ".join(filter(None, parts))
+
+
+def _write_tasks(runs: Sequence[PresentedRun], request: ExportRequest) -> Path:
+    assert request.dataset is not None
+    owner, _, name = request.dataset.partition("/")
+    tasks = dict.fromkeys(with_frames(task, run.header) for run in runs for task in run.tasks)
+    document = {
+        "name": name,
+        "description": _DESCRIPTION,
+        "evaluation_framework": _FRAMEWORK,
+        "tasks": [{"id": task, "config": "default", "split": "test"} for task in tasks],
+    }
+    path = request.out / file_name(owner) / file_name(name) / "eval.yaml"
+    _write_yaml(path, document)
+    return path
+
+
+def _write_yaml(path: Path, document: Any) -> None:
+    with wrap_errors(f"{path}: cannot be written", writing_hint("")):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with write_atomically(path) as partial:
+            text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
+            partial.write_text(text, encoding="utf-8")

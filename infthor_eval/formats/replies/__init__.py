@@ -1,0 +1,1 @@
+"""Replies to questions that others made: the forms of their logs, and a reply as all have it."""
