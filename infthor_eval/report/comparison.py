@@ -35,7 +35,7 @@ class Comparison:
         first: mean score of the first run on the shared units.
         second: mean score of the second run on them.
         difference: second minus first, paired by unit, or by group of units, and clustered.
-        n_unshared: number of units, or of groups, that only one of the runs evaluated; they are not
+        n_unshared: number of units, or of groups, that not both runs have a result of; they are not
             compared.
         drawing: half the width of the difference's 95 % interval over other drawings of both runs'
             replies to the same units; None if not every unit was repeated in both, and for groups.
@@ -54,17 +54,18 @@ class Comparison:
 def compare(
     suite: Suite, presenter: Presenter, first: Iterable[Record], second: Iterable[Record]
 ) -> list[Comparison]:
-    """Compare the records of two runs of a suite on the units that both evaluated.
+    """Compare the records of two runs of a suite on the units that both have a result of.
 
     Raises:
-        DataError: they share no unit.
+        DataError: there is no such unit.
     """
     firsts = _by_unit(first)
     seconds = _by_unit(second)
     shared = [key for key in firsts if key in seconds]
     if not shared:
         raise DataError(
-            "the two runs share no unit of the same task; compare runs on the same data"
+            "the two runs share no unit of the same task with a result in both; compare runs on "
+            "the same data, or with --same-questions"
         )
     comparisons: list[Comparison] = []
     for task in sorted({key.task for key in shared}):
@@ -78,10 +79,11 @@ def compare(
 
 
 def _by_unit(records: Iterable[Record]) -> dict[UnitKey, list[Record]]:
-    """Return the repetitions of each unit."""
+    """Return the repetitions of each unit that have a result."""
     units: dict[UnitKey, list[Record]] = {}
     for record in records:
-        units.setdefault(record.key.once, []).append(record)
+        if record.state == "answered":
+            units.setdefault(record.key.once, []).append(record)
     return units
 
 
@@ -146,7 +148,7 @@ class _TaskComparison:
             )
 
     def by_scores(self, units: Sequence[_PairedUnit], suite: Suite) -> Iterator[Comparison]:
-        """Compare in the suite's metrics; a unit without a result counts as 0."""
+        """Compare in the suite's metrics; one that a unit has not is 0."""
         scores = [unit.scores(suite.scores) for unit in units]
         for metric in _shared_metrics(scores):
             yield self._compare(metric, scores)
@@ -233,7 +235,7 @@ def _drawing(samples: Sequence[Sequence[float]], n_units: int) -> float | None:
 def comparison_table(comparisons: Sequence[Comparison], first: str, second: str) -> Table:
     """Return a table by task and metric, in its own unit; `first` and `second` name the runs."""
     repeated = any(comparison.drawing is not None for comparison in comparisons)
-    numbers = ["first", "second", "difference", "95 % interval", "p", "samples", "only in one"]
+    numbers = ["first", "second", "difference", "95 % interval", "p", "samples", "not in both"]
     numbers += ["drawing"] if repeated else []
     notes = (
         ("drawing: what the difference moves by if both are asked the same again (95 %).",)

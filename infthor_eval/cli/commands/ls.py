@@ -15,12 +15,13 @@ from infthor_eval.cli.options.values import PATH, SCENE_KINDS, floor_plans_optio
 from infthor_eval.cli.progress.notes import print_failure, print_note
 from infthor_eval.errors import InfthorError, ModelError, unknown_name
 from infthor_eval.memory import MEMORIES, accepted_options, memory_class
+from infthor_eval.rates import Rate
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs.catalog import Catalog, TaskFile
 from infthor_eval.runs.stored.labels import label_runs
 from infthor_eval.runs.stored.search import BrokenRun, StoredRun, find_runs
 from infthor_eval.suites import baseline_suites, find_suite, split_by_suite
-from infthor_eval.tables import Column, Row, Table
+from infthor_eval.tables import Column, Row, Table, answered_cell
 from infthor_eval.terminal import console, print_line
 from model_adapters import has_option, is_known, names, options
 from model_adapters.built_in import BUILT_IN
@@ -234,10 +235,14 @@ def _numbers(run: StoredRun) -> str:
     numbers = []
     for task in tasks[:_MAX_TASKS]:
         metric = run.primary_metrics.get(task)
-        numbers.append(task if metric is None else f"{task} {100 * metric.mean:.1f}")
+        numbers.append(task if metric is None else f"{task} {_mean(metric)}")
     if len(tasks) > _MAX_TASKS:
         numbers.append(f"{len(tasks) - _MAX_TASKS} more")
     return ", ".join(numbers)
+
+
+def _mean(metric: Rate) -> str:
+    return answered_cell(f"{100 * metric.mean:.1f}", metric.n, metric.n_all or metric.n)
 
 
 def _age(seconds: float) -> str:

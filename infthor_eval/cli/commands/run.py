@@ -155,10 +155,11 @@ def evaluate(
 
 
 def _print_if_void(outcome: RunOutcome) -> bool:
-    counted = [record for record in outcome.records if record.excluded is None]
-    is_void = bool(outcome.records) and not counted
+    states = {record.state for record in outcome.records}
+    is_void = bool(states) and "answered" not in states
     if is_void:
-        print_failure(f"{outcome.summary.header.name}: no result: every sample was excluded")
+        why = " or ".join(sorted(states))
+        print_failure(f"{outcome.summary.header.name}: no result: every sample is {why}")
     return is_void
 
 
@@ -173,8 +174,11 @@ def _send(outcome: RunOutcome, trackers: Trackers) -> bool:
 
 def _print_failures(outcome: RunOutcome) -> int:
     failed = [
-        (record.task, record.failure) for record in outcome.records if record.failure is not None
+        ((record.task, record.state), record.failure)
+        for record in outcome.records
+        if record.failure is not None
     ]
-    for task, reason, n in count_reasons(failed):
-        print_failure(f"{task}: {n} sample(s) failed, counted as wrong: {reason}")
+    for (task, state), reason, n in count_reasons(failed):
+        what = "failed" if state == "failed" else "not asked"
+        print_failure(f"{task}: {n} sample(s) {what}, in no score: {reason}")
     return len(failed)

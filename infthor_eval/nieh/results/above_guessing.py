@@ -54,20 +54,20 @@ class AboveGuessing(msgspec.Struct, frozen=True):
 
 
 def score_above_guessing(payload: NiehAnswer, scorer: str) -> float | None:
-    """Return what one question adds to the mean above guessing; None if it does not count."""
+    """Return what an answered question adds to the mean above guessing; None if it does not
+    count."""
     guess = payload.guess
     if guess is None or scorer not in guess.form_scores or guess.form_scores[scorer] > SOLVED:
         return None
     if payload.scores and scorer not in payload.scores:  # the task has not this scorer
         return None
-    # 0 if the model failed
     return (payload.scores.get(scorer, 0.0) - guess.scores[scorer]) / (
         1 - guess.form_scores[scorer]
     )
 
 
 def above_guessing(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> AboveGuessing:
-    """Return the score above guessing of some records under a scorer."""
+    """Return the score above guessing of some answered questions under a scorer."""
     known = [
         record
         for record in records

@@ -4,16 +4,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from infthor_eval.distances import DISTANCES
 from infthor_eval.nieh.results.above_guessing import SOLVED, AboveGuessing
+from infthor_eval.nieh.results.cells import Cell, mean_cell
 from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.summary import (
     SHOWN_CLUES,
-    Cell,
     EvidenceCells,
     NiehSummary,
     TaskSummary,
 )
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table, TableCell
+from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
 
 __all__ = ["above_guessing_cell", "above_guessing_notes", "evidence_tables", "short_name"]
 
@@ -121,9 +121,13 @@ def _cell(cell: Cell | None, metric: str) -> TableCell:
     if cell is None:
         missing = _score_cell(None, None, None)
         return TableCell(missing, {**missing.numbers, "questions": ""})
-    score = cell.scores[metric]
-    known = _score_cell(score.mean, score.low, score.high)
-    return TableCell(f"{known} ({cell.n})", {**known.numbers, "questions": str(cell.n)})
+    mean = mean_cell(cell, metric, 1)
+    score = cell.scores.get(metric)
+    ends = (None, None) if score is None else (score.low, score.high)
+    interval = interval_cell(*(None if end is None else 100 * end for end in ends))
+    text = mean if score is None or score.low is None else f"{mean} {interval}"
+    numbers = {"": "", **interval.numbers, **mean.numbers, "questions": str(cell.n)}
+    return TableCell(f"{text} ({cell.n})", numbers)
 
 
 def _score_cell(mean: float | None, low: float | None, high: float | None) -> TableCell:

@@ -28,30 +28,32 @@ class Gain:
     blind: TaskSummary
 
     def in_column(self, column: str) -> float | None:
-        """Return the gain for a number of clues or in total, -1 to 1; None without questions."""
+        """Return the gain for a number of clues, -1 to 1; None unless both runs answered all
+        questions, of which there are some."""
         seeing = self.seeing.by_clues[column]
         blind = self.blind.by_clues[column]
-        if not seeing.n or not blind.n:
+        if not (seeing.n_answered == seeing.n == blind.n_answered == blind.n > 0):
             return None
         return seeing.scores[self.metric].mean - blind.scores[self.metric].mean
 
     def total(self) -> MeanEstimate | None:
-        """Return mean gain and interval, paired by question, clustered by trajectory; or None.
-
-        Runs whose configs differ in their frames only ask the same questions, in the same order.
-        """
-        seeing = self.seeing.scores[self.metric]
-        blind = self.blind.scores[self.metric]
+        """Return mean gain and interval over the questions that both runs answered, paired and
+        clustered by trajectory; None if there are none."""
         clusters: list[str] = []
         ours: list[float] = []
         theirs: list[float] = []
-        for trajectory, scores in seeing.items():
-            clusters += [trajectory] * len(scores)
-            ours += scores
-            theirs += blind[trajectory]
-        if not clusters:
-            return None
-        return paired_difference(theirs, ours, clusters).estimate
+        for trajectory, scores in self.seeing.scores[self.metric].items():
+            blind = self.blind.scores[self.metric].get(trajectory, {})
+            shared = [sample for sample in scores if sample in blind]
+            clusters += [trajectory] * len(shared)
+            ours += [scores[sample] for sample in shared]
+            theirs += [blind[sample] for sample in shared]
+        return paired_difference(theirs, ours, clusters).estimate if clusters else None
+
+    @property
+    def n_all(self) -> int:
+        """Number of questions that both runs were to answer."""
+        return self.seeing.total.n
 
 
 def find_gains(runs: Sequence[RunSummary]) -> Iterator[Gain]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from infthor_eval.nieh.results.cells import mean_cell
 from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.memory_summary import subject_of
 from infthor_eval.nieh.results.summary import SHOWN_CLUES, NiehSummary, TaskSummary, main_metric
@@ -58,14 +59,16 @@ def _cells(summary: NiehSummary, name: str, task: TaskSummary) -> tuple[str, ...
     times = summary.took.get(name)
     metric = main_metric(task)
     assert memory is not None
-    score = task.by_clues["total"].scores[metric]
-    low, high = (None if end is None else 100 * end for end in (score.low, score.high))
+    score = task.total.scores.get(metric)
+    low, high = (None, None) if score is None else (score.low, score.high)
     above = task.above_guessing.get(metric)
     return (
         f"{memory.name}{'*' if memory.privileged else ''}",
         "-" if memory.budget is None else f"{memory.budget:,}",
-        f"{100 * score.mean:.1f}",
-        interval_cell(low, high, pattern="{}–{}"),
+        mean_cell(task.total, metric, 1),
+        interval_cell(
+            *(None if end is None else 100 * end for end in (low, high)), pattern="{}–{}"
+        ),
         "-" if above is None or above.mean is None else f"{100 * above.mean:.1f}",
         *(_recalled(task, share, metric) for share in SHOWN_CLUES),
         f"{memory.n_frames:.1f}",
@@ -81,6 +84,6 @@ def _recalled(task: TaskSummary, share: str, metric: str) -> TableCell:
     if share not in cells:
         return TableCell("-", {"": "", "questions": "0"})
     cell = cells[share]
-    mean = f"{100 * cell.scores[metric].mean:.1f}"
+    mean = mean_cell(cell, metric, 1)
     part = f"{100 * cell.n / n_all:.0f}"
-    return TableCell(f"{mean} ({part} %)", {"": mean, "questions": str(cell.n)})
+    return TableCell(f"{mean} ({part} %)", {**mean.numbers, "questions": str(cell.n)})

@@ -21,7 +21,7 @@ class TwinResults(msgspec.Struct, frozen=True):
 
     Attributes:
         n_pairs: pairs of which both worlds count.
-        n_incomplete: pairs of which one does not, as it is excluded or left out.
+        n_incomplete: pairs of which one does not, as it is excluded or left out, or has no result.
         pair_accuracy: share of pairs in which the place looked at first is right in both worlds.
         pair_success: share of pairs whose final task was carried out in both worlds.
         accuracy: share of worlds in which the place looked at first is right.
@@ -60,23 +60,27 @@ def twin_results(records: Sequence[Record]) -> TwinResults | UnsetType:
         if record.payload.twin is not None:
             worlds.setdefault(record.cluster, []).append(record)
     pairs: dict[str, list[_World]] = {}
+    lost: set[str] = set()  # pairs of which a world has no result
     for world in worlds.values():
         twin = world[0].payload.twin
         assert twin is not None
         group = pairs.setdefault(twin.pair, [])
-        if all(record.excluded is None for record in world):
+        if all(record.state == "answered" for record in world):
             group.append(tuple(world))
+        elif all(record.excluded is None for record in world):
+            lost.add(twin.pair)
     if not pairs:
         return UNSET
     whole = [(worlds[0], worlds[1]) for _, worlds in sorted(pairs.items()) if len(worlds) == 2]
-    return _Pairs(whole).results(len(pairs) - len(whole))
+    return _Pairs(whole, len(whole) + len(lost)).results(len(pairs) - len(whole))
 
 
 class _Pairs:
-    """Pairs of which both worlds count."""
+    """Pairs of which both worlds count, of all those that were to be answered."""
 
-    def __init__(self, pairs: Sequence[tuple[_World, _World]]) -> None:
+    def __init__(self, pairs: Sequence[tuple[_World, _World]], n_all: int) -> None:
         self._pairs = pairs
+        self._n_all = n_all
 
     def results(self, n_incomplete: int) -> TwinResults:
         return TwinResults(
@@ -94,7 +98,8 @@ class _Pairs:
 
     def _share(self, holds: Callable[[_World, _World], bool]) -> Rate | None:
         values = [float(holds(one, other)) for one, other in self._pairs]
-        return clustered_rate(values, [_base(one) for one, _ in self._pairs])
+        rate = clustered_rate(values, [_base(one) for one, _ in self._pairs])
+        return None if rate is None else rate.out_of(self._n_all)
 
     def _share_of_worlds(self, holds: Callable[[_World], bool]) -> Rate | None:
         values = [float(holds(world)) for world in self._worlds]

@@ -6,7 +6,7 @@ suite. Its payload is the suite's own, and tagged in turn.
 
 from dataclasses import dataclass
 from types import UnionType
-from typing import Annotated, Any, Generic, NamedTuple, TypeVar
+from typing import Annotated, Any, Generic, Literal, NamedTuple, TypeVar
 
 import msgspec
 
@@ -22,6 +22,7 @@ __all__ = [
     "Payload",
     "RecordTypes",
     "RunHeader",
+    "State",
     "SuiteUnit",
     "Tokens",
     "Unit",
@@ -31,6 +32,8 @@ __all__ = [
 ]
 
 FORMAT = 3
+
+State = Literal["answered", "failed", "not asked", "excluded"]
 
 _Name = Annotated[str, msgspec.Meta(min_length=1)]
 
@@ -85,6 +88,7 @@ class RunHeader(
         config: everything that can change a number; of the suite's own type where the suite is
             known, else with the configs of tasks as JSON values.
         n_units: number of units of the run; None where its records were made without a driver.
+        units_by_task: number of units of each task; empty where that is not known.
         format: format of the journal.
     """
 
@@ -92,6 +96,7 @@ class RunHeader(
     name: str
     config: Config
     n_units: Count | None = None
+    units_by_task: dict[str, Count] = {}
     format: int = FORMAT
 
 
@@ -113,6 +118,8 @@ class UnitRecord(
         payload: the suite's own struct.
         attempt: number of the attempt, from 1.
         failure: reason why there is no result; None if there is one.
+        asked: False if there is no result because the subject was not asked, by the user's wish (a
+            cap on the cost).
         excluded: reason why the unit does not count, through no fault of the subject; None if it
             counts.
         faults: faults that were retried, a line each.
@@ -130,6 +137,7 @@ class UnitRecord(
     repeat: Total = 1
     attempt: Total = 1
     failure: str | None = None
+    asked: bool = True
     excluded: str | None = None
     faults: tuple[str, ...] = ()
     seconds: Amount = 0.0
@@ -140,6 +148,15 @@ class UnitRecord(
     def key(self) -> UnitKey:
         """Key of the unit."""
         return UnitKey(self.task, self.id, self.variant, self.repeat)
+
+    @property
+    def state(self) -> State:
+        """Whether there is a result, and if not, why; docs/reference/metrics.md defines them."""
+        if self.excluded is not None:
+            return "excluded"
+        if self.failure is None:
+            return "answered"
+        return "failed" if self.asked else "not asked"
 
 
 class ArtifactRecord(

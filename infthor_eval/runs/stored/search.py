@@ -9,6 +9,7 @@ import msgspec
 from infthor_eval.errors import DataError, InfthorError, wrap_errors
 from infthor_eval.formats.reading import NOT_JSON, read_bytes
 from infthor_eval.rates import Rate
+from infthor_eval.runs.completeness import count_missing
 from infthor_eval.runs.journals.records import RunHeader
 from infthor_eval.runs.journals.shards import FOLDER, Tell, read_failures, read_header
 from infthor_eval.runs.results import RESULTS
@@ -24,8 +25,7 @@ class StoredRun:
 
     Attributes:
         n_done: number of units with a record, failed ones included.
-        n_missing: number of units that were not attempted; None if the run was killed before it
-            wrote results.
+        n_missing: number of units that were not attempted; None if neither header nor results tell.
         primary_metrics: primary metric of each task; empty if there are no results yet.
         changed: time of the last change to the journal, in seconds since 1970.
     """
@@ -112,12 +112,13 @@ def _read_run(folder: Path, tell: Tell | None) -> StoredRun:
     header = read_header(folder)
     failures = read_failures(folder, tell)
     results = read_results(folder)
+    n_missing = count_missing(header, len(failures))
     return StoredRun(
         folder=folder,
         header=header,
         n_done=len(failures),
         n_failed=sum(failures.values()),
-        n_missing=results.n_missing if results else None,
+        n_missing=results.n_missing if n_missing is None and results else n_missing,
         primary_metrics=results.primary_metrics if results else {},
         changed=max(path.stat().st_mtime for path in (folder / FOLDER).iterdir()),
     )
