@@ -55,12 +55,15 @@ def rate_over_clusters(values: Sequence[float]) -> Rate | None:
 
 
 def paired_rate(
-    first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]
+    first: Sequence[float],
+    second: Sequence[float],
+    clusters: Sequence[Hashable],
+    most: float | None = None,
 ) -> Rate | None:
     """Return the mean of second minus first, paired (see `paired_difference`); None without any."""
     from infthor_eval.statistics import paired_difference
 
-    return _rate(paired_difference(first, second, clusters).estimate) if first else None
+    return _rate(paired_difference(first, second, clusters, most).estimate) if first else None
 
 
 def format_percent(rate: Rate | None, n_all: int = 0) -> TableCell:

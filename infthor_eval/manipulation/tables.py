@@ -100,7 +100,7 @@ def _above_floor(
     trajectories = [episode.rpartition("/")[0] for episode in both]
     of_still = [stills[0].outcomes[episode] for episode in both]
     of_task = [task.outcomes[episode] for episode in both]
-    rate = paired_rate(of_still, of_task, trajectories)
+    rate = paired_rate(of_still, of_task, trajectories, most=1.0)
     return None if rate is None else rate.out_of(task.n_episodes)
 
 

@@ -17,11 +17,12 @@ from infthor_eval.runs import Suite, UnitKey, UnitRecord
 from infthor_eval.statistics import Difference, paired_difference
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
-__all__ = ["Comparison", "compare", "comparison_table"]
+__all__ = ["Comparison", "compare", "comparison_table", "p_cell"]
 
 Record = UnitRecord[Any]
 Scores = Mapping[str, float]
 _NORMAL_95 = 1.96
+_LEAST_P = 0.0001
 
 
 @dataclass(frozen=True)
@@ -165,9 +166,18 @@ class _TaskComparison:
         for scores in scored or further:
             names |= dict.fromkeys(scores.shared_names)
         for metric in names:
-            yield self._compare(metric, [it for it in further if metric in it.shared_names])
+            chosen = []
+            most = []
+            for unit, scores in zip(units, further, strict=True):
+                if metric in scores.shared_names:
+                    chosen.append(scores)
+                    low, high = self.presenter.further_ranges(unit.first[0])[metric]
+                    most.append(high - low)
+            yield self._compare(metric, chosen, fmean(most))
 
-    def _compare(self, metric: str, scores: Sequence[_PairedScores]) -> Comparison:
+    def _compare(
+        self, metric: str, scores: Sequence[_PairedScores], most: float | None = None
+    ) -> Comparison:
         firsts = [_values(unit.first, metric) for unit in scores]
         seconds = [_values(unit.second, metric) for unit in scores]
         return self._comparison(
@@ -177,6 +187,7 @@ class _TaskComparison:
             [unit.cluster for unit in scores],
             n_unshared=self.n_unshared,
             drawing=_drawing([*firsts, *seconds], len(scores)),
+            most=most,
         )
 
     def _comparison(
@@ -188,14 +199,19 @@ class _TaskComparison:
         *,
         n_unshared: int,
         drawing: float | None = None,
+        most: float | None = None,
     ) -> Comparison:
+        """Compare scores in one order; `most` is the largest possible difference of the means, 1 by
+        default where all scores are shares."""
+        if most is None and min(*first, *second) >= 0 and max(*first, *second) <= 1:
+            most = 1.0
         return Comparison(
             task=self.task,
             metric=metric,
             is_share=self.presenter.is_share(metric, [*first, *second]),
             first=sum(first) / len(first),
             second=sum(second) / len(second),
-            difference=paired_difference(first, second, clusters),
+            difference=paired_difference(first, second, clusters, most),
             n_unshared=n_unshared,
             drawing=drawing,
         )
@@ -263,12 +279,19 @@ def _row(comparison: Comparison, *, repeated: bool) -> Row:
         f"{factor * comparison.second:.2f}",
         f"{factor * estimate.mean:+.2f}",
         interval_cell(low, high, "+.2f"),
-        "-" if p is None else f"{p:.4f}",  # a single cluster has neither interval nor p
+        p_cell(p),
         str(estimate.n),
         str(comparison.n_unshared),
         *([_drawing_cell(comparison.drawing, factor)] if repeated else ()),
     )
     return Row((comparison.task, comparison.metric, unit, *numbers))
+
+
+def p_cell(p: float | None) -> str:
+    """Return a p value in words; a single cluster has none."""
+    if p is None:
+        return "-"
+    return f"{p:.4f}" if p >= _LEAST_P else f"< {_LEAST_P}"
 
 
 def _drawing_cell(drawing: float | None, factor: float) -> str:

@@ -20,6 +20,7 @@ from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs.catalog import Catalog, TaskFile
 from infthor_eval.runs.stored.labels import label_runs
 from infthor_eval.runs.stored.search import BrokenRun, StoredRun, find_runs
+from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.suites import baseline_suites, find_suite, split_by_suite
 from infthor_eval.tables import Column, Row, Table, answered_cell
 from infthor_eval.terminal import console, print_line
@@ -121,8 +122,17 @@ def _memories(name: str | None) -> None:
     "tasks", cls=ExampleCommand, example="infthor-eval ls tasks --include-path my_tasks"
 )
 @include_option
-def _tasks(include: tuple[Path, ...]) -> None:
+@click.option(
+    "--path",
+    "as_path",
+    is_flag=True,
+    help="Print the folder of this package's task files alone, for lm-eval's --include_path.",
+)
+def _tasks(include: tuple[Path, ...], as_path: bool) -> None:
     """Tasks and groups of tasks; those that differ in a size alone in one line."""
+    if as_path:
+        print_line(str(packaged_folder("tasks")))
+        return
     catalog = Catalog.find_installed(include)
     packaged = Catalog.find_packaged().tasks
     for suite, tasks in split_by_suite(catalog.tasks.values()).items():

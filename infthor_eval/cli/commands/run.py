@@ -179,6 +179,6 @@ def _print_failures(outcome: RunOutcome) -> int:
         if record.failure is not None
     ]
     for (task, state), reason, n in count_reasons(failed):
-        what = "failed" if state == "failed" else "not asked"
-        print_failure(f"{task}: {n} sample(s) {what}, in no score: {reason}")
+        what = "failed, in no score: " if state == "failed" else ""  # else the reason says so
+        print_failure(f"{task}: {n} sample(s) {what}{reason}")
     return len(failed)

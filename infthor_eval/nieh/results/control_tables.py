@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from infthor_eval.nieh.options import BLANK, NO_CLUE, OTHER, SHOWN
 from infthor_eval.nieh.results.cells import mean_cell
-from infthor_eval.nieh.results.gains import Gain, alike_but_for_frames
+from infthor_eval.nieh.results.gains import Gain, alike_but_for_frames, gain_cell
 from infthor_eval.nieh.results.summary import TaskSummary, main_metric
 from infthor_eval.rates import format_percent
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table, TableCell, answered_cell, interval_cell
+from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["control_tables", "without_alike_notes"]
 
@@ -99,19 +99,7 @@ def _cells(group: _Controls, task: str, with_pairs: bool) -> Iterator[str]:
         yield format_percent(pairs.pair_accuracy if pairs else None)
     for frames, without in _DIFFERENCES:
         is_known = frames in group and without in group
-        yield _points(
+        yield gain_cell(
             Gain(group[frames], task, metric, tasks[frames], tasks[without]) if is_known else None
         )
     yield str(first.n)
-
-
-def _points(gain: Gain | None) -> TableCell:
-    """Return a difference in points with its interval, which one trajectory alone has not."""
-    total = gain.total() if gain is not None else None
-    if gain is None or total is None:
-        return TableCell("-", {"": "", "low": "", "high": ""})
-    low, high = (None if end is None else 100 * end for end in (total.low, total.high))
-    interval = interval_cell(low, high, "+.1f")
-    mean = answered_cell(f"{100 * total.mean:+.1f}", total.n, gain.n_all)
-    numbers = {"": "", **interval.numbers, **mean.numbers}
-    return TableCell(mean if low is None else f"{mean} {interval}", numbers)

@@ -13,8 +13,9 @@ from infthor_eval.nieh.options import BLANK, SHOWN
 from infthor_eval.nieh.results.summary import TaskSummary
 from infthor_eval.runs import RunSummary
 from infthor_eval.statistics import MeanEstimate, paired_difference
+from infthor_eval.tables import TableCell, answered_cell, interval_cell
 
-__all__ = ["Gain", "alike_but_for_frames", "find_gains", "frames_of", "name_of"]
+__all__ = ["Gain", "alike_but_for_frames", "find_gains", "frames_of", "gain_cell", "name_of"]
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,11 @@ class Gain:
             clusters += [trajectory] * len(shared)
             ours += [scores[sample] for sample in shared]
             theirs += [blind[sample] for sample in shared]
-        return paired_difference(theirs, ours, clusters).estimate if clusters else None
+        if not clusters:
+            return None
+        # The reference scorer exceeds 1 on repetitions.
+        most = 1.0 if max(*ours, *theirs) <= 1 else None
+        return paired_difference(theirs, ours, clusters, most).estimate
 
     @property
     def n_all(self) -> int:
@@ -99,3 +104,15 @@ def _without_frames(run: RunSummary) -> NiehConfig:
         rescored = replace(rescored, source=None)
     tasks = {name: replace(task, without_alike=()) for name, task in config.tasks.items()}
     return replace(config, frames="", rescored=rescored, tasks=tasks)
+
+
+def gain_cell(gain: Gain | None) -> TableCell:
+    """Return a difference in points with its interval, which one trajectory alone has not."""
+    total = gain.total() if gain is not None else None
+    if gain is None or total is None:
+        return TableCell("-", {"": "", "low": "", "high": ""})
+    low, high = (None if end is None else 100 * end for end in (total.low, total.high))
+    interval = interval_cell(low, high, "+.1f")
+    mean = answered_cell(f"{100 * total.mean:+.1f}", total.n, gain.n_all)
+    numbers = {"": "", **interval.numbers, **mean.numbers}
+    return TableCell(mean if low is None else f"{mean} {interval}", numbers)

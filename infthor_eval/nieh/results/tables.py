@@ -41,6 +41,8 @@ _LEGEND = (
     "95 %: interval clustered by trajectory, valid near 0 and 100 %. bootstrap: interval over "
     "resampled trajectories, which assumes no distribution of the scores. If the two differ much, "
     "there are few trajectories.",
+    "strict takes words that are 80 % alike (most plurals in -s) and the published synonyms, and "
+    "drops no article; `infthor-eval show RUN --question ID` says why a reply got its score.",
 )
 _EMBEDDED = (
     "Questions on frames of the embedded simulator: not comparable with the published rows, which "
@@ -86,12 +88,13 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
     """
     tasks = list(_tasks(runs))
     with_samples = [(run, name, task) for run, name, task in tasks if task.n]
-    left_out = any(task.skipped.n or task.total.n_answered < task.n for *_, task in with_samples)
+    left_out = [_left_out(task) for *_, task in with_samples]
+    shown = [at for at in range(len(_LEFT_OUT)) if any(counts[at] != "0" for counts in left_out)]
     rows = tuple(
-        Row((run, *_name_and_total(name, task), *(_left_out(task) if left_out else ())))
-        for run, name, task in with_samples
+        Row((run, *_name_and_total(name, task), *(counts[at] for at in shown)))
+        for (run, name, task), counts in zip(with_samples, left_out, strict=True)
     )
-    numbers = ("total", "95 %", "bootstrap", "n", *(_LEFT_OUT if left_out else ()))
+    numbers = ("total", "95 %", "bootstrap", "n", *(_LEFT_OUT[at] for at in shown))
     notes = (
         *dict.fromkeys(_nothing_asked(name, task) for _, name, task in tasks if not task.n),
         *_notes(runs),
@@ -145,9 +148,14 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
 
 def clues_table(runs: Sequence[RunSummary]) -> Table:
     """Return accuracy by clues: a row per run, task and metric, then the published rows."""
-    apart = (OPEN_ENDED, ABSENCE, "above guessing")
+    is_guessed = any(
+        score.mean is not None
+        for *_, task in _tasks(runs)
+        for score in task.above_guessing.values()
+    )
+    apart = (OPEN_ENDED, ABSENCE, *(("above guessing",) if is_guessed else ()))
     numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", *apart, "n", *_LEFT_OUT)
-    rows = [row for run in runs for row in _rows_of(run)]
+    rows = [row for run in runs for row in _rows_of(run, is_guessed=is_guessed)]
     notes = [*_LEGEND, *above_guessing_notes(runs)]
     for table in filter(_is_by_clues, published_tables("nieh")):
         rows += _published_rows(table, runs)
@@ -175,15 +183,18 @@ def _notes(runs: Sequence[RunSummary]) -> list[str]:
     ]
 
 
-def _rows_of(run: RunSummary) -> list[Row]:
+def _rows_of(run: RunSummary, *, is_guessed: bool) -> list[Row]:
     lines = [(name, task, metric) for _, name, task in _tasks([run]) for metric in task.metrics]
     return [
-        Row((name_of(run), name, metric, *_cells(task, metric)), ends_section=number == len(lines))
+        Row(
+            (name_of(run), name, metric, *_cells(task, metric, is_guessed=is_guessed)),
+            ends_section=number == len(lines),
+        )
         for number, (name, task, metric) in enumerate(lines, 1)
     ]
 
 
-def _cells(task: TaskSummary, metric: str) -> list[str]:
+def _cells(task: TaskSummary, metric: str, *, is_guessed: bool) -> list[str]:
     total = task.total
     by_clues = [_mean_of(task.by_clues[name], metric) for name in CLUE_COLUMNS[:-1]]
     apart = [_mean_of(task.by_clues[name], metric) for name in (OPEN_ENDED, ABSENCE)]
@@ -193,7 +204,7 @@ def _cells(task: TaskSummary, metric: str) -> list[str]:
         mean_cell(total, metric),
         *_intervals(total, metric),
         *apart,
-        above,
+        *([above] if is_guessed else []),
         str(total.n),
         *_left_out(task),
     ]

@@ -55,11 +55,10 @@ def _row(
     kind: ManipulationKind,
     points: Sequence[tuple[float, Rate]],
     radii: Sequence[float],
-    end: str,
 ) -> Row:
     rates = dict(points)
     cells = (format_percent(rates.get(radius)) for radius in radii)
-    return Row((label, KIND_NAMES[kind], *cells, str(points[0][1].n), end))
+    return Row((label, KIND_NAMES[kind], *cells, str(points[0][1].n)))
 
 
 def radii_figure(success: SuccessByRadius) -> Figure:

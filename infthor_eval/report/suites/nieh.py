@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from infthor_eval.nieh.records import Guess, NiehAnswer
-from infthor_eval.nieh.results.above_guessing import score_above_guessing
+from infthor_eval.nieh.results.above_guessing import score_above_guessing, score_range
 from infthor_eval.nieh.results.pair_summary import score_pairs
 from infthor_eval.nieh.results.summary import NiehSummary
 from infthor_eval.nieh.scoring import SCORERS
@@ -27,6 +27,7 @@ from infthor_eval.runs import UnitKey, UnitRecord
 __all__ = ["NiehPresenter"]
 
 Record = UnitRecord[NiehAnswer]
+_ABOVE = "{}, above guessing"
 
 
 def _build_pairs_figure(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
@@ -62,11 +63,23 @@ class NiehPresenter(PlainPresenter):
     def further_scores(self, record: Record) -> Mapping[str, float]:
         """See `Presenter.further_scores`: scores above guessing, where guessing is not right."""
         scores = {scorer: score_above_guessing(record.payload, scorer) for scorer in SCORERS}
-        return {
-            f"{scorer}, above guessing": score
-            for scorer, score in scores.items()
-            if score is not None
-        }
+        return {_ABOVE.format(scorer): it for scorer, it in scores.items() if it is not None}
+
+    def further_ranges(self, record: Record) -> Mapping[str, tuple[float, float]]:
+        """See `Presenter.further_ranges`."""
+        counted = [
+            scorer for scorer in SCORERS if _ABOVE.format(scorer) in self.further_scores(record)
+        ]
+        return {_ABOVE.format(scorer): score_range([record], scorer) for scorer in counted}
+
+    def explain(self, record: Record) -> list[str]:
+        """See `Presenter.explain`: what each of our scorers finds in the reply."""
+        from infthor_eval.nieh.explaining import explain
+
+        if record.payload.reply is None:
+            return []
+        scorers = [scorer for scorer in SCORERS if scorer in record.payload.scores]
+        return explain(record.payload.reply, record.payload.answers, scorers)
 
     def group(self, record: Record) -> str:
         """See `Presenter.group`: the pair of a question of twins."""

@@ -163,7 +163,7 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(
     (task_files / "nieh" / "own.py").write_text("def measure(doc, results):\n    return {}\n")
     code, _, err = run_cli(*arguments, "--tasks", "nieh_own")
     assert code == 1
-    assert "nieh_own: 1 sample(s) failed, counted as wrong: process_results fails on traj_a/" in err
+    assert "nieh_own: 1 sample(s) failed, in no score: process_results fails on traj_a/" in err
     (task_files / "nieh" / "nieh_own.yaml").write_text(
         (task_files / "nieh" / "nieh_own.yaml")
         .read_text()
@@ -286,7 +286,7 @@ def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_s
     )
     code, out, err = run_cli(*arguments)
     assert code == 1
-    assert "nieh_gt: 2 sample(s) failed, counted as wrong" in err
+    assert "nieh_gt: 2 sample(s) failed, in no score" in err
     assert str(frame) in err
     assert next(line for line in out.splitlines() if "nieh_gt" in line).split()[-3:] == [
         "5",

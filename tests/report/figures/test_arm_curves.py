@@ -68,7 +68,6 @@ def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
         "2.00",
         "1",
         "4",
-        "0",
     )
 
 
