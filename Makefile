@@ -71,6 +71,7 @@ lint: $(INSTALLED)
 # The documentation as a site, build/site/index.html; a link that leads nowhere ends it.
 docs: $(INSTALLED)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	@echo "the site: $(CURDIR)/build/site/index.html"
 
 $(INSTALLED): pyproject.toml setup.py constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.11 ...")'

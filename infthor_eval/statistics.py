@@ -189,14 +189,15 @@ def paired_difference(
         )
     totals, sizes = _partition([b - a for a, b in zip(first, second, strict=True)], clusters)
     estimate = _with_t_interval(totals, sizes)
-    if estimate.stderr is None:
+    stderr = estimate.stderr
+    if stderr is None:
         return Difference(estimate, None)
     if most is not None:
         estimate = _within(estimate, -most, most)
     # Every question differs by the same amount: either by nothing, or never by chance.
-    if estimate.stderr == 0:
+    if stderr == 0:
         return Difference(estimate, 1.0 if estimate.mean == 0 else 0.0)
-    t = abs(estimate.mean / estimate.stderr)
+    t = abs(estimate.mean / stderr)
     return Difference(estimate, float(2 * scipy.special.stdtr(estimate.n_clusters - 1, -t)))
 
 

@@ -109,7 +109,8 @@ def _cells(pair: Sequence[ArmTaskSummary | None]) -> Iterator[str]:
     tasks = [task for task in pair if task is not None]
     yield ", ".join(dict.fromkeys(f"{task.radius:g}" for task in tasks))
     yield from (
-        format_percent(task and task.success, task.n_episodes if task else 0) for task in pair
+        format_percent(None) if task is None else format_percent(task.success, task.n_episodes)
+        for task in pair
     )
     yield from (str(task.n_episodes if task else 0) for task in pair)
     yield str(max(task.n_trajectories for task in tasks))

@@ -9,7 +9,7 @@ from typing import Any
 
 from infthor_eval.errors import UsageError
 
-__all__ = ["NoOptions", "describe", "parse", "read_pairs"]
+__all__ = ["NoOptions", "describe", "is_required", "parse", "read_pairs"]
 
 _LARGEST = 2**63  # limit of the numbers in a run config
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}

@@ -143,6 +143,9 @@ def evaluate(
         for outcome in outcomes
     ]
     print_results(results, show)
+    with quiet_notes(show.quiet):
+        for outcome in outcomes:
+            _print_faults(outcome)
     n_failed = sum(map(_print_failures, outcomes))  # every run prints its failures
     n_void = sum(map(_print_if_void, outcomes))
     n_unsent = sum(not _send(outcome, senders) for outcome in outcomes if not outcome.n_missing)
@@ -170,6 +173,13 @@ def _send(outcome: RunOutcome, trackers: Trackers) -> bool:
         print_failure(str(error))
         return False
     return True
+
+
+def _print_faults(outcome: RunOutcome) -> None:
+    """Print the faults that a run got over, such as the 429 of a busy server."""
+    faults = [(record.task, fault) for record in outcome.records for fault in record.faults]
+    for task, reason, n in count_reasons(faults):
+        print_note(f"{task}: {n} fault(s): {reason}", "yellow")
 
 
 def _print_failures(outcome: RunOutcome) -> int:

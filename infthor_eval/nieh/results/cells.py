@@ -8,9 +8,9 @@ import msgspec
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.runs import UnitRecord
 from infthor_eval.statistics import bootstrap_interval, clustered_mean
-from infthor_eval.tables import TableCell, answered_cell
+from infthor_eval.tables import TableCell, answered_cell, interval_cell
 
-__all__ = ["Cell", "Score", "make_cell", "mean_cell", "score_of", "with_missing"]
+__all__ = ["Cell", "Score", "make_cell", "mean_cell", "score_interval", "score_of", "with_missing"]
 
 Record = UnitRecord[NiehAnswer]
 
@@ -92,3 +92,11 @@ def mean_cell(cell: Cell | None, metric: str, n_digits: int = 2) -> TableCell:
     score = cell.scores.get(metric)
     mean = "" if score is None else f"{100 * score.mean:.{n_digits}f}"
     return answered_cell(mean, cell.n_answered, cell.n)
+
+
+def score_interval(cell: Cell, metric: str, pattern: str = "[{}, {}]") -> TableCell:
+    """Return the interval of a mean in percent; `-` if there is none."""
+    score = cell.scores.get(metric)
+    if score is None or score.low is None or score.high is None:
+        return interval_cell(None, None)
+    return interval_cell(100 * score.low, 100 * score.high, pattern=pattern)

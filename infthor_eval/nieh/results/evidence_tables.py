@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from infthor_eval.distances import DISTANCES
 from infthor_eval.nieh.results.above_guessing import SOLVED, AboveGuessing
-from infthor_eval.nieh.results.cells import Cell, mean_cell
+from infthor_eval.nieh.results.cells import Cell, mean_cell, score_interval
 from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.summary import (
     SHOWN_CLUES,
@@ -13,7 +13,7 @@ from infthor_eval.nieh.results.summary import (
     TaskSummary,
 )
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
+from infthor_eval.tables import Column, Row, Table, TableCell
 
 __all__ = ["above_guessing_cell", "above_guessing_notes", "evidence_tables", "short_name"]
 
@@ -122,10 +122,8 @@ def _cell(cell: Cell | None, metric: str) -> TableCell:
         missing = _score_cell(None, None, None)
         return TableCell(missing, {**missing.numbers, "questions": ""})
     mean = mean_cell(cell, metric, 1)
-    score = cell.scores.get(metric)
-    ends = (None, None) if score is None else (score.low, score.high)
-    interval = interval_cell(*(None if end is None else 100 * end for end in ends))
-    text = mean if score is None or score.low is None else f"{mean} {interval}"
+    interval = score_interval(cell, metric)
+    text = f"{mean} {interval}" if interval.numbers["low"] else mean
     numbers = {"": "", **interval.numbers, **mean.numbers, "questions": str(cell.n)}
     return TableCell(f"{text} ({cell.n})", numbers)
 

@@ -7,12 +7,12 @@ from typing import Any
 from msgspec.structs import replace
 
 from infthor_eval.nieh.config import NiehConfig
-from infthor_eval.nieh.results.cells import mean_cell
+from infthor_eval.nieh.results.cells import mean_cell, score_interval
 from infthor_eval.nieh.results.gains import Gain, gain_cell, name_of
 from infthor_eval.nieh.results.memory_summary import subject_of
 from infthor_eval.nieh.results.summary import SHOWN_CLUES, NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
+from infthor_eval.tables import Column, Row, Table, TableCell
 
 __all__ = ["memory_tables"]
 
@@ -134,15 +134,11 @@ def _cells(summary: NiehSummary, name: str, task: TaskSummary) -> tuple[str, ...
     times = summary.took.get(name)
     metric = main_metric(task)
     assert memory is not None
-    score = task.total.scores.get(metric)
-    low, high = (None, None) if score is None else (score.low, score.high)
     return (
         f"{memory.name}{'*' if memory.privileged else ''}",
         "-" if memory.budget is None else f"{memory.budget:,}",
         mean_cell(task.total, metric, 1),
-        interval_cell(
-            *(None if end is None else 100 * end for end in (low, high)), pattern="{}–{}"
-        ),
+        score_interval(task.total, metric, "{}–{}"),
         *(_recalled(task, share, metric) for share in SHOWN_CLUES),
         f"{memory.n_frames:.1f}",
         "-" if memory.n_tokens is None else f"{memory.n_tokens:,.0f}",

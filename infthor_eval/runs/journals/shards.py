@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any, Generic
 
@@ -101,7 +102,11 @@ def read_header(run: Path) -> RunHeader:
             f"{run}: its journal is of format 1, this version reads {FORMAT}; run the evaluation "
             "again"
         )
-    raise DataError(f"{run}: no journal in it; give the folder of a run")
+    if not run.exists():
+        raise DataError(f"{run}: no such folder; `infthor-eval ls runs` lists the runs of a folder")
+    below = next(chain(run.glob(f"*/{FOLDER}"), run.glob(f"*/*/{FOLDER}")), None)
+    such_as = "" if below is None else f", such as {below.parent}"
+    raise DataError(f"{run}: no journal in it; give the folder of a run{such_as}")
 
 
 def read_run(

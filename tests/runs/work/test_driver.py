@@ -359,6 +359,13 @@ def test_a_subject_that_cannot_do_what_the_suite_needs_is_refused(tmp_path, monk
         run(request(tmp_path, model="arm"))
 
 
+def test_a_file_that_may_be_meant_by_an_unknown_name_is_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("edge.py").touch()
+    with pytest.raises(UsageError, match=r"in \./edge\.py is meant, give --model edge\.py:CLASS"):
+        prepare(request(tmp_path, model="edge"), ToySuite())
+
+
 def test_unknown_names_and_options_are_refused_before_anything_is_done(tmp_path):
     with pytest.raises(UsageError, match="did you mean 'adder'"):
         prepare(request(tmp_path, model="ader"), ToySuite())
