@@ -71,6 +71,14 @@ def test_the_tables_of_show(planted: Path, whole: Path, run_cli) -> None:
     assert row.split()[-4:] == ["8", "0", "1", "3"]
 
 
+def test_the_list_of_runs(planted: Path, nothing: Path, run_cli, tmp_path: Path) -> None:
+    _, out, _ = run_cli("ls", "runs", tmp_path, "--format", "csv")
+    rows = {row["run"]: row for row in csv.DictReader(io.StringIO(out))}
+    states = ("answered", "failed", "not asked")
+    assert [rows["m (incomplete)"][state] for state in states] == ["4", "1", "3"]
+    assert [rows["dead (incomplete)"][state] for state in states] == ["0", "8", "0"]
+
+
 def test_the_same_as_csv_and_json(planted: Path, run_cli) -> None:
     _, out, _ = run_cli("show", planted, "--format", "csv")
     (row,) = csv.DictReader(line for line in io.StringIO(out) if not line.startswith("#"))

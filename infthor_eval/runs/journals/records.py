@@ -29,6 +29,7 @@ __all__ = [
     "UnitKey",
     "UnitRecord",
     "describe_failure",
+    "state_of",
 ]
 
 FORMAT = 3
@@ -152,11 +153,7 @@ class UnitRecord(
     @property
     def state(self) -> State:
         """Whether there is a result, and if not, why; docs/reference/metrics.md defines them."""
-        if self.excluded is not None:
-            return "excluded"
-        if self.failure is None:
-            return "answered"
-        return "failed" if self.asked else "not asked"
+        return state_of(self.failure, self.excluded, asked=self.asked)
 
 
 class ArtifactRecord(
@@ -206,6 +203,15 @@ class RecordTypes(Generic[Payload_co]):
     def header_decoder(self) -> msgspec.json.Decoder[RunHeader[Any]]:
         """Return the decoder of a journal's first line."""
         return msgspec.json.Decoder(RunHeader[self.config])  # type: ignore[name-defined]
+
+
+def state_of(failure: str | None, excluded: str | None, *, asked: bool) -> State:
+    """Return the state of a unit by the fields of its record."""
+    if excluded is not None:
+        return "excluded"
+    if failure is None:
+        return "answered"
+    return "failed" if asked else "not asked"
 
 
 def describe_failure(error: BaseException) -> str:
