@@ -128,14 +128,17 @@ def _runs_among(paths: Sequence[Path]) -> list[Path]:
     from infthor_eval.errors import UsageError
     from infthor_eval.runs.stored.search import run_folders
 
-    runs = []
-    for path in paths:
-        if not path.exists() or (path.is_dir() and any(run_folders(path, depth=0))):
-            runs.append(path)  # what does not exist is refused where it is read
-        else:
-            print_note(f"skipped: {path}: no run", "yellow")
+    # What does not exist is refused where it is read.
+    runs = [
+        path
+        for path in paths
+        if not path.exists() or (path.is_dir() and any(run_folders(path, depth=0)))
+    ]
     if not runs:
         raise UsageError(f"{paths[0]}: no run, nor is another of the paths; give folders of runs")
+    for path in paths:
+        if path not in runs:
+            print_note(f"skipped: {path}: no run", "yellow")
     return runs
 
 
