@@ -43,18 +43,21 @@ class PresentedRun(ReportRun):
         return "right" if score >= 1 else "partly" if score > 0 else "wrong"
 
 
-def read_report_runs(folders: Sequence[Path], tell: Tell | None = None) -> list[PresentedRun]:
+def read_report_runs(
+    folders: Sequence[Path], tell: Tell | None = None, *, twice: bool = False
+) -> list[PresentedRun]:
     """Read runs from their folders, at least one.
 
     Args:
         folders: the folders.
         tell: told of bad lines of journals, see `read_run`.
+        twice: whether a folder may be given twice.
 
     Raises:
         UsageError: a folder is given twice, or the suite of a run is not known here.
         DataError: a folder has no journal, or it cannot be read.
     """
-    if len({folder.resolve() for folder in folders}) < len(folders):
+    if not twice and len({folder.resolve() for folder in folders}) < len(folders):
         raise UsageError("one run is given twice; give each once")
     headers = [read_header(folder) for folder in folders]
     names = distinct_names(folders, headers)

@@ -51,7 +51,7 @@ def command(folders: tuple[Path, ...], same_questions: bool, against: Path | Non
         raise UsageError(
             f"{folders[0]}: one run; give another, or --same-questions to compare its tasks"
         )
-    runs = read_report_runs(folders, print_failure)
+    runs = read_report_runs(folders, print_failure, twice=True)
     other = next((run for run in runs if run.suite.name != runs[0].suite.name), None)
     if other is not None:
         raise UsageError(
