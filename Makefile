@@ -86,6 +86,7 @@ lint: $(INSTALLED)
 # The documentation as a site, build/site/index.html; a link that leads nowhere ends it.
 docs: $(INSTALLED)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	@echo "the site: $(CURDIR)/build/site/index.html"
 
 # Both need the network: versions with hashes of what the core needs, and of the tools here; known vulnerabilities of them.
 lock: $(TOOLS)/.installed

@@ -19,8 +19,9 @@ from infthor_eval.cli.results import read_run_results
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.published import published_tables
 from infthor_eval.nieh.guessing.audit import audit
+from infthor_eval.nieh.results.cells import Cell
 from infthor_eval.nieh.results.evidence_tables import short_name
-from infthor_eval.nieh.results.summary import DISTANCES, SHOWN_CLUES, Cell, NiehSummary, TaskSummary
+from infthor_eval.nieh.results.summary import DISTANCES, SHOWN_CLUES, NiehSummary, TaskSummary
 from infthor_eval.report.figures.style import LEGEND, add_legend, looks_of, save_figure
 
 DOCS = Path(__file__).parents[1] / "docs"

@@ -20,6 +20,7 @@ __all__ = [
     "DataError",
     "InfthorError",
     "ModelError",
+    "NotAskedError",
     "OutputClosed",
     "SceneError",
     "SimulatorError",
@@ -69,6 +70,10 @@ class DataError(InfthorError):
 
 class ModelError(InfthorError):
     """A model cannot be loaded, or cannot do what is required of it."""
+
+
+class NotAskedError(ModelError):
+    """A model was not asked, by the user's own wish (a cap is reached): no fault, and no result."""
 
 
 class UserCodeError(InfthorError):

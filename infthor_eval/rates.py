@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from infthor_eval.tables import TableCell, interval_cell
+from infthor_eval.tables import TableCell, answered_cell, interval_cell
 
 if TYPE_CHECKING:
     from infthor_eval.statistics import MeanEstimate
@@ -23,13 +23,21 @@ __all__ = [
 ]
 
 
-class Rate(msgspec.Struct, frozen=True):
-    """The mean of n values and its 95 % interval by trajectory (None with fewer than two)."""
+class Rate(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The mean of n values and its 95 % interval by trajectory (None with fewer than two).
+
+    `n_all` is the number of units that were to have a value; None if all of them have one.
+    """
 
     mean: float
     low: float | None
     high: float | None
     n: int
+    n_all: int | None = None
+
+    def out_of(self, n_all: int) -> "Rate":
+        """Return the same mean as that of some of `n_all` units."""
+        return msgspec.structs.replace(self, n_all=n_all if n_all > self.n else None)
 
 
 def clustered_rate(values: Sequence[float], clusters: Sequence[Hashable]) -> Rate | None:
@@ -47,32 +55,40 @@ def rate_over_clusters(values: Sequence[float]) -> Rate | None:
 
 
 def paired_rate(
-    first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]
+    first: Sequence[float],
+    second: Sequence[float],
+    clusters: Sequence[Hashable],
+    most: float | None = None,
 ) -> Rate | None:
     """Return the mean of second minus first, paired (see `paired_difference`); None without any."""
     from infthor_eval.statistics import paired_difference
 
-    return _rate(paired_difference(first, second, clusters).estimate) if first else None
+    return _rate(paired_difference(first, second, clusters, most).estimate) if first else None
 
 
-def format_percent(rate: Rate | None) -> TableCell:
-    """Return a share as a table cell, in percent."""
-    return _format(rate, 100.0)
+def format_percent(rate: Rate | None, n_all: int = 0) -> TableCell:
+    """Return a share as a table cell, in percent; `n_all` units were to have a value."""
+    return _format(rate, 100.0, n_all)
 
 
-def format_number(rate: Rate | None) -> TableCell:
-    """Return a number as a table cell."""
-    return _format(rate, 1.0)
+def format_number(rate: Rate | None, n_all: int = 0) -> TableCell:
+    """Return a number as a table cell; `n_all` units were to have a value."""
+    return _format(rate, 1.0, n_all)
 
 
 def _rate(estimate: "MeanEstimate") -> Rate:
     return Rate(estimate.mean, estimate.low, estimate.high, estimate.n)
 
 
-def _format(rate: Rate | None, factor: float) -> TableCell:
+def _format(rate: Rate | None, factor: float, n_all: int) -> TableCell:
     if rate is None:
-        return TableCell("-", {"": "", "low": "", "high": ""})
-    mean = f"{factor * rate.mean:.1f}"
+        return (
+            answered_cell("", 0, n_all)
+            if n_all
+            else TableCell("-", {"": "", "low": "", "high": ""})
+        )
+    mean = answered_cell(f"{factor * rate.mean:.1f}", rate.n, rate.n_all or rate.n)
     low, high = (None if end is None else factor * end for end in (rate.low, rate.high))
     interval = interval_cell(low, high)
-    return TableCell(mean if low is None else f"{mean} {interval}", {"": mean, **interval.numbers})
+    numbers = {"": mean.numbers[""], **interval.numbers, **mean.numbers}
+    return TableCell(mean if low is None else f"{mean} {interval}", numbers)

@@ -168,9 +168,16 @@ def bootstrap_interval(
 
 
 def paired_difference(
-    first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]
+    first: Sequence[float],
+    second: Sequence[float],
+    clusters: Sequence[Hashable],
+    most: float | None = None,
 ) -> Difference:
     """Return the mean of second minus first: two runs' scores on the same questions in one order.
+
+    Args:
+        most: largest possible distance of the two means, 1 for shares; the interval is cut off
+            there, which loses no truth. None if there is none.
 
     Raises:
         DataError: the runs differ in length, or as in `clustered_mean`.
@@ -182,13 +189,24 @@ def paired_difference(
         )
     totals, sizes = _partition([b - a for a, b in zip(first, second, strict=True)], clusters)
     estimate = _with_t_interval(totals, sizes)
-    if estimate.stderr is None:
+    stderr = estimate.stderr
+    if stderr is None:
         return Difference(estimate, None)
+    if most is not None:
+        estimate = _within(estimate, -most, most)
     # Every question differs by the same amount: either by nothing, or never by chance.
-    if estimate.stderr == 0:
+    if stderr == 0:
         return Difference(estimate, 1.0 if estimate.mean == 0 else 0.0)
-    t = abs(estimate.mean / estimate.stderr)
+    t = abs(estimate.mean / stderr)
     return Difference(estimate, float(2 * scipy.special.stdtr(estimate.n_clusters - 1, -t)))
+
+
+def _within(estimate: MeanEstimate, least: float, most: float) -> MeanEstimate:
+    """Return an estimate whose interval ends where its values do; it holds the mean in any case."""
+    assert estimate.low is not None and estimate.high is not None
+    low = min(max(estimate.low, least), estimate.mean)
+    high = max(min(estimate.high, most), estimate.mean)
+    return replace(estimate, low=low, high=high)
 
 
 def _partition(

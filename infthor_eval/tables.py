@@ -5,7 +5,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
-__all__ = ["Column", "Row", "Table", "TableCell", "interval_cell", "left_out_notes"]
+__all__ = [
+    "Column",
+    "Row",
+    "Table",
+    "TableCell",
+    "answered_cell",
+    "interval_cell",
+    "left_out_notes",
+]
 
 _N_REASONS = 5  # reasons that a table lists
 
@@ -38,6 +46,16 @@ def interval_cell(
         return TableCell("-", {"low": "", "high": ""})
     ends = {"low": f"{low:{number_format}}", "high": f"{high:{number_format}}"}
     return TableCell(pattern.format(*ends.values()), ends)
+
+
+def answered_cell(mean: str, n_answered: int, n_all: int) -> TableCell:
+    """Return the cell of a mean over the units with a result; it says if these are not all, and a
+    mean over none has no number."""
+    if n_answered == n_all:
+        return TableCell(mean, {"": mean})
+    if not n_answered:
+        return TableCell("none answered", {"": "", "answered": "0"})
+    return TableCell(f"{mean} of {n_answered} answered", {"": mean, "answered": str(n_answered)})
 
 
 @dataclass(frozen=True)

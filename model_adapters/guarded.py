@@ -213,7 +213,10 @@ class _GuardedPolicy(_Guarded):
 
 def _require_reply(name: str, reply: Any) -> Reply:
     if not isinstance(reply, Reply):
-        raise ModelError(f"{name} gives {_in_words(reply)} for a reply; give a Reply")
+        raise ModelError(
+            f"{name} gives {_in_words(reply)} for a reply; write `return Reply(text)`, with `from "
+            "model_adapters import Reply`"
+        )
     try:
         checked = msgspec.convert(reply, _ReplyLimits, from_attributes=True)
         for text in (checked.text, checked.thinking or "", *checked.faults):

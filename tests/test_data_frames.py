@@ -100,7 +100,7 @@ def make_run(tmp_path: Path):
     return make_run
 
 
-def test_a_failed_sample_counts_as_wrong_and_an_excluded_one_not_at_all(make_run) -> None:
+def test_a_failed_sample_and_an_excluded_one_have_no_scores(make_run) -> None:
     excluded = msgspec.structs.replace(
         make_record(2, None, ("Bed",), failure="x"), failure=None, excluded="no frame"
     )
@@ -112,7 +112,8 @@ def test_a_failed_sample_counts_as_wrong_and_an_excluded_one_not_at_all(make_run
         )
     )
     frame = frame.set_index("id").sort_index()
-    assert frame["score_strict"].fillna(-1).tolist() == [1.0, 0.0, -1.0]
+    assert frame["score_strict"].fillna(-1).tolist() == [1.0, -1.0, -1.0]
+    assert frame["state"].tolist() == ["answered", "failed", "excluded"]
     assert frame["failure"].fillna("").tolist() == ["", "it fails", ""]
     assert frame["excluded"].fillna("").tolist() == ["", "", "no frame"]
 

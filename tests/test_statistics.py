@@ -158,3 +158,13 @@ def test_a_mean_over_clusters_takes_no_number_for_a_share():
     assert mean_over_clusters([3.0]).low is None
     with pytest.raises(DataError):
         mean_over_clusters([])
+
+
+def test_the_interval_of_a_difference_ends_where_shares_do():
+    first, second = [1.0, 1.0, 1.0, 1.0, 1.0, 0.0], [0.0] * 6
+    clusters = list("abcdef")
+    beyond = paired_difference(first, second, clusters)
+    within = paired_difference(first, second, clusters, most=1.0)
+    assert beyond.estimate.low < -1
+    assert (within.estimate.low, within.estimate.high) == (-1, beyond.estimate.high)
+    assert (within.estimate.mean, within.p) == (beyond.estimate.mean, beyond.p)

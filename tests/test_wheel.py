@@ -75,6 +75,7 @@ def test_what_runs_is_the_installed_code(installed, tmp_path):
 
 def test_it_runs_in_an_empty_folder(command, tmp_path):
     assert "nieh_haystack_{8k,...,1m}" in command("ls", "tasks")
+    assert (Path(command("ls", "tasks", "--path").strip()) / "nieh" / "nieh_mini_gt.yaml").is_file()
     words = (
         *option_words(model="blind,oracle,qwen2.5-vl-nano", tasks="nieh_mini_gt", limit="20"),
         "--full",
@@ -83,6 +84,11 @@ def test_it_runs_in_an_empty_folder(command, tmp_path):
     assert "Qwen2.5-VL 7B" in table  # the published numbers came with it
     # The first: $XDG_CACHE_HOME.
     assert {path.name for path in tmp_path.iterdir()} - {"cache"} == {"results"}
+
+
+def test_lm_evals_command_knows_its_tasks(command):
+    words = ("--model", "infthor", "--model_args", "adapter=qwen2.5-vl-tiny", "--limit", "2")
+    assert "nieh_mini_gt" in command("lm-eval", "run", *words, "--tasks", "nieh_mini_gt")
 
 
 def test_the_simulator_runs_by_itself(installed, tmp_path):

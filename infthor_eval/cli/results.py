@@ -13,7 +13,8 @@ from infthor_eval.cli.options.show import ShowOptions
 from infthor_eval.cli.progress.notes import print_failure
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
-from infthor_eval.runs import RunSummary, Suite, Usage, read_header
+from infthor_eval.runs import RunSummary, Suite, Usage, mark_incomplete, read_header
+from infthor_eval.runs.completeness import count_missing
 from infthor_eval.runs.journals.shards import read_run_log
 from infthor_eval.runs.results import results_document
 from infthor_eval.runs.stored.labels import label_runs
@@ -56,8 +57,11 @@ def read_run_results(folder: Path) -> RunResults:
     suite = find_suite(read_header(folder).suite)
     header, log = read_run_log(folder, suite.records, print_failure)
     results = read_results(folder)
-    summary = RunSummary(header, suite.summarise(header, log.records))
-    return RunResults(folder, suite, summary, log.usage, results.n_missing if results else None)
+    summary = RunSummary.of(suite, header, log.records)
+    n_missing = count_missing(header, len(log.records))
+    if n_missing is None and results is not None:
+        n_missing = results.n_missing
+    return RunResults(folder, suite, summary, log.usage, n_missing)
 
 
 def print_results(runs: Sequence[RunResults], options: ShowOptions) -> None:
@@ -88,7 +92,8 @@ def _with_labels(runs: Sequence[RunResults]) -> list[RunResults]:
     labels = label_runs([(run.folder, run.summary.header) for run in runs], _SHOWN_BY_TABLES)
     labelled = []
     for run, label in zip(runs, labels, strict=True):
-        header = msgspec.structs.replace(run.summary.header, name=label)
+        name = mark_incomplete(label, run.summary.units, run.n_missing)
+        header = msgspec.structs.replace(run.summary.header, name=name)
         labelled.append(replace(run, summary=replace(run.summary, header=header)))
     return labelled
 

@@ -238,8 +238,8 @@ def _drawn_run(
 
 
 def _earned(records: Sequence[UnitRecord[P]]) -> Earned[P]:
-    """Pair episodes with their rewards; one that failed earns nothing."""
-    return [(r, 0.0 if r.failure is not None else r.payload.reward) for r in records]
+    """Pair episodes with their rewards."""
+    return [(record, record.payload.reward) for record in records]
 
 
 def _highest_possible(

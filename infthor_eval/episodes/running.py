@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 
 from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.episodes.retries import with_retries
-from infthor_eval.errors import InfthorError, SceneError
+from infthor_eval.errors import InfthorError, NotAskedError, SceneError
 from infthor_eval.runs import NOTHING, Session, Tokens, Unit, UnitRecord, Usage
 from infthor_eval.thor.simulator import Simulator
 
@@ -74,7 +74,10 @@ class EpisodeRunner(Generic[E, P]):
         except InfthorError as error:
             begun = unit if self.begun is None else replace(unit, payload=self.begun)
             return begun.record_failure(
-                session.describe_failure(unit, error), fingerprint, usage=self.usage
+                session.describe_failure(unit, error),
+                fingerprint,
+                asked=not isinstance(error, NotAskedError),
+                usage=self.usage,
             )
         return unit.record(
             fingerprint,

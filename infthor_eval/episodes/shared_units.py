@@ -1,13 +1,13 @@
 """The episodes that several runs have in common, so that their rewards can be compared."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from infthor_eval.episodes.recorded_runs import RecordedRun
 from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.errors import DataError, UsageError, unknown_name
-from infthor_eval.runs.journals.records import UnitRecord
+from infthor_eval.runs.journals.records import State, UnitRecord
 
 __all__ = ["SharedUnits", "difference_notes", "only_name", "shared_tasks", "shared_units"]
 
@@ -21,8 +21,8 @@ class SharedUnits(Generic[P]):
 
     Attributes:
         trajectories: names of the trajectories that all runs have in full.
-        records: by run, then by trajectory: records of the episodes that count in every run, in
-            time order.
+        records: by run, then by trajectory: records of the episodes with a result in every run,
+            in time order.
         notes: what was left out, and how the runs differ, a line each.
     """
 
@@ -74,7 +74,9 @@ def shared_units(
     units = [run.by_trajectory(tasks) for run in runs]
     digests = [run.digests(tasks) for run in runs]
     names = sorted(set().union(*digests, *units))
-    left_out = {name: _excluded(name, units) for name in names}
+    excluded_of = {name: _in_state(name, units, {"excluded"}) for name in names}
+    lost = {name: _in_state(name, units, {"failed", "not asked"}) for name in names}
+    left_out = {name: excluded_of[name] | lost[name] for name in names}
     shared = [
         name
         for name in names
@@ -98,20 +100,19 @@ def shared_units(
         )
     if len(shared) == 1:
         notes.append("a mean over one trajectory has no interval")
-    if n_excluded := sum(len(left_out[name]) for name in shared):
+    if n_excluded := sum(len(excluded_of[name]) for name in shared):
         notes.append(f"{excluded}: {n_excluded}")
+    if n_lost := sum(len(lost[name] - excluded_of[name]) for name in shared):
+        notes.append(f"left out, as they failed or were not asked in a run: {n_lost}")
     notes += difference_notes("simulator", runs, [run.config.simulator for run in runs])
     return SharedUnits(tuple(tasks), tuple(shared), tuple(records), (*notes, *differences))
 
 
-def _excluded(name: str, units: Sequence[Units[P]]) -> set[Any]:
-    """Return which episodes of a trajectory some run excludes, by their order in time."""
+def _in_state(name: str, units: Sequence[Units[P]], states: Collection[State]) -> set[Any]:
+    """Return which episodes of a trajectory some run has in a state, by their order in time."""
     of_runs = [of_run.get(name, {}) for of_run in units]
     return {
-        order
-        for of_run in of_runs
-        for order, record in of_run.items()
-        if record.excluded is not None
+        order for of_run in of_runs for order, record in of_run.items() if record.state in states
     }
 
 

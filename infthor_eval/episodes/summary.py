@@ -1,7 +1,7 @@
 """Results of a run of episodes: a pure function of its journal, without times."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 import msgspec
@@ -14,6 +14,7 @@ from infthor_eval.runs import UnitRecord
 __all__ = [
     "EpisodeTaskSummary",
     "EpisodesSummary",
+    "answered_records",
     "common_results",
     "counted_records",
     "success_rate",
@@ -26,10 +27,11 @@ class EpisodeTaskSummary(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         n_trajectories: trajectories of the episodes that count.
-        n_failed: episodes in which the subject itself failed; they count as no success.
+        n_failed: episodes in which the subject itself failed, which have no result.
         excluded: episodes that do not count, by reason.
         skipped: trajectories that could not be read, by reason.
         endings: number of episodes by how they ended.
+        n_not_asked: episodes that a stopped run did not come to, or that a cap left out.
     """
 
     n_trajectories: int
@@ -37,6 +39,12 @@ class EpisodeTaskSummary(msgspec.Struct, frozen=True, kw_only=True):
     excluded: dict[str, int]
     skipped: dict[str, int]
     endings: dict[str, int]
+    n_not_asked: int = 0
+
+    @property
+    def n_without(self) -> int:
+        """Number of episodes that count and have no result."""
+        return self.n_failed + self.n_not_asked
 
 
 C = TypeVar("C", bound=EpisodeTaskConfig)
@@ -54,18 +62,22 @@ class EpisodesSummary(msgspec.Struct, Generic[T], frozen=True):
 def summarise_episodes(
     config: EpisodesConfig[C],
     records: Sequence[UnitRecord[P]],
-    summarise_task: Callable[[C, list[UnitRecord[P]]], T],
+    units_by_task: Mapping[str, int],
+    summarise_task: Callable[[C, list[UnitRecord[P]], int], T],
 ) -> EpisodesSummary[T]:
     """Summarise a run.
 
     Args:
-        summarise_task: returns a task's results, given its config and its records in order.
+        units_by_task: see `RunHeader`.
+        summarise_task: returns a task's results, given its config, its records in order, and the
+            number of its episodes without a record.
     """
     ordered = sorted(records, key=lambda record: record.key)
     tasks = {}
     for name, task in config.tasks.items():
         chosen = [record for record in ordered if record.task == name]
-        tasks[name] = summarise_task(task, chosen)
+        n_missing = max(0, units_by_task.get(name, 0) - len(chosen))
+        tasks[name] = summarise_task(task, chosen, n_missing)
     return EpisodesSummary(config.simulator, tasks)
 
 
@@ -74,23 +86,42 @@ def counted_records(records: Sequence[UnitRecord[P]]) -> list[UnitRecord[P]]:
     return [record for record in records if record.excluded is None]
 
 
-def common_results(config: EpisodeTaskConfig, records: Sequence[UnitRecord[P]]) -> dict[str, Any]:
-    """Return the fields of `EpisodeTaskSummary`, given a task's config and its records."""
+def answered_records(records: Sequence[UnitRecord[P]]) -> list[UnitRecord[P]]:
+    """Return the records with a result, which scores are over."""
+    return [record for record in records if record.state == "answered"]
+
+
+def common_results(
+    config: EpisodeTaskConfig, records: Sequence[UnitRecord[P]], n_missing: int
+) -> dict[str, Any]:
+    """Return the fields of `EpisodeTaskSummary`; see `summarise_episodes`."""
     counted = counted_records(records)
+    states = Counter(record.state for record in counted)
     return {
         "n_trajectories": len({record.cluster for record in counted}),
-        "n_failed": sum(record.failure is not None for record in counted),
+        "n_failed": states["failed"],
+        "n_not_asked": states["not asked"] + n_missing,
         "excluded": _count(record.excluded for record in records if record.excluded is not None),
         "skipped": _count(reason for _, reason in config.broken),
-        "endings": _count(record.payload.ended or "failed" for record in counted),
+        "endings": _count(
+            record.payload.ended if record.state == "answered" else record.state
+            for record in counted
+        ),
     }
 
 
-def success_rate(records: Sequence[UnitRecord[P]]) -> Rate | None:
-    """Return the share of successes, clustered by trajectory; None if there are no records."""
-    return clustered_rate(
-        [float(record.payload.done) for record in records], [record.cluster for record in records]
+def success_rate(records: Sequence[UnitRecord[P]], n_missing: int = 0) -> Rate | None:
+    """Return the share of successes among results, clustered by trajectory; None without any.
+
+    Args:
+        records: records that count.
+        n_missing: number of further episodes that count.
+    """
+    answered = answered_records(records)
+    rate = clustered_rate(
+        [float(record.payload.done) for record in answered], [record.cluster for record in answered]
     )
+    return None if rate is None else rate.out_of(len(records) + n_missing)
 
 
 def _count(reasons: Iterable[str]) -> dict[str, int]:

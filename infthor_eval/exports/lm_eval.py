@@ -14,9 +14,11 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any
 
+import msgspec
+
 from infthor_eval.errors import wrap_errors
 from infthor_eval.exports import LM_EVAL_MODEL
-from infthor_eval.runs import RunOutcome, TaskFile, UnitRecord, UnitSample
+from infthor_eval.runs import RunOutcome, TaskFile, UnitCounts, UnitRecord, UnitSample
 from infthor_eval.statistics import clustered_mean
 from infthor_eval.storage.digests import canonical_json
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
@@ -85,11 +87,16 @@ def export(outcome: RunOutcome) -> Path:
 
 @dataclass(frozen=True)
 class _Scored:
-    """A task with its units' records, scores, and lines in lm-eval's file without the scores."""
+    """A task with its units' records, scores, and lines in lm-eval's file without the scores.
+
+    Attributes:
+        units: numbers of all its units by state.
+    """
 
     file: TaskFile
+    units: UnitCounts
     records: list[UnitRecord[Any]] = field(default_factory=list)
-    scores: list[Mapping[str, float]] = field(default_factory=list)  # empty for a failed unit
+    scores: list[Mapping[str, float]] = field(default_factory=list)
     rows: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -99,16 +106,35 @@ class _Scored:
     @property
     def n_samples(self) -> int:
         """Number of samples; one that was repeated has several records."""
-        return len({record.key.once for record in self.records})
+        n_known = len({record.key.once for record in self.records})
+        n_repeats = max(record.repeat for record in self.records)
+        units = self.units
+        n_missing = units.answered + units.failed + units.not_asked - len(self.records)
+        return n_known + n_missing // n_repeats
+
+    @property
+    def n_answered(self) -> int:
+        """Number of samples with a result."""
+        return len({record.key.once for record, _ in self.answered})
+
+    @cached_property
+    def answered(self) -> list[tuple[UnitRecord[Any], Mapping[str, float]]]:
+        """Records with a result, and their scores."""
+        pairs = zip(self.records, self.scores, strict=True)
+        return [(record, scores) for record, scores in pairs if record.state == "answered"]
 
     @cached_property
     def metrics(self) -> list[str]:
-        return list(dict.fromkeys(name for scores in self.scores for name in scores))
+        return list(dict.fromkeys(name for _, scores in self.answered for name in scores))
 
 
 def _tasks(outcome: RunOutcome[Any, Any]) -> list[_Scored]:
     """Return the tasks with records that count."""
-    tasks = {file.name: _Scored(file) for file in outcome.run.request.tasks.tasks}
+    units = outcome.summary.units
+    tasks = {
+        file.name: _Scored(file, units.get(file.name, UnitCounts()))
+        for file in outcome.run.request.tasks.tasks
+    }
     for record, sample in zip(outcome.records, outcome.samples, strict=True):
         if record.excluded is None:
             tasks[record.task].records.append(record)
@@ -118,19 +144,26 @@ def _tasks(outcome: RunOutcome[Any, Any]) -> list[_Scored]:
 
 
 def _scored_rows(task: _Scored) -> list[dict[str, Any]]:
-    """Return a row per sample, in the task's order; repeats give all replies and mean scores."""
-    repeated: dict[int, list[tuple[dict[str, Any], Mapping[str, float]]]] = {}
-    for row, scores in zip(task.rows, task.scores, strict=True):
-        repeated.setdefault(row["doc_id"], []).append((row, scores))
+    """Return a row per sample, in the task's order; repeats give all replies and mean scores.
+
+    A sample without a result has no scores (null), and says why under `infthor_eval`.
+    """
+    repeated: dict[int, list[tuple[dict[str, Any], UnitRecord[Any], Mapping[str, float]]]] = {}
+    for row, record, scores in zip(task.rows, task.records, task.scores, strict=True):
+        repeated.setdefault(row["doc_id"], []).append((row, record, scores))
     rows = []
     for _, same in sorted(repeated.items()):
-        replies = [reply for row, _ in same for reply in row["filtered_resps"]]
-        first, _ = same[0]
+        replies = [reply for row, _, _ in same for reply in row["filtered_resps"]]
+        first, record, _ = same[0]
+        answered = [scores for _, record, scores in same if record.state == "answered"]
         rows.append(
             first | {"resps": [replies], "filtered_resps": replies, "metrics": task.metrics}
         )
         for name in task.metrics:
-            rows[-1][name] = fmean(scores.get(name, 0.0) for _, scores in same)
+            values = [scores.get(name, 0.0) for scores in answered]
+            rows[-1][name] = fmean(values) if values else None
+        if not answered:
+            rows[-1]["infthor_eval"] = {"state": record.state, "failure": record.failure}
     return rows
 
 
@@ -182,8 +215,9 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
         "n-shot": {task.name: 0 for task in tasks},
         "higher_is_better": {task.name: dict.fromkeys(task.metrics, True) for task in tasks},
         "n-samples": {
-            task.name: dict.fromkeys(("original", "effective"), task.n_samples) for task in tasks
+            task.name: {"original": task.n_samples, "effective": task.n_answered} for task in tasks
         },
+        "infthor_eval_units": msgspec.to_builtins(outcome.summary.units),
         "config": {
             "model": LM_EVAL_MODEL,
             "model_args": {"adapter": request.model, **request.model_options},
@@ -210,10 +244,10 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
 
 
 def _means(task: _Scored) -> dict[str, Any]:
-    means: dict[str, Any] = {"name": task.name, "alias": task.name, "sample_len": task.n_samples}
+    means: dict[str, Any] = {"name": task.name, "alias": task.name, "sample_len": task.n_answered}
     for metric in task.metrics:
-        scores = [scores.get(metric, 0.0) for scores in task.scores]
-        estimate = clustered_mean(scores, [record.cluster for record in task.records])
+        scores = [scores.get(metric, 0.0) for _, scores in task.answered]
+        estimate = clustered_mean(scores, [record.cluster for record, _ in task.answered])
         means[f"{metric},{_FILTER}"] = estimate.mean
         means[f"{metric}_stderr,{_FILTER}"] = "N/A" if estimate.stderr is None else estimate.stderr
     return means

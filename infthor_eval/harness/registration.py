@@ -1,8 +1,19 @@
-"""Registers our model class with lm-eval unimported, and tells our tasks whether it is used."""
+"""Registers our model class with lm-eval unimported, and our tasks; tells these whether the class
+is used."""
+
+from pathlib import Path
+from typing import Any
 
 from infthor_eval.exports import LM_EVAL_MODEL as NAME
+from infthor_eval.storage.folders import packaged_folder
 
-__all__ = ["NAME", "model_takes_references", "register", "say_model_takes_references"]
+__all__ = [
+    "NAME",
+    "add_tasks",
+    "model_takes_references",
+    "register",
+    "say_model_takes_references",
+]
 
 _TARGET = "infthor_eval.harness.model:InfthorLM"
 _references = False
@@ -15,6 +26,26 @@ def register() -> None:
 
     if NAME not in model_registry:
         model_registry.register(NAME, target=_TARGET)
+
+
+def add_tasks() -> None:
+    """Let lm-eval's command find this package's tasks as it finds its own, by their names."""
+    import lm_eval.tasks
+
+    own = lm_eval.tasks.TaskManager
+
+    class WithOurs(own):  # type: ignore[misc, valid-type]
+        """lm-eval's tasks, ours, and those of the folders that a person gives, which come last."""
+
+        def __init__(
+            self, *args: Any, include_path: str | Path | list[Any] | None = None, **options: Any
+        ) -> None:
+            given = include_path if isinstance(include_path, list | tuple) else [include_path]
+            paths = [packaged_folder("tasks"), *filter(None, given)]
+            super().__init__(*args, include_path=paths, **options)
+
+    # Its command imports the name when it runs, and takes no further folder otherwise.
+    lm_eval.tasks.TaskManager = WithOurs
 
 
 def say_model_takes_references() -> None:

@@ -49,7 +49,7 @@ class ManipulationSuite:
     ) -> ManipulationSummary:
         """See `Suite.summarise`; raises DataError for a journal without tasks."""
         require_tasks(header.config, header.name)
-        return summarise_manipulation(header.config, records)
+        return summarise_manipulation(header.config, records, header.units_by_task)
 
     def scores(self, record: UnitRecord[ArmRecord]) -> Mapping[str, float]:
         """See `Suite.scores`: whether the episode is a success, and its reward."""

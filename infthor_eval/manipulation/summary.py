@@ -1,11 +1,13 @@
 """Results of a run of manipulation: a pure function of its journal, without times."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from statistics import fmean
+from types import MappingProxyType
 
 from infthor_eval.episodes.summary import (
     EpisodesSummary,
     EpisodeTaskSummary,
+    answered_records,
     common_results,
     counted_records,
     success_rate,
@@ -34,8 +36,8 @@ class ArmTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
             episodes.
         steps: steps of an episode, mean.
         collisions: collisions of an episode, mean.
-        outcomes: success of each episode by its id, 1 or 0; ids begin with the trajectory. Runs are
-            paired by them.
+        outcomes: success of each episode with a result by its id, 1 or 0; ids begin with the
+            trajectory. Runs are paired by them.
     """
 
     kind: str
@@ -47,31 +49,39 @@ class ArmTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     collisions: float | None
     outcomes: dict[str, float]
 
+    @property
+    def n_episodes(self) -> int:
+        """Number of episodes that count."""
+        return (self.success.n if self.success else 0) + self.n_without
+
 
 ManipulationSummary = EpisodesSummary[ArmTaskSummary]
 
 
 def summarise_manipulation(
-    config: ManipulationConfig, records: Sequence[Record]
+    config: ManipulationConfig,
+    records: Sequence[Record],
+    units_by_task: Mapping[str, int] = MappingProxyType({}),
 ) -> ManipulationSummary:
-    """Summarise a run, given its config and the records of all its episodes."""
-    return summarise_episodes(config, records, _summarise_task)
+    """Summarise a run, given its config, its records, and the numbers of its tasks' episodes."""
+    return summarise_episodes(config, records, units_by_task, _summarise_task)
 
 
-def _summarise_task(config: ArmTaskConfig, records: Sequence[Record]) -> ArmTaskSummary:
-    counted = counted_records(records)
-    acted = [record for record in counted if record.failure is None]
+def _summarise_task(
+    config: ArmTaskConfig, records: Sequence[Record], n_missing: int
+) -> ArmTaskSummary:
+    acted = answered_records(records)
     starts_inside = [float(record.payload.starts_inside) for record in acted]
     return ArmTaskSummary(
-        **common_results(config, records),
+        **common_results(config, records, n_missing),
         kind=config.kind,
         radius=config.radius,
-        success=success_rate(counted),
+        success=success_rate(counted_records(records), n_missing),
         inside=clustered_rate(starts_inside, [record.cluster for record in acted]),
         closest=_mean([record.payload.closest for record in acted]),
         steps=_mean([len(record.payload.steps) for record in acted]),
         collisions=_mean([record.payload.n_collisions for record in acted]),
-        outcomes={record.id: float(record.payload.done) for record in counted},
+        outcomes={record.id: float(record.payload.done) for record in acted},
     )
 
 

@@ -75,6 +75,7 @@ def _success_table(runs: Sequence[RunSummary]) -> Table:
         "excluded",
         "skipped",
         "failed",
+        "not asked",
         *_ABOVE,
     )
     columns = (Column("model", False), Column("radius, m", False), *map(Column, names))
@@ -89,7 +90,7 @@ def _above_floor(
     stills = [
         other.summary.tasks[name]
         for other in runs
-        if other.header.name == _STILL
+        if other.header.config.model.get("name") == _STILL
         and other is not run
         and other.header.config.tasks.get(name) == run.header.config.tasks[name]
     ]
@@ -99,20 +100,24 @@ def _above_floor(
     trajectories = [episode.rpartition("/")[0] for episode in both]
     of_still = [stills[0].outcomes[episode] for episode in both]
     of_task = [task.outcomes[episode] for episode in both]
-    return paired_rate(of_still, of_task, trajectories)
+    rate = paired_rate(of_still, of_task, trajectories, most=1.0)
+    return None if rate is None else rate.out_of(task.n_episodes)
 
 
 def _cells(pair: Sequence[ArmTaskSummary | None]) -> Iterator[str]:
     """Yield the cells of a pick-up task and a put task, either of which may be missing."""
     tasks = [task for task in pair if task is not None]
-    rates = [None if task is None else task.success for task in pair]
     yield ", ".join(dict.fromkeys(f"{task.radius:g}" for task in tasks))
-    yield from map(format_percent, rates)
-    yield from (str(0 if rate is None else rate.n) for rate in rates)
+    yield from (
+        format_percent(None) if task is None else format_percent(task.success, task.n_episodes)
+        for task in pair
+    )
+    yield from (str(task.n_episodes if task else 0) for task in pair)
     yield str(max(task.n_trajectories for task in tasks))
     yield str(sum(sum(task.excluded.values()) for task in tasks))
     yield str(max(sum(task.skipped.values()) for task in tasks))
     yield str(sum(task.n_failed for task in tasks))
+    yield str(sum(task.n_not_asked for task in tasks))
 
 
 def _episodes_table(tasks: Sequence[tuple[str, str, ArmTaskSummary]]) -> Table:

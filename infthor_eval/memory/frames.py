@@ -13,7 +13,7 @@ from infthor_eval.memory.protocol import (
     TrajectoryFacts,
 )
 
-__all__ = ["FrameMemory", "Last", "Oracle", "Random", "Uniform"]
+__all__ = ["FrameMemory", "Last", "Nothing", "Oracle", "Random", "Uniform"]
 
 PUBLISHED_K = 10  # frames that the published retrieval shows
 
@@ -61,6 +61,18 @@ class FrameMemory(ABC):
     def draw(self, query: Query) -> random.Random:
         """Return a generator for a query, the same one each time it is asked."""
         return random.Random(f"{self.facts.seed}/{self.facts.name}/{query.text}/{len(self.past)}")
+
+
+class Nothing(FrameMemory):
+    """No memory: the current view alone, which every memory must be better than."""
+
+    def __init__(self) -> None:
+        """There is nothing to set."""
+        super().__init__()
+
+    def choose(self, query: Query, n_frames: int) -> Sequence[int]:
+        """See `FrameMemory`."""
+        return ()
 
 
 class Last(FrameMemory):

@@ -48,6 +48,7 @@ MEMORIES = PluginTable(
     "memory",
     "infthor_eval.memories",
     {
+        "none": f"{_FRAMES}:Nothing",
         "last": f"{_FRAMES}:Last",
         "uniform": f"{_FRAMES}:Uniform",
         "clip": f"{_RETRIEVAL}:Clip",

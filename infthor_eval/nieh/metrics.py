@@ -135,7 +135,7 @@ def _check(entry: object, where: str) -> None:
         raise DataError(
             f"{where}{entry['metric']} is not averaged (aggregation: mean); use lm-eval"
         )
-    # A failed sample counts as 0, which would be the best value.
+    # Full marks, pairs of twins and effective lengths read a score as better when it is higher.
     if not entry.get("higher_is_better", True):
         raise DataError(f"{where}{entry['metric']} is better when lower; negate it, or use lm-eval")
 

@@ -33,15 +33,24 @@ from infthor_eval.formats.question import Answer
 from infthor_eval.nieh.prompts import last_line
 
 __all__ = [
+    "NEAR",
     "SCORERS",
     "STRICT_RULES",
     "Scorer",
+    "are_synonyms",
+    "is_number",
+    "matches_reference",
+    "matches_strict",
+    "normal_form",
     "pieces_of",
     "plain_form",
     "says_number",
     "says_yes_or_no",
     "score",
     "scores",
+    "similarity",
+    "split_published",
+    "without_slice",
 ]
 
 # Part of a run's identity: scores of other rules are another run's. 2: F1 of several answers;
@@ -50,7 +59,7 @@ STRICT_RULES = "2"
 Scorer = Literal["reference", "strict"]
 SCORERS: tuple[Scorer, ...] = ("reference", "strict")
 
-_NEAR = 80  # similarity in percent from which two normalised strings count as equal
+NEAR = 80  # similarity in percent from which two normalised strings count as equal
 _YES_NO = ("yes", "no")
 _SLICE = re.compile(r"\b(?:slices?|sliced)\b(?: of\b)?|(?<=\w)sliced\b")
 
@@ -78,12 +87,12 @@ def scores(reply: str, answers: Sequence[Answer]) -> dict[str, float]:
 
 def says_yes_or_no(response: str) -> str | None:
     """Return "yes" or "no" as the strict scorer takes a response; None for neither or both."""
-    return next((answer for answer in _YES_NO if _matches_strict(response, answer)), None)
+    return next((answer for answer in _YES_NO if matches_strict(response, answer)), None)
 
 
 def says_number(response: str) -> bool:
     """Return True if both scorers read a response as a number."""
-    return _is_number(_normalise(response))
+    return is_number(normal_form(response))
 
 
 def pieces_of(response: str) -> list[str]:
@@ -95,6 +104,11 @@ def pieces_of(response: str) -> list[str]:
     ]
 
 
+def split_published(response: str) -> list[str]:
+    """Return the answers that a response enumerates, as the published scorer separates them."""
+    return [piece.replace("and", "").strip() for piece in response.split(",")]
+
+
 def plain_form(text: str) -> str:
     """Return a text without marks and a leading "X is", as both scorers compare it."""
     bare = re.sub(r"[^\w\s]", "", text)
@@ -103,18 +117,18 @@ def plain_form(text: str) -> str:
 
 def _reference(response: str, answers: Sequence[Answer]) -> float:
     if len(answers) == 1:
-        return float(_matches_reference(response, answers[0]))
-    pieces = [piece.replace("and", "").strip() for piece in response.split(",")]
-    return sum(_matches_reference(piece, gold) for gold in answers for piece in pieces) / len(
+        return float(matches_reference(response, answers[0]))
+    pieces = split_published(response)
+    return sum(matches_reference(piece, gold) for gold in answers for piece in pieces) / len(
         answers
     )
 
 
 def _strict(response: str, answers: Sequence[Answer]) -> float:
     if len(answers) == 1:
-        return float(_matches_strict(response, answers[0]))
+        return float(matches_strict(response, answers[0]))
     pieces = pieces_of(response)
-    return 2 * _largest_matching(answers, pieces, _matches_strict) / (len(answers) + len(pieces))
+    return 2 * _largest_matching(answers, pieces, matches_strict) / (len(answers) + len(pieces))
 
 
 def _largest_matching(
@@ -137,40 +151,43 @@ def _largest_matching(
     return sum(assign(gold, set()) for gold in range(len(answers)))
 
 
-def _matches_reference(response: str, gold: Answer) -> bool:
-    answer = _normalise(response)
-    wanted = _normalise(gold)
-    if _near(answer, wanted) or _synonymous(answer, wanted):
+def matches_reference(response: str, gold: Answer) -> bool:
+    """Return whether a response, or a piece of it, is a gold answer to the published scorer."""
+    answer = normal_form(response)
+    wanted = normal_form(gold)
+    if _near(answer, wanted) or are_synonyms(answer, wanted):
         return True
     if wanted == "yes" and "yes" in answer[:4]:
         return True
     return wanted == "no" and "no" in answer[:3]
 
 
-def _matches_strict(response: str, gold: Answer) -> bool:
-    wanted = _normalise(gold)
+def matches_strict(response: str, gold: Answer) -> bool:
+    """Return whether a response, or a piece of it, is a gold answer to the strict scorer."""
+    wanted = normal_form(gold)
     if wanted in _YES_NO:
         words = re.findall(r"\w+", response.lower())
         other = _YES_NO[wanted == "yes"]
         return words[:1] == [wanted] and other not in words
-    if _is_number(wanted):
-        answer = _normalise(response)
-        return _is_number(answer) and float(answer) == float(wanted)
-    answer = _without_slice(plain_form(response.lower().strip()))
-    wanted = _without_slice(wanted)
-    return _near(answer, wanted) or _synonymous(answer, wanted)
+    if is_number(wanted):
+        answer = normal_form(response)
+        return is_number(answer) and float(answer) == float(wanted)
+    answer = without_slice(plain_form(response.lower().strip()))
+    wanted = without_slice(wanted)
+    return _near(answer, wanted) or are_synonyms(answer, wanted)
 
 
-def _without_slice(text: str) -> str:
+def without_slice(text: str) -> str:
     """Return the food of a slice; another text, and one that is nothing but "slice", as it is."""
     return " ".join(_SLICE.sub(" ", text).split()) or text if _SLICE.search(text) else text
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Return whether a text in normal form is a number."""
     return re.fullmatch(r"-?\d+(\.\d+)?", text) is not None
 
 
-def _normalise(text: Answer) -> str:
+def normal_form(text: Answer) -> str:
     """Return the published normal form: a number in digits if there is one, else plain words."""
     if not isinstance(text, str):
         return str(text)
@@ -187,10 +204,16 @@ def _near(answer: str, wanted: str) -> bool:
         return True
     if not answer or not wanted:
         return False
-    return round(100 * SequenceMatcher(None, answer, wanted).ratio()) >= _NEAR
+    return similarity(answer, wanted) >= NEAR
 
 
-def _synonymous(answer: str, wanted: str) -> bool:
+def similarity(one: str, other: str) -> int:
+    """Return how alike two texts are, in percent."""
+    return round(100 * SequenceMatcher(None, one, other).ratio())
+
+
+def are_synonyms(answer: str, wanted: str) -> bool:
+    """Return whether two texts in normal form are of one row of the published synonyms."""
     return any(
         (answer == word and wanted in phrases)
         or (wanted == word and answer in phrases)

@@ -91,17 +91,20 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
             if task.final_form is not None:
                 yield from self._run_in_one_go(group, task.final_form, runner, session)
                 return
-            stopped = False
+            stopped = lost = False
             for unit in group.units:
                 record = known[unit.key]
-                # A plan that was not attempted is, once an earlier one that failed by a fault is
-                # completed.
+                # A plan that was not attempted is, once an earlier one that had no result is done.
                 if record is None or (record.payload.ended == NOT_ATTEMPTED and not stopped):
-                    run = partial(runner.pass_over if stopped else runner.run, unit.episode)
-                    record = runner.record(unit, fingerprints[unit.key], run, session)
+                    if lost:
+                        record = _not_asked(unit, fingerprints[unit.key])
+                    else:
+                        run = partial(runner.pass_over if stopped else runner.run, unit.episode)
+                        record = runner.record(unit, fingerprints[unit.key], run, session)
                 yield record
-                failed = record.excluded is None and not record.payload.done
-                stopped = stopped or (failed and task.settings.after_failure == "stop")
+                if task.settings.after_failure == "stop":
+                    lost = lost or record.state in ("failed", "not asked")
+                    stopped = stopped or (record.state == "answered" and not record.payload.done)
 
     def _run_in_one_go(
         self,
@@ -114,7 +117,11 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         fingerprints, known = self._find_records(group, session)
         tried = 0
         goes_on = True
+        lost = False
         for unit in group.units:
+            if lost:
+                yield known[unit.key] or _not_asked(unit, fingerprints[unit.key])
+                continue
             if not tried:
                 run: Callable[[], EpisodeResult[PlanRecord]] = partial(
                     self._first_of_all, runner, group, unit
@@ -126,6 +133,7 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
             record = runner.record(unit, fingerprints[unit.key], run, session)
             tried += record.payload.attempted
             # After a failure of the model or the simulator nobody knows where the world is.
+            lost = record.state in ("failed", "not asked")
             goes_on = form.goes_on and goes_on and record.payload.attempted
             yield known[unit.key] or record
 
@@ -165,6 +173,13 @@ def _refuse_decoding(model: Model, options: PlansOptions, tasks: Iterable[PlansT
                 f"{model.name} draws no replies, as {task.name} does at temperature "
                 f"{task.decoding.temperature:g}; add --greedy"
             )
+
+
+def _not_asked(unit: PlanUnit, fingerprint: str) -> UnitRecord[PlanRecord]:
+    """Return the record of a plan after one without a result: nobody knows whether it would have
+    been reached."""
+    reason = "not asked: an earlier plan of the trajectory has no result; run the command again"
+    return unit.record_failure(reason, fingerprint, asked=False)
 
 
 def _warnings(trained: str | None, tasks: Iterable[PlansTask]) -> list[str]:

@@ -52,7 +52,7 @@ class PlansSuite:
     ) -> PlansSummary:
         """See `Suite.summarise`; raises DataError for a journal without tasks."""
         require_tasks(header.config, header.name)
-        return summarise_plans(header.config, records)
+        return summarise_plans(header.config, records, header.units_by_task)
 
     def scores(self, record: UnitRecord[PlanRecord]) -> Mapping[str, float]:
         """See `Suite.scores`: whether the plan was completed, and its reward if it has one.

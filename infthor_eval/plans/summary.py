@@ -1,6 +1,7 @@
 """Results of a run of plans: a pure function of its journal, without times."""
 
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 from msgspec import UNSET, UnsetType
@@ -9,6 +10,7 @@ from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_cl
 from infthor_eval.episodes.summary import (
     EpisodesSummary,
     EpisodeTaskSummary,
+    answered_records,
     common_results,
     counted_records,
     success_rate,
@@ -39,7 +41,7 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     """Results of one task; those of rewards, goals and actions are None for imported counts.
 
     Attributes:
-        n_plans: plans that count; a failed one earns nothing.
+        n_plans: plans that count, with those that have no result.
         n_tried: those of them in which the subject acted.
         success: share of completed plans, by column of the published table.
         by_kind: share of completed plans, by kind.
@@ -83,40 +85,49 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
 PlansSummary = EpisodesSummary[PlanTaskSummary]
 
 
-def summarise_plans(config: PlansConfig, records: Sequence[Record]) -> PlansSummary:
-    """Summarise a run, given its config and the records of all its plans."""
-    return summarise_episodes(config, records, _summarise_task)
+def summarise_plans(
+    config: PlansConfig,
+    records: Sequence[Record],
+    units_by_task: Mapping[str, int] = MappingProxyType({}),
+) -> PlansSummary:
+    """Summarise a run, given its config, its records, and the numbers of its tasks' plans."""
+    return summarise_episodes(config, records, units_by_task, _summarise_task)
 
 
-def _summarise_task(config: PlansTaskConfig, records: Sequence[Record]) -> PlanTaskSummary:
+def _summarise_task(
+    config: PlansTaskConfig, records: Sequence[Record], n_missing: int
+) -> PlanTaskSummary:
     counted = counted_records(records)
+    answered = answered_records(records)
     has_steps = config.rewards is not None  # which imported counts have not
-    acted = counted if has_steps else []
+    acted = answered if has_steps else []
+    whole = _Whole(counted if has_steps else [])
+    success = {name: _success(counted, kinds) for name, kinds in _COLUMNS.items()}
+    success["total"] = success_rate(counted, n_missing)
     return PlanTaskSummary(
-        **common_results(config, records),
-        n_plans=len(counted),
-        n_tried=sum(record.payload.attempted for record in counted) if has_steps else None,
-        success={
-            name: rate for name, kinds in _COLUMNS.items() if (rate := _success(counted, kinds))
-        },
+        **common_results(config, records, n_missing),
+        n_plans=len(counted) + n_missing,
+        n_tried=sum(record.payload.attempted for record in answered) if has_steps else None,
+        success={name: rate for name, rate in success.items() if rate is not None},
         by_kind={
             str(kind): rate for kind in PlanKind if (rate := _success(counted, frozenset({kind})))
         },
-        path_weighted=clustered_rate(
-            [_path_weight(item.payload) for item in acted], [item.cluster for item in acted]
+        path_weighted=_out_of(
+            clustered_rate(
+                [_path_weight(item.payload) for item in acted], [item.cluster for item in acted]
+            ),
+            len(counted) + n_missing,
         ),
-        reward_share=_rate_of_trajectories(
-            acted, lambda reward, most: reward / most if most else 0.0
-        ),
-        reward=_rate_of_trajectories(acted, lambda reward, _: reward),
-        max_reward=_rate_of_trajectories(acted, lambda _, most: most),
-        goals=_goals(acted),
-        goal_conditions=_goal_conditions(acted),
+        reward_share=whole.of_trajectories(lambda reward, most: reward / most if most else 0.0),
+        reward=whole.of_trajectories(lambda reward, _: reward),
+        max_reward=whole.of_trajectories(lambda _, most: most),
+        goals=whole.goals(),
+        goal_conditions=whole.goal_conditions(),
         by_distance=_by_class(acted, _distance, (*DISTANCES, NEVER)),
         by_tokens=_by_class(acted, _clue_tokens, LENGTHS),
         n_actions=sum(len(record.payload.steps) for record in acted) if has_steps else None,
         rules=_rules(config.rewards),
-        logged=_logged(acted),
+        logged=_logged(whole.trajectories),
         twins=twin_results(records),
     )
 
@@ -127,16 +138,11 @@ def _rules(rewards: Mapping[str, Any] | None) -> str | None:
     return None if rewards is None else str(rewards.get("scoring", "older"))
 
 
-def _logged(records: Sequence[Record]) -> dict[str, Rate]:
+def _logged(trajectories: Mapping[str, Sequence[PlanRecord]]) -> dict[str, Rate]:
     """Return the mean over trajectories of the last totals in the published log."""
-    by_trajectory: dict[str, list[PlanRecord]] = {}
-    for record in records:
-        by_trajectory.setdefault(record.cluster, []).append(record.payload)
-    if not all(
-        plan.expert_reward is not None for plans in by_trajectory.values() for plan in plans
-    ):
+    if not all(plan.expert_reward is not None for plans in trajectories.values() for plan in plans):
         return {}
-    ends = [list(log_rows(plans))[-1] for _, plans in sorted(by_trajectory.items())]
+    ends = [list(log_rows(plans))[-1] for _, plans in sorted(trajectories.items())]
     totals = {
         "total_reward": [end.total_reward for end in ends],
         "agent_reward": [end.agent_reward for end in ends],
@@ -157,26 +163,71 @@ def _path_weight(plan: PlanRecord) -> float:
     return plan.n_expert_steps / n_agent if plan.done and n_agent else 0.0
 
 
-def _goals(records: Sequence[Record]) -> Rate | None:
-    """Return the share of tasks whose goal was reached; tasks without a plan here do not count."""
-    reached: dict[tuple[str, int], bool] = {}
-    for record in records:
-        key = record.cluster, record.payload.task
-        reached[key] = reached.get(key, False) or record.payload.goal_reached
-    return clustered_rate(
-        [float(value) for value in reached.values()], [trajectory for trajectory, _ in reached]
-    )
+class _Whole:
+    """Results of what takes several plans: tasks and trajectories of which all plans have one.
+
+    A sum over the plans that happen to have a result would be a score of the server.
+    """
+
+    def __init__(self, records: Sequence[Record]) -> None:
+        """Take the records that count."""
+        self._records = records
+        self._lost = [record for record in records if record.state != "answered"]
+
+    @property
+    def trajectories(self) -> dict[str, list[PlanRecord]]:
+        """Plans of whole trajectories, in time order."""
+        lost = {record.cluster for record in self._lost}
+        plans: dict[str, list[PlanRecord]] = {}
+        for record in self._records:
+            if record.cluster not in lost:
+                plans.setdefault(record.cluster, []).append(record.payload)
+        return plans
+
+    def of_trajectories(self, measure: Callable[[float, float], float]) -> Rate | None:
+        """Return the mean over trajectories of a measure of their reward and the highest one."""
+        values = [
+            measure(
+                sum(plan.reward for plan in plans), sum(plan.max_reward or 0.0 for plan in plans)
+            )
+            for _, plans in sorted(self.trajectories.items())
+        ]
+        return _out_of(rate_over_clusters(values), len({it.cluster for it in self._records}))
+
+    def goals(self) -> Rate | None:
+        """Return the share of tasks whose goal was reached; those without a plan do not count."""
+        reached: dict[tuple[str, int], float] = {}
+        for record in self._of_whole_tasks:
+            key = _task_of(record)
+            reached[key] = float(bool(reached.get(key)) or record.payload.goal_reached)
+        return self._of_tasks(reached)
+
+    def goal_conditions(self) -> Rate | None:
+        """Return the mean over tasks of the share of their conditions that are met where the agent
+        left them."""
+        last: dict[tuple[str, int], float] = {}
+        for record in sorted(self._of_whole_tasks, key=lambda record: record.payload.index):
+            if record.payload.conditions is not None:
+                met, total = record.payload.conditions
+                last[_task_of(record)] = met / total
+        return self._of_tasks(last)
+
+    @property
+    def _of_whole_tasks(self) -> list[Record]:
+        lost = set(map(_task_of, self._lost))
+        return [record for record in self._records if _task_of(record) not in lost]
+
+    def _of_tasks(self, values: Mapping[tuple[str, int], float]) -> Rate | None:
+        rate = clustered_rate(list(values.values()), [trajectory for trajectory, _ in values])
+        return _out_of(rate, len(values) + len(set(map(_task_of, self._lost))))
 
 
-def _goal_conditions(records: Sequence[Record]) -> Rate | None:
-    """Return the mean over tasks of the share of their conditions that are met where the agent left
-    them."""
-    last: dict[tuple[str, int], float] = {}
-    for record in sorted(records, key=lambda record: record.payload.index):
-        if record.payload.conditions is not None:
-            met, total = record.payload.conditions
-            last[record.cluster, record.payload.task] = met / total
-    return clustered_rate(list(last.values()), [trajectory for trajectory, _ in last])
+def _task_of(record: Record) -> tuple[str, int]:
+    return record.cluster, record.payload.task
+
+
+def _out_of(rate: Rate | None, n_all: int) -> Rate | None:
+    return None if rate is None else rate.out_of(n_all)
 
 
 def _by_class(
@@ -200,18 +251,3 @@ def _distance(plan: PlanRecord) -> str | None:
 
 def _clue_tokens(plan: PlanRecord) -> str | None:
     return None if plan.clue_tokens is None else length_class(plan.clue_tokens)
-
-
-def _rate_of_trajectories(
-    records: Sequence[Record], measure: Callable[[float, float], float]
-) -> Rate | None:
-    """Return the mean over trajectories of a measure of their reward and highest possible
-    reward."""
-    sums: dict[str, tuple[float, float]] = {}
-    for record in records:
-        reward, most = sums.get(record.cluster, (0.0, 0.0))
-        sums[record.cluster] = (
-            reward + record.payload.reward,
-            most + (record.payload.max_reward or 0.0),
-        )
-    return rate_over_clusters([measure(*sums[name]) for name in sorted(sums)])

@@ -18,7 +18,7 @@ from infthor_eval.tables import Column, Row, Table
 __all__ = ["overview_table", "result_tables"]
 
 _PATH_WEIGHTED = "path-weighted"
-_COUNTS = ("plans", "tried", "trajectories", "excluded", "skipped", "failed")
+_COUNTS = ("plans", "tried", "trajectories", "excluded", "skipped", "failed", "not asked")
 _NEVER = "*"  # marks published cells that cannot be other than 0
 _AFTER_FAILURE = {
     "continue": "After a failed plan the next one is tried, as in the published script "
@@ -39,7 +39,7 @@ def overview_table(runs: Sequence[RunSummary]) -> Table:
     has_twins = any(task.twins is not UNSET for *_, task in tasks)
     rows = []
     for *names, task in tasks:
-        success = format_percent(task.success.get("total"))
+        success = format_percent(task.success.get("total"), task.n_plans)
         second = format_pairs(task.twins) if has_twins else format_percent(task.reward_share)
         rows.append(Row((*names, success, second, *_sizes(task)[:3])))
     second_column = PAIRS_RIGHT if has_twins else "reward, % of the most"
@@ -66,7 +66,8 @@ def _success_table(
     """Return completed plans, by the columns of the published table of final tasks."""
     rows = []
     for *names, task in tasks:
-        success = [format_percent(task.success.get(column)) for column in FINAL_COLUMNS]
+        success = [format_percent(task.success.get(column)) for column in FINAL_COLUMNS[:-1]]
+        success.append(format_percent(task.success.get("total"), task.n_plans))
         rows.append(Row((*names, *success, format_percent(task.path_weighted), *_sizes(task))))
     notes = [*result_notes(runs), *_conduct_notes(runs)]
     if any(_is_comparable(run) for run in runs):
@@ -159,6 +160,7 @@ def _sizes(task: PlanTaskSummary) -> tuple[str, ...]:
         sum(task.excluded.values()),
         sum(task.skipped.values()),
         task.n_failed,
+        task.n_not_asked,
     )
     return tuple(map(str, (task.n_plans, tried, *others)))
 

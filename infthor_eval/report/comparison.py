@@ -17,11 +17,12 @@ from infthor_eval.runs import Suite, UnitKey, UnitRecord
 from infthor_eval.statistics import Difference, paired_difference
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
-__all__ = ["Comparison", "compare", "comparison_table"]
+__all__ = ["Comparison", "compare", "comparison_table", "p_cell"]
 
 Record = UnitRecord[Any]
 Scores = Mapping[str, float]
 _NORMAL_95 = 1.96
+_LEAST_P = 0.0001
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Comparison:
         first: mean score of the first run on the shared units.
         second: mean score of the second run on them.
         difference: second minus first, paired by unit, or by group of units, and clustered.
-        n_unshared: number of units, or of groups, that only one of the runs evaluated; they are not
+        n_unshared: number of units, or of groups, that not both runs have a result of; they are not
             compared.
         drawing: half the width of the difference's 95 % interval over other drawings of both runs'
             replies to the same units; None if not every unit was repeated in both, and for groups.
@@ -54,17 +55,18 @@ class Comparison:
 def compare(
     suite: Suite, presenter: Presenter, first: Iterable[Record], second: Iterable[Record]
 ) -> list[Comparison]:
-    """Compare the records of two runs of a suite on the units that both evaluated.
+    """Compare the records of two runs of a suite on the units that both have a result of.
 
     Raises:
-        DataError: they share no unit.
+        DataError: there is no such unit.
     """
     firsts = _by_unit(first)
     seconds = _by_unit(second)
     shared = [key for key in firsts if key in seconds]
     if not shared:
         raise DataError(
-            "the two runs share no unit of the same task; compare runs on the same data"
+            "the two runs share no unit of the same task with a result in both; compare runs on "
+            "the same data, or with --same-questions"
         )
     comparisons: list[Comparison] = []
     for task in sorted({key.task for key in shared}):
@@ -78,10 +80,11 @@ def compare(
 
 
 def _by_unit(records: Iterable[Record]) -> dict[UnitKey, list[Record]]:
-    """Return the repetitions of each unit."""
+    """Return the repetitions of each unit that have a result."""
     units: dict[UnitKey, list[Record]] = {}
     for record in records:
-        units.setdefault(record.key.once, []).append(record)
+        if record.state == "answered":
+            units.setdefault(record.key.once, []).append(record)
     return units
 
 
@@ -146,7 +149,7 @@ class _TaskComparison:
             )
 
     def by_scores(self, units: Sequence[_PairedUnit], suite: Suite) -> Iterator[Comparison]:
-        """Compare in the suite's metrics; a unit without a result counts as 0."""
+        """Compare in the suite's metrics; one that a unit has not is 0."""
         scores = [unit.scores(suite.scores) for unit in units]
         for metric in _shared_metrics(scores):
             yield self._compare(metric, scores)
@@ -163,9 +166,18 @@ class _TaskComparison:
         for scores in scored or further:
             names |= dict.fromkeys(scores.shared_names)
         for metric in names:
-            yield self._compare(metric, [it for it in further if metric in it.shared_names])
+            chosen = []
+            most = []
+            for unit, scores in zip(units, further, strict=True):
+                if metric in scores.shared_names:
+                    chosen.append(scores)
+                    low, high = self.presenter.further_ranges(unit.first[0])[metric]
+                    most.append(high - low)
+            yield self._compare(metric, chosen, fmean(most))
 
-    def _compare(self, metric: str, scores: Sequence[_PairedScores]) -> Comparison:
+    def _compare(
+        self, metric: str, scores: Sequence[_PairedScores], most: float | None = None
+    ) -> Comparison:
         firsts = [_values(unit.first, metric) for unit in scores]
         seconds = [_values(unit.second, metric) for unit in scores]
         return self._comparison(
@@ -175,6 +187,7 @@ class _TaskComparison:
             [unit.cluster for unit in scores],
             n_unshared=self.n_unshared,
             drawing=_drawing([*firsts, *seconds], len(scores)),
+            most=most,
         )
 
     def _comparison(
@@ -186,14 +199,19 @@ class _TaskComparison:
         *,
         n_unshared: int,
         drawing: float | None = None,
+        most: float | None = None,
     ) -> Comparison:
+        """Compare scores in one order; `most` is the largest possible difference of the means, 1 by
+        default where all scores are shares."""
+        if most is None and min(*first, *second) >= 0 and max(*first, *second) <= 1:
+            most = 1.0
         return Comparison(
             task=self.task,
             metric=metric,
             is_share=self.presenter.is_share(metric, [*first, *second]),
             first=sum(first) / len(first),
             second=sum(second) / len(second),
-            difference=paired_difference(first, second, clusters),
+            difference=paired_difference(first, second, clusters, most),
             n_unshared=n_unshared,
             drawing=drawing,
         )
@@ -233,7 +251,7 @@ def _drawing(samples: Sequence[Sequence[float]], n_units: int) -> float | None:
 def comparison_table(comparisons: Sequence[Comparison], first: str, second: str) -> Table:
     """Return a table by task and metric, in its own unit; `first` and `second` name the runs."""
     repeated = any(comparison.drawing is not None for comparison in comparisons)
-    numbers = ["first", "second", "difference", "95 % interval", "p", "samples", "only in one"]
+    numbers = ["first", "second", "difference", "95 % interval", "p", "samples", "not in both"]
     numbers += ["drawing"] if repeated else []
     notes = (
         ("drawing: what the difference moves by if both are asked the same again (95 %).",)
@@ -261,12 +279,19 @@ def _row(comparison: Comparison, *, repeated: bool) -> Row:
         f"{factor * comparison.second:.2f}",
         f"{factor * estimate.mean:+.2f}",
         interval_cell(low, high, "+.2f"),
-        "-" if p is None else f"{p:.4f}",  # a single cluster has neither interval nor p
+        p_cell(p),
         str(estimate.n),
         str(comparison.n_unshared),
         *([_drawing_cell(comparison.drawing, factor)] if repeated else ()),
     )
     return Row((comparison.task, comparison.metric, unit, *numbers))
+
+
+def p_cell(p: float | None) -> str:
+    """Return a p value in words; a single cluster has none."""
+    if p is None:
+        return "-"
+    return f"{p:.4f}" if p >= _LEAST_P else f"< {_LEAST_P}"
 
 
 def _drawing_cell(drawing: float | None, factor: float) -> str:

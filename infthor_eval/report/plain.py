@@ -58,6 +58,14 @@ class PlainPresenter:
         """See `Presenter.further_scores`: none."""
         return {}
 
+    def further_ranges(self, record: UnitRecord[Any]) -> Mapping[str, tuple[float, float]]:
+        """See `Presenter.further_ranges`: none."""
+        return {}
+
+    def explain(self, record: UnitRecord[Any]) -> Sequence[str]:
+        """See `Presenter.explain`: nothing is known."""
+        return ()
+
     def group(self, record: UnitRecord[Any]) -> str:
         """See `Presenter.group`: none."""
         return ""

@@ -274,6 +274,12 @@ class Presenter(Protocol):
     def further_scores(self, record: Record) -> Mapping[str, float]:
         """Return scores that only some samples have, by name; runs are compared on those."""
 
+    def further_ranges(self, record: Record) -> Mapping[str, tuple[float, float]]:
+        """Return the lowest and the highest possible value of each of `further_scores`."""
+
+    def explain(self, record: Record) -> Sequence[str]:
+        """Return why the reply of a record got its scores, a line each."""
+
     def group(self, record: Record) -> str:
         """Return the name of the record's group, which is one sample and right if all of it is.
 

@@ -28,9 +28,9 @@ class ReportRun:
 
     Attributes:
         folder: folder of the run.
-        label: name of the run beside the others.
+        label: name of the run beside the others, with a mark if the run is not whole.
         model: name of the model, the same for runs that differ in other settings; with what
-            replaces the frames.
+            replaces the frames, and the mark.
         suite: suite of the run.
         header: first line of the journal; its name has the options that tell runs of one name
             apart.
@@ -55,7 +55,7 @@ class ReportRun:
     @cached_property
     def summary(self) -> RunSummary:
         """Summary of the records."""
-        return RunSummary(self.header, self.suite.summarise(self.header, self.records))
+        return RunSummary.of(self.suite, self.header, self.records)
 
     @property
     def tasks(self) -> Mapping[str, Any]:

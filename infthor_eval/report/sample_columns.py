@@ -39,6 +39,7 @@ ENVELOPE = (
     SampleColumn("repeat", int, lambda record: record.repeat),
     SampleColumn("cluster", str, lambda record: record.cluster),
     SampleColumn("attempt", int, lambda record: record.attempt),
+    SampleColumn("state", str, lambda record: record.state),
     SampleColumn("failure", str, lambda record: record.failure),
     SampleColumn("excluded", str, lambda record: record.excluded),
     SampleColumn("n_faults", int, lambda record: len(record.faults)),

@@ -70,8 +70,8 @@ def _score_columns(run: PresentedRun) -> list[SampleColumn]:
 
 
 def _score(run: PresentedRun, metric: str, record: UnitRecord[Any]) -> float | None:
-    """Return a score as summaries count it: 0 for a failed unit, None for one that is excluded."""
-    return None if record.excluded is not None else run.suite.scores(record).get(metric, 0.0)
+    """Return a score as summaries count it; None for a unit without a result."""
+    return run.suite.scores(record).get(metric, 0.0) if record.state == "answered" else None
 
 
 def load_run(folder: str | os.PathLike[str]) -> DataFrame:

@@ -13,7 +13,8 @@ from infthor_eval.terminal import console, printable
 __all__ = ["print_table", "table_console"]
 
 _LINE = 100  # letters in a line of a note
-_WIDTH = 200  # on a narrower terminal lines wrap, which is better than numbers that are cut off
+_WIDTH = 200  # where it is no terminal
+_ANY_WIDTH = 10_000
 
 
 def table_console() -> Console:
@@ -22,7 +23,36 @@ def table_console() -> Console:
 
 
 def print_table(table: Table, on: Console) -> None:
-    """Print a table; whatever its cells hold is shown as text."""
+    """Print a table; whatever its cells hold is shown as text.
+
+    On a terminal that is too narrow for it each row is a block with a line per column, so that no
+    number is cut off or out of sight.
+    """
+    rich_table = _rich_table(table)
+    options = on.options.update(width=_ANY_WIDTH)
+    if on.is_terminal and on.measure(rich_table, options=options).maximum > Console().width:
+        _print_blocks(table, on)
+    else:
+        on.print(rich_table)
+
+
+def _print_blocks(table: Table, on: Console) -> None:
+    if table.title:
+        on.print(Text(printable(table.title), style="italic"))
+    widest = max(len(column.name) for column in table.columns)
+    for row in table.rows:
+        on.print()
+        for column, cell in zip(table.columns, row.cells, strict=False):
+            if cell:
+                line = f"  {printable(column.name):<{widest}}  {printable(cell)}"
+                on.print(Text(line, style="dim" if row.is_published else ""))
+    for note in table.notes:
+        on.print()
+        on.print(Text(printable(note)))
+    on.print()
+
+
+def _rich_table(table: Table) -> RichTable:
     rich_table = RichTable(
         box=box.SIMPLE_HEAD,
         title=Text(printable(table.title)) if table.title else None,
@@ -44,4 +74,4 @@ def print_table(table: Table, on: Console) -> None:
         rich_table.caption = Text(
             "\n".join(textwrap.fill(printable(note), _LINE) for note in table.notes)
         )
-    on.print(rich_table)
+    return rich_table

@@ -1,6 +1,7 @@
 """One run of any suite: its config, its journal, and the order of its work."""
 
 from infthor_eval.runs.catalog import Catalog, TaskFile
+from infthor_eval.runs.completeness import UnitCounts, count_units, mark_incomplete
 from infthor_eval.runs.config import RunConfig, TaskConfig
 from infthor_eval.runs.journals.records import (
     RecordTypes,
@@ -59,14 +60,17 @@ __all__ = [
     "TaskRequest",
     "Tokens",
     "Unit",
+    "UnitCounts",
     "UnitKey",
     "UnitRecord",
     "UnitSample",
     "Usage",
     "Workload",
     "check_equality",
+    "count_units",
     "estimate_run",
     "execute",
+    "mark_incomplete",
     "prepare",
     "read_header",
     "read_run",

@@ -5,6 +5,7 @@ lm-eval passes over a broken file without a word, so they are read and checked h
 importing lm-eval.
 """
 
+import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,11 +19,22 @@ from infthor_eval.formats.yaml_files import PlainLoader, read_yaml
 from infthor_eval.storage.digests import canonical_json
 from infthor_eval.storage.folders import packaged_folder
 
-__all__ = ["ENTRY_POINTS", "Catalog", "TaskFile"]
+__all__ = ["ENTRY_POINTS", "KEYS", "Catalog", "TaskFile"]
 
 ENTRY_POINTS = "infthor_eval.tasks"  # a package's entry is "package.folder" with its task files
 
 _HINT = "fix the task file"
+# What lm-eval reads of a task and of a group (0.4.13), and the files that either includes.
+KEYS = (
+    *("task", "task_alias", "tag", "include", "custom_dataset", "dataset_path", "dataset_name"),
+    *("dataset_kwargs", "training_split", "validation_split", "test_split", "fewshot_split"),
+    *("process_docs", "doc_to_text", "doc_to_target", "doc_to_image", "doc_to_audio"),
+    *("unsafe_code", "doc_to_choice", "process_results", "use_prompt", "description"),
+    *("target_delimiter", "fewshot_delimiter", "fewshot_config", "num_fewshot", "metric_list"),
+    *("output_type", "generation_kwargs", "repeats", "filter_list", "should_decontaminate"),
+    *("doc_to_decontamination_query", "gen_prefix", "metadata"),
+    *("group", "group_alias", "aggregate_metric_list"),
+)
 
 
 class _Loader(PlainLoader):
@@ -244,4 +256,9 @@ def _read(path: Path) -> dict[str, Any]:
     config = read_yaml(path, _HINT, _Loader)
     if not isinstance(config, dict) or not all(isinstance(key, str) for key in config):
         raise DataError(f"{path}: not a mapping of settings; {_HINT}")
+    for key in config:
+        if key not in KEYS:
+            near = difflib.get_close_matches(key, KEYS, n=1)
+            hint = f"did you mean {near[0]}?" if near else "leave it out, or put it under metadata"
+            raise DataError(f"{path}: {key} is not known; {hint}")
     return config

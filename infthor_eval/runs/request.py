@@ -87,7 +87,7 @@ def prepare(
             written.
     """
     if request.model not in suite.baselines and not is_known(request.model):
-        raise unknown_name("model", request.model, [*suite.baselines, *names()])
+        raise _unknown_model(request.model, [*suite.baselines, *names()])
     if request.model not in suite.baselines:
         # Before the data are read, which may take minutes.
         check_options(request.model, request.model_options)
@@ -97,3 +97,13 @@ def prepare(
         )
     require_writable(request.output / file_name(request.label), "--output")
     return PreparedRun(request, suite, suite.prepare(request.tasks))
+
+
+def _unknown_model(name: str, known: Iterable[str]) -> UsageError:
+    """Return the error for an unknown model; it names a file here that may be meant."""
+    file = Path(f"{name}.py")
+    if name.isidentifier() and file.is_file():
+        return UsageError(
+            f"unknown model {name!r}; if the class in ./{file} is meant, give --model {file}:CLASS"
+        )
+    return unknown_name("model", name, known)

@@ -39,6 +39,7 @@ def results_document(
         "name": header.name,
         "config": header.config,
         "n_missing": n_missing,
+        "units": run.units,
         "primary_metrics": suite.primary_metrics(run.summary),
         "summary": _reproducible(run.summary),
         # Without cached tokens: their number differs between a run and the same run resumed, or run
@@ -93,6 +94,7 @@ def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRec
             "variant": record.variant,
             **({"repeat": record.repeat} if record.repeat > 1 else {}),
             "cluster": record.cluster,
+            "state": record.state,
             "scores": suite.scores(record),
             "failure": record.failure,
             "excluded": record.excluded,

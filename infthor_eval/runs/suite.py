@@ -16,6 +16,7 @@ To add or change what people see of a suite: its `overview` first, its `tables` 
 one number, `primary_metrics`.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,6 +26,7 @@ import msgspec
 
 from infthor_eval.rates import Rate
 from infthor_eval.runs.catalog import TaskFile
+from infthor_eval.runs.completeness import UnitCounts, count_units
 from infthor_eval.runs.config import RunConfig
 from infthor_eval.runs.journals.records import (
     Artifact,
@@ -136,6 +138,11 @@ class Workload(Generic[SuiteUnit_co]):
     def n_units(self) -> int:
         """Number of units in all groups."""
         return sum(len(group.units) for group in self.groups)
+
+    @property
+    def units_by_task(self) -> dict[str, int]:
+        """Number of units of each task."""
+        return dict(Counter(unit.key.task for group in self.groups for unit in group.units))
 
 
 class Session(Protocol[Payload]):
@@ -258,10 +265,12 @@ class Suite(Protocol[SuiteUnit, Payload]):
         """
 
     def scores(self, record: UnitRecord[Payload]) -> Mapping[str, float]:
-        """Return a unit's metrics by name; a missing one is 0, as all are where the unit failed."""
+        """Return a unit's metrics by name; a missing one is 0, unless the unit has no result
+        (`UnitRecord.state`), which counts in no mean."""
 
     def primary_metrics(self, summary: Any) -> Mapping[str, Rate]:
-        """Return each task's primary metric, a share from 0 to 1; none where no unit counts."""
+        """Return each task's primary metric, a share from 0 to 1, over the units with a result;
+        none where there is no such unit."""
 
     def overview(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:
         """Return what people see first of runs side by side, at most 100 columns wide."""
@@ -272,10 +281,24 @@ class Suite(Protocol[SuiteUnit, Payload]):
 
 @dataclass(frozen=True)
 class RunSummary:
-    """The header of a run's journal, and its summary by its suite (`Suite.summarise`)."""
+    """A run summed up.
+
+    Attributes:
+        header: header of its journal.
+        summary: summary by its suite (`Suite.summarise`).
+        units: numbers of units of each task by state.
+    """
 
     header: RunHeader
     summary: Any
+    units: Mapping[str, UnitCounts] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls, suite: Suite[Any, Any], header: RunHeader, records: Sequence[UnitRecord[Any]]
+    ) -> "RunSummary":
+        """Sum up the records of a run of a suite."""
+        return cls(header, suite.summarise(header, records), count_units(header, records))
 
 
 class BaselineSubject:

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from threading import Condition, Lock
 
-from infthor_eval.errors import ModelError
+from infthor_eval.errors import NotAskedError
 
 __all__ = ["Caps", "Charge", "Prices", "RateLimiter", "Spend"]
 
@@ -80,7 +80,7 @@ class Spend:
         """Account for one request; what the charge is filled with counts even if it fails later.
 
         Raises:
-            ModelError: a cap is reached or cannot be enforced; the request must not be sent.
+            NotAskedError: a cap is reached or cannot be enforced; the request must not be sent.
         """
         charge = Charge()
         self._admit()
@@ -95,7 +95,7 @@ class Spend:
                 self._changed.wait()
             reason = self._refusal()
             if reason is not None:
-                raise ModelError(reason)
+                raise NotAskedError(reason)
             self._in_flight += 1
 
     def _settle(self, charge: Charge) -> None:

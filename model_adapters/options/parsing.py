@@ -9,7 +9,7 @@ from typing import Any
 
 from infthor_eval.errors import UsageError
 
-__all__ = ["NoOptions", "describe", "parse", "read_pairs"]
+__all__ = ["NoOptions", "describe", "is_required", "parse", "read_pairs"]
 
 _LARGEST = 2**63  # limit of the numbers in a run config
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
@@ -24,10 +24,19 @@ def describe(options: type) -> str:
     """Return the options with their defaults, as `a=1, b=x`, or "no options"."""
     texts = []
     for field in dataclasses.fields(options):
+        if is_required(field):
+            texts.append(f"{field.name} (required)")
+            continue
         default = field.default_factory() if callable(field.default_factory) else field.default
         is_keyword = default is None or isinstance(default, bool)
         texts.append(f"{field.name}={str(default).lower() if is_keyword else default}")
     return ", ".join(texts) or "no options"
+
+
+def is_required(field: dataclasses.Field[Any]) -> bool:
+    """Return whether an option has no default."""
+    missing = dataclasses.MISSING
+    return field.init and field.default is missing and field.default_factory is missing
 
 
 def parse(model: str, options: type, texts: Mapping[str, str]) -> Any:
@@ -35,13 +44,13 @@ def parse(model: str, options: type, texts: Mapping[str, str]) -> Any:
 
     Args:
         model: name of the model, for the message.
-        options: a dataclass with defaults, whose fields are str, int, float, bool, or one of these
-            or None.
+        options: a dataclass, whose fields are str, int, float, bool, or one of these or None; one
+            without a default must be given.
         texts: option names to values as typed.
 
     Raises:
-        UsageError: an option is unknown (the message has the nearest one), or a value does not fit
-            its type.
+        UsageError: an option is unknown (the message has the nearest one) or missing, or a value
+            does not fit its type.
     """
     hints = typing.get_type_hints(options)
     for name in texts:
@@ -49,6 +58,12 @@ def parse(model: str, options: type, texts: Mapping[str, str]) -> Any:
             near = difflib.get_close_matches(name, hints, n=1)
             hint = f"; did you mean {near[0]}?" if near else ";"
             raise UsageError(f"{model} has no option {name}{hint} it takes: {describe(options)}")
+    for field in dataclasses.fields(options):
+        if is_required(field) and field.name not in texts:
+            raise UsageError(
+                f"{model}: the option {field.name} has no default; give it (--model-args "
+                f"{field.name}=VALUE), or give its field a default"
+            )
     try:
         return options(**{name: _value(name, hints[name], text) for name, text in texts.items()})
     except ValueError as error:

@@ -60,7 +60,7 @@ def test_datasets_reads_the_samples(make_nieh_set, tmp_path, run_cli):
     }
 
 
-def test_a_failed_sample_is_exported_as_wrong(make_nieh_set, tmp_path, run_cli):
+def test_a_failed_sample_is_exported_without_a_score(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
@@ -68,7 +68,21 @@ def test_a_failed_sample_is_exported_as_wrong(make_nieh_set, tmp_path, run_cli):
     assert run_cli(*arguments)[0] == 1
     rows = read_samples(tmp_path)["nieh_gt"]
     assert len(rows) == 5
-    assert [row["strict"] for row in rows if row["resps"] == [[""]]] == [0.0, 0.0]
+    failed = [row for row in rows if row["resps"] == [[""]]]
+    assert [(row["strict"], row["infthor_eval"]["state"]) for row in failed] == [
+        (None, "failed"),
+        (None, "failed"),
+    ]
+    (path,) = tmp_path.glob("**/lm_eval/*/results_*.json")
+    results = json.loads(path.read_text())
+    assert results["n-samples"]["nieh_gt"] == {"original": 5, "effective": 3}
+    assert results["results"]["nieh_gt"]["sample_len"] == 3
+    assert results["infthor_eval_units"]["nieh_gt"] == {
+        "answered": 3,
+        "failed": 2,
+        "not_asked": 0,
+        "excluded": 0,
+    }
 
 
 def test_others_get_the_files_that_the_run_wrote(questions_run, export):

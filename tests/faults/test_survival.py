@@ -189,7 +189,7 @@ def test_a_frame_that_no_model_can_take_fails_alone(
     code, _, err = run_cli(*arguments, "--data", data, "--output", tmp_path / "out")
     assert code == 1
     assert "5 evaluated now" in err
-    assert "nieh_gt: 1 sample(s) failed, counted as wrong: " in err
+    assert "nieh_gt: 1 sample(s) failed, in no score: " in err
     assert "Traceback" not in err
 
 
@@ -212,9 +212,7 @@ def test_what_an_adapter_raises_on_one_question_fails_alone(
         *arguments, "--data", make_nieh_set(size=56), "--output", tmp_path / "out"
     )
     assert code == 1
-    assert (
-        "nieh_gt: 1 sample(s) failed, counted as wrong: qwen2.5-vl-tiny fails on the request" in err
-    )
+    assert "nieh_gt: 1 sample(s) failed, in no score: qwen2.5-vl-tiny fails on the request" in err
 
 
 @pytest.mark.parametrize("batch_size", [1, 4])

@@ -8,7 +8,7 @@ import pytest
 
 from infthor_eval.storage.folders import packaged_folder
 from tests.harness.conftest import LM_EVAL, OURS_WITH_ALL_TASKS, read_samples
-from tests.helpers.command_line import option_words
+from tests.helpers.command_line import assert_refused, option_words
 
 PEERS = Path(sys.prefix) / "test-peers"
 SHIM = Path(__file__).parents[1] / "peers"
@@ -103,8 +103,6 @@ def test_our_command_starts_lm_evals_with_any_adapter_and_tasks_by_name(
         "infthor",
         "--model_args",
         "adapter=constant,word=mug",
-        "--include_path",
-        TASKS,
     ]
     arguments += ["--tasks", "nieh_gt", "--metadata", json.dumps({"data": str(data)})]
     out = tmp_path / "theirs"
@@ -120,6 +118,20 @@ def test_our_command_starts_lm_evals_with_any_adapter_and_tasks_by_name(
     )
     (rows,) = read_samples(out).values()
     assert [row["resps"][0][0] for row in rows] == ["mug"] * 5
+
+
+def test_what_lm_eval_raises_is_one_line(run_cli, monkeypatch):
+    import lm_eval.tasks
+
+    def misspelt():
+        raise ValueError("Tasks not found: nieh_mni")
+
+    monkeypatch.setattr("lm_eval.__main__.cli_evaluate", misspelt)
+    monkeypatch.setattr(lm_eval.tasks, "TaskManager", lm_eval.tasks.TaskManager)
+    assert_refused(
+        run_cli("lm-eval", "run"),
+        "lm-eval fails (Tasks not found: nieh_mni); `infthor-eval ls tasks` lists those",
+    )
 
 
 def write_adapter(site):

@@ -45,6 +45,7 @@ def make_record(
         "fingerprint": "f",
         "payload": payload,
         "tokens": Tokens(reply=n_reply_tokens),
+        "failure": "no reply" if reply is None else None,
     }
     return UnitRecord(**{**fields, **changes})
 

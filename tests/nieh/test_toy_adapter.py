@@ -61,7 +61,7 @@ def test_an_error_in_its_code_has_its_place_and_its_traceback_is_kept(
     )
     assert code == 1
     assert (
-        f"nieh_gt: 5 sample(s) failed, counted as wrong: {failure}; traceback in "
+        f"nieh_gt: 5 sample(s) failed, in no score: {failure}; traceback in "
         "journal/tracebacks.txt" in err
     )
     (text,) = [path.read_text() for path in (tmp_path / "out").rglob("journal/tracebacks.txt")]

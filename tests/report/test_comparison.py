@@ -82,13 +82,21 @@ def test_a_question_that_only_one_run_has_it_for_is_not_compared_in_it():
 
 
 def test_a_metric_that_one_run_has_not_is_not_compared():
-    """A task may have the reference scorer alone; to a run without any result, every metric is
-    0."""
+    """A task may have the reference scorer alone."""
     alone = [make_guessed_record(0, "mug"), make_guessed_record(1, None)]
     alone[0] = replace(alone[0], payload=replace(alone[0].payload, scores={"reference": 1.0}))
     both = [make_guessed_record(0, "mug"), make_guessed_record(1, "mug")]
     assert list(compared(alone, both)) == list(compared(both, alone)) == ["reference"]
-    assert list(compared([make_guessed_record(0, None)], both)) == ["reference", "strict", ABOVE]
+
+
+def test_a_question_without_a_reply_in_one_run_is_not_compared():
+    first = [make_guessed_record(0, "mug"), make_guessed_record(1, None)]
+    second = [make_guessed_record(0, "mug"), make_guessed_record(1, "mug")]
+    comparisons = compared(first, second)
+    assert {one.difference.estimate.n for one in comparisons.values()} == {1}
+    assert {one.n_unshared for one in comparisons.values()} == {1}
+    with pytest.raises(DataError, match="with a result in both"):
+        compared([make_guessed_record(0, None)], second)
 
 
 def test_units_that_one_run_alone_has_are_counted_and_without_a_shared_one_there_is_an_error():

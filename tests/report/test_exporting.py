@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from infthor_eval.formats.csv_files import unshield
 from infthor_eval.rates import Rate, format_number
 from infthor_eval.report.exporting import export_tables
+from infthor_eval.report.terminal import print_table
 from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
+from infthor_eval.terminal import PlainConsole
 
 # What a table's cell may hold; blanks in a row are one, and control characters are written out.
 CELLS = st.text(
@@ -133,3 +135,25 @@ def test_titles_notes_and_published_numbers_are_kept():
 @pytest.mark.parametrize("form", ["csv", "latex", "markdown"])
 def test_a_control_character_is_written_out(form):
     assert "\x1b" not in export_tables([table([("\x1b[31mred", "1")])], form)
+
+
+def test_on_a_narrow_terminal_a_row_is_a_block(monkeypatch):
+    columns = (Column("model", False), Column("total"), Column("folder", False))
+    rows = (Row(("m" * 20, "61.20 of 88 answered", "results/" + "f" * 30)),)
+    table = Table("Scores", columns, rows, ("A note.",))
+    monkeypatch.setenv("COLUMNS", "40")
+    shown = io.StringIO()
+    print_table(table, PlainConsole(file=shown, force_terminal=True, color_system=None, width=200))
+    lines = shown.getvalue().splitlines()
+    assert lines[0] == "Scores"
+    assert [line.split(maxsplit=1) for line in lines[2:5]] == [
+        ["model", "m" * 20],
+        ["total", "61.20 of 88 answered"],
+        ["folder", "results/" + "f" * 30],
+    ]
+    assert lines[6] == "A note."
+    monkeypatch.setenv("COLUMNS", "120")
+    wide = io.StringIO()
+    print_table(table, PlainConsole(file=wide, force_terminal=True, color_system=None, width=200))
+    lines = wide.getvalue().splitlines()
+    assert any("61.20 of 88 answered" in line and "mmm" in line for line in lines)

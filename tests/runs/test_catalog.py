@@ -2,6 +2,7 @@ import pytest
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.runs import Catalog
+from infthor_eval.runs.catalog import KEYS
 
 
 def test_the_packaged_tasks_are_those_that_lm_eval_sees():
@@ -15,6 +16,16 @@ def test_the_packaged_tasks_are_those_that_lm_eval_sees():
     assert [task.name for task in twice] == ["nieh_mini_full", "nieh_mini_gt"]
     assert {task.suite for task in catalog.tasks.values()} == {"nieh", "plans", "manipulation"}
     assert catalog.tasks["nieh_gt"].settings["generation_kwargs"]["max_gen_toks"] == 50
+
+
+def test_the_known_keys_are_those_that_lm_eval_reads():
+    from dataclasses import fields
+
+    from lm_eval.config.group import GroupConfig
+    from lm_eval.config.task import TaskConfig
+
+    read = {field.name for kind in (TaskConfig, GroupConfig) for field in fields(kind)}
+    assert {*KEYS} == read | {"include"}
 
 
 def test_each_task_says_what_distinguishes_it_and_that_is_no_setting():
@@ -43,6 +54,8 @@ def test_an_unknown_name_is_answered_with_the_nearest(name, near):
         ("task: a\noutput_type: generate_until", "no suite; write it as metadata"),
         ("group: g\ntask: a", "must be a list"),
         ("include: none.yaml\ntask: a", "cannot be read"),
+        ("task: a\nmetric_lst: []", "metric_lst is not known; did you mean metric_list?"),
+        ("task: a\nxyz: 1", "xyz is not known; leave it out, or put it under metadata"),
     ],
 )
 def test_a_broken_task_file_is_named(tmp_path, content, expected):

@@ -65,9 +65,9 @@ def test_the_scores_of_every_unit_stand_in_a_file(tmp_path: Any) -> None:
     assert [row["id"] for row in rows] == ["1+3", "1+4", "2+3", "2+4"]
     assert rows[0] == {
         **{"task": "sums", "id": "1+3", "variant": "", "cluster": "from 1"},
-        **{"scores": {"right": 1.0}, "failure": None, "excluded": None},
+        **{"state": "answered", "scores": {"right": 1.0}, "failure": None, "excluded": None},
     }
-    assert rows[2]["failure"] == "the abacus is broken"
+    assert (rows[2]["state"], rows[2]["failure"]) == ("failed", "the abacus is broken")
 
 
 def test_what_a_task_is_known_by_stands_in_the_results(tmp_path: Any) -> None:

@@ -126,14 +126,18 @@ class SumsSuite:
                 "all": chosen,
                 **{kind: [r for r in chosen if r.payload.kind == kind] for kind in KINDS},
             }
-            rates = {
-                name: clustered_rate(
-                    [self.scores(r).get("right", 0.0) for r in group], [r.cluster for r in group]
-                )
-                for name, group in groups.items()
-            }
+            rates = {name: self._rate(group) for name, group in groups.items()}
             tasks[task] = {name: rate for name, rate in rates.items() if rate is not None}
         return SumsSummary(tasks)
+
+    def _rate(self, records: Sequence[UnitRecord[Sum]]) -> Rate | None:
+        """Return the share of right answers, over the records that have one."""
+        answered = [record for record in records if record.state == "answered"]
+        rate = clustered_rate(
+            [self.scores(record)["right"] for record in answered],
+            [record.cluster for record in answered],
+        )
+        return None if rate is None else rate.out_of(len(records))
 
     def scores(self, record: UnitRecord[Sum]) -> Mapping[str, float]:
         """See `Suite.scores`."""
@@ -159,7 +163,7 @@ def _table(runs: Sequence[RunSummary], kinds: Sequence[str]) -> Table:
                 run.header.name,
                 task,
                 *(format_percent(rates.get(kind)) for kind in kinds),
-                str(rates["all"].n),
+                str(rates["all"].n if "all" in rates else 0),
             )
         )
         for run in runs

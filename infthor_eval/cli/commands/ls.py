@@ -15,12 +15,16 @@ from infthor_eval.cli.options.values import PATH, SCENE_KINDS, floor_plans_optio
 from infthor_eval.cli.progress.notes import print_failure, print_note
 from infthor_eval.errors import InfthorError, ModelError, unknown_name
 from infthor_eval.memory import MEMORIES, accepted_options, memory_class
+from infthor_eval.rates import Rate
+from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs.catalog import Catalog, TaskFile
+from infthor_eval.runs.completeness import mark_incomplete
 from infthor_eval.runs.stored.labels import label_runs
 from infthor_eval.runs.stored.search import BrokenRun, StoredRun, find_runs
+from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.suites import baseline_suites, find_suite, split_by_suite
-from infthor_eval.tables import Column, Row, Table
+from infthor_eval.tables import Column, Row, Table, answered_cell
 from infthor_eval.terminal import console, print_line
 from model_adapters import has_option, is_known, names, options
 from model_adapters.built_in import BUILT_IN
@@ -34,7 +38,7 @@ _SIZE = re.compile(r"(?<=_)\d+[km]$")  # tokens, at the end of a task's name
 _SIZE_HERE = "\0"  # stands for the size in a description
 _MAX_TASKS = 3  # tasks of a run that are listed with their numbers
 _AGES = ((86_400, "d"), (3_600, "h"), (60, "min"), (1, "s"))
-_COUNTS = ("done", "missing", "failed")
+_COUNTS = ("answered", "failed", "not asked")
 
 
 @click.group("ls", cls=ExampleGroup, invoke_without_command=True, example="infthor-eval ls models")
@@ -120,8 +124,17 @@ def _memories(name: str | None) -> None:
     "tasks", cls=ExampleCommand, example="infthor-eval ls tasks --include-path my_tasks"
 )
 @include_option
-def _tasks(include: tuple[Path, ...]) -> None:
+@click.option(
+    "--path",
+    "as_path",
+    is_flag=True,
+    help="Print the folder of this package's task files alone, for lm-eval's --include_path.",
+)
+def _tasks(include: tuple[Path, ...], as_path: bool) -> None:
     """Tasks and groups of tasks; those that differ in a size alone in one line."""
+    if as_path:
+        print_line(str(packaged_folder("tasks")))
+        return
     catalog = Catalog.find_installed(include)
     packaged = Catalog.find_packaged().tasks
     for suite, tasks in split_by_suite(catalog.tasks.values()).items():
@@ -204,8 +217,14 @@ def _scenes(data: Path | None) -> None:
 
 @command.command("runs", cls=ExampleCommand, example="infthor-eval ls runs results")
 @click.argument("folder", metavar="[DIR]", type=PATH, default=Path("results"))
-def _runs(folder: Path) -> None:
-    """Runs below DIR (default: results): units done, missing, failed; primary metrics of tasks."""
+@click.option(
+    "--format",
+    "output_format",
+    type=click.Choice(["csv", "latex", "markdown"]),
+    help="Write the table in this form.",
+)
+def _runs(folder: Path, output_format: str | None) -> None:
+    """Runs below DIR (default: results): units by state; primary metrics of tasks."""
     runs = list(find_runs(folder, print_failure))
     stored = [run for run in runs if isinstance(run, StoredRun)]
     if not runs:
@@ -215,15 +234,20 @@ def _runs(folder: Path) -> None:
         more = (Column("tasks, %", False), Column("age"), Column("folder", False))
         labels = label_runs([(run.folder, run.header) for run in stored])
         rows = tuple(_row(label, run) for label, run in zip(labels, stored, strict=True))
-        print_table(Table("", (*columns, *more), rows), table_console())
+        table = Table("", (*columns, *more), rows)
+        if output_format is None:
+            print_table(table, table_console())
+        else:
+            click.echo(export_tables([table], output_format))
     for run in runs:
         if isinstance(run, BrokenRun):
             print_note(f"{run.folder}: cannot be read: {run.reason}", "red")
 
 
 def _row(label: str, run: StoredRun) -> Row:
-    n_missing = "?" if run.n_missing is None else str(run.n_missing)
-    counts = (str(run.n_done), n_missing, str(run.n_failed))
+    n_not_asked = "?" if run.n_not_asked is None else str(run.n_not_asked)
+    counts = (str(run.n_answered), str(run.n_failed), n_not_asked)
+    label = mark_incomplete(label, {}, run.n_failed + (run.n_not_asked or 0))
     age = _age(time.time() - run.changed)
     return Row((label, run.header.suite, *counts, _numbers(run), age, str(run.folder)))
 
@@ -234,10 +258,14 @@ def _numbers(run: StoredRun) -> str:
     numbers = []
     for task in tasks[:_MAX_TASKS]:
         metric = run.primary_metrics.get(task)
-        numbers.append(task if metric is None else f"{task} {100 * metric.mean:.1f}")
+        numbers.append(task if metric is None else f"{task} {_mean(metric)}")
     if len(tasks) > _MAX_TASKS:
         numbers.append(f"{len(tasks) - _MAX_TASKS} more")
     return ", ".join(numbers)
+
+
+def _mean(metric: Rate) -> str:
+    return answered_cell(f"{100 * metric.mean:.1f}", metric.n, metric.n_all or metric.n)
 
 
 def _age(seconds: float) -> str:

@@ -111,7 +111,7 @@ def _write_page(folders: tuple[Path, ...], request: PageRequest, out: Path) -> N
     if out.suffix.lower() not in (".html", ".htm"):
         raise UsageError(f"--out {out}: the page is an .html file; name one")
     path = prepare_file(out)
-    runs = read_report_runs(folders, print_failure)
+    runs = read_report_runs(_runs_among(folders), print_failure)
     with progress_bar(error_console()) as progress:
         page = build_page(runs, request, _PageBars(progress))
     size = write_page(page, path)
@@ -119,6 +119,27 @@ def _write_page(folders: tuple[Path, ...], request: PageRequest, out: Path) -> N
         f"{len(page.samples):,} samples, {len(page.pictures):,} pictures, {size / 1e6:.1f} MB: "
         f"{path}"
     )
+
+
+def _runs_among(paths: Sequence[Path]) -> list[Path]:
+    """Return the folders of runs; of another path, such as an earlier page, it is said that it is
+    none."""
+    from infthor_eval.cli.progress.notes import print_note
+    from infthor_eval.errors import UsageError
+    from infthor_eval.runs.stored.search import run_folders
+
+    # What does not exist is refused where it is read.
+    runs = [
+        path
+        for path in paths
+        if not path.exists() or (path.is_dir() and any(run_folders(path, depth=0)))
+    ]
+    if not runs:
+        raise UsageError(f"{paths[0]}: no run, nor is another of the paths; give folders of runs")
+    for path in paths:
+        if path not in runs:
+            print_note(f"skipped: {path}: no run", "yellow")
+    return runs
 
 
 class _PageBars:

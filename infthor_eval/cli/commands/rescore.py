@@ -204,7 +204,7 @@ def _print_failures(rescored: Rescored) -> int:
         if r.failure is not None and r.payload.reply is not None
     ]
     for task, reason, n in count_reasons(failed):
-        print_failure(f"{task}: {n} sample(s) failed, counted as wrong: {reason}")
+        print_failure(f"{task}: {n} sample(s) failed, in no score: {reason}")
     unasked = rescored.judgement.failures if rescored.judgement else ()
     for name, reason, n in count_reasons(("judge", reason) for reason in unasked):
         print_failure(f"{name}: not asked about {n} replies, whose strict score stands: {reason}")

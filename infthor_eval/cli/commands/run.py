@@ -143,6 +143,9 @@ def evaluate(
         for outcome in outcomes
     ]
     print_results(results, show)
+    with quiet_notes(show.quiet):
+        for outcome in outcomes:
+            _print_faults(outcome)
     n_failed = sum(map(_print_failures, outcomes))  # every run prints its failures
     n_void = sum(map(_print_if_void, outcomes))
     n_unsent = sum(not _send(outcome, senders) for outcome in outcomes if not outcome.n_missing)
@@ -155,10 +158,11 @@ def evaluate(
 
 
 def _print_if_void(outcome: RunOutcome) -> bool:
-    counted = [record for record in outcome.records if record.excluded is None]
-    is_void = bool(outcome.records) and not counted
+    states = {record.state for record in outcome.records}
+    is_void = bool(states) and "answered" not in states
     if is_void:
-        print_failure(f"{outcome.summary.header.name}: no result: every sample was excluded")
+        why = " or ".join(sorted(states))
+        print_failure(f"{outcome.summary.header.name}: no result: every sample is {why}")
     return is_void
 
 
@@ -171,10 +175,20 @@ def _send(outcome: RunOutcome, trackers: Trackers) -> bool:
     return True
 
 
+def _print_faults(outcome: RunOutcome) -> None:
+    """Print the faults that a run got over, such as the 429 of a busy server."""
+    faults = [(record.task, fault) for record in outcome.records for fault in record.faults]
+    for task, reason, n in count_reasons(faults):
+        print_note(f"{task}: {n} fault(s): {reason}", "yellow")
+
+
 def _print_failures(outcome: RunOutcome) -> int:
     failed = [
-        (record.task, record.failure) for record in outcome.records if record.failure is not None
+        ((record.task, record.state), record.failure)
+        for record in outcome.records
+        if record.failure is not None
     ]
-    for task, reason, n in count_reasons(failed):
-        print_failure(f"{task}: {n} sample(s) failed, counted as wrong: {reason}")
+    for (task, state), reason, n in count_reasons(failed):
+        what = "failed, in no score: " if state == "failed" else ""  # else the reason says so
+        print_failure(f"{task}: {n} sample(s) {what}{reason}")
     return len(failed)

@@ -1,8 +1,11 @@
 """`infthor-eval show`: the results of runs again, or what is in trajectory files."""
 
+from __future__ import annotations
+
 import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,6 +16,11 @@ from infthor_eval.cli.progress.notes import print_failure
 from infthor_eval.cli.results import print_results, read_run_results
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import is_trajectory_file
+from infthor_eval.terminal import print_line
+
+if TYPE_CHECKING:
+    from infthor_eval.report.presented import PresentedRun
+    from infthor_eval.runs import UnitRecord
 
 __all__ = ["command"]
 
@@ -24,16 +32,26 @@ __all__ = ["command"]
 )
 @click.argument("paths", metavar="RUN|TRAJECTORY...", nargs=-1, required=True, type=PATH)
 @sample_options
-def command(paths: tuple[Path, ...], per_sample: bool, **params: Any) -> None:
+@click.option(
+    "--question",
+    metavar="ID",
+    help="Show one sample of the runs: question, reply, and why it got its score.",
+)
+def command(paths: tuple[Path, ...], per_sample: bool, question: str | None, **params: Any) -> None:
     """Print the results of the runs in the folders RUN..., made from their journals, as `run`
     prints them at its end; or what is in the files TRAJECTORY...: scene, tasks and their steps,
     how it was generated.
 
     Several runs of one suite stand in one table. With `--per-sample` the samples are printed
-    instead, for other programs: `infthor-eval show RUN --format parquet > samples.parquet`.
+    instead, for other programs: `infthor-eval show RUN --format parquet > samples.parquet`. With
+    `--question ID` one sample is shown, and why its reply got its score.
     """
     options = ShowOptions.from_click(params)
-    if any(map(is_trajectory_file, paths)):
+    if question is not None:
+        if per_sample or options != ShowOptions():
+            raise UsageError("--question: is for one sample in words; leave out the other options")
+        _print_question(paths, question)
+    elif any(map(is_trajectory_file, paths)):
         if per_sample or options.full or options.format not in {None, "json"}:
             raise UsageError(
                 "--per-sample, --format and --full: are for runs, not for trajectories"
@@ -62,6 +80,42 @@ def _print_trajectories(paths: tuple[Path, ...], options: ShowOptions) -> None:
     output = table_console()
     for summary in found:
         print_table(trajectory_table(summary), output)
+
+
+def _print_question(folders: tuple[Path, ...], name: str) -> None:
+    from infthor_eval.errors import unknown_name
+    from infthor_eval.report.presented import read_report_runs
+
+    runs = read_report_runs(folders, print_failure)
+    found = [
+        (run, record)
+        for run in runs
+        for record in run.records
+        if name in (record.id, str(record.key))
+    ]
+    if not found:
+        raise unknown_name("question", name, {record.id for run in runs for record in run.records})
+    for run, record in found:
+        for line in _sample_lines(run, record):
+            print_line(line)
+
+
+def _sample_lines(run: PresentedRun, record: UnitRecord[Any]) -> Iterator[str]:
+    """Yield a sample in words: what was asked, what was replied, and why it got its score."""
+    sample = run.presenter.describe(record)
+    yield f"{run.label}, {record.task}, {record.key}"
+    yield f"  {sample.title}"
+    yield f"  {run.presenter.target_label}: {sample.target}"
+    if record.state != "answered":
+        yield f"  {record.state}, in no score: {record.failure or record.excluded}"
+        return
+    yield f"  {run.presenter.reply_label}: {run.presenter.reply(record) or '(empty)'}"
+    scores = (f"{name} {score:g}" for name, score in run.suite.scores(record).items())
+    yield f"  scores: {', '.join(scores) or '-'}"
+    for line in run.presenter.explain(record):
+        yield f"    {line}"
+    for name, value in run.presenter.details(record).items():
+        yield f"  {name}: {value}"
 
 
 def _print_samples(folders: tuple[Path, ...], options: ShowOptions) -> None:

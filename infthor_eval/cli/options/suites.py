@@ -13,6 +13,7 @@ import msgspec
 from infthor_eval.cli.options.values import WholeNumber, split_names
 from infthor_eval.errors import UsageError
 from infthor_eval.suites import options_class, suite_names
+from model_adapters.options.parsing import is_required
 
 __all__ = ["expand_suite_options", "refuse_duplicate_options", "suite_options", "suite_values"]
 
@@ -62,8 +63,8 @@ def expand_suite_options(suite: str, params: Mapping[str, Any], used: Collection
         used: names of the suites that the tasks belong to.
 
     Raises:
-        UsageError: an option belongs to no suite that is used, or a flag stands for one that is
-            given as well.
+        UsageError: an option belongs to no suite that is used, or is missing and has no default, or
+            a flag stands for one that is given as well.
     """
     _refuse_unused(params, used)
     kinds = typing.get_type_hints(options_class(suite))
@@ -77,6 +78,11 @@ def expand_suite_options(suite: str, params: Mapping[str, Any], used: Collection
             values[option.name] = [
                 msgspec.convert(value, kinds[option.name], strict=False) for value in typed
             ]
+        elif is_required(option):
+            raise UsageError(
+                f"--{option.name.replace('_', '-')}: {suite} needs it, as its field has no "
+                "default; give it"
+            )
     return [
         options_class(suite)(**dict(zip(values, chosen, strict=True)))
         for chosen in product(*values.values())

@@ -84,6 +84,7 @@ def generate_questions(
     by_subject: bool = True,
     worker_settings: WorkerSettings = _ONE_PROCESS,
     say: Callable[[str], None] = lambda _: None,
+    begin: Callable[[str, int], Callable[[], object]] = lambda *_: lambda: None,
 ) -> GeneratedQuestions:
     """Generate questions on a replayed set.
 
@@ -98,6 +99,8 @@ def generate_questions(
             leaves more questions, for training.
         worker_settings: number and place of the workers; they do not change the questions.
         say: called with messages about the workers.
+        begin: called with the name of a part of the work and its number of trajectories; returns
+            what is called after each.
 
     Returns:
         The questions, and the trajectories whose log cannot be read.
@@ -112,13 +115,14 @@ def generate_questions(
         )
     simulator_of(folder)  # raises for another format version
     result = GeneratedQuestions()
-    types = _object_types(folder, share, result)
+    types = _object_types(folder, share, result, begin)
     rooms = {path: rooms_of(names) for path, names in types.items()}
     vocabularies: dict[str, frozenset[str]] = {}
     for path, kind in rooms.items():
         vocabularies[kind] = vocabularies.get(kind, frozenset()) | types[path]
     rule_jobs = [_RuleJob(path, vocabularies[rooms[path]], seed, share, further) for path in types]
-    candidates_by_path = _share_out(rule_jobs, worker_settings, say, result)
+    advance = begin("questions found", len(rule_jobs))
+    candidates_by_path = _share_out(rule_jobs, worker_settings, say, advance, result)
     chooser = Chooser(by_subject=by_subject)
     check_jobs = []
     chosen_by_path = {}
@@ -128,7 +132,8 @@ def generate_questions(
         chosen = chosen_by_path[path] = chooser.choose(candidates, per_trajectory, rng, rooms[path])
         questions = tuple(candidate.question(path.name) for candidate in chosen)
         check_jobs.append(_CheckJob(path, questions, share))
-    soundness = _share_out(check_jobs, worker_settings, say, result)
+    advance = begin("questions checked", len(check_jobs))
+    soundness = _share_out(check_jobs, worker_settings, say, advance, result)
     for job in check_jobs:
         name = job.path.name
         chosen = chosen_by_path[job.path]
@@ -142,11 +147,17 @@ def generate_questions(
 
 
 def _object_types(
-    folder: Path, share: float, result: GeneratedQuestions
+    folder: Path,
+    share: float,
+    result: GeneratedQuestions,
+    begin: Callable[[str, int], Callable[[], object]],
 ) -> dict[Path, frozenset[str]]:
     """Return the object types of each trajectory; those that cannot be read are skipped."""
     types: dict[Path, frozenset[str]] = {}
-    for path in _trajectory_folders(folder):
+    folders = _trajectory_folders(folder)
+    advance = begin("trajectories read", len(folders))
+    for path in folders:
+        advance()
         try:
             types[path] = _read_history(path, share).all_object_types
         except DataError as error:
@@ -215,11 +226,13 @@ def _share_out(
     jobs: Sequence[_RuleJob] | Sequence[_CheckJob],
     worker_settings: WorkerSettings,
     say: Callable[[str], None],
+    advance: Callable[[], object],
     result: GeneratedQuestions,
 ) -> dict[Path, Any]:
     """Return the results by trajectory; one at which several workers were lost is skipped."""
     results: dict[Path, Any] = {}
     for number, outcome in run_jobs(_QuestionWorker, jobs, worker_settings, say):
+        advance()
         if isinstance(outcome, InfthorError):
             place = "" if isinstance(outcome, DataError) else f"{jobs[number].path}: "
             result.skipped.append(f"{place}{outcome}")

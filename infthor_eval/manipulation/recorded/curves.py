@@ -68,7 +68,4 @@ def _functions(trajectories: Sequence[Earned[ArmRecord]], facet: str) -> list[St
 
 
 def _count(episodes: Sequence[UnitRecord[ArmRecord]]) -> dict[str, int]:
-    return {
-        "episodes": len(episodes),
-        "failed": sum(record.failure is not None for record in episodes),
-    }
+    return {"episodes": len(episodes)}

@@ -25,7 +25,6 @@ class RadiusLine:
         is_bound: whether it is the planner, which bounds the others.
         is_embedded: whether its numbers are from the embedded simulator.
         points: share of successes by radius in metres, ascending.
-        n_failed: episodes of all radii on which the model failed; they count as no success.
     """
 
     label: str
@@ -33,7 +32,6 @@ class RadiusLine:
     is_bound: bool
     is_embedded: bool
     points: Points
-    n_failed: int = 0
 
 
 @dataclass(frozen=True)
@@ -106,8 +104,7 @@ def _line(
         kind=kind,
         is_bound=all(run.is_planner for run in runs),
         is_embedded=any(run.is_embedded for run in runs),
-        points=_points(by_radius, lambda r: r.failure is None and r.payload.done),
-        n_failed=sum(r.failure is not None for records in by_radius.values() for r in records),
+        points=_points(by_radius, lambda record: record.payload.done),
     )
 
 
@@ -122,8 +119,7 @@ def _floor(task: str | None, runs: Sequence[ArmRun], shared: SharedUnits[ArmReco
     for number, run in enumerate(runs):
         episodes = radii.setdefault(run.config.tasks[task].radius, {})
         for record in _records_of(task, shared, number):
-            if record.failure is None:
-                episodes.setdefault(record.id, record)
+            episodes.setdefault(record.id, record)
     by_radius = {radius: list(episodes.values()) for radius, episodes in radii.items()}
     return _points(by_radius, lambda record: record.payload.starts_inside)
 

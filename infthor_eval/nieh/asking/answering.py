@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 from msgspec.structs import replace as replace_fields
 
-from infthor_eval.errors import DataError, ModelError, UserCodeError
+from infthor_eval.errors import DataError, ModelError, NotAskedError, UserCodeError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Answer
 from infthor_eval.formats.video import Video
@@ -224,7 +224,7 @@ def answer_units(
                 raise recalled
             requests.append(_UnitRequest.of(recalled, prepared, answerer))
         except (DataError, ModelError, UserCodeError) as error:
-            yield unit.record_failure(session.describe_failure(unit, error))
+            yield unit.record_failure(session.describe_failure(unit, error), asked=_is_asked(error))
     waiting: list[_UnitRequest] = []
     for _, in_one_context in groupby(sorted(requests, key=_names), key=_names):
         waiting += in_one_context
@@ -346,7 +346,10 @@ def _answer(
         if len(requests) == 1:
             (request,) = requests
             yield request.unit.record_failure(
-                session.describe_failure(request.unit, error), request.fingerprint, faults=faults
+                session.describe_failure(request.unit, error),
+                request.fingerprint,
+                asked=_is_asked(error),
+                faults=faults,
             )
             return
         for request in requests:  # one of them may be to blame; the others are answered
@@ -357,3 +360,7 @@ def _answer(
     seconds = (time.perf_counter() - start) / len(requests)
     for request, reply in zip(requests, replies, strict=True):
         yield request.record(reply, seconds, faults, answerer.usage(reply), session)
+
+
+def _is_asked(error: Exception) -> bool:
+    return not isinstance(error, NotAskedError)

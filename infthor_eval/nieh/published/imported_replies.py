@@ -102,7 +102,12 @@ class ImportedRun:
         )
         config = NiehConfig(tasks={self.task: task}, frames=self.frames)
         model = {"name": self.model, "imported": True}
-        return RunHeader(suite="nieh", name=self.model, config=config.complete("nieh", model))
+        return RunHeader(
+            suite="nieh",
+            name=self.model,
+            config=config.complete("nieh", model),
+            units_by_task={self.task: len(self.question_ids)},
+        )
 
 
 def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -> list[ImportedRun]:

@@ -52,8 +52,13 @@ class Source:
     @property
     def n_missing(self) -> int:
         """Number of units without a record."""
-        tasks = self.header.config.tasks.values()
-        return sum(task.n_samples for task in tasks) - len(self.records)
+        return sum(self.units_by_task.values()) - len(self.records)
+
+    @property
+    def units_by_task(self) -> dict[str, int]:
+        """Number of units of each task."""
+        config = self.header.config
+        return {name: task.n_samples * config.repeats for name, task in config.tasks.items()}
 
     @property
     def replied(self) -> list[Record]:
@@ -116,7 +121,9 @@ class Rescoring:
             ),
         )
         name = f"{source.name.removesuffix(_SUFFIX)}{_SUFFIX}"
-        return RunHeader(suite=source.suite, name=name, config=config)
+        return RunHeader(
+            suite=source.suite, name=name, config=config, units_by_task=self.source.units_by_task
+        )
 
     def store(self, output: Path, track: Track = list) -> Rescored:
         """Score the replies and store the run below a folder, with `rescored.json`.

@@ -14,7 +14,14 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.runs import UnitRecord
 from infthor_eval.statistics import bootstrap_interval
 
-__all__ = ["SOLVED", "AboveGuessing", "FormScore", "above_guessing", "score_above_guessing"]
+__all__ = [
+    "SOLVED",
+    "AboveGuessing",
+    "FormScore",
+    "above_guessing",
+    "score_above_guessing",
+    "score_range",
+]
 
 # A form with a better guess counts as solved by guessing: what is left of it is a few questions,
 # and a run that errs on one of them more than the guesser would lose more than it could win on all
@@ -54,20 +61,20 @@ class AboveGuessing(msgspec.Struct, frozen=True):
 
 
 def score_above_guessing(payload: NiehAnswer, scorer: str) -> float | None:
-    """Return what one question adds to the mean above guessing; None if it does not count."""
+    """Return what an answered question adds to the mean above guessing; None if it does not
+    count."""
     guess = payload.guess
     if guess is None or scorer not in guess.form_scores or guess.form_scores[scorer] > SOLVED:
         return None
     if payload.scores and scorer not in payload.scores:  # the task has not this scorer
         return None
-    # 0 if the model failed
     return (payload.scores.get(scorer, 0.0) - guess.scores[scorer]) / (
         1 - guess.form_scores[scorer]
     )
 
 
 def above_guessing(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> AboveGuessing:
-    """Return the score above guessing of some records under a scorer."""
+    """Return the score above guessing of some answered questions under a scorer."""
     known = [
         record
         for record in records
@@ -77,9 +84,10 @@ def above_guessing(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> Ab
     counted = [(score, cluster) for score, cluster in pairs if score is not None]
     scores = [score for score, _ in counted]
     clusters = [cluster for _, cluster in counted]
-    low, high = (bootstrap_interval(scores, clusters) if scores else None) or (None, None)
+    mean = sum(scores) / len(scores) if scores else None
+    low, high = _interval(scores, clusters, [it for it in known if _counts(it, scorer)], scorer)
     return AboveGuessing(
-        mean=sum(scores) / len(scores) if scores else None,
+        mean=mean,
         low=low,
         high=high,
         n=len(scores),
@@ -94,6 +102,43 @@ def above_guessing(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> Ab
             }
         ),
     )
+
+
+def _counts(record: UnitRecord[NiehAnswer], scorer: str) -> bool:
+    return score_above_guessing(record.payload, scorer) is not None
+
+
+def _interval(
+    scores: Sequence[float],
+    clusters: Sequence[str],
+    records: Sequence[UnitRecord[NiehAnswer]],
+    scorer: str,
+) -> tuple[float, float] | tuple[None, None]:
+    """Return the interval over resampled trajectories, cut off where all are right, or wrong.
+
+    A question on which the guess is wrong adds more than 1 if it is right, so a sample of such ones
+    would exceed 1.
+    """
+    found = bootstrap_interval(scores, clusters) if scores else None
+    if found is None:
+        return None, None
+    lowest, highest = score_range(records, scorer)
+    mean = sum(scores) / len(scores)
+    return min(mean, max(found[0], lowest)), max(mean, min(found[1], highest))
+
+
+def score_range(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> tuple[float, float]:
+    """Return the score above guessing of questions that count if all are wrong, and if all are
+    right."""
+    ends = []
+    for right in (0.0, 1.0):
+        payloads = (
+            msgspec.structs.replace(record.payload, scores={scorer: right}) for record in records
+        )
+        ends.append(
+            sum(score_above_guessing(payload, scorer) or 0.0 for payload in payloads) / len(records)
+        )
+    return ends[0], ends[1]
 
 
 def _by_form(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> dict[str, FormScore]:

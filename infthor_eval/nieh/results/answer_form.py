@@ -16,7 +16,7 @@ Record = UnitRecord[NiehAnswer]
 
 
 class YesNo(msgspec.Struct, frozen=True):
-    """Yes/no questions; the shares, 0 to 1, are None without any.
+    """Yes/no questions with an answer; the shares, 0 to 1, are None without any.
 
     Attributes:
         n_neither: replies that are neither, or both.
@@ -30,7 +30,11 @@ class YesNo(msgspec.Struct, frozen=True):
 
 def yes_no(records: Sequence[Record]) -> YesNo:
     """Return the bias on a task's yes/no questions: is it always yes, or neither?"""
-    binary = [record for record in records if _gold(record) in ({"yes"}, {"no"})]
+    binary = [
+        record
+        for record in records
+        if record.state == "answered" and _gold(record) in ({"yes"}, {"no"})
+    ]
     answers = Counter(says_yes_or_no(last_line(record.payload.reply or "")) for record in binary)
     n = len(binary)
     return YesNo(

@@ -6,12 +6,12 @@ Both are defined in docs/reference/metrics.md.
 from collections.abc import Iterator, Mapping, Sequence
 
 from infthor_eval.nieh.options import BLANK, NO_CLUE, OTHER, SHOWN
-from infthor_eval.nieh.results.gains import Gain, alike_but_for_frames
+from infthor_eval.nieh.results.cells import mean_cell
+from infthor_eval.nieh.results.gains import Gain, alike_but_for_frames, gain_cell
 from infthor_eval.nieh.results.summary import TaskSummary, main_metric
 from infthor_eval.rates import format_percent
 from infthor_eval.runs import RunSummary
-from infthor_eval.statistics import MeanEstimate
-from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
+from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["control_tables", "without_alike_notes"]
 
@@ -93,26 +93,13 @@ def _cells(group: _Controls, task: str, with_pairs: bool) -> Iterator[str]:
     yield task
     yield first.context
     for frames in _FRAMES:
-        score = tasks[frames].by_clues["total"].scores[metric] if frames in tasks else None
-        yield "-" if score is None else f"{100 * score.mean:.1f}"
+        yield mean_cell(tasks[frames].total if frames in tasks else None, metric, 1)
     for frames in _FRAMES if with_pairs else ():
         pairs = tasks[frames].pairs if frames in tasks else None
         yield format_percent(pairs.pair_accuracy if pairs else None)
     for frames, without in _DIFFERENCES:
         is_known = frames in group and without in group
-        yield _points(
-            Gain(group[frames], task, metric, tasks[frames], tasks[without]).total()
-            if is_known
-            else None
+        yield gain_cell(
+            Gain(group[frames], task, metric, tasks[frames], tasks[without]) if is_known else None
         )
     yield str(first.n)
-
-
-def _points(gain: MeanEstimate | None) -> TableCell:
-    """Return a difference in points with its interval, which one trajectory alone has not."""
-    if gain is None:
-        return TableCell("-", {"": "", "low": "", "high": ""})
-    low, high = (None if end is None else 100 * end for end in (gain.low, gain.high))
-    interval = interval_cell(low, high, "+.1f")
-    mean = f"{100 * gain.mean:+.1f}"
-    return TableCell(mean if low is None else f"{mean} {interval}", {"": mean, **interval.numbers})

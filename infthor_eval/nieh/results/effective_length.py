@@ -104,7 +104,12 @@ def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:
             by_subject.setdefault(subject, []).append((run, name, task))
     for items in by_subject.values():
         base = next(
-            ((run, task) for run, _, task in items if task.context == "clues" and task.n), None
+            (
+                (run, task)
+                for run, _, task in items
+                if task.context == "clues" and task.total.scores
+            ),
+            None,
         )
         if base is None:
             continue
@@ -145,15 +150,14 @@ def _points(sized: tuple[float, TaskSummary], scorer: str) -> Iterator[_Point]:
     for name in LENGTHS:
         if name in task.by_length:
             at = task.by_length[name]
-            yield _Point(name, at.cell.scores[scorer].mean, at.above_guessing.get(scorer))
+            score = at.cell.scores.get(scorer)
+            yield _Point(name, score.mean if score else None, at.above_guessing.get(scorer))
 
 
 def _point(length: str, task: TaskSummary, scorer: str) -> _Point:
-    total = task.by_clues["total"]
+    score = task.total.scores.get(scorer)
     above = task.above_guessing.get(scorer)
-    return _Point(
-        length, total.scores[scorer].mean if total.n else None, above.mean if above else None
-    )
+    return _Point(length, score.mean if score else None, above.mean if above else None)
 
 
 def _percent(value: float | None) -> str:

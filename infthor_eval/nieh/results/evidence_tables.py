@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from infthor_eval.distances import DISTANCES
 from infthor_eval.nieh.results.above_guessing import SOLVED, AboveGuessing
+from infthor_eval.nieh.results.cells import Cell, mean_cell, score_interval
 from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.summary import (
     SHOWN_CLUES,
-    Cell,
     EvidenceCells,
     NiehSummary,
     TaskSummary,
@@ -121,9 +121,11 @@ def _cell(cell: Cell | None, metric: str) -> TableCell:
     if cell is None:
         missing = _score_cell(None, None, None)
         return TableCell(missing, {**missing.numbers, "questions": ""})
-    score = cell.scores[metric]
-    known = _score_cell(score.mean, score.low, score.high)
-    return TableCell(f"{known} ({cell.n})", {**known.numbers, "questions": str(cell.n)})
+    mean = mean_cell(cell, metric, 1)
+    interval = score_interval(cell, metric)
+    text = f"{mean} {interval}" if interval.numbers["low"] else mean
+    numbers = {"": "", **interval.numbers, **mean.numbers, "questions": str(cell.n)}
+    return TableCell(f"{text} ({cell.n})", numbers)
 
 
 def _score_cell(mean: float | None, low: float | None, high: float | None) -> TableCell:

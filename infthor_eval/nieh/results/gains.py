@@ -13,8 +13,9 @@ from infthor_eval.nieh.options import BLANK, SHOWN
 from infthor_eval.nieh.results.summary import TaskSummary
 from infthor_eval.runs import RunSummary
 from infthor_eval.statistics import MeanEstimate, paired_difference
+from infthor_eval.tables import TableCell, answered_cell, interval_cell
 
-__all__ = ["Gain", "alike_but_for_frames", "find_gains", "frames_of", "name_of"]
+__all__ = ["Gain", "alike_but_for_frames", "find_gains", "frames_of", "gain_cell", "name_of"]
 
 
 @dataclass(frozen=True)
@@ -28,30 +29,36 @@ class Gain:
     blind: TaskSummary
 
     def in_column(self, column: str) -> float | None:
-        """Return the gain for a number of clues or in total, -1 to 1; None without questions."""
+        """Return the gain for a number of clues, -1 to 1; None unless both runs answered all
+        questions, of which there are some."""
         seeing = self.seeing.by_clues[column]
         blind = self.blind.by_clues[column]
-        if not seeing.n or not blind.n:
+        if not (seeing.n_answered == seeing.n == blind.n_answered == blind.n > 0):
             return None
         return seeing.scores[self.metric].mean - blind.scores[self.metric].mean
 
     def total(self) -> MeanEstimate | None:
-        """Return mean gain and interval, paired by question, clustered by trajectory; or None.
-
-        Runs whose configs differ in their frames only ask the same questions, in the same order.
-        """
-        seeing = self.seeing.scores[self.metric]
-        blind = self.blind.scores[self.metric]
+        """Return mean gain and interval over the questions that both runs answered, paired and
+        clustered by trajectory; None if there are none."""
         clusters: list[str] = []
         ours: list[float] = []
         theirs: list[float] = []
-        for trajectory, scores in seeing.items():
-            clusters += [trajectory] * len(scores)
-            ours += scores
-            theirs += blind[trajectory]
+        for trajectory, scores in self.seeing.scores[self.metric].items():
+            blind = self.blind.scores[self.metric].get(trajectory, {})
+            shared = [sample for sample in scores if sample in blind]
+            clusters += [trajectory] * len(shared)
+            ours += [scores[sample] for sample in shared]
+            theirs += [blind[sample] for sample in shared]
         if not clusters:
             return None
-        return paired_difference(theirs, ours, clusters).estimate
+        # The reference scorer exceeds 1 on repetitions.
+        most = 1.0 if max(*ours, *theirs) <= 1 else None
+        return paired_difference(theirs, ours, clusters, most).estimate
+
+    @property
+    def n_all(self) -> int:
+        """Number of questions that both runs were to answer."""
+        return self.seeing.total.n
 
 
 def find_gains(runs: Sequence[RunSummary]) -> Iterator[Gain]:
@@ -97,3 +104,15 @@ def _without_frames(run: RunSummary) -> NiehConfig:
         rescored = replace(rescored, source=None)
     tasks = {name: replace(task, without_alike=()) for name, task in config.tasks.items()}
     return replace(config, frames="", rescored=rescored, tasks=tasks)
+
+
+def gain_cell(gain: Gain | None) -> TableCell:
+    """Return a difference in points with its interval, which one trajectory alone has not."""
+    total = gain.total() if gain is not None else None
+    if gain is None or total is None:
+        return TableCell("-", {"": "", "low": "", "high": ""})
+    low, high = (None if end is None else 100 * end for end in (total.low, total.high))
+    interval = interval_cell(low, high, "+.1f")
+    mean = answered_cell(f"{100 * total.mean:+.1f}", total.n, gain.n_all)
+    numbers = {"": "", **interval.numbers, **mean.numbers}
+    return TableCell(mean if low is None else f"{mean} {interval}", numbers)

@@ -1,12 +1,18 @@
 """The table of memories: what each got right, what it recalled of the evidence, what that took."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
+from operator import itemgetter
+from typing import Any
 
-from infthor_eval.nieh.results.gains import name_of
+from msgspec.structs import replace
+
+from infthor_eval.nieh.config import NiehConfig
+from infthor_eval.nieh.results.cells import mean_cell, score_interval
+from infthor_eval.nieh.results.gains import Gain, gain_cell, name_of
 from infthor_eval.nieh.results.memory_summary import subject_of
 from infthor_eval.nieh.results.summary import SHOWN_CLUES, NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
+from infthor_eval.tables import Column, Row, Table, TableCell
 
 __all__ = ["memory_tables"]
 
@@ -15,7 +21,6 @@ _NUMBERS = (
     "budget",
     "accuracy",
     "95 %",
-    "above guessing",
     "all clues",
     "some",
     "none",
@@ -23,6 +28,14 @@ _NUMBERS = (
     "tokens",
     "build s",
     "recall s",
+)
+_NONE = "none"  # the memory that recalls nothing
+_ABOVE_NONE = "above none"
+_ABOVE_GUESSING = "above guessing"
+_FIRST = 3  # numbers before those two
+_ABOVE_NONE_NOTE = (
+    "above none: accuracy less that of the run that recalls nothing, in points, paired by "
+    "question, with the 95 % interval clustered by trajectory."
 )
 _NOTES = (
     "Accuracy in %, by the main scorer. all clues, some, none: accuracy where all, some and none "
@@ -36,21 +49,84 @@ _NOTES = (
 
 
 def memory_tables(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return the table of the tasks that have a memory, if there are any."""
-    rows = tuple(row for _, row in sorted(_rows(runs), key=lambda keyed: keyed[0]))
-    columns = (*(Column(name, False) for name in _NAMES), *map(Column, _NUMBERS))
-    return [Table("Memories", columns, rows, _NOTES)] if rows else []
+    """Return the table of the tasks that have a memory, if there are any.
+
+    It compares with no memory, and with guessing, where a run has none and a guess is known.
+    """
+    found = [
+        (run, name)
+        for run in runs
+        for name, task in run.summary.tasks.items()
+        if task.memory is not None
+    ]
+    further = [
+        *([_ABOVE_NONE] if any(_is_none(run, name) for run, name in found) else []),
+        *([_ABOVE_GUESSING] if any(_above_guessing(run, name) for run, name in found) else []),
+    ]
+    keyed = sorted(((_place(*it), _row(*it, runs, further)) for it in found), key=itemgetter(0))
+    names = (*_NUMBERS[:_FIRST], *further, *_NUMBERS[_FIRST:])
+    columns = (*(Column(name, False) for name in _NAMES), *map(Column, names))
+    notes = (*_NOTES, *((_ABOVE_NONE_NOTE,) if _ABOVE_NONE in further else ()))
+    return [Table("Memories", columns, tuple(row for _, row in keyed), notes)] if found else []
 
 
-def _rows(runs: Sequence[RunSummary]) -> Iterator[tuple[tuple[str | int, ...], Row]]:
-    """Yield rows with their place: by subject and task, a memory's budgets below each other."""
-    for run in runs:
-        assert isinstance(run.summary, NiehSummary)
-        for name, task in run.summary.tasks.items():
-            if task.memory is not None:
-                subject = subject_of(name_of(run))
-                sort_key = subject, name, task.memory.name, task.memory.budget or 0
-                yield sort_key, Row((subject, name, *_cells(run.summary, name, task)))
+def _place(run: RunSummary, name: str) -> tuple[str, str, bool, str, int]:
+    """Return the place of a row: by subject and task, none first, a memory's budgets in order."""
+    memory = run.summary.tasks[name].memory
+    return subject_of(name_of(run)), name, memory.name != _NONE, memory.name, memory.budget or 0
+
+
+def _row(run: RunSummary, name: str, runs: Sequence[RunSummary], further: Sequence[str]) -> Row:
+    cells = _cells(run.summary, name, run.summary.tasks[name])
+    made = {_ABOVE_NONE: _above_none, _ABOVE_GUESSING: _above_guessing_cell}
+    more = [made[column](run, name, runs) for column in further]
+    at = len(_NAMES) - 2 + _FIRST
+    return Row((subject_of(name_of(run)), name, *cells[:at], *more, *cells[at:]))
+
+
+def _is_none(run: RunSummary, name: str) -> bool:
+    return bool(run.summary.tasks[name].memory.name == _NONE)
+
+
+def _above_none(run: RunSummary, name: str, runs: Sequence[RunSummary]) -> TableCell:
+    """Return the gain over the run that is alike but recalls nothing, if there is one."""
+    alike = [
+        other
+        for other in runs
+        if name in other.summary.tasks
+        and other.summary.tasks[name].memory is not None
+        and _is_none(other, name)
+        and _without_memory(other, name) == _without_memory(run, name)
+    ]
+    task = run.summary.tasks[name]
+    if not alike or _is_none(run, name):
+        return gain_cell(None)
+    return gain_cell(Gain(run, name, main_metric(task), task, alike[0].summary.tasks[name]))
+
+
+def _without_memory(run: RunSummary, name: str) -> NiehConfig:
+    """Return the config of a run of a task, without its memory."""
+    config: NiehConfig = run.header.config
+    task = config.tasks[name]
+    sources = {key: value for key, value in task.sources.items() if key != "memory"}
+    settings = task.settings | {"dataset_kwargs": _without_options(task.dataset_kwargs)}
+    tasks = {name: replace(task, sources=sources, settings=settings)}
+    return replace(config, tasks=tasks, memory=None, memory_args=None, budget=None)
+
+
+def _without_options(settings: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in settings.items() if key not in ("memory", "budget")}
+
+
+def _above_guessing(run: RunSummary, name: str) -> float | None:
+    task = run.summary.tasks[name]
+    above = task.above_guessing.get(main_metric(task))
+    return None if above is None else above.mean
+
+
+def _above_guessing_cell(run: RunSummary, name: str, _: Sequence[RunSummary]) -> str:
+    above = _above_guessing(run, name)
+    return "-" if above is None else f"{100 * above:.1f}"
 
 
 def _cells(summary: NiehSummary, name: str, task: TaskSummary) -> tuple[str, ...]:
@@ -58,15 +134,11 @@ def _cells(summary: NiehSummary, name: str, task: TaskSummary) -> tuple[str, ...
     times = summary.took.get(name)
     metric = main_metric(task)
     assert memory is not None
-    score = task.by_clues["total"].scores[metric]
-    low, high = (None if end is None else 100 * end for end in (score.low, score.high))
-    above = task.above_guessing.get(metric)
     return (
         f"{memory.name}{'*' if memory.privileged else ''}",
         "-" if memory.budget is None else f"{memory.budget:,}",
-        f"{100 * score.mean:.1f}",
-        interval_cell(low, high, pattern="{}–{}"),
-        "-" if above is None or above.mean is None else f"{100 * above.mean:.1f}",
+        mean_cell(task.total, metric, 1),
+        score_interval(task.total, metric, "{}–{}"),
         *(_recalled(task, share, metric) for share in SHOWN_CLUES),
         f"{memory.n_frames:.1f}",
         "-" if memory.n_tokens is None else f"{memory.n_tokens:,.0f}",
@@ -81,6 +153,6 @@ def _recalled(task: TaskSummary, share: str, metric: str) -> TableCell:
     if share not in cells:
         return TableCell("-", {"": "", "questions": "0"})
     cell = cells[share]
-    mean = f"{100 * cell.scores[metric].mean:.1f}"
+    mean = mean_cell(cell, metric, 1)
     part = f"{100 * cell.n / n_all:.0f}"
-    return TableCell(f"{mean} ({part} %)", {"": mean, "questions": str(cell.n)})
+    return TableCell(f"{mean} ({part} %)", {**mean.numbers, "questions": str(cell.n)})

@@ -47,7 +47,8 @@ class PairSummary(msgspec.Struct, frozen=True):
         n_pairs: number of pairs, in each variant of the context.
         n_facts: number of different facts that they are about.
         n_trajectories: number of trajectories that their worlds were made of.
-        n_incomplete: number of questions whose twin was not asked; they are in no pair.
+        n_incomplete: number of questions that have no answer, or whose twin has none; they are in
+            no pair.
         pair_accuracy: both answers right, with full marks: the primary metric.
         by_fact: mean over facts of the accuracy of their pairs.
         single: single answers right, with full marks.
@@ -135,15 +136,19 @@ class PairScore(msgspec.Struct, frozen=True):
 
 
 def find_pairs(records: Iterable[Record]) -> tuple[list[TwinRecords], int]:
-    """Return the pairs among the records of a task, and the number of questions without a twin."""
+    """Return the answered pairs of a task's records, and the number of questions in none."""
     sides: dict[tuple[str, str, int], list[_Side]] = {}
     for record in sorted(records, key=lambda record: record.key):
         twin = record.payload.twin
         if twin is not None:
             key = twin.pair, record.variant, record.repeat
             sides.setdefault(key, []).append(_Side(record, twin))
-    pairs = [TwinRecords((it[0], it[1])) for _, it in sorted(sides.items()) if len(it) == 2]
-    return pairs, sum(len(it) for it in sides.values() if len(it) != 2)
+    pairs = [TwinRecords((it[0], it[1])) for _, it in sorted(sides.items()) if _is_answered(it)]
+    return pairs, sum(len(it) for it in sides.values() if not _is_answered(it))
+
+
+def _is_answered(sides: Sequence[_Side]) -> bool:
+    return len(sides) == 2 and all(side.record.state == "answered" for side in sides)
 
 
 def score_pairs(records: Iterable[Record], metric: str) -> list[PairScore]:
@@ -152,12 +157,37 @@ def score_pairs(records: Iterable[Record], metric: str) -> list[PairScore]:
     return list(_scores(pairs, metric))
 
 
-def summarise_pairs(records: Sequence[Record], metric: str) -> PairSummary | None:
-    """Return how the pairs of a task were answered under its main metric; None without any."""
+def summarise_pairs(
+    records: Sequence[Record], metric: str, n_missing: int = 0
+) -> PairSummary | None:
+    """Return how the pairs of a task were answered under its main metric; None without any.
+
+    Args:
+        n_missing: number of questions that a stopped run did not come to.
+    """
     pairs, n_incomplete = find_pairs(records)
     if not pairs:
         return None
-    return _Pairs(pairs, metric).summary(n_incomplete)
+    summary = _Pairs(pairs, metric).summary(n_incomplete)
+    n_lost = _n_lost(records, n_missing)
+    accuracy = summary.pair_accuracy.out_of(summary.n_pairs + n_lost)
+    return msgspec.structs.replace(summary, pair_accuracy=accuracy)
+
+
+def _n_lost(records: Sequence[Record], n_missing: int) -> int:
+    """Return the number of pairs without an answer to one of their questions."""
+    sides: dict[tuple[str, str], list[Record]] = {}
+    for record in records:
+        if record.payload.twin is not None:
+            sides.setdefault((record.payload.twin.pair, record.variant), []).append(record)
+    lost = alone = 0
+    for same in sides.values():
+        answered = {record.id for record in same if record.state == "answered"}
+        asked = {record.id for record in same}
+        lost += len(asked) == 2 and len(answered) < 2
+        alone += len(asked) == 1
+    # A question alone has its twin among the missing ones, unless the run was to ask it alone.
+    return lost + min(alone, n_missing) + (max(0, n_missing - alone) + 1) // 2
 
 
 @dataclass(frozen=True)

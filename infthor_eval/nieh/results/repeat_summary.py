@@ -30,7 +30,7 @@ class RepeatSummary(msgspec.Struct, frozen=True):
 
     Attributes:
         n_repeats: times that each question was asked.
-        n_questions: number of questions.
+        n_questions: number of questions with an answer; the answers that a question has count.
         mean: mean score of all answers.
         drawing: half the width of the 95 % interval of the mean over other drawings of answers to
             the same questions.
@@ -63,14 +63,21 @@ def by_question(records: Sequence[Record]) -> list[list[Record]]:
 
 
 def mean_record(records: Sequence[Record]) -> Record:
-    """Return a record of a question's answers: their mean scores, and the first failure if any."""
+    """Return a record of a question's answers, with their mean scores; the first failed one, or
+    else the first, if there is no answer."""
+    answered = _answered(records)
+    if not answered:
+        return next((record for record in records if record.state == "failed"), records[0])
     if len(records) == 1:
         return records[0]
-    names = {name for record in records for name in record.payload.scores}
-    scores = {name: fmean(_scores(records, name)) for name in sorted(names)}
-    failure = next((record.failure for record in records if record.failure is not None), None)
-    payload = msgspec.structs.replace(records[0].payload, scores=scores)
-    return msgspec.structs.replace(records[0], payload=payload, failure=failure)
+    names = {name for record in answered for name in record.payload.scores}
+    scores = {name: fmean(_scores(answered, name)) for name in sorted(names)}
+    payload = msgspec.structs.replace(answered[0].payload, scores=scores)
+    return msgspec.structs.replace(answered[0], payload=payload)
+
+
+def _answered(records: Sequence[Record]) -> list[Record]:
+    return [record for record in records if record.state == "answered"]
 
 
 def _scores(records: Sequence[Record], metric: str) -> list[float]:
@@ -80,7 +87,8 @@ def _scores(records: Sequence[Record], metric: str) -> list[float]:
 def summarise_repeats(questions: Sequence[Sequence[Record]], metric: str) -> RepeatSummary | None:
     """Return how a task's repeated answers compare under a metric; None if nothing was repeated."""
     n_repeats = max(map(len, questions), default=0)
-    if n_repeats < 2:
+    questions = [answered for same in questions if (answered := _answered(same))]
+    if n_repeats < 2 or not questions:
         return None
     means: list[float] = []
     within: list[float] = []
@@ -109,14 +117,9 @@ def summarise_repeats(questions: Sequence[Sequence[Record]], metric: str) -> Rep
 
 
 def _vote(records: Sequence[Record], metric: str) -> tuple[float, float]:
-    """Return the commonest answer's score and share of the answers; failures say nothing."""
-    replies = [record.payload.reply if record.failure is None else None for record in records]
-    answers = [
-        None if reply is None else plain_form(last_line(reply)).casefold() for reply in replies
-    ]
-    counts = Counter(text for text in answers if text is not None)
-    if not counts:
-        return 0.0, 0.0
+    """Return the commonest answer's score and share of the answers."""
+    answers = [plain_form(last_line(record.payload.reply or "")).casefold() for record in records]
+    counts = Counter(answers)
     # The first of equals: counters keep the order.
     text, count = max(counts.items(), key=lambda counted: counted[1])
     return records[answers.index(text)].payload.scores.get(metric, 0.0), count / len(records)

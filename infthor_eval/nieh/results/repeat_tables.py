@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table
+from infthor_eval.tables import Column, Row, Table, answered_cell
 
 __all__ = ["repeat_tables"]
 
@@ -40,7 +40,7 @@ def repeat_tables(runs: Sequence[RunSummary]) -> list[Table]:
         assert isinstance(run.summary, NiehSummary)
         for name, of_task in run.summary.repeats.items():
             task = run.summary.tasks[name]
-            score = task.by_clues["total"].scores[main_metric(task)]
+            score = task.total.scores[main_metric(task)]  # repeats are summed up from answers alone
             interval = (
                 "-"
                 if score.low is None or score.high is None
@@ -57,7 +57,7 @@ def repeat_tables(runs: Sequence[RunSummary]) -> list[Table]:
             cells = (
                 f"{of_task.n_repeats}x",
                 str(of_task.n_questions),
-                _percent(of_task.mean),
+                answered_cell(_percent(of_task.mean), of_task.n_questions, task.n),
                 interval,
                 f"±{_percent(of_task.drawing)}",
                 *map(_percent, shares),

@@ -16,6 +16,7 @@ from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig, SkippedSample
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.results.above_guessing import AboveGuessing, above_guessing
 from infthor_eval.nieh.results.answer_form import YesNo, format_failures, yes_no
+from infthor_eval.nieh.results.cells import Cell, make_cell, score_of, with_missing
 from infthor_eval.nieh.results.memory_summary import (
     MemorySummary,
     MemoryTimes,
@@ -32,18 +33,15 @@ from infthor_eval.nieh.results.repeat_summary import (
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.rates import Rate
 from infthor_eval.runs import UnitRecord
-from infthor_eval.statistics import bootstrap_interval, clustered_mean
 
 __all__ = [
     "CLUE_COLUMNS",
     "OPEN_ENDED",
     "SHOWN_CLUES",
-    "Cell",
     "EvidenceCells",
     "Failure",
     "LengthCell",
     "NiehSummary",
-    "Score",
     "SkippedSummary",
     "TaskSummary",
     "is_open_ended",
@@ -58,29 +56,6 @@ OPEN_ENDED = "open-ended"  # column of questions whose answer is neither yes, no
 SHOWN_CLUES = ("all", "some", "none")
 
 Record = UnitRecord[NiehAnswer]
-
-
-class Score(msgspec.Struct, frozen=True):
-    """A mean score under a metric, 0 to 1; the reference scorer exceeds 1 on repetitions.
-
-    Standard error and 95 % intervals are by trajectory, and None with fewer than two. `bootstrap`
-    is the interval over resampled trajectories; None also if all scores are equal.
-    """
-
-    mean: float
-    stderr: float | None
-    low: float | None
-    high: float | None
-    bootstrap: tuple[float, float] | None
-    n_trajectories: int
-
-
-class Cell(msgspec.Struct, frozen=True):
-    """Scores of n samples by metric (empty if n is 0); where the model failed, it is wrong."""
-
-    n: int
-    n_failed: int
-    scores: dict[str, Score]
 
 
 class EvidenceCells(msgspec.Struct, frozen=True):
@@ -104,7 +79,8 @@ class LengthCell(msgspec.Struct, frozen=True):
 
 
 class SkippedSummary(msgspec.Struct, frozen=True):
-    """Samples that were not asked, by reason; and the mean by metric if they counted as wrong."""
+    """Samples that cannot be asked, by reason; and the mean by metric if they and all others
+    without an answer counted as wrong."""
 
     n: int
     by_reason: dict[str, int]
@@ -112,7 +88,7 @@ class SkippedSummary(msgspec.Struct, frozen=True):
 
 
 class Failure(msgspec.Struct, frozen=True):
-    """A sample on which the model failed, and the reason."""
+    """A sample on which the model failed, or that it was not asked, and the reason."""
 
     question: str
     reason: str
@@ -134,9 +110,8 @@ class TaskSummary(msgspec.Struct, frozen=True):
         n_thought: number of replies behind thoughts.
         tokens_per_right: tokens of all replies, thoughts included, for each right answer under the
             main metric; None if none is right or the model counts no tokens.
-        below_full_marks: samples with a score below 1, by metric.
-        scores: scores by metric and trajectory, in the order of the samples' keys, by which runs
-            are paired.
+        below_full_marks: answered samples with a score below 1, by metric.
+        scores: scores of the answered samples by metric, trajectory and sample.
         memory: the memory that recalled what was shown; None if there is none.
         pairs: how pairs of twins were answered under the main metric; None if there are none.
     """
@@ -158,10 +133,15 @@ class TaskSummary(msgspec.Struct, frozen=True):
     n_thought: int
     tokens_per_right: float | None
     below_full_marks: dict[str, list[str]]
-    scores: dict[str, dict[str, list[float]]]
+    scores: dict[str, dict[str, dict[str, float]]]
     failures: list[Failure]
     memory: MemorySummary | None = None
     pairs: PairSummary | None = None
+
+    @property
+    def total(self) -> Cell:
+        """Scores of all samples."""
+        return self.by_clues["total"]
 
 
 class NiehSummary(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -207,47 +187,49 @@ def _main_metric(metrics: Sequence[str]) -> str:
 
 
 def primary_metrics(summary: NiehSummary) -> dict[str, Rate]:
-    """Return the main metric of each task with any sample: of twins the pairs', else the mean."""
+    """Return the main metric of each task with any answer: of twins the pairs', else the mean."""
     rates = {}
     for name, task in summary.tasks.items():
         if task.pairs is not None:
             rates[name] = task.pairs.pair_accuracy
             continue
-        total = task.by_clues["total"]
-        if total.n:
-            score = total.scores[main_metric(task)]
-            rates[name] = Rate(score.mean, score.low, score.high, total.n)
+        score = task.total.scores.get(main_metric(task))
+        if score is not None:
+            rate = Rate(score.mean, score.low, score.high, task.total.n_answered)
+            rates[name] = rate.out_of(task.total.n)
     return rates
 
 
 def _task(replies: Sequence[Record], task: NiehTaskConfig, config: NiehConfig) -> TaskSummary:
     metrics = list(task.metrics.names)
     records = [mean_record(same) for same in by_question(replies)]
+    n_missing = max(0, task.n_samples - len(records))
+    answered = [record for record in records if record.state == "answered"]
     files = _by_file(records)
     return TaskSummary(
-        n=len(records),
+        n=len(records) + n_missing,
         context=task.context,
         simulator=task.simulator,
         metrics=metrics,
-        by_clues=_by_clues(records, metrics),
+        by_clues=_by_clues(records, metrics, n_missing),
         by_question_type=_group(records, metrics, _question_type),
         by_variant=_group(records, metrics, lambda record: record.variant or "-"),
-        by_file={name: _cell(chosen, metrics) for name, chosen in files.items()},
+        by_file={name: make_cell(chosen, metrics) for name, chosen in files.items()},
         evidence={
             name: _evidence(chosen, metrics) for name, chosen in {"total": records, **files}.items()
         },
         by_length=_by_length(records, metrics),
-        above_guessing=_above_guessing(records, metrics),
-        skipped=_summarise_skipped(records, metrics, task.skipped),
+        above_guessing=_above_guessing(answered, metrics),
+        skipped=_summarise_skipped(records, n_missing, metrics, task.skipped),
         yes_no=yes_no(replies),
         format_failures=format_failures(replies, task.decoding["max_new_tokens"]),
         n_thought=sum(record.payload.thinking is not None for record in replies),
         tokens_per_right=_tokens_per_right(replies, _main_metric(metrics)),
-        below_full_marks={name: _below_full_marks(records, name) for name in metrics},
-        scores={name: _by_trajectory(records, name) for name in metrics},
+        below_full_marks={name: _below_full_marks(answered, name) for name in metrics},
+        scores={name: _by_trajectory(answered, name) for name in metrics},
         failures=_failures(replies),
         memory=summarise_memory(config, task, records),
-        pairs=summarise_pairs(replies, _main_metric(metrics)),
+        pairs=summarise_pairs(replies, _main_metric(metrics), n_missing),
     )
 
 
@@ -265,7 +247,7 @@ def _question_type(record: Record) -> str:
 
 
 def _below_full_marks(records: Sequence[Record], metric: str) -> list[str]:
-    return [str(record.key) for record in records if _score(record, metric) < 1.0]
+    return [str(record.key) for record in records if score_of(record, metric) < 1.0]
 
 
 def _failures(replies: Sequence[Record]) -> list[Failure]:
@@ -280,29 +262,27 @@ def _tokens_per_right(replies: Sequence[Record], metric: str) -> float | None:
     return sum(counts) / right if counts and right else None
 
 
-def _score(record: Record, metric: str) -> float:
-    return record.payload.scores.get(metric, 0.0)  # 0 if the model failed
-
-
 def _sum(records: Sequence[Record], metric: str) -> float:
-    return math.fsum(_score(record, metric) for record in records)
+    return math.fsum(score_of(record, metric) for record in records)
 
 
-def _by_trajectory(records: Sequence[Record], metric: str) -> dict[str, list[float]]:
-    scores: dict[str, list[float]] = {}
+def _by_trajectory(records: Sequence[Record], metric: str) -> dict[str, dict[str, float]]:
+    scores: dict[str, dict[str, float]] = {}
     for record in records:
-        scores.setdefault(record.cluster, []).append(_score(record, metric))
+        scores.setdefault(record.cluster, {})[str(record.key)] = score_of(record, metric)
     return scores
 
 
-def _by_clues(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, Cell]:
+def _by_clues(records: Sequence[Record], metrics: Sequence[str], n_missing: int) -> dict[str, Cell]:
     columns: dict[str, list[Record]] = {name: [] for name in (*CLUE_COLUMNS, ABSENCE)}
     for record in records:
         if record.payload.clue_column in columns:
             columns[record.payload.clue_column].append(record)
     columns["total"] = list(records)
     columns[OPEN_ENDED] = [record for record in records if is_open_ended(record)]
-    return {name: _cell(chosen, metrics) for name, chosen in columns.items()}
+    cells = {name: make_cell(chosen, metrics) for name, chosen in columns.items()}
+    cells["total"] = with_missing(cells["total"], n_missing)
+    return cells
 
 
 def is_open_ended(record: Record) -> bool:
@@ -317,7 +297,7 @@ def _group(
     groups: dict[str, list[Record]] = {}
     for record in records:
         groups.setdefault(name_of(record), []).append(record)
-    return {name: _cell(chosen, metrics) for name, chosen in sorted(groups.items())}
+    return {name: make_cell(chosen, metrics) for name, chosen in sorted(groups.items())}
 
 
 def _evidence(records: Sequence[Record], metrics: Sequence[str]) -> EvidenceCells:
@@ -338,14 +318,16 @@ def _in_order(
     for name in names:
         chosen = [record for record in records if name_of(record) == name]
         if chosen:
-            cells[name] = _cell(chosen, metrics)
+            cells[name] = make_cell(chosen, metrics)
     return cells
 
 
 def _by_length(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, LengthCell]:
     cells = {}
     for name, cell in _in_order(records, metrics, _length, LENGTHS).items():
-        chosen = [record for record in records if _length(record) == name]
+        chosen = [
+            record for record in records if _length(record) == name and record.state == "answered"
+        ]
         shares = _above_guessing(chosen, metrics)
         cells[name] = LengthCell(cell, {metric: share.mean for metric, share in shares.items()})
     return cells
@@ -372,29 +354,13 @@ def _length(record: Record) -> str | None:
     return None if tokens is None else length_class(tokens)
 
 
-def _cell(records: Sequence[Record], metrics: Sequence[str]) -> Cell:
-    scores = {name: _mean(records, name) for name in metrics} if records else {}
-    return Cell(len(records), sum(record.failure is not None for record in records), scores)
-
-
-def _mean(records: Sequence[Record], metric: str) -> Score:
-    scores = [_score(record, metric) for record in records]
-    trajectories = [record.cluster for record in records]
-    estimate = clustered_mean(scores, trajectories)
-    return Score(
-        mean=estimate.mean,
-        stderr=estimate.stderr,
-        low=estimate.low,
-        high=estimate.high,
-        bootstrap=bootstrap_interval(scores, trajectories),
-        n_trajectories=estimate.n_clusters,
-    )
-
-
 def _summarise_skipped(
-    records: Sequence[Record], metrics: Sequence[str], skipped: Sequence[SkippedSample]
+    records: Sequence[Record],
+    n_missing: int,
+    metrics: Sequence[str],
+    skipped: Sequence[SkippedSample],
 ) -> SkippedSummary:
-    n = len(records) + len(skipped)
+    n = len(records) + n_missing + len(skipped)
     means = {name: _sum(records, name) / n if n else None for name in metrics}
     reasons = Counter(sample.reason for sample in skipped)
     return SkippedSummary(len(skipped), dict(sorted(reasons.items())), means)

@@ -6,6 +6,7 @@ from infthor_eval.formats.published import PublishedRow, PublishedTable, publish
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.rescoring.report import sources_of
+from infthor_eval.nieh.results.cells import Cell, mean_cell
 from infthor_eval.nieh.results.control_tables import control_tables, without_alike_notes
 from infthor_eval.nieh.results.effective_length import effective_lengths
 from infthor_eval.nieh.results.evidence_tables import (
@@ -21,25 +22,27 @@ from infthor_eval.nieh.results.repeat_tables import repeat_tables
 from infthor_eval.nieh.results.summary import (
     CLUE_COLUMNS,
     OPEN_ENDED,
-    Cell,
     NiehSummary,
     TaskSummary,
     main_metric,
 )
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
+from infthor_eval.tables import Column, Row, Table, TableCell, answered_cell, interval_cell
 
 __all__ = ["clues_table", "overview", "tables"]
 
 _NAMES = (Column("model", False), Column("task", False))
 _METRIC = Column("scorer", False)
+_LEFT_OUT = ("skipped", "failed", "not asked")
 _LEGEND = (
     "total: all questions, with those on absences. Open-ended questions are in the columns by "
     "clues too.",
     "95 %: interval clustered by trajectory, valid near 0 and 100 %. bootstrap: interval over "
     "resampled trajectories, which assumes no distribution of the scores. If the two differ much, "
     "there are few trajectories.",
+    "strict takes words that are 80 % alike (most plurals in -s) and the published synonyms, and "
+    "drops no article; `infthor-eval show RUN --question ID` says why a reply got its score.",
 )
 _EMBEDDED = (
     "Questions on frames of the embedded simulator: not comparable with the published rows, which "
@@ -85,12 +88,13 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
     """
     tasks = list(_tasks(runs))
     with_samples = [(run, name, task) for run, name, task in tasks if task.n]
-    left_out = any(task.skipped.n or task.by_clues["total"].n_failed for _, _, task in with_samples)
+    left_out = [_left_out(task) for *_, task in with_samples]
+    shown = [at for at in range(len(_LEFT_OUT)) if any(counts[at] != "0" for counts in left_out)]
     rows = tuple(
-        Row((run, *_name_and_total(name, task), *(_left_out(task) if left_out else ())))
-        for run, name, task in with_samples
+        Row((run, *_name_and_total(name, task), *(counts[at] for at in shown)))
+        for (run, name, task), counts in zip(with_samples, left_out, strict=True)
     )
-    numbers = ("total", "95 %", "bootstrap", "n", *(("skipped", "failed") if left_out else ()))
+    numbers = ("total", "95 %", "bootstrap", "n", *(_LEFT_OUT[at] for at in shown))
     notes = (
         *dict.fromkeys(_nothing_asked(name, task) for _, name, task in tasks if not task.n),
         *_notes(runs),
@@ -107,14 +111,15 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def _name_and_total(name: str, task: TaskSummary) -> tuple[str, ...]:
-    total = task.by_clues["total"]
+    total = task.total
     metric = main_metric(task)
     name_and_metric = name if metric == "strict" else f"{name}, {metric}"
-    return name_and_metric, _mean(total, metric), *_intervals(total, metric), str(total.n)
+    return name_and_metric, mean_cell(total, metric), *_intervals(total, metric), str(total.n)
 
 
-def _left_out(task: TaskSummary) -> tuple[str, str]:
-    return str(task.skipped.n), str(task.by_clues["total"].n_failed)
+def _left_out(task: TaskSummary) -> tuple[str, str, str]:
+    """Return the cells of the columns `_LEFT_OUT`."""
+    return str(task.skipped.n), str(task.total.n_failed), str(task.total.n_not_asked)
 
 
 def _nothing_asked(name: str, task: TaskSummary) -> str:
@@ -143,9 +148,14 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
 
 def clues_table(runs: Sequence[RunSummary]) -> Table:
     """Return accuracy by clues: a row per run, task and metric, then the published rows."""
-    apart = (OPEN_ENDED, ABSENCE, "above guessing")
-    numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", *apart, "n", "skipped", "failed")
-    rows = [row for run in runs for row in _rows_of(run)]
+    is_guessed = any(
+        score.mean is not None
+        for *_, task in _tasks(runs)
+        for score in task.above_guessing.values()
+    )
+    apart = (OPEN_ENDED, ABSENCE, *(("above guessing",) if is_guessed else ()))
+    numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", *apart, "n", *_LEFT_OUT)
+    rows = [row for run in runs for row in _rows_of(run, is_guessed=is_guessed)]
     notes = [*_LEGEND, *above_guessing_notes(runs)]
     for table in filter(_is_by_clues, published_tables("nieh")):
         rows += _published_rows(table, runs)
@@ -173,25 +183,28 @@ def _notes(runs: Sequence[RunSummary]) -> list[str]:
     ]
 
 
-def _rows_of(run: RunSummary) -> list[Row]:
+def _rows_of(run: RunSummary, *, is_guessed: bool) -> list[Row]:
     lines = [(name, task, metric) for _, name, task in _tasks([run]) for metric in task.metrics]
     return [
-        Row((name_of(run), name, metric, *_cells(task, metric)), ends_section=number == len(lines))
+        Row(
+            (name_of(run), name, metric, *_cells(task, metric, is_guessed=is_guessed)),
+            ends_section=number == len(lines),
+        )
         for number, (name, task, metric) in enumerate(lines, 1)
     ]
 
 
-def _cells(task: TaskSummary, metric: str) -> list[str]:
-    total = task.by_clues["total"]
+def _cells(task: TaskSummary, metric: str, *, is_guessed: bool) -> list[str]:
+    total = task.total
     by_clues = [_mean_of(task.by_clues[name], metric) for name in CLUE_COLUMNS[:-1]]
     apart = [_mean_of(task.by_clues[name], metric) for name in (OPEN_ENDED, ABSENCE)]
     above = above_guessing_cell(task.above_guessing.get(metric))
     return [
         *by_clues,
-        _mean(total, metric),
+        mean_cell(total, metric),
         *_intervals(total, metric),
         *apart,
-        above,
+        *([above] if is_guessed else []),
         str(total.n),
         *_left_out(task),
     ]
@@ -205,15 +218,11 @@ def _intervals(cell: Cell, metric: str) -> tuple[str, str]:
     return _range(score.low, score.high), _range(*(score.bootstrap or (None, None)))
 
 
-def _mean(cell: Cell, metric: str) -> str:
-    return f"{100 * cell.scores[metric].mean:.2f}" if cell.n else "-"
-
-
 def _mean_of(cell: Cell | None, metric: str) -> TableCell:
     if not cell or not cell.n:
         return TableCell("-", {"": "", "questions": ""})
-    mean = _mean(cell, metric)
-    return TableCell(f"{mean} ({cell.n})", {"": mean, "questions": str(cell.n)})
+    mean = mean_cell(cell, metric)
+    return TableCell(f"{mean} ({cell.n})", {**mean.numbers, "questions": str(cell.n)})
 
 
 def _range(low: float | None, high: float | None) -> TableCell:
@@ -258,9 +267,9 @@ def _differences(run: RunSummary, row: PublishedRow, table: PublishedTable) -> I
 
 
 def _difference(cell: Cell, value: float | None, metric: str) -> str:
-    if not cell.n or value is None:
+    ours = cell.scores.get(metric)
+    if ours is None or value is None:
         return "-"
-    ours = cell.scores[metric]
     within = (
         ours.low is not None
         and ours.high is not None
@@ -288,10 +297,7 @@ def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
             cells = task.by_clues | task.by_question_type | task.by_variant | by_file
             if not cells.keys() & set(table.columns):
                 continue
-            means = [
-                _mean(cells[column], table.metric) if column in cells else "-"
-                for column in table.columns
-            ]
+            means = [mean_cell(cells.get(column), table.metric) for column in table.columns]
             rows.append(Row((run, name, table.metric, *means)))
     columns = (*_NAMES, _METRIC, *map(Column, table.columns))
     return Table(
@@ -324,13 +330,14 @@ def _gains_table(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def _gain_cells(gain: Gain) -> tuple[str, ...]:
-    by_clues = [_points(gain.in_column(name)) for name in CLUE_COLUMNS]
+    by_clues = [_points(gain.in_column(name)) for name in CLUE_COLUMNS[:-1]]
     apart = [_points(gain.in_column(name)) for name in (OPEN_ENDED, ABSENCE)]
     total = gain.total()
+    mean = "-" if total is None else answered_cell(_points(total.mean), total.n, gain.n_all)
     # One trajectory alone tells nothing about others, and has no interval.
     low = None if total is None else _in_percent(total.low)
     high = None if total is None else _in_percent(total.high)
-    return *by_clues, interval_cell(low, high, "+.2f"), *apart
+    return *by_clues, mean, interval_cell(low, high, "+.2f"), *apart
 
 
 def _points(gain: float | None) -> str:

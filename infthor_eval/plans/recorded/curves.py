@@ -85,6 +85,5 @@ def _context(record: UnitRecord[PlanRecord]) -> float | None:
 def _count(plans: Sequence[UnitRecord[PlanRecord]]) -> dict[str, int]:
     return {
         "plans": len(plans),
-        "failed": sum(record.failure is not None for record in plans),
         NOT_ATTEMPTED: sum(record.payload.ended == NOT_ATTEMPTED for record in plans),
     }

@@ -22,7 +22,7 @@ class TwinResults(msgspec.Struct, frozen=True):
 
     Attributes:
         n_pairs: pairs of which both worlds count.
-        n_incomplete: pairs of which one does not, as it is excluded or left out.
+        n_incomplete: pairs of which one does not, as it is excluded or left out, or has no result.
         pair_accuracy: share of pairs in which the place looked at first is right in both worlds.
         pair_success: share of pairs whose final task was carried out in both worlds.
         accuracy: share of worlds in which the place looked at first is right.
@@ -66,31 +66,34 @@ def score_pairs(records: Sequence[Record]) -> list[PairScore]:
     """Return the scores of the pairs of a task of which both worlds count."""
     return [
         PairScore(_twin(one).pair, _base(one), _is_right(one) and _is_right(other))
-        for one, other in _whole_pairs(_worlds_of_pairs(records))
+        for one, other in _whole_pairs(_worlds_of_pairs(records)[0])
     ]
 
 
 def twin_results(records: Sequence[Record]) -> TwinResults | UnsetType:
     """Return the results of a task's pairs; UNSET if its trajectories are no twins."""
-    pairs = _worlds_of_pairs(records)
+    pairs, lost = _worlds_of_pairs(records)
     if not pairs:
         return UNSET
     whole = _whole_pairs(pairs)
-    return _Pairs(whole).results(len(pairs) - len(whole))
+    return _Pairs(whole, len(whole) + len(lost)).results(len(pairs) - len(whole))
 
 
-def _worlds_of_pairs(records: Sequence[Record]) -> dict[str, list[_World]]:
-    """Return the worlds of each pair that count."""
+def _worlds_of_pairs(records: Sequence[Record]) -> tuple[dict[str, list[_World]], set[str]]:
+    """Return the answered worlds of each pair, and the pairs of which a world has no result."""
     worlds: dict[str, list[Record]] = {}
     for record in sorted(records, key=lambda record: record.payload.index):
         if record.payload.twin is not None:
             worlds.setdefault(record.cluster, []).append(record)
     pairs: dict[str, list[_World]] = {}
+    lost: set[str] = set()
     for world in worlds.values():
         group = pairs.setdefault(_twin(tuple(world)).pair, [])
-        if all(record.excluded is None for record in world):
+        if all(record.state == "answered" for record in world):
             group.append(tuple(world))
-    return pairs
+        elif all(record.excluded is None for record in world):
+            lost.add(_twin(tuple(world)).pair)
+    return pairs, lost
 
 
 def _whole_pairs(pairs: Mapping[str, Sequence[_World]]) -> list[tuple[_World, _World]]:
@@ -98,10 +101,11 @@ def _whole_pairs(pairs: Mapping[str, Sequence[_World]]) -> list[tuple[_World, _W
 
 
 class _Pairs:
-    """Pairs of which both worlds count."""
+    """Pairs of which both worlds count, of all those that were to be answered."""
 
-    def __init__(self, pairs: Sequence[tuple[_World, _World]]) -> None:
+    def __init__(self, pairs: Sequence[tuple[_World, _World]], n_all: int) -> None:
         self._pairs = pairs
+        self._n_all = n_all
 
     def results(self, n_incomplete: int) -> TwinResults:
         return TwinResults(
@@ -119,7 +123,8 @@ class _Pairs:
 
     def _share(self, holds: Callable[[_World, _World], bool]) -> Rate | None:
         values = [float(holds(one, other)) for one, other in self._pairs]
-        return clustered_rate(values, [_base(one) for one, _ in self._pairs])
+        rate = clustered_rate(values, [_base(one) for one, _ in self._pairs])
+        return None if rate is None else rate.out_of(self._n_all)
 
     def _share_of_worlds(self, holds: Callable[[_World], bool]) -> Rate | None:
         values = [float(holds(world)) for world in self._worlds]

@@ -7,6 +7,7 @@ from pathlib import Path
 from infthor_eval.episodes.curves import RewardCurves, RunCurves
 from infthor_eval.errors import DataError
 from infthor_eval.formats.yaml_files import read_yaml
+from infthor_eval.runs.completeness import unmarked
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
 __all__ = [
@@ -61,14 +62,15 @@ def read_panels(path: Path, curves: RewardCurves) -> list[Panel]:
 def _panel(path: Path, title: str, named: object, curves: RewardCurves) -> Panel:
     if not isinstance(named, list) or not named:
         raise DataError(f"{path}: {title!r:.60} is not a list of runs; write their names")
-    labels = [run.label for run in curves.runs]
-    for name in map(str, named):
+    labels = {unmarked(run.label): run.label for run in curves.runs}
+    names = [unmarked(str(name)) for name in named]
+    for name in names:
         if name not in labels:
             raise DataError(
                 f"{path}: {title!r:.60}: {name!r:.60} is none of the runs; there are "
                 f"{', '.join(labels)}"
             )
-    return Panel(title, tuple(dict.fromkeys(map(str, named))))
+    return Panel(title, tuple(labels[name] for name in dict.fromkeys(names)))
 
 
 def embedded_label(curves: RewardCurves) -> str | None:

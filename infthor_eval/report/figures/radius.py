@@ -41,13 +41,10 @@ def radii_table(success: SuccessByRadius) -> Table:
     """Return a table with a row per model and kind and a column per radius."""
     all_points = (success.floor, *(line.points for line in success.lines))
     radii = sorted({radius for points in all_points for radius, _ in points})
-    rows = [
-        _row(line.label, line.kind, line.points, radii, str(line.n_failed))
-        for line in success.lines
-    ]
+    rows = [_row(line.label, line.kind, line.points, radii) for line in success.lines]
     if success.floor:
-        rows.append(_row(f"({_FLOOR})", ManipulationKind.PICKUP, success.floor, radii, "-"))
-    names = (*(f"{radius:g} m" for radius in radii), "episodes", "failed")
+        rows.append(_row(f"({_FLOOR})", ManipulationKind.PICKUP, success.floor, radii))
+    names = (*(f"{radius:g} m" for radius in radii), "episodes")
     columns = (Column("model", False), Column("kind", False), *map(Column, names))
     title = f"{success.task}: success by radius, %, of {trajectories_text(success.n_trajectories)}"
     return Table(title, columns, tuple(rows), (*_label(success), *success.notes))
@@ -58,11 +55,10 @@ def _row(
     kind: ManipulationKind,
     points: Sequence[tuple[float, Rate]],
     radii: Sequence[float],
-    end: str,
 ) -> Row:
     rates = dict(points)
     cells = (format_percent(rates.get(radius)) for radius in radii)
-    return Row((label, KIND_NAMES[kind], *cells, str(points[0][1].n), end))
+    return Row((label, KIND_NAMES[kind], *cells, str(points[0][1].n)))
 
 
 def radii_figure(success: SuccessByRadius) -> Figure:

@@ -1,7 +1,7 @@
 "use strict";
 // All that comes from the journal is set as text, never as HTML.
 const EVERY_MS = 1000;
-const MARKS = {right: "✓", partly: "◐", wrong: "✗", failed: "!", excluded: "–"};
+const MARKS = {right: "✓", partly: "◐", wrong: "✗", failed: "!", "not asked": "·", excluded: "–"};
 const STATUS = {
   waiting: "has not started",
   running: "running",
@@ -36,7 +36,10 @@ function explain(state) {
     stopped: "The run was stopped before its end. The same command continues it.",
     unknown: state.problem ? "" : "This system does not tell whether the run goes on.",
   };
-  return [state.problem, texts[state.status] || ""].filter(Boolean).join(" ");
+  const {n_done, n_failed, n_not_asked} = state.totals;
+  const lost = state.status !== "waiting" && n_failed + n_not_asked ? "Not whole: failed samples and those that were not asked are in no score; the same command tries them again." : "";
+  const none = n_done && !Object.keys(state.metrics).length ? "No sample has a result yet, so there is no score." : "";
+  return [state.problem, texts[state.status] || "", lost, none].filter(Boolean).join(" ");
 }
 
 function showStatus(status) {
@@ -62,12 +65,12 @@ function showFacts(state) {
 }
 
 function showProgress(state) {
-  const {n_done, n_failed, n_excluded} = state.totals, total = state.n_units;
+  const {n_done, n_failed, n_not_asked, n_excluded} = state.totals, total = state.n_units;
   const bar = at("bar");
   if (total) { bar.max = total; bar.value = Math.min(n_done, total); } else { bar.removeAttribute("value"); }
   if (state.status === "waiting") { bar.max = 1; bar.value = 0; }
   const of = total ? ` of ${number(total)} (${Math.floor(100 * n_done / total)} %)` : " samples";
-  const more = [n_failed && `${number(n_failed)} failed`, n_excluded && `${number(n_excluded)} excluded`].filter(Boolean);
+  const more = [n_failed && `${number(n_failed)} failed`, n_not_asked && `${number(n_not_asked)} not asked`, n_excluded && `${number(n_excluded)} excluded`].filter(Boolean);
   at("count").textContent = [number(n_done) + of, ...more].join(", ");
   document.title = total ? `${number(n_done)} / ${number(total)} ${state.name}` : `${number(n_done)} ${state.name || "a run"}`;
 }
@@ -90,9 +93,9 @@ function showMetrics(state) {
   at("measure").textContent = state.measure + ", %";
   at("metrics").replaceChildren(...Object.entries(state.metrics).map(([task, rate]) => element("tr", "",
     element("td", "", task),
-    element("td", "n", percent(rate.mean)),
+    element("td", "n", percent(rate.mean) + (rate.n_all ? ` of ${number(rate.n)} answered` : "")),
     element("td", "n", rate.low == null ? "-" : `${percent(rate.low)}–${percent(rate.high)}`),
-    element("td", "n", number(rate.n)),
+    element("td", "n", number(rate.n_all || rate.n)),
     element("td", "", shareOf(rate)),
   )));
 }
@@ -111,7 +114,7 @@ function sampleOf(sample, targetLabel) {
   const tokens = read == null ? [] : [`${number(read)} tokens` + (written == null ? "" : ` + ${number(written)}`)];
   const of = [sample.task, sample.id, ...(sample.target ? [`${targetLabel}: ${sample.target}`] : []), ...scores, duration(sample.seconds), ...tokens];
   return element("article", "sample",
-    element("div", "q", element("span", "mark " + sample.outcome, MARKS[sample.outcome] || ""), " " + sample.title),
+    element("div", "q", element("span", "mark " + sample.outcome.replace(" ", "-"), MARKS[sample.outcome] || ""), " " + sample.title),
     element("div", "reply", sample.reason || sample.reply || "(empty)"),
     element("div", "of", ...of.map(text => element("span", "", text))),
   );

@@ -61,11 +61,12 @@ class Totals(msgspec.Struct, frozen=True):
     Attributes:
         seconds: of all samples, in seconds of each; more than on the clock if several are evaluated
             at once.
-        reasons: number of failed samples by reason, the most frequent first.
+        reasons: number of samples without a result by reason, the most frequent first.
     """
 
     n_done: int = 0
     n_failed: int = 0
+    n_not_asked: int = 0
     n_excluded: int = 0
     seconds: float = 0.0
     usage: Usage = NOTHING
@@ -86,7 +87,7 @@ class LiveState(msgspec.Struct, frozen=True, kw_only=True):
         measure: what the primary metric measures, in words.
         target_label: what a sample's target is called.
         metrics: primary metric of each task.
-        failures: failed samples, the newest first.
+        failures: samples that failed or were not asked, the newest first.
         newest: the newest samples first.
     """
 
@@ -188,12 +189,14 @@ class LiveRun:
 
     def _sum_up(self, run: PresentedRun, journal: FollowedJournal) -> None:
         records = list(journal.log.units.values())
+        states = Counter(record.state for record in records)
         failed = [record for record in records if record.failure is not None]
         reasons = Counter(_cut(record.failure or "") for record in failed)
         self._totals = Totals(
             n_done=len(records),
-            n_failed=len(failed),
-            n_excluded=sum(record.excluded is not None for record in records),
+            n_failed=states["failed"],
+            n_not_asked=states["not asked"],
+            n_excluded=states["excluded"],
             seconds=sum(record.seconds for record in records),
             usage=journal.log.usage,
             reasons=tuple(reasons.most_common(_N_FAILURES)),

@@ -6,7 +6,8 @@ from typing import NamedTuple
 from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 
-from infthor_eval.nieh.results.summary import Score, main_metric
+from infthor_eval.nieh.results.cells import Score
+from infthor_eval.nieh.results.summary import main_metric
 from infthor_eval.report.figures.style import LEGEND, add_legend, inline_svg, looks_of
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.sections import Chart
@@ -43,10 +44,10 @@ def _curves(runs: Sequence[ReportRun], task: str) -> dict[str, list[_Point]]:
         if of_task is None or of_task.memory is None or of_task.memory.n_tokens is None:
             continue
         memory = f"{of_task.memory.name}{'*' if of_task.memory.privileged else ''}"
-        point = _Point(
-            of_task.memory.n_tokens, of_task.by_clues["total"].scores[main_metric(of_task)]
-        )
-        by_memory.setdefault((run.model, memory), []).append(point)
+        score = of_task.total.scores.get(main_metric(of_task))
+        if score is not None:
+            point = _Point(of_task.memory.n_tokens, score)
+            by_memory.setdefault((run.model, memory), []).append(point)
     several = len({subject for subject, _ in by_memory}) > 1
     return {
         f"{subject}, {memory}" if several else memory: sorted(

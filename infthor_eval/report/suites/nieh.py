@@ -6,7 +6,7 @@ from pathlib import Path
 
 from infthor_eval.nieh.records import Guess, NiehAnswer
 from infthor_eval.nieh.rescoring.judging import JUDGED
-from infthor_eval.nieh.results.above_guessing import score_above_guessing
+from infthor_eval.nieh.results.above_guessing import score_above_guessing, score_range
 from infthor_eval.nieh.results.pair_summary import score_pairs
 from infthor_eval.nieh.results.summary import NiehSummary
 from infthor_eval.nieh.scoring import SCORERS
@@ -84,6 +84,24 @@ class NiehPresenter(PlainPresenter):
             for scorer, score in scores.items()
             if score is not None
         }
+
+    def further_ranges(self, record: Record) -> Mapping[str, tuple[float, float]]:
+        """See `Presenter.further_ranges`."""
+        counted = [
+            scorer
+            for scorer in SCORERS
+            if f"{scorer}{_ABOVE_GUESSING}" in self.further_scores(record)
+        ]
+        return {f"{scorer}{_ABOVE_GUESSING}": score_range([record], scorer) for scorer in counted}
+
+    def explain(self, record: Record) -> list[str]:
+        """See `Presenter.explain`: what each of our scorers finds in the reply."""
+        from infthor_eval.nieh.explaining import explain
+
+        if record.payload.reply is None:
+            return []
+        scorers = [scorer for scorer in SCORERS if scorer in record.payload.scores]
+        return explain(record.payload.reply, record.payload.answers, scorers)
 
     def group(self, record: Record) -> str:
         """See `Presenter.group`: the pair of a question of twins."""

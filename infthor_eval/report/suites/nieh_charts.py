@@ -10,13 +10,12 @@ from matplotlib.figure import Figure
 from infthor_eval.distances import DISTANCES
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.results.above_guessing import AboveGuessing
+from infthor_eval.nieh.results.cells import Cell, Score, mean_cell
 from infthor_eval.nieh.results.evidence_tables import short_name
 from infthor_eval.nieh.results.gains import find_gains, name_of
 from infthor_eval.nieh.results.summary import (
     CLUE_COLUMNS,
     SHOWN_CLUES,
-    Cell,
-    Score,
     TaskSummary,
     main_metric,
 )
@@ -161,7 +160,7 @@ def _dots(
 ) -> None:
     """Draw a dot with its interval for each cell that has questions."""
     for at, cell in enumerate(cells):
-        if cell is not None and cell.n:
+        if cell is not None and cell.scores:
             _dot(axes, cell.scores[line.metric], at + offset, line.look.colour, is_flat=is_flat)
 
 
@@ -184,8 +183,8 @@ def _dot(
 
 def _describe(lines: Sequence[_Line]) -> str:
     """Return the totals in words."""
-    totals = ((line.label, line.task.by_clues["total"].scores[line.metric]) for line in lines)
-    return "; ".join(f"{label} {100 * score.mean:.1f} %" for label, score in totals)
+    totals = ((line.label, mean_cell(line.task.total, line.metric, 1)) for line in lines)
+    return "; ".join(f"{label} {mean} %" for label, mean in totals)
 
 
 def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
@@ -285,4 +284,5 @@ def _heat_map(run: ReportRun) -> Chart | None:
 
 
 def _percent(cell: Cell | None, metric: str) -> float:
-    return math.nan if cell is None or not cell.n else 100 * cell.scores[metric].mean
+    score = None if cell is None else cell.scores.get(metric)
+    return math.nan if score is None else 100 * score.mean

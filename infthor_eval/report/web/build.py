@@ -65,7 +65,7 @@ def build_page(
     sections.append(Section("cost", "Speed and cost", tables=(costs_table(runs),)))
     left_out = left_out_table(runs)
     if left_out is not None:
-        sections.append(Section("left-out", "Failed, skipped, excluded", tables=(left_out,)))
+        sections.append(Section("left-out", "Failed, not asked, skipped", tables=(left_out,)))
     thumbnails = ThumbnailStore(request.pictures, progress=progress)
     replays = EpisodeReplays(
         runs, request.episodes, (request.data, request.scenes), thumbnails, progress
@@ -163,6 +163,18 @@ def _metrics(runs: Sequence[PresentedRun], samples: Sequence[PageSample]) -> lis
     return sorted(names, key=lambda name: name not in main)
 
 
+def _state(run: PresentedRun) -> str:
+    """Return how many samples have a result, and what became of the others; empty for a whole
+    run."""
+    units = list(run.summary.units.values())
+    failed = sum(counts.failed for counts in units)
+    not_asked = sum(counts.not_asked for counts in units)
+    if not failed + not_asked:
+        return ""
+    answered = sum(counts.answered for counts in units)
+    return f"{answered:,} answered, {failed:,} failed, {not_asked:,} not asked"
+
+
 def _about(run: PresentedRun) -> About:
     config = run.header.config
     facts = {
@@ -175,6 +187,7 @@ def _about(run: PresentedRun) -> About:
         "limit": "" if config.limit is None else str(config.limit),
         "infthor-eval": config.infthor_eval,
         "samples": f"{len(run.records):,}",
+        "state": _state(run),
         "folder": str(run.folder),
     }
     known = tuple((name, value) for name, value in facts.items() if value)

@@ -2,7 +2,7 @@
 // What the parts of the browser of samples share. Whatever the data hold is put into the page as text, never as markup.
 const byId = id => document.getElementById(id);
 const { runs, suites, metrics, samples, details, pictures, large, frames, prompts, tracebacks } = JSON.parse(byId("data").textContent);
-const MARKS = { right: "✓", partly: "◐", wrong: "✗", failed: "!", excluded: "–" };
+const MARKS = { right: "✓", partly: "◐", wrong: "✗", failed: "!", "not asked": "·", excluded: "–" };
 
 const make = (name, attributes = {}, ...children) => {
   const element = document.createElement(name);
@@ -13,7 +13,7 @@ const make = (name, attributes = {}, ...children) => {
 const sourceOf = number => `data:image/webp;base64,${pictures[number]}`;
 const withName = (heading, name) => [heading, name].filter(Boolean).join(", ");
 const mark = (result, label) => make(
-  "span", { class: `mark ${result?.outcome ?? "none"}`, title: `${label}: ${result?.outcome ?? "not evaluated"}` },
+  "span", { class: `mark ${(result?.outcome ?? "none").replace(" ", "-")}`, title: `${label}: ${result?.outcome ?? "not evaluated"}` },
   result ? MARKS[result.outcome] : "·");
 
 const resultsOf = sample => sample.results.filter(Boolean);

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 from infthor_eval.rates import Rate
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.presented import PresentedRun
-from infthor_eval.runs import TaskConfig
-from infthor_eval.tables import Column, Row, Table, interval_cell
+from infthor_eval.runs import TaskConfig, UnitCounts
+from infthor_eval.tables import Column, Row, Table, answered_cell, interval_cell
 
 __all__ = ["costs_table", "left_out_table", "primary_metrics_table"]
 
@@ -19,16 +19,26 @@ def primary_metrics_table(runs: Sequence[PresentedRun]) -> Table:
     rows = []
     for run in runs:
         summary = run.summary.summary
-        for task, rate in run.suite.primary_metrics(summary).items():
+        rates = run.suite.primary_metrics(summary)
+        for task, rate in rates.items():
             measure = run.presenter.measure_of(task, summary)
-            rows.append(Row((run.label, task, measure, *_cells(rate), str(rate.n))))
+            rows.append(Row((run.label, task, measure, *_cells(rate), str(rate.n_all or rate.n))))
+        for task, counts in run.summary.units.items():
+            if task not in rates and not counts.is_whole:
+                rows.append(Row((run.label, task, run.presenter.measure, *_no_score(counts))))
     columns = (*_NAMES, Column("measure", False), *map(Column, ("%", "95 % interval", "samples")))
     return Table("", columns, tuple(rows))
 
 
 def _cells(rate: Rate) -> tuple[str, str]:
     low, high = (None if end is None else 100 * end for end in (rate.low, rate.high))
-    return f"{100 * rate.mean:.1f}", interval_cell(low, high, pattern="{}–{}")
+    mean = answered_cell(f"{100 * rate.mean:.1f}", rate.n, rate.n_all or rate.n)
+    return mean, interval_cell(low, high, pattern="{}–{}")
+
+
+def _no_score(counts: UnitCounts) -> tuple[str, str, str]:
+    n_all = counts.answered + counts.failed + counts.not_asked
+    return answered_cell("", 0, n_all), interval_cell(None, None), str(n_all)
 
 
 def costs_table(runs: Sequence[PresentedRun]) -> Table:
@@ -63,9 +73,7 @@ def left_out_table(runs: Sequence[PresentedRun]) -> Table | None:
     ]
     why = "the run was stopped; the same command continues it"
     rows += [
-        Row((run.label, "", "not attempted", str(run.n_missing), why))
-        for run in runs
-        if run.n_missing
+        Row((run.label, "", "not asked", str(run.n_missing), why)) for run in runs if run.n_missing
     ]
     if not rows:
         return None
@@ -76,7 +84,7 @@ def left_out_table(runs: Sequence[PresentedRun]) -> Table | None:
 def _left_out(run: PresentedRun) -> Iterator[tuple[tuple[str, str], str]]:
     for record in run.records:
         if record.failure is not None:
-            yield (record.task, "failed"), record.failure
+            yield (record.task, record.state), record.failure
         if record.excluded is not None:
             yield (record.task, "excluded"), record.excluded
         for fault in record.faults:

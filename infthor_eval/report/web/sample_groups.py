@@ -56,7 +56,7 @@ def _result(results: Sequence[SampleResult | None]) -> SampleResult | None:
 
 def _outcome(outcomes: Sequence[str]) -> str:
     """Return "right" if all are, and "partly" if some are."""
-    for left_out in ("excluded", "failed"):
+    for left_out in ("excluded", "failed", "not asked"):
         if left_out in outcomes:
             return left_out
     if all(outcome == "right" for outcome in outcomes):

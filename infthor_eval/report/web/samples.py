@@ -156,7 +156,7 @@ class SampleResult(msgspec.Struct, frozen=True, omit_defaults=True):
     """The result of a run on a sample.
 
     Attributes:
-        outcome: "right", "partly", "wrong", "failed" or "excluded".
+        outcome: "right", "partly", "wrong", "failed", "not asked" or "excluded".
         reply: the reply, or how the episode ended.
         scores: scores by metric.
         reason: why the sample failed or was excluded.

@@ -6,7 +6,7 @@ suite. Its payload is the suite's own, and tagged in turn.
 
 from dataclasses import dataclass
 from types import UnionType
-from typing import Annotated, Any, Generic, NamedTuple, TypeVar
+from typing import Annotated, Any, Generic, Literal, NamedTuple, TypeVar
 
 import msgspec
 
@@ -22,15 +22,19 @@ __all__ = [
     "Payload",
     "RecordTypes",
     "RunHeader",
+    "State",
     "SuiteUnit",
     "Tokens",
     "Unit",
     "UnitKey",
     "UnitRecord",
     "describe_failure",
+    "state_of",
 ]
 
 FORMAT = 3
+
+State = Literal["answered", "failed", "not asked", "excluded"]
 
 _Name = Annotated[str, msgspec.Meta(min_length=1)]
 
@@ -85,6 +89,7 @@ class RunHeader(
         config: everything that can change a number; of the suite's own type where the suite is
             known, else with the configs of tasks as JSON values.
         n_units: number of units of the run; None where its records were made without a driver.
+        units_by_task: number of units of each task; empty where that is not known.
         format: format of the journal.
     """
 
@@ -92,6 +97,7 @@ class RunHeader(
     name: str
     config: Config
     n_units: Count | None = None
+    units_by_task: dict[str, Count] = {}
     format: int = FORMAT
 
 
@@ -113,6 +119,8 @@ class UnitRecord(
         payload: the suite's own struct.
         attempt: number of the attempt, from 1.
         failure: reason why there is no result; None if there is one.
+        asked: False if there is no result because the subject was not asked, by the user's wish (a
+            cap on the cost).
         excluded: reason why the unit does not count, through no fault of the subject; None if it
             counts.
         faults: faults that were retried, a line each.
@@ -130,6 +138,7 @@ class UnitRecord(
     repeat: Total = 1
     attempt: Total = 1
     failure: str | None = None
+    asked: bool = True
     excluded: str | None = None
     faults: tuple[str, ...] = ()
     seconds: Amount = 0.0
@@ -140,6 +149,11 @@ class UnitRecord(
     def key(self) -> UnitKey:
         """Key of the unit."""
         return UnitKey(self.task, self.id, self.variant, self.repeat)
+
+    @property
+    def state(self) -> State:
+        """Whether there is a result, and if not, why; docs/reference/metrics.md defines them."""
+        return state_of(self.failure, self.excluded, asked=self.asked)
 
 
 class ArtifactRecord(
@@ -189,6 +203,15 @@ class RecordTypes(Generic[Payload_co]):
     def header_decoder(self) -> msgspec.json.Decoder[RunHeader[Any]]:
         """Return the decoder of a journal's first line."""
         return msgspec.json.Decoder(RunHeader[self.config])  # type: ignore[name-defined]
+
+
+def state_of(failure: str | None, excluded: str | None, *, asked: bool) -> State:
+    """Return the state of a unit by the fields of its record."""
+    if excluded is not None:
+        return "excluded"
+    if failure is None:
+        return "answered"
+    return "failed" if asked else "not asked"
 
 
 def describe_failure(error: BaseException) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any, Generic
 
@@ -16,8 +17,10 @@ from infthor_eval.runs.journals.records import (
     Payload,
     RecordTypes,
     RunHeader,
+    State,
     UnitKey,
     UnitRecord,
+    state_of,
 )
 from infthor_eval.runs.usage import Usage
 
@@ -30,13 +33,13 @@ __all__ = [
     "find_shards",
     "parse_header",
     "parse_record",
-    "read_failures",
     "read_header",
     "read_lines",
     "read_run",
     "read_run_log",
     "read_shard",
     "read_shards",
+    "read_states",
 ]
 
 
@@ -83,7 +86,7 @@ class RunLog(Generic[Payload]):
         )
 
 
-def _rank(record: UnitRecord[Any]) -> tuple[int, bool]:
+def _rank(record: "UnitRecord[Any] | _UnitOutcome") -> tuple[int, bool]:
     return record.attempt, record.failure is None
 
 
@@ -101,7 +104,11 @@ def read_header(run: Path) -> RunHeader:
             f"{run}: its journal is of format 1, this version reads {FORMAT}; run the evaluation "
             "again"
         )
-    raise DataError(f"{run}: no journal in it; give the folder of a run")
+    if not run.exists():
+        raise DataError(f"{run}: no such folder; `infthor-eval ls runs` lists the runs of a folder")
+    below = next(chain(run.glob(f"*/{FOLDER}"), run.glob(f"*/*/{FOLDER}")), None)
+    such_as = "" if below is None else f", such as {below.parent}"
+    raise DataError(f"{run}: no journal in it; give the folder of a run{such_as}")
 
 
 def read_run(
@@ -143,6 +150,13 @@ class _UnitOutcome(msgspec.Struct, tag_field="type", tag="unit"):
     repeat: int = 1
     attempt: int = 1
     failure: str | None = None
+    asked: bool = True
+    excluded: str | None = None
+
+    @property
+    def state(self) -> State:
+        """See `UnitRecord.state`."""
+        return state_of(self.failure, self.excluded, asked=self.asked)
 
 
 class _AnyArtifact(msgspec.Struct, tag_field="type", tag="artifact"):
@@ -153,8 +167,8 @@ class _AnyHeader(msgspec.Struct, tag_field="type", tag="run"):
     """A header; no field of it is read."""
 
 
-def read_failures(run: Path, tell: Tell | None = None) -> dict[UnitKey, bool]:
-    """Return for each unit with a record whether its latest attempt failed; needs no suite.
+def read_states(run: Path, tell: Tell | None = None) -> dict[UnitKey, State]:
+    """Return the state of each unit with a record, by its latest attempt; needs no suite.
 
     Args:
         run: the folder.
@@ -164,7 +178,7 @@ def read_failures(run: Path, tell: Tell | None = None) -> dict[UnitKey, bool]:
         DataError: a line is bad.
     """
     decoder = msgspec.json.Decoder(_UnitOutcome | _AnyArtifact | _AnyHeader)
-    latest: dict[UnitKey, tuple[int, bool]] = {}
+    latest: dict[UnitKey, _UnitOutcome] = {}
     for path in find_shards(run):
         for number, line in enumerate(read_lines(path), 1):
             with _told(tell), _naming(path, number):
@@ -172,9 +186,10 @@ def read_failures(run: Path, tell: Tell | None = None) -> dict[UnitKey, bool]:
                 if not isinstance(unit, _UnitOutcome):
                     continue
                 key = UnitKey(unit.task, unit.id, unit.variant, unit.repeat)
-                rank = (unit.attempt, unit.failure is None)
-                latest[key] = max(latest.get(key, rank), rank)
-    return {key: not succeeded for key, (_, succeeded) in latest.items()}
+                known = latest.get(key)
+                if known is None or _rank(unit) >= _rank(known):
+                    latest[key] = unit
+    return {key: unit.state for key, unit in latest.items()}
 
 
 def find_shards(run: Path) -> list[Path]:

@@ -1,5 +1,6 @@
 """Finding the runs below a folder, without their suites."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,8 +10,9 @@ import msgspec
 from infthor_eval.errors import DataError, InfthorError, wrap_errors
 from infthor_eval.formats.reading import NOT_JSON, read_bytes
 from infthor_eval.rates import Rate
+from infthor_eval.runs.completeness import count_missing
 from infthor_eval.runs.journals.records import RunHeader
-from infthor_eval.runs.journals.shards import FOLDER, Tell, read_failures, read_header
+from infthor_eval.runs.journals.shards import FOLDER, Tell, read_header, read_states
 from infthor_eval.runs.results import RESULTS
 
 __all__ = ["BrokenRun", "Results", "StoredRun", "find_runs", "read_results", "run_folders"]
@@ -23,18 +25,19 @@ class StoredRun:
     """A run on disk.
 
     Attributes:
-        n_done: number of units with a record, failed ones included.
-        n_missing: number of units that were not attempted; None if the run was killed before it
-            wrote results.
+        n_answered: number of units with a result.
+        n_failed: number of units that failed.
+        n_not_asked: number of units that were not attempted, or that a cap left out; None if
+            neither header nor results tell.
         primary_metrics: primary metric of each task; empty if there are no results yet.
         changed: time of the last change to the journal, in seconds since 1970.
     """
 
     folder: Path
     header: RunHeader
-    n_done: int
+    n_answered: int
     n_failed: int
-    n_missing: int | None
+    n_not_asked: int | None
     primary_metrics: Mapping[str, Rate]
     changed: float
 
@@ -110,14 +113,17 @@ def run_folders(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
 
 def _read_run(folder: Path, tell: Tell | None) -> StoredRun:
     header = read_header(folder)
-    failures = read_failures(folder, tell)
+    states = Counter(read_states(folder, tell).values())
     results = read_results(folder)
+    n_missing = count_missing(header, states.total())
+    if n_missing is None and results is not None:
+        n_missing = results.n_missing
     return StoredRun(
         folder=folder,
         header=header,
-        n_done=len(failures),
-        n_failed=sum(failures.values()),
-        n_missing=results.n_missing if results else None,
+        n_answered=states["answered"],
+        n_failed=states["failed"],
+        n_not_asked=None if n_missing is None else n_missing + states["not asked"],
         primary_metrics=results.primary_metrics if results else {},
         changed=max(path.stat().st_mtime for path in (folder / FOLDER).iterdir()),
     )

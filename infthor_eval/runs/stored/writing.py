@@ -56,7 +56,7 @@ def store_run(
             [record.usage for record in records]
             + [artifact.usage for artifact in journal.artifacts]
         )
-        summary = RunSummary(header, suite.summarise(header, records))
+        summary = RunSummary.of(suite, header, records)
         write_run_files(folder, summary, suite, records, n_missing, usage)
     return Stored(folder, summary, usage)
 

@@ -76,7 +76,11 @@ def _header(
         seed=request.tasks.seed,
     )
     return RunHeader(
-        suite=run.suite.name, name=request.label, config=config, n_units=workload.n_units
+        suite=run.suite.name,
+        name=request.label,
+        config=config,
+        n_units=workload.n_units,
+        units_by_task=workload.units_by_task,
     )
 
 

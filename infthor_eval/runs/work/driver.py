@@ -160,7 +160,7 @@ def _write_results(
     keys = {unit.key for group in workload.groups for unit in group.units}
     records = [record for record in journal.records if record.key in keys]
     journal.check_file()
-    summary = RunSummary(journal.header, run.suite.summarise(journal.header, records))
+    summary = RunSummary.of(run.suite, journal.header, records)
     n_missing = workload.n_units - len(records)
     usage = Usage.total(
         [record.usage for record in records] + [artifact.usage for artifact in journal.artifacts]

@@ -1,10 +1,13 @@
+import dataclasses
 import json
+import re
 
 import pytest
 from msgspec.structs import replace
 
 from infthor_eval.plans.records import StepRecord
 
+from ...conftest import QUESTIONS
 from ...helpers.command_line import assert_refused, option_words
 from ...helpers.journals import write_run
 from ...helpers.plan_runs import make_plan_record, make_plans_run
@@ -24,6 +27,7 @@ def test_two_runs_are_compared_question_by_question(make_nieh_set, tmp_path, run
     code, out, _ = run_cli("compare", oracle, oracle)
     assert "+0.00" in out
     assert "1.0000" in out
+    assert_refused(run_cli("compare", oracle), "one run; give another, or --same-questions")
 
 
 def test_runs_without_a_shared_unit_and_folders_without_a_run_are_refused(
@@ -92,7 +96,8 @@ def test_rewards_are_points_and_shares_are_percent(tmp_path, run_cli):
         "+2.20",
         "[+2.20,",
         "+2.20]",
-        "0.0000",
+        "<",
+        "0.0001",
         "4",
         "0",
     ]
@@ -126,3 +131,35 @@ def test_blank_frames_are_part_of_the_name(make_nieh_set, tmp_path, run_cli):
         key=lambda folder: "frames: blank" in (folder / "run.yaml").read_text(),
     )
     assert "oracle, blank frames against oracle" in run_cli("compare", *folders)[1]
+
+
+def test_runs_of_other_tasks_are_compared_on_the_questions_that_they_share(
+    make_nieh_set, tmp_path, run_cli
+):
+    data = make_nieh_set(size=56)
+    for model, task in (("oracle", "nieh_gt"), ("blind", "nieh_full"), ("oracle", "nieh_full")):
+        run_cli("--model", model, "--tasks", task, "--data", data, "--output", tmp_path)
+    (blind,) = (tmp_path / "blind").iterdir()
+    folders = sorted((tmp_path / "oracle").iterdir())
+    code, out, _ = run_cli("compare", *folders, blind, "--same-questions")
+    rows = [line.split() for line in out.splitlines() if " strict " in line and "guess" not in line]
+    assert (code, len(rows)) == (0, 3)
+    assert all(row[-2:] == ["5", "0"] for row in rows)
+    code, out, _ = run_cli("compare", *folders, "--against", blind, "--same-questions")
+    rows = [line for line in out.splitlines() if " strict " in line and "guess" not in line]
+    assert (code, len(rows)) == (0, 2)
+    assert all("blind, nieh_full" in row and "oracle, nieh_" in row for row in rows)
+    # An interval of a difference of shares stays among them.
+    ends = [float(end) for end in re.findall(r"[+-]\d+\.\d+", " ".join(rows))]
+    assert ends and max(map(abs, ends)) <= 100
+
+
+def test_questions_of_other_words_are_not_the_same(make_nieh_set, tmp_path, run_cli):
+    others = [dataclasses.replace(it, text=f"{it.text} Now?") for it in QUESTIONS]
+    folders = []
+    for name, questions in (("one", QUESTIONS), ("two", others)):
+        data = make_nieh_set(questions, size=56, name=name)
+        out = tmp_path / f"runs-{name}"
+        run_cli("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", out)
+        folders += (out / "oracle").iterdir()
+    assert_refused(run_cli("compare", *folders, "--same-questions"), "share no question")

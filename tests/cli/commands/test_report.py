@@ -132,3 +132,25 @@ def test_replays_are_counted_with_the_time_left_also_where_there_is_no_terminal(
     pattern = r"episodes replayed: {} of 3 \({} %\), .* left, .*; scripted, bedroom-1-seed7"
     assert re.fullmatch(pattern.format(1, 33), first)
     assert re.fullmatch(pattern.format(2, 67), second)
+
+
+def test_what_is_no_run_is_skipped_and_said(make_nieh_set, tmp_path, run_cli):
+    run_cli(
+        *option_words(
+            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "out"
+        )
+    )
+    (run,) = (tmp_path / "out" / "oracle").iterdir()
+    earlier = tmp_path / "earlier"
+    earlier.mkdir()
+    (earlier / "report.html").touch()
+    page = tmp_path / "page.html"
+    code, _, err = run_cli("report", run, earlier, earlier / "report.html", "--out", page)
+    assert (code, page.is_file()) == (0, True)
+    assert f"skipped: {earlier}: no run" in err
+    assert f"skipped: {earlier / 'report.html'}: no run" in err
+    assert_refused(run_cli("report", earlier), f"{earlier}: no run, nor is another of the paths")
+    assert_refused(
+        run_cli("show", tmp_path / "nope"), "nope: no such folder; `infthor-eval ls runs`"
+    )
+    assert_refused(run_cli("show", tmp_path / "out"), f"give the folder of a run, such as {run}")

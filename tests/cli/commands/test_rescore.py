@@ -198,7 +198,7 @@ def test_an_exception_fails_the_reply_alone_and_its_traceback_is_kept(source, re
         "third fails: IndexError in own.py:2 (third): list index out of range; traceback in "
         "journal/tracebacks.txt"
     )
-    assert f"nieh_gt: 6 sample(s) failed, counted as wrong: {failure}" in output
+    assert f"nieh_gt: 6 sample(s) failed, in no score: {failure}" in output
     assert "1 replies scored; 6 failed by the scorer; 1 without a reply stay failed" in output
     assert "reply.split()[2]" in (new / "journal" / "tracebacks.txt").read_text()
     records = {one.id: one for one in read_run(new, RECORDS)[1]}

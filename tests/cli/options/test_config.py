@@ -2,6 +2,7 @@
 options."""
 
 import shlex
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from infthor_eval.cli.options import suites
 from infthor_eval.cli.options.run import RunOptions, run_options
 from infthor_eval.cli.options.values import ModelList
 from infthor_eval.errors import UsageError
@@ -226,3 +228,15 @@ def test_invalid_lists_of_models_are_refused(run_cli, typed, expected):
 def test_results_do_not_name_the_file(config, tmp_path, run_cli):
     run_cli("--config", config(limit=1))
     assert "typed.yaml" not in find_one(tmp_path / "out", "results.json").read_text()
+
+
+def test_a_suites_option_without_a_default_must_be_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    @dataclass(frozen=True)
+    class Required:
+        size_m: int
+
+    monkeypatch.setattr(suites, "options_class", lambda _: Required)
+    monkeypatch.setattr(suites, "suite_names", lambda: ["toy"])
+    assert suites.expand_suite_options("toy", {"size_m": "3"}, ["toy"]) == [Required(3)]
+    with pytest.raises(UsageError, match="--size-m: toy needs it, as its field has no default"):
+        suites.expand_suite_options("toy", {}, ["toy"])

@@ -90,19 +90,16 @@ def test_two_tasks_of_one_kind_are_not_drawn_together():
     assert arm_curves([run], "arm_pickup,arm_put").task == "arm_pickup and arm_put"
 
 
-def test_an_excluded_episode_is_left_out_of_all_runs_and_a_failed_one_earns_nothing():
-    refused = (*EPISODES[:1], make_episode_record("a", 20, "put", excluded="refused"), EPISODES[2])
-    failed = (make_episode_record("a", 10, failure="out of memory"), *EPISODES[1:])
+def test_excluded_and_failed_episodes_are_left_out_of_all_runs():
+    kept = (EPISODES[2], make_episode_record("a", 25))
+    refused = (EPISODES[0], make_episode_record("a", 20, "put", excluded="refused"), *kept)
+    failed = (make_episode_record("a", 10, failure="out of memory"), EPISODES[1], *kept)
     curves = arm_curves([make_arm_run("m", refused), make_arm_run("n", failed)])
-    assert means(curve_of(curves, "m")) == [0, 1, 2]
-    assert means(curve_of(curves, "n")) == [0, 0, 1]
-    assert means(curve_of(curves, AT_MOST)) == [0, 1, 2]
-    assert [run.counts for run in curves.runs] == [
-        {"episodes": 2, "failed": 0},
-        {"episodes": 2, "failed": 1},
-        {"episodes": 2, "failed": 0},
-    ]
+    for label in ("m", "n", AT_MOST):
+        assert means(curve_of(curves, label)) == [0, 1, 2]
+    assert [run.counts for run in curves.runs] == [{"episodes": 2}] * 3
     assert any(note.endswith("cannot restore their start: 1") for note in curves.notes)
+    assert "left out, as they failed or were not asked in a run: 1" in curves.notes
 
 
 def test_a_run_that_was_stopped_amid_a_trajectory_does_not_draw_it():

@@ -71,10 +71,7 @@ def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask: Any, tmp_path
     with serve_chat(keep_requests(requests, lambda *_: completion("yes", (95, 5)))) as url:
         code, _, err = ask(url, "--max-tokens-total", 250)
         assert code == 1
-        assert (
-            "2 sample(s) failed, counted as wrong: not asked: 300 tokens reach "
-            "max_tokens_total=250; raise" in err
-        )
+        assert "2 sample(s) not asked: 300 tokens reach max_tokens_total=250; raise" in err
         assert len(requests) == 3
         code, _, err = ask(url, "--max-tokens-total", 10_000, max_in_flight=1, timeout_s=90)
         assert code == 0, err
@@ -147,7 +144,7 @@ def test_units_that_fail_are_named_and_the_others_answered(ask: Any, tmp_path: P
         code, _, err = ask(url)
     assert code == 1
     assert "Traceback" not in err
-    assert "1 sample(s) failed, counted as wrong: " in err
+    assert "1 sample(s) failed, in no score: " in err
     records, results = _run(tmp_path / "out")
     (failed,) = [record for record in records if record.failure]
     assert "answers 400 Bad Request: 'no fridge'" in failed.failure

@@ -55,3 +55,15 @@ def test_what_does_not_fit_is_named_with_all_options(texts: dict[str, str], comp
 )
 def test_describe(options: Any, beginning: str) -> None:
     assert describe(options).startswith(beginning)
+
+
+def test_an_option_without_a_default_must_be_given() -> None:
+    @dataclass(frozen=True)
+    class Required:
+        path: str
+        count: int = 3
+
+    assert describe(Required) == "path (required), count=3"
+    assert parse("m", Required, {"path": "x"}).path == "x"
+    with pytest.raises(UsageError, match=r"m: the option path has no default; give it"):
+        parse("m", Required, {"count": "1"})

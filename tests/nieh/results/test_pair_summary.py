@@ -108,11 +108,11 @@ def test_the_commoner_answer_is_prior_knowledge():
     assert even.one_is_commoner.mean == 0.5
 
 
-def test_a_failed_reply_is_wrong_and_no_flip():
-    found = summary(pair("bowl", None))
-    assert found.pair_accuracy.mean == 0
-    assert found.flipped.mean == 0
-    assert found.one_right.mean == 1
+def test_a_pair_with_a_failed_reply_has_no_result_and_the_score_says_so():
+    assert summary(pair("bowl", None)) is None
+    found = summary([*pair("bowl", None), *pair("bowl", "sofa", "b/9")])
+    assert (found.n_pairs, found.n_incomplete) == (1, 2)
+    assert (found.pair_accuracy.mean, found.pair_accuracy.n, found.pair_accuracy.n_all) == (1, 1, 2)
 
 
 def test_a_question_without_its_twin_is_counted_and_in_no_pair():

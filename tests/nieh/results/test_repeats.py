@@ -112,14 +112,14 @@ def test_the_figures_are_those_of_a_calculation_by_hand():
     ]
     summary = make_run(make_config(), records).summary
     task, repeats = summary.tasks["nieh_gt"], summary.repeats["nieh_gt"]
-    assert (task.n, task.by_clues["total"].n, task.by_clues["total"].n_failed) == (3, 3, 1)
+    assert (task.n, task.by_clues["total"].n, task.by_clues["total"].n_failed) == (3, 3, 0)
     assert task.by_clues["total"].scores["strict"].mean == repeats.mean == 0.5
     assert [failure.question for failure in task.failures] == ["q2 (4)"]
-    assert task.scores["strict"] == {"t0": [1.0], "t1": [0.5], "t2": [0.0]}
+    assert task.scores["strict"] == {"t0": {"q0": 1.0}, "t1": {"q1": 0.5}, "t2": {"q2": 0.0}}
     assert (repeats.n_repeats, repeats.n_questions) == (4, 3)
     assert (repeats.always, repeats.sometimes, repeats.never) == (1 / 3, 1 / 3, 1 / 3)
     assert repeats.consensus == 2 / 3  # "mug" twice against "cup" and "bowl"
-    assert repeats.agreement == pytest.approx((1 + 0.5 + 0.5) / 3)
+    assert repeats.agreement == pytest.approx((1 + 0.5 + 2 / 3) / 3)
     assert repeats.variance_within == pytest.approx((1 / 3) / 3)  # of 0, 1, 1, 0: a third
     noise = (1 / 3 / 4) / 3
     assert repeats.variance_between == pytest.approx(0.25 - noise)

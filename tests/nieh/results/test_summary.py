@@ -67,12 +67,14 @@ def test_a_column_without_a_question_has_no_score():
     assert (alone.stderr, alone.low, alone.high, alone.bootstrap) == (None, None, None, None)
 
 
-def test_a_failed_question_counts_as_wrong_and_is_named():
+def test_a_failed_question_is_in_no_score_and_is_named():
     result = summarise(
         make_config(), [make_record(0, "mug"), make_record(1, None, failure="too long")]
     ).tasks["nieh_gt"]
-    assert result.by_clues["total"].scores["strict"].mean == 0.5
-    assert result.by_clues["total"].n_failed == 1
+    assert result.total.scores["strict"].mean == 1.0
+    assert (result.n, result.total.n_failed, result.total.n_answered) == (2, 1, 1)
+    assert result.below_full_marks["strict"] == []
+    assert result.skipped.mean_counting_them_wrong["strict"] == 0.5
     assert [(failure.question, failure.reason) for failure in result.failures] == [
         ("q1", "too long")
     ]

@@ -14,7 +14,7 @@ def clues_lines(*runs):
 
 
 def lines(table):
-    console = Console(width=200, record=True, file=open("/dev/null", "w"))  # noqa: SIM115, PTH123
+    console = Console(width=300, record=True, file=open("/dev/null", "w"))  # noqa: SIM115, PTH123
     print_table(table, console)
     return [line.split() for line in console.export_text().splitlines()]
 
@@ -50,14 +50,13 @@ def test_a_row_has_every_column_of_the_table():
         "run",
         "nieh_gt",
         "strict",
-        *("75.00", "(8)", "100.00", "(1)", "0.00", "(1)"),
-        "70.00",
+        *("75.00", "(8)", "100.00", "(1)", "none", "answered", "(1)"),
+        *("77.78", "of", "9", "answered"),
         *intervals,
-        *("70.00", "(10)"),
-        *("-", "-"),
+        *("77.78", "of", "9", "answered", "(10)"),
+        "-",
         "10",
-        "1",
-        "1",
+        *("1", "1", "0"),
     ]
 
 
@@ -78,7 +77,7 @@ def test_a_leaning_to_yes_and_the_form_of_replies_have_a_table():
     ]
     (row,) = [row for row in table.rows if row.cells[0] == "a run"]
     assert row.cells == (
-        *("a run", "nieh_gt", "4", "25.0", "25.0", "25.0"),  # 50 tokens of two right answers
+        *("a run", "nieh_gt", "3", "33.3", "33.3", "25.0"),  # 50 tokens of two right answers
         "1 cut off at the token limit, 1 empty, 1 neither yes nor no, 1 no number",
     )
 
@@ -222,7 +221,7 @@ def test_the_interval_of_a_gain_is_that_of_the_comparison_of_both_runs():
         (row,) = [row for row in table.rows if row.cells[2] == compared.metric]
         estimate = compared.difference.estimate
         assert row.cells[6:8] == (
-            f"{100 * estimate.mean:+.2f}",
+            f"{100 * estimate.mean:+.2f} of 37 answered",
             f"[{100 * estimate.low:+.2f}, {100 * estimate.high:+.2f}]",
         )
 

@@ -72,17 +72,18 @@ def test_an_excluded_plan_is_left_out_of_all_runs_and_counted():
     assert any(note.endswith("refuses their expert: 1") for note in curves.notes)
 
 
-def test_failed_plans_and_those_not_come_to_earn_nothing_and_are_counted():
+def test_plans_without_a_result_are_left_out_and_those_not_come_to_earn_nothing():
     records = [
         make_plan_record("a", 0, (0, 10), 1.0),
         make_plan_record("a", 1, (10, 20), 9.0, failure="out of memory"),
         make_plan_record("a", 2, (20, 40), ended=NOT_ATTEMPTED),
     ]
     curves = plan_curves([make_plans_run("m", records)])
-    assert means(curve_of(curves, "m")) == [0, 1, 1, 1]
-    assert curve_of(curves, "m").places == (0, 10, 20, 40)
+    assert means(curve_of(curves, "m")) == [0, 1, 1]
+    assert curve_of(curves, "m").places == (0, 10, 40)
     run = curves.runs[0]
-    assert run.counts == {"plans": 3, "failed": 1, "not attempted": 1}
+    assert run.counts == {"plans": 2, "not attempted": 1}
+    assert "left out, as they failed or were not asked in a run: 1" in curves.notes
     assert curves.n_trajectories == 1
     assert curve_of(curves, "m").end.low is None
     assert "a mean over one trajectory has no interval" in curves.notes

@@ -58,7 +58,7 @@ def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
         "of puts",
         "at step",
     ]
-    assert [column.name for column in table.columns] == [*names, "episodes", "failed"]
+    assert [column.name for column in table.columns] == [*names, "episodes"]
     assert table.rows[1].cells == (
         "run 1",
         "4.00",
@@ -68,7 +68,6 @@ def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
         "2.00",
         "1",
         "4",
-        "0",
     )
 
 
@@ -88,7 +87,7 @@ def test_success_by_radius_is_drawn_with_its_floor(tmp_path):
     with Image.open(tmp_path / "one.png") as picture:
         assert min(picture.size) > 300
     table = radii_table(curves)
-    assert [column.name for column in table.columns][2:] == ["0.1 m", "0.5 m", "episodes", "failed"]
+    assert [column.name for column in table.columns][2:] == ["0.1 m", "0.5 m", "episodes"]
     assert [row.cells[:2] for row in table.rows] == [
         ("m", "Pick-up"),
         ("planner-arm", "Pick-up"),

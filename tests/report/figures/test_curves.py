@@ -118,7 +118,6 @@ def test_the_table_has_the_ends():
         "300",
         "12",
         "0",
-        "0",
     )
     assert table.rows[-1].cells[:4] == ("planner", "12.00", "[2.06, 21.94]", "100.0")
     assert table.rows[1].cells[5] == "-"

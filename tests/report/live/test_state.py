@@ -55,7 +55,7 @@ def test_what_is_appended_is_seen_and_summed_up(live, open_journal) -> None:
     assert [(sample.id, sample.reason) for sample in second.failures] == [("q2", "m fails")]
     assert second.totals.reasons == (("m fails", 1),)
     (rate,) = second.metrics.values()
-    assert (rate.mean, rate.n) == (pytest.approx(1 / 3), 3)
+    assert (rate.mean, rate.n, rate.n_all) == (0.5, 2, 8)
 
 
 def test_the_metrics_at_the_end_are_those_of_the_results(run_cli, tmp_path, make_nieh_set) -> None:

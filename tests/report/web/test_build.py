@@ -136,7 +136,7 @@ def test_a_run_that_was_stopped_and_has_failures_says_so(make_page, nieh_runs, t
     (table,) = next(section.tables for section in page.sections if section.key == "left-out")
     facts = {row.cells[2]: row.cells[3:] for row in table.rows}
     assert facts["failed"] == ("1", "the frame is gone")
-    assert facts["not attempted"][0] == "3"
+    assert facts["not asked"][0] == "3"
     assert sum(sample.results[0].outcome == "failed" for sample in page.samples) == 1
 
 

@@ -221,7 +221,7 @@ def test_journals_of_other_formats_are_refused_in_one_line(tmp_path):
     with pytest.raises(DataError, match="journal is of format 1, this version reads 3") as caught:
         read_header(tmp_path)
     assert "\n" not in str(caught.value)
-    with pytest.raises(DataError, match="no journal in it"):
+    with pytest.raises(DataError, match="no such folder"):
         read_header(tmp_path / "nowhere")
     shard(tmp_path).parent.mkdir()
     for version in (2, 99):

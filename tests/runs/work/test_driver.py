@@ -216,8 +216,7 @@ def test_a_programming_error_is_counted_and_told_at_the_end(tmp_path, capfd):
     output, error_text = capfd.readouterr()
     assert ["adder", "2"] in [line.split() for line in output.splitlines()]
     assert (
-        "sums: 2 sample(s) failed, counted as wrong: ZeroDivisionError in test_driver.py:"
-        in error_text
+        "sums: 2 sample(s) failed, in no score: ZeroDivisionError in test_driver.py:" in error_text
     )
     assert "Traceback" not in error_text
 
@@ -327,8 +326,8 @@ def test_a_killed_command_goes_on_and_shows_progress_table_results_and_export(tm
     assert again.returncode == 1, error_text  # a group failed
     assert "adder: 3 evaluated now, 1 resumed from the journal" in error_text
     assert "sums: 1 sample(s) skipped: nothing to add" in error_text
-    assert "sums: 2 sample(s) failed, counted as wrong: the abacus is broken" in error_text
-    assert ["adder", "2"] in [line.split() for line in output.splitlines()]
+    assert "sums: 2 sample(s) failed, in no score: the abacus is broken" in error_text
+    assert ["adder", "(incomplete)", "2"] in [line.split() for line in output.splitlines()]
     (folder,) = (tmp_path / "adder").iterdir()
     results = json.loads((folder / "results.json").read_text())
     assert (results["suite"], results["summary"]["numbers"]) == ("toy", [2, 2])
@@ -337,8 +336,8 @@ def test_a_killed_command_goes_on_and_shows_progress_table_results_and_export(tm
     assert [(row["target"], row["right"]) for row in rows] == [
         ("4", 1.0),
         ("5", 1.0),
-        ("5", 0.0),
-        ("6", 0.0),
+        ("5", None),
+        ("6", None),
     ]
 
 
@@ -358,6 +357,13 @@ def test_a_subject_that_cannot_do_what_the_suite_needs_is_refused(tmp_path, monk
         match="arm cannot be evaluated on toy, which needs a model that answers in words",
     ):
         run(request(tmp_path, model="arm"))
+
+
+def test_a_file_that_may_be_meant_by_an_unknown_name_is_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("edge.py").touch()
+    with pytest.raises(UsageError, match=r"in \./edge\.py is meant, give --model edge\.py:CLASS"):
+        prepare(request(tmp_path, model="edge"), ToySuite())
 
 
 def test_unknown_names_and_options_are_refused_before_anything_is_done(tmp_path):

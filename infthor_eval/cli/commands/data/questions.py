@@ -77,25 +77,28 @@ def questions(
 
     Exit code 1 if a trajectory of the set cannot be read.
     """
+    from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.errors import wrap_errors
     from infthor_eval.formats.qa_csv import encode_questions
     from infthor_eval.generation.questions.generate import generate_questions
     from infthor_eval.storage.files import prepare_file, refuse_overwrite, write_atomically
-    from infthor_eval.terminal import error_console, print_line
+    from infthor_eval.terminal import error_console, print_line, progress_bar
 
     worker_settings = parse_worker_settings(**workers)
     prepare_file(out)
     notes = error_console()
-    result = generate_questions(
-        folder,
-        seed=seed,
-        per_trajectory=per_trajectory,
-        share=min_share,
-        further=further,
-        published_words=words == "published",
-        worker_settings=worker_settings,
-        say=notes.print,
-    )
+    with progress_bar(notes) as progress:
+        result = generate_questions(
+            folder,
+            seed=seed,
+            per_trajectory=per_trajectory,
+            share=min_share,
+            further=further,
+            published_words=words == "published",
+            worker_settings=worker_settings,
+            say=notes.print,
+            begin=lambda part, n: PacedBar(progress, part, n).advance,
+        )
     content = encode_questions(result.questions)
     if not overwrite:
         refuse_overwrite(out, content)

@@ -1,10 +1,12 @@
 """`infthor-eval validate`: keep the questions of a set that one of several models can answer."""
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
 import click
+from msgspec.structs import replace
 
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.run import RunOptions
@@ -157,6 +159,12 @@ def _model_names(outcomes: Sequence[RunOutcome]) -> list[str]:
 def _summarise_kept(outcome: RunOutcome, verdicts: Verdicts) -> RunSummary:
     """The run's summary on the questions that are kept."""
     kept = {verdict.question.id for verdict in verdicts.kept}
-    header = outcome.summary.header
     records = [record for record in outcome.records if record.id in kept]
-    return RunSummary(header, outcome.run.suite.summarise(header, records))
+    header = outcome.summary.header
+    n_kept = Counter(record.task for record in records)
+    tasks = {
+        name: replace(task, n_samples=n_kept[name]) for name, task in header.config.tasks.items()
+    }
+    config = replace(header.config, tasks=tasks)
+    header = replace(header, config=config, n_units=len(records), units_by_task=dict(n_kept))
+    return RunSummary.of(outcome.run.suite, header, records)
