@@ -1,0 +1,209 @@
+"""The exploration of one kind: each fault at each of its calls, then the same command again."""
+
+import os
+import shutil
+import signal
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fault_explorer.control import CallKind, Control, Fault
+from fault_explorer.forks import Ended, Forks, Place
+from fault_explorer.kinds import Kind
+from fault_explorer.trees import Tree, difference, read_tree
+
+__all__ = ["Cut", "Exploration", "explore"]
+
+_BESIDE_S = 1.0  # that another process has while the first stands still
+_SHARED_MEMORY = Path("/dev/shm")
+_TOLD = 2  # exit code of a command that says in one line why not
+_ENDS = (0, 1, _TOLD)
+
+
+@dataclass(frozen=True)
+class Cut:
+    """One fault at one call, and what came of it.
+
+    Attributes:
+        call: name and path of the call.
+        problem: what was lost, or left behind; None if nothing.
+        told: whether the same command then said in one line why it cannot go on.
+    """
+
+    fault: Fault
+    at: int
+    call: str
+    problem: str | None = None
+    told: str | None = None
+
+
+@dataclass
+class Exploration:
+    """All cuts of a kind."""
+
+    kind: str
+    calls: list[CallKind]
+    cuts: list[Cut] = field(default_factory=list)
+    seconds: float = 0.0
+
+    @property
+    def lost(self) -> list[Cut]:
+        return [cut for cut in self.cuts if cut.problem is not None]
+
+    @property
+    def told(self) -> list[Cut]:
+        return [cut for cut in self.cuts if cut.problem is None and cut.told is not None]
+
+    def by_fault(self) -> Counter[Fault]:
+        return Counter(cut.fault for cut in self.cuts)
+
+
+class _LostError(Exception):
+    """Something was lost, or is left behind."""
+
+
+class _Explorer:
+    def __init__(self, kind: Kind, place: Place, control: Control) -> None:
+        self._kind = kind
+        self._place = place
+        self._control = control
+        self._forks = Forks(place, control)
+        self._expected: Tree = {}
+        self._shared = set(os.listdir(_SHARED_MEMORY))
+
+    def prepare(self) -> list[CallKind]:
+        """Make the inputs, import what is needed, and return the calls of an uncut run."""
+        for words in self._kind.inputs(self._place):
+            _require(self._forks.run(words), (0,))
+        self._start_anew()
+        self._forks.import_for(self._words())
+        self._start_anew()
+        ended = self._forks.run(self._words())
+        _require(ended, (0, 1))
+        calls = self._control.calls()
+        self._expected = read_tree(self._place.out)
+        self._start_anew()
+        _require(self._forks.run(self._words()), (ended.code,))
+        problem = difference(self._expected, read_tree(self._place.out))
+        if problem is not None or self._control.calls() != calls:
+            raise SystemExit(f"{self._kind.name}: two uncut runs differ: {problem or 'their calls'}")
+        self._code = ended.code
+        return calls
+
+    def cut(self, fault: Fault, at: int) -> Cut:
+        """Let one call fail, and run the command again."""
+        self._start_anew()
+        call = told = problem = None
+        try:
+            if fault is Fault.PAUSE:
+                self._run_two(at)
+            else:
+                self._check_cut(self._forks.run(self._words(), fault, at), fault)
+            call = self._control.failed_call
+            again = self._forks.run(self._words())
+            told = self._check_again(again)
+            self._check_leavings(again)
+        except _LostError as lost:
+            problem = str(lost)
+        return Cut(fault, at, call or self._control.failed_call, problem, told)
+
+    def _words(self) -> Sequence[str | Path]:
+        return self._kind.words(self._place)
+
+    def _start_anew(self) -> None:
+        shutil.rmtree(self._place.out, ignore_errors=True)
+        if self._kind.start is None:
+            self._place.out.mkdir()
+        else:
+            shutil.copytree(self._place.inputs / self._kind.start, self._place.out)
+        self._forks.clear_temporary()
+
+    def _check_cut(self, ended: Ended, fault: Fault) -> None:
+        """Hold the cut run to what it is to do: die, or say in one line what is wrong."""
+        if fault in (Fault.KILL, Fault.TORN):
+            if not ended.was_killed and self._control.failed_call:
+                raise _LostError(f"was not killed: {ended.code}")
+            return
+        self._check_end(ended, "the cut run")
+        if ended.code == self._code:
+            problem = difference(self._expected, read_tree(self._place.out))
+            if problem is not None:
+                raise _LostError(f"ended well, but {problem}")
+
+    def _check_end(self, ended: Ended, who: str) -> None:
+        if ended.hung:
+            raise _LostError(f"{who} hangs")
+        if "Traceback" in ended.said:
+            raise _LostError(f"{who} ends with a traceback: {ended.last_line}")
+        if ended.code not in _ENDS:
+            raise _LostError(f"{who} ends with {ended.code}: {ended.last_line}")
+        if ended.orphans:
+            raise _LostError(f"{who} leaves {ended.orphans} processes")
+
+    def _check_again(self, again: Ended) -> str | None:
+        """Return the line of a refusal; None if all is as after an uncut run."""
+        self._check_end(again, "the next run")
+        if again.code == _TOLD and again.code != self._code:
+            return again.last_line
+        if again.code != self._code:
+            raise _LostError(f"the next run ends with {again.code}: {again.last_line}")
+        problem = difference(self._expected, read_tree(self._place.out))
+        if problem is not None:
+            raise _LostError(problem)
+        return None
+
+    def _check_leavings(self, again: Ended) -> None:
+        left = sorted(path.name for path in self._place.temporary.iterdir())
+        if left:
+            raise _LostError(f"left in the temporary folder: {', '.join(left)}")
+        left = sorted(set(os.listdir(_SHARED_MEMORY)) - self._shared)
+        if left:
+            raise _LostError(f"left in shared memory: {', '.join(left)}")
+
+    def _run_two(self, at: int) -> None:
+        """Run the command twice at once: one stands still at a call while the other goes."""
+        said = [self._place.root / f"said-{number}.txt" for number in (1, 2)]
+        first = self._forks.start(self._words(), said[0], Fault.PAUSE, at)
+        paused = self._forks.wait_until_paused(first)
+        second = self._forks.start(self._words(), said[1], is_watched=False)
+        time.sleep(_BESIDE_S if paused else 0)
+        if paused:
+            os.kill(first, signal.SIGCONT)
+        ended = self._forks.wait_all({first: said[0], second: said[1]})
+        for each, who in zip(ended, ("the first", "the second"), strict=True):
+            self._check_end(each, who)
+        if self._code not in (each.code for each in ended):
+            raise _LostError(f"of two, none ends well: {ended[0].last_line} / {ended[1].last_line}")
+
+
+def _require(ended: Ended, codes: tuple[int, ...]) -> None:
+    if ended.code not in codes or "Traceback" in ended.said:
+        raise SystemExit(f"an uncut run ended with {ended.code}: {ended.said[-2000:]}")
+
+
+def explore(
+    kind: Kind, place: Place, control: Control, faults: Sequence[Fault], most: int | None = None
+) -> Iterator[Exploration]:
+    """Cut a kind of run; yields what is known so far after each cut.
+
+    Args:
+        faults: the faults.
+        most: cuts of each fault, at most, evenly over the calls; None for all.
+    """
+    began = time.monotonic()
+    explorer = _Explorer(kind, place, control)
+    result = Exploration(kind.name, explorer.prepare())
+    for fault in faults:
+        points = [at for at, call in enumerate(result.calls, 1) if fault.suits(call)]
+        for at in _evenly(points, most):
+            result.cuts.append(explorer.cut(fault, at))
+            result.seconds = time.monotonic() - began
+            yield result
+
+
+def _evenly(points: list[int], most: int | None) -> list[int]:
+    if most is None or len(points) <= most:
+        return points
+    return [points[number * len(points) // most] for number in range(most)]
