@@ -1,5 +1,7 @@
 """The exploration of one kind: each fault at each of its calls, then the same command again."""
 
+import gc
+import hashlib
 import os
 import shutil
 import signal
@@ -71,14 +73,22 @@ class _Explorer:
         self._control = control
         self._forks = Forks(place, control)
         self._expected: Tree = {}
+        self._seen: dict[str, str | None | _LostError] = {}
         self._shared = set(os.listdir(_SHARED_MEMORY))
 
     def prepare(self) -> list[CallKind]:
         """Make the inputs, import what is needed, and return the calls of an uncut run."""
+        if self._kind.simulates:
+            from fault_explorer.players import fork_players
+
+            fork_players()
+        self._kind.files(self._place.inputs)
         for words in self._kind.inputs(self._place):
             _require(self._forks.run(words), (0,))
         self._start_anew()
         self._forks.import_for(self._words())
+        gc.collect()
+        gc.freeze()  # or each fork would copy the pages of all objects
         self._start_anew()
         ended = self._forks.run(self._words())
         _require(ended, (0, 1))
@@ -102,12 +112,33 @@ class _Explorer:
             else:
                 self._check_cut(self._forks.run(self._words(), fault, at), fault)
             call = self._control.failed_call
-            again = self._forks.run(self._words())
-            told = self._check_again(again)
-            self._check_leavings(again)
+            told = self._go_on()
         except _LostError as lost:
             problem = str(lost)
         return Cut(fault, at, call or self._control.failed_call, problem, told)
+
+    def _go_on(self) -> str | None:
+        """Run the command again; return the line of a refusal.
+
+        From what an earlier cut has left already, it would do the same again.
+        """
+        state = self._state()
+        if state not in self._seen:
+            try:
+                self._seen[state] = self._check_again(self._forks.run(self._words()))
+                self._check_leavings()
+            except _LostError as lost:
+                self._seen[state] = lost
+        known = self._seen[state]
+        if isinstance(known, _LostError):
+            raise known
+        return known
+
+    def _state(self) -> str:
+        """Return a digest of all that the next run finds."""
+        temporary = sorted(path.name[:9] for path in self._place.temporary.iterdir())
+        tree = read_tree(self._place.out)
+        return hashlib.sha256(repr((temporary, sorted(tree.items()))).encode()).hexdigest()
 
     def _words(self) -> Sequence[str | Path]:
         return self._kind.words(self._place)
@@ -154,7 +185,7 @@ class _Explorer:
             raise _LostError(problem)
         return None
 
-    def _check_leavings(self, again: Ended) -> None:
+    def _check_leavings(self) -> None:
         left = sorted(path.name for path in self._place.temporary.iterdir())
         if left:
             raise _LostError(f"left in the temporary folder: {', '.join(left)}")

@@ -1,5 +1,7 @@
 """Kinds of runs: what each needs, and its command. All are as small as they can be."""
 
+import csv
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +12,9 @@ __all__ = ["KINDS", "Kind", "Words"]
 
 Words = tuple[str | Path, ...]
 
+_SET = Path("infthor_eval", "sets", "nieh_mini")
+_N_REPLIES = 3
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -18,30 +23,125 @@ class Kind:
     Attributes:
         name: its name in the table.
         words: the command, given the place.
-        inputs: commands that make its inputs first; they write into the place's `inputs`.
-        start: folder within `inputs` that is there, in `out`, before the command; None for none.
+        inputs: commands that make its inputs first, in the place's `inputs`.
+        files: writes files there before.
+        start: folder there that is copied to `out` before each run; None for none.
+        simulates: whether it starts simulators.
     """
 
     name: str
     words: Callable[[Place], Words]
     inputs: Callable[[Place], tuple[Words, ...]] = lambda _: ()
+    files: Callable[[Path], None] = lambda _: None
     start: str | None = None
+    simulates: bool = False
 
 
-def _generate(place: Place) -> Words:
-    words: Words = ("generate", "--scene", "kitchen-1", "--min-steps", "1", "--min-subgoals", "1")
-    return (*words, "--out", place.inputs / "trajectories")
+def _run(place: Place, model: str, task: str, *more: str | Path) -> Words:
+    command = ("run", "--quiet", "--output", place.out / "runs", "--model", model)
+    return (*command, "--tasks", task, *more)
 
 
-def _replay(place: Place) -> Words:
-    return ("replay", place.inputs / "trajectories", "--out", place.inputs / "set")
+def _generate(folder: Path) -> Words:
+    command = ("generate", "--scene", "bathroom-3", "--min-steps", "1", "--min-subgoals", "1")
+    return (*command, "--out", folder / "trajectories")
 
 
-_RUN: Words = ("run", "--quiet", "--output")
+def _trajectory(place: Place) -> tuple[Words, ...]:
+    return (_generate(place.inputs),)
+
+
+def _replay(place: Place, folder: Path) -> Words:
+    return ("replay", place.inputs / "trajectories", "--out", folder / "set")
+
+
+def _replayed(place: Place) -> tuple[Words, ...]:
+    return (*_trajectory(place), _replay(place, place.inputs))
+
+
+def _twins(place: Place, *more: str) -> Words:
+    command = ("twins", place.inputs / "trajectories", "--out", place.out / "twins")
+    return (*command, "--kinds", "move", "--per-kind", "1", *more)
+
+
+def _write_replies(folder: Path) -> None:
+    """Write a log of replies to questions of the bundled set."""
+    (questions,) = _bundled_set().glob("qa_set*.csv")
+    with questions.open(newline="") as file:
+        ids = [row["question_id"] for row, _ in zip(csv.DictReader(file), range(_N_REPLIES))]
+    rows = [json.dumps({"question_id": name, "reply": "yes"}) for name in ids]
+    (folder / "replies.jsonl").write_text("\n".join(rows) + "\n")
+
+
+def _bundled_set() -> Path:
+    return Path(__file__).parents[2] / _SET
+
+
+def _asked(place: Place) -> tuple[Words, ...]:
+    command = ("run", "--quiet", "--output", place.inputs, "--model", "oracle")
+    return ((*command, "--tasks", "nieh_mini_gt", "--limit", "2"),)
+
+
+def _report(place: Place) -> Words:
+    runs = sorted((place.inputs / "oracle").iterdir())
+    return ("report", *runs, "--out", place.out / "report.html")
+
+
+def _train(place: Place) -> Words:
+    command = ("train", "--recipe", "questions", "--model", "qwen2.5-vl-tiny", "--data")
+    steps = ("--set", "max_steps=2", "--set", "save_every=1")
+    return (*command, _bundled_set(), *steps, "--out", place.out / "training")
+
 
 KINDS = (
+    Kind("questions", lambda place: _run(place, "oracle", "nieh_mini_gt", "--limit", "2")),
     Kind(
-        "questions",
-        lambda place: (*_RUN, place.out / "runs", "--model", "qwen2.5-vl-tiny", "--tasks", "nieh_mini_gt", "--limit", "2"),
+        "questions, model",
+        lambda place: _run(place, "qwen2.5-vl-tiny", "nieh_mini_gt", "--limit", "2"),
     ),
+    Kind(
+        "plans",
+        lambda place: _run(
+            place, "scripted", "infthor_plans", "--data", place.inputs / "trajectories"
+        ),
+        _trajectory,
+        simulates=True,
+    ),
+    Kind(
+        "arms",
+        lambda place: _run(
+            place, "planner-arm", "manipulathor_pickup", "--data", place.inputs / "trajectories"
+        ),
+        _trajectory,
+        simulates=True,
+    ),
+    Kind("generate", lambda place: _generate(place.out), simulates=True),
+    Kind("replay", lambda place: _replay(place, place.out), _trajectory, simulates=True),
+    Kind(
+        "making questions",
+        lambda place: ("questions", place.out, "--out", place.out / "qa_set_new.csv"),
+        _replayed,
+        start="set",
+        simulates=True,
+    ),
+    Kind("twins", _twins, _trajectory, simulates=True),
+    Kind("final twins", lambda place: _twins(place, "--final-tasks"), _trajectory, simulates=True),
+    Kind(
+        "import-replies",
+        lambda place: (
+            *("import-replies", place.inputs / "replies.jsonl", "--data", _bundled_set()),
+            *("--model", "theirs", "--output", place.out / "runs"),
+        ),
+        files=_write_replies,
+    ),
+    Kind("report", _report, _asked),
+    Kind(
+        "rescore",
+        lambda place: (
+            *("rescore", *sorted((place.inputs / "oracle").iterdir())),
+            *("--output", place.out / "runs"),
+        ),
+        _asked,
+    ),
+    Kind("train", _train),
 )
