@@ -107,10 +107,15 @@ class Control:
         return os.environ | {"LD_PRELOAD": str(library), _VARIABLE: str(path)}
 
     @staticmethod
-    def leave_environment() -> None:
-        """Keep the shim from the processes that this one starts."""
-        for name in ("LD_PRELOAD", _VARIABLE):
-            os.environ.pop(name, None)
+    def is_in_environment() -> bool:
+        """Return whether the shim is loaded into this process."""
+        return _VARIABLE in os.environ
+
+    @staticmethod
+    def leave_environment() -> Path:
+        """Keep the shim from the processes that this one starts; returns the mapped file."""
+        os.environ.pop("LD_PRELOAD")
+        return Path(os.environ.pop(_VARIABLE))
 
     def watch(self, folder: Path, fault: Fault | None = None, at: int = 0) -> None:
         """Count the calls of this process below a folder; the fault comes at the call `at`."""

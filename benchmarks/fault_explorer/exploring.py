@@ -6,7 +6,6 @@ import os
 import shutil
 import signal
 import time
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,8 +17,7 @@ from fault_explorer.trees import Tree, difference, read_tree
 
 __all__ = ["Cut", "Exploration", "explore"]
 
-_BESIDE_S = 1.0  # that another process has while the first stands still
-_SHARED_MEMORY = Path("/dev/shm")
+_BESIDE_S = 3.0  # that another process has, at most, while the first stands still
 _TOLD = 2  # exit code of a command that says in one line why not
 _ENDS = (0, 1, _TOLD)
 
@@ -30,36 +28,33 @@ class Cut:
 
     Attributes:
         call: name and path of the call.
-        problem: what was lost, or left behind; None if nothing.
-        told: whether the same command then said in one line why it cannot go on.
+        lost: what was lost, or left behind; None if nothing.
+        told: why the same command does not go on, in its own line; None if it did.
     """
 
     fault: Fault
     at: int
     call: str
-    problem: str | None = None
+    lost: str | None = None
     told: str | None = None
 
 
 @dataclass
 class Exploration:
-    """All cuts of a kind."""
+    """What is known of a kind.
+
+    Attributes:
+        calls: what each call of an uncut run does.
+        cuts: all cuts so far.
+        n_states: number of different states that they left, from each of which the command was
+            run again.
+    """
 
     kind: str
     calls: list[CallKind]
     cuts: list[Cut] = field(default_factory=list)
+    n_states: int = 0
     seconds: float = 0.0
-
-    @property
-    def lost(self) -> list[Cut]:
-        return [cut for cut in self.cuts if cut.problem is not None]
-
-    @property
-    def told(self) -> list[Cut]:
-        return [cut for cut in self.cuts if cut.problem is None and cut.told is not None]
-
-    def by_fault(self) -> Counter[Fault]:
-        return Counter(cut.fault for cut in self.cuts)
 
 
 class _LostError(Exception):
@@ -73,8 +68,8 @@ class _Explorer:
         self._control = control
         self._forks = Forks(place, control)
         self._expected: Tree = {}
-        self._seen: dict[str, str | None | _LostError] = {}
-        self._shared = set(os.listdir(_SHARED_MEMORY))
+        self._seen: dict[str, str | _LostError | None] = {}
+        self._shared = _shared_memory()
 
     def prepare(self) -> list[CallKind]:
         """Make the inputs, import what is needed, and return the calls of an uncut run."""
@@ -98,24 +93,33 @@ class _Explorer:
         _require(self._forks.run(self._words()), (ended.code,))
         problem = difference(self._expected, read_tree(self._place.out))
         if problem is not None or self._control.calls() != calls:
-            raise SystemExit(f"{self._kind.name}: two uncut runs differ: {problem or 'their calls'}")
+            raise SystemExit(
+                f"{self._kind.name}: two uncut runs differ: {problem or 'their calls'}"
+            )
         self._code = ended.code
         return calls
+
+    @property
+    def n_states(self) -> int:
+        """Number of different states that were left so far."""
+        return len(self._seen)
 
     def cut(self, fault: Fault, at: int) -> Cut:
         """Let one call fail, and run the command again."""
         self._start_anew()
-        call = told = problem = None
+        told = lost = None
+        call = ""
         try:
             if fault is Fault.PAUSE:
                 self._run_two(at)
             else:
-                self._check_cut(self._forks.run(self._words(), fault, at), fault)
-            call = self._control.failed_call
+                ended = self._forks.run(self._words(), fault, at)
+                call = self._control.failed_call
+                self._check_cut(ended, fault)
             told = self._go_on()
-        except _LostError as lost:
-            problem = str(lost)
-        return Cut(fault, at, call or self._control.failed_call, problem, told)
+        except _LostError as error:
+            lost = str(error)
+        return Cut(fault, at, call, lost, told)
 
     def _go_on(self) -> str | None:
         """Run the command again; return the line of a refusal.
@@ -170,6 +174,8 @@ class _Explorer:
             raise _LostError(f"{who} ends with a traceback: {ended.last_line}")
         if ended.code not in _ENDS:
             raise _LostError(f"{who} ends with {ended.code}: {ended.last_line}")
+        if ended.code == _TOLD and not ended.last_line.startswith("infthor-eval: "):
+            raise _LostError(f"{who} does not say why it ends: {ended.last_line}")
         if ended.orphans:
             raise _LostError(f"{who} leaves {ended.orphans} processes")
 
@@ -189,7 +195,7 @@ class _Explorer:
         left = sorted(path.name for path in self._place.temporary.iterdir())
         if left:
             raise _LostError(f"left in the temporary folder: {', '.join(left)}")
-        left = sorted(set(os.listdir(_SHARED_MEMORY)) - self._shared)
+        left = sorted(_shared_memory() - self._shared)
         if left:
             raise _LostError(f"left in shared memory: {', '.join(left)}")
 
@@ -199,14 +205,18 @@ class _Explorer:
         first = self._forks.start(self._words(), said[0], Fault.PAUSE, at)
         paused = self._forks.wait_until_paused(first)
         second = self._forks.start(self._words(), said[1], is_watched=False)
-        time.sleep(_BESIDE_S if paused else 0)
         if paused:
+            self._forks.wait_a_while(second, _BESIDE_S)
             os.kill(first, signal.SIGCONT)
         ended = self._forks.wait_all({first: said[0], second: said[1]})
         for each, who in zip(ended, ("the first", "the second"), strict=True):
             self._check_end(each, who)
         if self._code not in (each.code for each in ended):
             raise _LostError(f"of two, none ends well: {ended[0].last_line} / {ended[1].last_line}")
+
+
+def _shared_memory() -> set[str]:
+    return {path.name for path in Path("/dev/shm").iterdir()}
 
 
 def _require(ended: Ended, codes: tuple[int, ...]) -> None:
@@ -230,6 +240,7 @@ def explore(
         points = [at for at, call in enumerate(result.calls, 1) if fault.suits(call)]
         for at in _evenly(points, most):
             result.cuts.append(explorer.cut(fault, at))
+            result.n_states = explorer.n_states
             result.seconds = time.monotonic() - began
             yield result
 

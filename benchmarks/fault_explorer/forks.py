@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fault_explorer.control import Control, Fault
-
 from infthor_eval.cli import main
 
 __all__ = ["Ended", "Forks", "Place"]
@@ -33,26 +32,23 @@ _HUNG = -1000
 
 @dataclass(frozen=True)
 class Place:
-    """The folders of an exploration.
-
-    Attributes:
-        out: what is cut; every run has this path, which is in some files.
-        inputs: what runs read.
-        temporary: TMPDIR.
-    """
+    """The folders of an exploration."""
 
     root: Path
 
     @property
     def out(self) -> Path:
+        """What is cut; every run has this path, which is in some files."""
         return self.root / "out"
 
     @property
     def inputs(self) -> Path:
+        """What runs read."""
         return self.root / "inputs"
 
     @property
     def temporary(self) -> Path:
+        """TMPDIR."""
         return self.root / "tmp"
 
 
@@ -117,7 +113,12 @@ class Forks:
                 importlib.import_module(name)
 
     def run(
-        self, words: Sequence[str], fault: Fault | None = None, at: int = 0, *, names: Path | None = None
+        self,
+        words: Sequence[str],
+        fault: Fault | None = None,
+        at: int = 0,
+        *,
+        names: Path | None = None,
     ) -> Ended:
         """Run a command to its end; its call `at` fails."""
         process = self.start(words, self._said, fault, at, names=names)
@@ -157,6 +158,14 @@ class Forks:
             ended = os.waitid(os.P_PID, process, os.WSTOPPED | os.WEXITED | os.WNOWAIT)
             if ended is not None:
                 return ended.si_code == os.CLD_STOPPED
+
+    def wait_a_while(self, process: int, seconds: float) -> None:
+        """Wait for the end of a process, but not for long."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            if os.waitid(os.P_PID, process, os.WEXITED | os.WNOWAIT | os.WNOHANG) is not None:
+                return
+            time.sleep(_POLL_S)
 
     def wait(self, process: int, said: Path) -> Ended:
         """Wait for the end of a command, and of what it started."""
@@ -212,7 +221,7 @@ def _exit_code(words: Sequence[str]) -> int:
         main([str(word) for word in words])
     except SystemExit as ended:
         return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
-    except BaseException:
+    except BaseException:  # noqa: BLE001 - as Python ends with whatever it is
         traceback.print_exc()
         return 1
     finally:

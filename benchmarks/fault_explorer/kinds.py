@@ -1,12 +1,13 @@
 """Kinds of runs: what each needs, and its command. All are as small as they can be."""
 
-import csv
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from fault_explorer.forks import Place
+from infthor_eval.formats.qa_csv import read_questions
+from infthor_eval.formats.question import Question
 
 __all__ = ["KINDS", "Kind", "Words"]
 
@@ -66,9 +67,8 @@ def _twins(place: Place, *more: str) -> Words:
 
 def _write_replies(folder: Path) -> None:
     """Write a log of replies to questions of the bundled set."""
-    (questions,) = _bundled_set().glob("qa_set*.csv")
-    with questions.open(newline="") as file:
-        ids = [row["question_id"] for row, _ in zip(csv.DictReader(file), range(_N_REPLIES))]
+    questions = read_questions(next(_bundled_set().glob("qa_set*.csv")))
+    ids = [row.id for row in questions if isinstance(row, Question)][:_N_REPLIES]
     rows = [json.dumps({"question_id": name, "reply": "yes"}) for name in ids]
     (folder / "replies.jsonl").write_text("\n".join(rows) + "\n")
 

@@ -89,7 +89,7 @@ def _play(arguments: list[str], environment: Mapping[str, str], log: int) -> Non
         code = main(arguments)
     except SystemExit as ended:
         code = ended.code if isinstance(ended.code, int) else 1
-    except BaseException:
+    except BaseException:  # noqa: BLE001 - as Python ends with whatever it is
         traceback.print_exc()
     finally:
         sys.stdout.flush()

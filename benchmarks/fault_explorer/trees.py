@@ -55,7 +55,9 @@ def _journal(content: bytes) -> Any:
     lines = [json.loads(line) for line in content.splitlines()]
     records = [_without(line, _OF_A_TRY) for line in lines]
     last = {
-        json.dumps([record.get(key) for key in ("type", "task", "id", "variant", "repeat", "fingerprint")]): record
+        json.dumps(
+            [record.get(key) for key in ("type", "task", "id", "variant", "repeat", "fingerprint")]
+        ): record
         for record in records
     }
     return dict(sorted(last.items())), content.endswith(b"\n")

@@ -160,11 +160,12 @@ def refuse_overwrite(path: Path, content: bytes) -> None:
 
 
 @contextmanager
-def write_atomically(path: Path) -> Iterator[Path]:
+def write_atomically(path: Path, known_as: str | None = None) -> Iterator[Path]:
     """Write a file or folder under a temporary name beside `path`; rename it when it is complete.
 
     Args:
         path: the final path; an existing file is replaced, a folder must not exist.
+        known_as: name that is the same each time, if that of `path` has the time in it.
 
     Yields:
         The temporary path, at which nothing exists. After an error nothing remains there.
@@ -174,8 +175,9 @@ def write_atomically(path: Path) -> Iterator[Path]:
         OSError: the temporary path cannot be renamed.
     """
     # The name is fixed, so that what a killed process left is found and removed by the next one.
-    partial = path.with_name(f".{path.name}.partial")
-    with hold_lock(path.with_name(f".{path.name}{_LOCK}"), path, _WAIT_S):
+    name = known_as or path.name
+    partial = path.with_name(f".{name}.partial")
+    with hold_lock(path.with_name(f".{name}{_LOCK}"), path, _WAIT_S):
         remove(partial)
         try:
             yield partial

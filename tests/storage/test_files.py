@@ -73,6 +73,15 @@ def test_a_folder_appears_whole_and_leftovers_of_a_killed_process_are_gone(tmp_p
     assert not leftover.exists()
 
 
+def test_leftovers_are_found_by_the_next_writer_whose_name_has_another_time_in_it(tmp_path):
+    leftovers = tmp_path / ".results.partial", tmp_path / ".results.lock"
+    for leftover in leftovers:
+        leftover.touch()
+    with write_atomically(tmp_path / "results_12-30.json", "results") as partial:
+        partial.touch()
+    assert [item.name for item in tmp_path.iterdir()] == ["results_12-30.json"]
+
+
 def test_a_file_has_the_digest_of_its_content(tmp_path):
     path = tmp_path / "a.bin"
     path.write_bytes(b"content")
