@@ -13,6 +13,7 @@ import json
 import os
 import sys
 import tempfile
+import traceback
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -75,7 +76,7 @@ def _explore_all(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
     path = Control.leave_environment()
     for kind in [kind for kind in KINDS if kind.name in names]:
         folder = path.parent / kind.name
-        folder.mkdir()
+        (folder / "inputs").mkdir(parents=True)
         row = folder / "row.json"
         process = os.fork()
         if not process:
@@ -83,6 +84,10 @@ def _explore_all(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
             try:
                 row.write_text(json.dumps(_explore(kind, folder, Control(path), faults, options)))
                 code = 0
+            except SystemExit as error:
+                print(error, file=sys.stderr)
+            except Exception:  # noqa: BLE001 - as Python ends with it, which a fork does not reach
+                traceback.print_exc()
             finally:
                 sys.stderr.flush()
                 os._exit(code)

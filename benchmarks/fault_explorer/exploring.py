@@ -18,6 +18,13 @@ from fault_explorer.trees import Tree, difference, read_tree
 __all__ = ["Cut", "Exploration", "explore"]
 
 _BESIDE_S = 3.0  # that another process has, at most, while the first stands still
+# What does not depend on the call that it comes at: so many calls of each kind, evenly.
+_SPARSE = {
+    Fault.READ_ONLY: 12,
+    Fault.PAUSE: 12,
+    Fault.CLOCK_BACK: 3,
+    Fault.CLOCK_FORWARD: 3,
+}
 _TOLD = 2  # exit code of a command that says in one line why not
 _ENDS = (0, 1, _TOLD)
 
@@ -238,14 +245,15 @@ def explore(
     result = Exploration(kind.name, explorer.prepare())
     for fault in faults:
         points = [at for at, call in enumerate(result.calls, 1) if fault.suits(call)]
-        for at in _evenly(points, most):
+        limits = [limit for limit in (most, _SPARSE.get(fault)) if limit is not None]
+        for at in _evenly(points, min(limits, default=len(points))):
             result.cuts.append(explorer.cut(fault, at))
             result.n_states = explorer.n_states
             result.seconds = time.monotonic() - began
             yield result
 
 
-def _evenly(points: list[int], most: int | None) -> list[int]:
-    if most is None or len(points) <= most:
+def _evenly(points: list[int], most: int) -> list[int]:
+    if len(points) <= most:
         return points
     return [points[number * len(points) // most] for number in range(most)]
