@@ -13,6 +13,7 @@ import json
 import os
 import sys
 import tempfile
+import time
 import traceback
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -23,6 +24,7 @@ from fault_explorer.control import Control, Fault, NoCompilerError, compile_shim
 
 _FAULTS = {fault.name.lower().replace("_", "-"): fault for fault in Fault}
 _NO_COMPILER = 2
+_TELL_S = 60.0  # between two lines on how far it is
 # Libraries that start threads would lose them in a fork.
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
@@ -102,7 +104,11 @@ def _explore(
     from fault_explorer.exploring import explore
     from fault_explorer.forks import Place
 
+    told_at = time.monotonic()
     for known in explore(kind, Place(folder), control, faults, options.most):
+        if time.monotonic() > told_at + _TELL_S:
+            told_at = time.monotonic()
+            print(f"{kind.name}: {len(known.cuts)} of {known.n_points}", file=sys.stderr)
         cut = known.cuts[-1]
         if cut.lost or cut.told:
             what = f"LOST: {cut.lost}" if cut.lost else f"told: {cut.told}"
@@ -114,6 +120,7 @@ def _explore(
     return {
         "kind": kind.name,
         "calls": len(known.calls),
+        "possible": known.n_possible,
         "cuts": Counter(cut.fault.name for cut in known.cuts),
         "told": told,
         "lost": lost,
@@ -128,11 +135,19 @@ def _read(path: Path | None) -> dict[str, dict[str, Any]]:
 
 
 def _print_tables(rows: list[dict[str, Any]]) -> None:
-    print("| kind of run | calls | cut points | states | survived | told | lost | minutes |")
-    print("|---|---|---|---|---|---|---|---|")
+    print("| kind of run | calls | possible | cut | states | survived | told | lost | minutes |")
+    print("|---|---|---|---|---|---|---|---|---|")
     for row in rows:
         cuts, told, lost = (sum(row[name].values()) for name in ("cuts", "told", "lost"))
-        figures = (row["calls"], cuts, row["states"], cuts - told - lost, told, lost)
+        figures = (
+            row["calls"],
+            row["possible"],
+            cuts,
+            row["states"],
+            cuts - told - lost,
+            told,
+            lost,
+        )
         print(f"| {row['kind']} | {' | '.join(map(str, figures))} | {row['minutes']} |")
     print("\n| fault | cut points | survived | told | lost |\n|---|---|---|---|---|")
     for name, fault in _FAULTS.items():

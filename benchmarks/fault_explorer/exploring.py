@@ -20,8 +20,8 @@ __all__ = ["Cut", "Exploration", "explore"]
 _BESIDE_S = 3.0  # that another process has, at most, while the first stands still
 # What does not depend on the call that it comes at: so many calls of each kind, evenly.
 _SPARSE = {
-    Fault.READ_ONLY: 12,
-    Fault.PAUSE: 12,
+    Fault.READ_ONLY: 10,
+    Fault.PAUSE: 10,
     Fault.CLOCK_BACK: 3,
     Fault.CLOCK_FORWARD: 3,
 }
@@ -52,13 +52,17 @@ class Exploration:
 
     Attributes:
         calls: what each call of an uncut run does.
-        cuts: all cuts so far.
+        n_points: number of cuts to be made.
+        n_possible: that number with all faults, each at as many calls as it is to come at.
+        cuts: those so far.
         n_states: number of different states that they left, from each of which the command was
             run again.
     """
 
     kind: str
     calls: list[CallKind]
+    n_points: int = 0
+    n_possible: int = 0
     cuts: list[Cut] = field(default_factory=list)
     n_states: int = 0
     seconds: float = 0.0
@@ -243,14 +247,21 @@ def explore(
     began = time.monotonic()
     explorer = _Explorer(kind, place, control)
     result = Exploration(kind.name, explorer.prepare())
-    for fault in faults:
-        points = [at for at, call in enumerate(result.calls, 1) if fault.suits(call)]
-        limits = [limit for limit in (most, _SPARSE.get(fault)) if limit is not None]
-        for at in _evenly(points, min(limits, default=len(points))):
-            result.cuts.append(explorer.cut(fault, at))
-            result.n_states = explorer.n_states
-            result.seconds = time.monotonic() - began
-            yield result
+    points = [(fault, at) for fault in faults for at in _points(fault, result.calls, most)]
+    result.n_points = len(points)
+    result.n_possible = sum(len(_points(fault, result.calls, None)) for fault in Fault)
+    for fault, at in points:
+        result.cuts.append(explorer.cut(fault, at))
+        result.n_states = explorer.n_states
+        result.seconds = time.monotonic() - began
+        yield result
+
+
+def _points(fault: Fault, calls: Sequence[CallKind], most: int | None) -> list[int]:
+    """Return the numbers of the calls that a fault comes at."""
+    points = [at for at, call in enumerate(calls, 1) if fault.suits(call)]
+    limits = [limit for limit in (most, _SPARSE.get(fault)) if limit is not None]
+    return _evenly(points, min(limits, default=len(points)))
 
 
 def _evenly(points: list[int], most: int) -> list[int]:

@@ -6,6 +6,7 @@ Starting Python and importing torch would take seconds each time, and there are 
 import atexit
 import contextlib
 import ctypes
+import functools
 import importlib
 import os
 import shutil
@@ -19,7 +20,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fault_explorer.control import Control, Fault
+from infthor_eval import plugins
 from infthor_eval.cli import main
+from infthor_eval.runs import catalog
 
 __all__ = ["Ended", "Forks", "Place"]
 
@@ -95,6 +98,9 @@ class Forks:
         os.environ["TMPDIR"] = str(place.temporary)
         os.environ["XDG_CACHE_HOME"] = str(place.root / "cache")
         tempfile.tempdir = None
+        # What is installed, and the packaged task files, are read once and not in each fork.
+        plugins.entry_points = functools.cache(plugins.entry_points)
+        catalog.read_yaml = functools.cache(catalog.read_yaml)
         self.clear_temporary()
 
     def clear_temporary(self) -> None:

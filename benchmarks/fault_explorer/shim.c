@@ -2,7 +2,7 @@
  * makes one of them fail. Loaded by LD_PRELOAD; `control.py` writes what is to fail into a mapped
  * file, and reads there what was counted.
  *
- * A call is counted before it is made. What the C library does within itself (a buffered stdio
+ * A call is counted before it is made, and only if it changes something. What the C library does within itself (a buffered stdio
  * stream) cannot be seen; creation by fopen is. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -154,14 +154,38 @@ static void after_half(void)
         kill(getpid(), SIGKILL);
 }
 
+static int exists(const char *path)
+{
+    return faccessat(AT_FDCWD, path, F_OK, AT_SYMLINK_NOFOLLOW) == 0;
+}
+
+/* Whether a call changes anything: not to delete what is missing, to create what exists, or to
+ * create in a folder that is missing. */
+static int changes(enum kind kind, const char *path)
+{
+    if (kind == DELETE)
+        return exists(path);
+    if (kind != CREATE)
+        return 1;
+    char parent[LONGEST];
+    snprintf(parent, LONGEST, "%s", path);
+    char *end = strrchr(parent, '/');
+    if (end)
+        *end = '\0';
+    return !exists(path) && exists(parent);
+}
+
 static enum answer count_at(enum kind kind, const char *name, int folder, const char *path)
 {
     if (!is_watched() || !path)
         return MAKE;
+    int before = errno;
     inside = 1;
     char whole[LONGEST];
     path_at(folder, path, whole);
-    enum answer answer = count(kind, name, whole);
+    int counts = !strcmp(name, "open") || !strcmp(name, "fopen") || changes(kind, whole);
+    errno = before;
+    enum answer answer = counts ? count(kind, name, whole) : MAKE;
     inside = 0;
     return answer;
 }

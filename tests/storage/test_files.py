@@ -105,8 +105,10 @@ def test_what_another_process_writes_again_is_waited_for(tmp_path, monkeypatch):
     monkeypatch.setattr("infthor_eval.storage.files._WAIT_S", 0.0)
     path = tmp_path / "a.txt"
     path.touch()
-    with write_atomically(path), pytest.raises(UsageError, match="another process is writing it"):
-        is_written(path)
+    with write_atomically(path) as partial:
+        partial.touch()
+        with pytest.raises(UsageError, match="another process is writing it"):
+            is_written(path)
 
 
 def test_a_file_has_the_digest_of_its_content(tmp_path):
