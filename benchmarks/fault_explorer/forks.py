@@ -30,6 +30,7 @@ _LIMIT_S = 180.0  # of a run: longer is a hang
 _CHILDREN_S = 10.0  # after which what a run started must have ended
 _POLL_S = 0.005
 _SET_CHILD_SUBREAPER = 36  # of prctl
+_SET_PDEATHSIG = 1
 _HUNG = -1000
 
 
@@ -148,6 +149,7 @@ class Forks:
             return process
         code = 70
         try:
+            ctypes.CDLL(None).prctl(_SET_PDEATHSIG, signal.SIGKILL)  # one that stands still, too
             _write_into(said)
             if is_watched:
                 self._control.watch(self._place.out, fault, at)

@@ -60,6 +60,12 @@ def _replayed(place: Place) -> tuple[Words, ...]:
     return (*_trajectory(place), _replay(place, place.inputs))
 
 
+def _questioned(place: Place) -> tuple[Words, ...]:
+    folder = place.inputs / "set"
+    command = ("questions", folder, "--per-trajectory", "4", "--out", folder / "qa_set_new.csv")
+    return (*_replayed(place), command)
+
+
 def _twins(place: Place, *more: str) -> Words:
     command = ("twins", place.inputs / "trajectories", "--out", place.out / "twins")
     return (*command, "--kinds", "move", "--per-kind", "1", *more)
@@ -90,7 +96,7 @@ def _report(place: Place) -> Words:
 def _train(place: Place) -> Words:
     command = ("train", "--recipe", "questions", "--model", "qwen2.5-vl-tiny", "--data")
     steps = ("--set", "max_steps=2", "--set", "save_every=1")
-    return (*command, _bundled_set(), *steps, "--out", place.out / "training")
+    return (*command, place.inputs / "set", *steps, "--out", place.out / "training")
 
 
 KINDS = (
@@ -143,5 +149,5 @@ KINDS = (
         ),
         _asked,
     ),
-    Kind("train", _train),
+    Kind("train", _train, _questioned, simulates=True),
 )
