@@ -79,6 +79,13 @@ def _write_replies(folder: Path) -> None:
     (folder / "replies.jsonl").write_text("\n".join(rows) + "\n")
 
 
+def _write_manifest(folder: Path) -> None:
+    """Write the manifest of a set of one trajectory."""
+    trajectory = {"scene": "bathroom-3", "seed": 0, "min_steps": 1}
+    manifest = {"name": "small", "trajectories": [trajectory], "per_trajectory": 2}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+
+
 def _bundled_set() -> Path:
     return Path(__file__).parents[2] / _SET
 
@@ -148,6 +155,12 @@ KINDS = (
             *("--output", place.out / "runs"),
         ),
         _asked,
+    ),
+    Kind(
+        "bundle",
+        lambda place: ("bundle", place.inputs / "manifest.json", "--out", place.out / "bundle"),
+        files=_write_manifest,
+        simulates=True,
     ),
     Kind("train", _train, _questioned, simulates=True),
 )
