@@ -121,3 +121,30 @@ def test_without_a_compiler_one_line_says_so(control_module, monkeypatch, tmp_pa
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(control_module.NoCompilerError, match="no C compiler"):
         control_module.compile_shim(tmp_path)
+
+
+def test_trees_are_equal_but_for_times_and_differ_by_a_byte_a_name_or_half_a_line(
+    control_module, tmp_path
+):
+    trees = importlib.import_module("fault_explorer.trees")
+
+    def write(name: str, seconds: float, text: str = "yes", stamp: str = "2026-01-02") -> Path:
+        run = tmp_path / name
+        (run / "journal").mkdir(parents=True)
+        (run / "lm_eval" / "m").mkdir(parents=True)
+        unit = {"type": "unit", "task": "t", "id": "1", "seconds": seconds, "text": text}
+        (run / "journal" / "worker-0.jsonl").write_text(json.dumps(unit) + "\n")
+        (run / "lm_eval" / "m" / f"results_{stamp}T10-11-12.5.json").write_text('{"date": 1}')
+        return run
+
+    one = trees.read_tree(write("one", 1.0))
+    assert trees.difference(one, trees.read_tree(write("two", 2.0, stamp="2026-03-04"))) is None
+    other = write("three", 1.0, "no")
+    assert trees.difference(one, trees.read_tree(other)) == "journal/worker-0.jsonl differs"
+    torn = write("four", 1.0)
+    with (torn / "journal" / "worker-0.jsonl").open("a") as file:
+        file.write('{"type": "un')
+    assert trees.difference(one, trees.read_tree(torn)) == "journal/worker-0.jsonl differs"
+    more = write("five", 1.0)
+    (more / ".left.lock").touch()
+    assert trees.difference(one, trees.read_tree(more)) == ".left.lock is too many"
