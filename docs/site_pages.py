@@ -28,6 +28,7 @@ _OUTSIDE = {  # where a file lies in the repository: where its page stands in th
     "benchmarks/manipulation.md": "benchmarks/manipulation.md",
     "benchmarks/memories.md": "benchmarks/memories.md",
     "benchmarks/families.md": "benchmarks/families.md",
+    "benchmarks/faults.md": "benchmarks/faults.md",
     "benchmarks/plans.md": "benchmarks/plans.md",
     "benchmarks/rehearsal.md": "benchmarks/rehearsal.md",
     "benchmarks/simulator.md": "benchmarks/simulator.md",

@@ -27,7 +27,8 @@ class Controller(ai2thor.controller.Controller):
     It takes all arguments of ai2thor's, by position or by name. Those that choose a build, a screen
     or a transport have no effect: `local_executable_path`, `local_build`, `commit_id`, `branch`,
     `platform`, `x_display`, `gpu_device`, `server_class`, `start_unity`. It writes nothing to
-    `~/.ai2thor`, and its process ends with `stop`, with the context, or with Python.
+    `~/.ai2thor`, and its process ends with `stop`, with the context, or with Python, and so do its
+    temporary files, also where Python is killed.
     """
 
     def __init__(
@@ -82,7 +83,7 @@ class Controller(ai2thor.controller.Controller):
         """Return the command line of the simulator's process."""
         # ai2thor takes one from CUDA_VISIBLE_DEVICES, and would run vulkaninfo to find it.
         self.gpu_device = None
-        return own_player(super().unity_command(width, height, headless))
+        return own_player(super().unity_command(width, height, headless), self._files.name)
 
     def stop(self) -> None:
         """End the simulator's process and remove its files. Calling it again does nothing."""
@@ -91,8 +92,14 @@ class Controller(ai2thor.controller.Controller):
             server.stop()
             if server.unity_proc is not None:
                 server.unity_proc.wait()
-            server.tmp_dir.cleanup()
         self._files.cleanup()
+
+    def _build_server(self, *arguments: Any) -> None:
+        super()._build_server(*arguments)
+        # With all other files, so that the simulator can remove them if this process is killed.
+        self.server.tmp_dir.cleanup()
+        self.server.server_pipe_path = str(Path(self._files.name, "server.pipe"))
+        self.server.client_pipe_path = str(Path(self._files.name, "client.pipe"))
 
     def _start_unity_thread(self, *arguments: Any) -> None:
         super()._start_unity_thread(*arguments)

@@ -23,9 +23,14 @@ def player_command(data: Path | str | None = None, supplement: Path | str | None
     return shlex.join(words)
 
 
-def own_player(command: list[str]) -> list[str]:
+def own_player(command: list[str], files: Path | str | None = None) -> list[str]:
     """Return the command line of a simulator that this process starts, and that ends with it.
 
     Without it, a simulator whose Controller is killed while it imports would wait for ever.
+
+    Args:
+        command: the command line.
+        files: a temporary folder, which the simulator removes if this process is killed.
     """
-    return [*command, "--controller", str(os.getpid())]
+    owned = [*command, "--controller", str(os.getpid())]
+    return owned if files is None else [*owned, "--files", str(files)]

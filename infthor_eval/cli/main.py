@@ -25,6 +25,7 @@ from infthor_eval.errors import (
     unknown_name,
 )
 from infthor_eval.plugins import import_target
+from infthor_eval.storage.scratch import remove_abandoned
 from infthor_eval.terminal import print_error
 
 __all__ = ["main"]
@@ -163,6 +164,7 @@ def main(args: list[str] | None = None) -> None:
     output = sys.stdout
     try:
         with handle_signal(signal.SIGTERM, _raise_terminated), _collecting_seldom():
+            remove_abandoned()
             code = _infthor_eval.main(args, prog_name="infthor-eval", standalone_mode=False)
         # Here and not at Python's exit, so that a full disk is an error like any other.
         sys.stdout.flush()

@@ -75,10 +75,11 @@ def export(outcome: RunOutcome) -> Path:
     with wrap_errors(f"{folder}: cannot be written", hint):
         folder.mkdir(parents=True, exist_ok=True)
         for task, rows in converted.samples.items():
-            with write_atomically(folder / f"samples_{file_name(task)}_{stamp}.jsonl") as partial:
+            name = f"samples_{file_name(task)}"
+            with write_atomically(folder / f"{name}_{stamp}.jsonl", name) as partial:
                 lines = (json.dumps(row, ensure_ascii=False) + "\n" for row in rows)
                 partial.write_text("".join(lines), encoding="utf-8")
-        with write_atomically(folder / f"results_{stamp}.json") as partial:
+        with write_atomically(folder / f"results_{stamp}.json", "results") as partial:
             partial.write_text(
                 json.dumps(converted.results, indent=2, ensure_ascii=False), encoding="utf-8"
             )

@@ -7,7 +7,7 @@ from typing import Any
 import infthor_eval
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import read_json
-from infthor_eval.storage.files import write_atomically, writing_hint
+from infthor_eval.storage.files import is_written, write_atomically, writing_hint
 
 __all__ = ["FORMAT", "claim_for_simulator", "simulator_of"]
 
@@ -39,7 +39,7 @@ def claim_for_simulator(root: Path, simulator: str) -> None:
     """
     path = root / _FILE
     version = infthor_eval.__version__
-    if not path.exists():
+    if not is_written(path):
         info = {"format": FORMAT, "simulator": simulator, "infthor_eval": version}
         with (
             wrap_errors(f"{path}: cannot be written", writing_hint(", or give another folder")),

@@ -30,7 +30,7 @@ from infthor_eval.generation.twins.drafting import TwinSettings
 from infthor_eval.generation.twins.pairing import ScoreReply
 from infthor_eval.generation.twins.twin_set import TwinSummary, make_twins
 from infthor_eval.storage.digests import digest_of_file, fingerprint
-from infthor_eval.storage.files import remove
+from infthor_eval.storage.files import remove, write_atomically
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings
@@ -230,6 +230,8 @@ def _building(manifest: Manifest | TwinsManifest, out: Path) -> Iterator[Path]:
     if (whole / MANIFEST).is_file():  # stopped while the set was moved
         for name in _top_names(read_json(whole / MANIFEST, _HINT, type(manifest)).files):
             remove(out / name)
+    elif (out / MANIFEST).is_file():  # stopped after that
+        remove(work)
     if any(not path.name.startswith(".") for path in out.iterdir()):
         raise DataError(f"{out}: not empty; give a new folder")
     for other in out.glob(f"{_WORK}*"):
@@ -262,7 +264,8 @@ def _write_manifest(manifest: _AnyManifest, out: Path) -> _AnyManifest:
     """Write the manifest with the digests of the set's files into the set, and return it."""
     finished = msgspec.structs.replace(manifest, files=_digests(out))
     content = msgspec.json.format(msgspec.json.encode(finished), indent=1)
-    (out / MANIFEST).write_bytes(content + b"\n")
+    with write_atomically(out / MANIFEST) as partial:  # it says that all is there
+        partial.write_bytes(content + b"\n")
     return finished
 
 

@@ -18,7 +18,7 @@ from infthor_eval.generation.simulator_jobs import (
 )
 from infthor_eval.generation.statistics import AttemptStatistics
 from infthor_eval.household.pddl import DOMAIN
-from infthor_eval.storage.files import file_name, write_atomically, writing_hint
+from infthor_eval.storage.files import file_name, is_written, write_atomically, writing_hint
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings, run_jobs
@@ -204,7 +204,7 @@ def _summarise(
 def _generate_one(job: TrajectorySettings, simulator: Simulator, out: Path) -> _GenerationOutcome:
     path = out / f"{file_name(job.traj_id)}.json"
     try:
-        if path.exists():
+        if is_written(path):
             return _GenerationOutcome(path, _check_earlier(path, job))
         with freeze_existing_objects():
             generated = generate(job, simulator)

@@ -31,7 +31,7 @@ from infthor_eval.generation.simulator_jobs import (
     collect_outcomes,
     freeze_existing_objects,
 )
-from infthor_eval.storage.files import file_name, write_atomically, writing_hint
+from infthor_eval.storage.files import file_name, is_written, write_atomically, writing_hint
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import agent_path
@@ -292,7 +292,7 @@ def _replay_or_check(
     form: ReplayForm,
 ) -> _ReplayOutcome:
     final = out / file_name(trajectory.traj_id)
-    if final.exists():
+    if is_written(final):
         return _ReplayOutcome(_check_earlier(final, source.digest, form), is_resumed=True)
     started = time.monotonic()
     hint = writing_hint(", or choose another --out")

@@ -19,6 +19,7 @@ __all__ = [
     "PACKED",
     "file_name",
     "hold_folder",
+    "is_written",
     "plain_name",
     "prepare_file",
     "prepare_folder",
@@ -160,11 +161,12 @@ def refuse_overwrite(path: Path, content: bytes) -> None:
 
 
 @contextmanager
-def write_atomically(path: Path) -> Iterator[Path]:
+def write_atomically(path: Path, known_as: str | None = None) -> Iterator[Path]:
     """Write a file or folder under a temporary name beside `path`; rename it when it is complete.
 
     Args:
         path: the final path; an existing file is replaced, a folder must not exist.
+        known_as: name that is the same each time, if that of `path` has the time in it.
 
     Yields:
         The temporary path, at which nothing exists. After an error nothing remains there.
@@ -174,14 +176,36 @@ def write_atomically(path: Path) -> Iterator[Path]:
         OSError: the temporary path cannot be renamed.
     """
     # The name is fixed, so that what a killed process left is found and removed by the next one.
-    partial = path.with_name(f".{path.name}.partial")
-    with hold_lock(path.with_name(f".{path.name}{_LOCK}"), path, _WAIT_S):
+    partial, lock = _leftovers(path, known_as or path.name)
+    with hold_lock(lock, path, _WAIT_S):
         remove(partial)
         try:
             yield partial
             partial.replace(path)  # atomic, as both are on one file system
         finally:
             remove(partial)
+
+
+def is_written(path: Path) -> bool:
+    """Return whether a path that `write_atomically` writes is there, and need not be written.
+
+    What a killed process left beside it is removed, as no other writer would.
+
+    Raises:
+        UsageError: another process is writing it, and does not end within a minute.
+    """
+    if not path.exists():
+        return False
+    partial, lock = _leftovers(path, path.name)
+    if lock.exists():
+        with hold_lock(lock, path, _WAIT_S):
+            remove(partial)
+    return True
+
+
+def _leftovers(path: Path, name: str) -> tuple[Path, Path]:
+    """Return the temporary path and the lock that a killed process leaves beside `path`."""
+    return path.with_name(f".{name}.partial"), path.with_name(f".{name}{_LOCK}")
 
 
 def remove(path: Path) -> None:

@@ -3,10 +3,11 @@
 import fcntl
 import shutil
 import tempfile
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-__all__ = ["ScratchFolder"]
+__all__ = ["ScratchFolder", "remove_abandoned"]
 
 _PREFIX = "infthor-"
 _LOCK = ".lock"
@@ -15,10 +16,10 @@ _LOCK = ".lock"
 class ScratchFolder:
     """A temporary folder, locked as long as it is in use; as a context manager it returns its path.
 
-    A killed process cannot remove its folders. The first scratch folder of another process removes
-    all folders whose lock nobody holds any more. The system releases a lock when its process ends,
-    in whatever way; a process id in a file would not do, as containers that share the folder have
-    the same ids.
+    A killed process cannot remove its folders. Each command (`remove_abandoned`), and the first
+    scratch folder of another process, removes all folders whose lock nobody holds any more. The
+    system releases a lock when its process ends, in whatever way; a process id in a file would not
+    do, as containers that share the folder have the same ids.
 
     Attributes:
         path: the folder, initially empty.
@@ -59,6 +60,12 @@ class ScratchFolder:
         """Remove the folder. Calling it again does nothing."""
         self._outer.cleanup()
         self._lock.close()
+
+
+def remove_abandoned() -> None:
+    """Remove the system's temporary folders that killed processes left; others are in use."""
+    with suppress(OSError):  # no place for temporary files, which few commands need
+        _remove_abandoned(Path(tempfile.gettempdir()), _PREFIX)
 
 
 @cache

@@ -4,10 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import torch
+from safetensors import SafetensorError
 from torch.distributed.tensor import DTensor
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.object_ids import Words
+from infthor_eval.storage.scratch import ScratchFolder
 from model_adapters.hf.global_settings import hide_transformers_output
 from model_adapters.hf.loading.card import WORDS
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
@@ -15,6 +17,7 @@ from model_adapters.hf.loading.tower_names import with_published_names
 
 __all__ = ["export", "gather_weights"]
 
+_CONFIG = "config.json"
 _CARD = f"""\
 ---
 library_name: transformers
@@ -52,20 +55,36 @@ def export(
     """Write weights by published names (safetensors), configs, tokenizer, image processor, card.
 
     The template is that of training, so that evaluation renders the same prompts. The card has the
-    title of the recipe and the words of plans and actions. The folder is created. `weights` are the
+    title of the recipe and the words of plans and actions. The folder is created; each file appears
+    in it when it is whole, and the config, which makes it a checkpoint, last. `weights` are the
     gathered ones of a sharded model.
 
     Raises:
         DataError: the checkpoint cannot be written.
     """
     with wrap_errors(
-        f"{folder}: the checkpoint cannot be written", "free some space, or choose another folder"
+        f"{folder}: the checkpoint cannot be written",
+        "free some space, or choose another folder",
+        catch=(OSError, SafetensorError),
     ):
         folder.mkdir(parents=True, exist_ok=True)
-        loaded.tokenizer.chat_template = loaded.template
-        with hide_transformers_output():
-            loaded.tokenizer.save_pretrained(folder)
-            loaded.image_processor.save_pretrained(folder)
-            own = loaded.model.state_dict() if weights is None else weights
-            loaded.model.save_pretrained(folder, state_dict=with_published_names(own))
-        (folder / "README.md").write_text(_CARD.format(title=title, words=words), encoding="utf-8")
+        with ScratchFolder(folder) as whole:
+            _write(loaded, whole, title, words, weights)
+            for file in sorted(whole.iterdir(), key=lambda file: file.name == _CONFIG):
+                file.replace(folder / file.name)
+
+
+def _write(
+    loaded: LoadedCheckpoint,
+    folder: Path,
+    title: str,
+    words: Words,
+    weights: Mapping[str, torch.Tensor] | None,
+) -> None:
+    loaded.tokenizer.chat_template = loaded.template
+    with hide_transformers_output():
+        loaded.tokenizer.save_pretrained(folder)
+        loaded.image_processor.save_pretrained(folder)
+        own = loaded.model.state_dict() if weights is None else weights
+        loaded.model.save_pretrained(folder, state_dict=with_published_names(own))
+    (folder / "README.md").write_text(_CARD.format(title=title, words=words), encoding="utf-8")

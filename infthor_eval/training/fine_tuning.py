@@ -15,7 +15,7 @@ import torch.distributed as dist
 
 from infthor_eval.errors import UsageError, wrap_errors
 from infthor_eval.storage.digests import digest
-from infthor_eval.storage.files import hold_folder, write_atomically
+from infthor_eval.storage.files import hold_folder, is_written, write_atomically
 from infthor_eval.training.batches import collate
 from infthor_eval.training.data import TrainingData, read_training_data
 from infthor_eval.training.encoding import Encoder
@@ -174,7 +174,7 @@ def _processes() -> Iterator[None]:
 def _claim_folder(out: Path, document: dict[str, Any]) -> None:
     """Write the run's description into its folder, or check that the folder belongs to it."""
     path = out / _DESCRIPTION
-    if not path.exists():
+    if not is_written(path):
         with write_atomically(path) as partial_file:
             partial_file.write_text(
                 json.dumps(document, indent=2, sort_keys=True) + "\n", encoding="utf-8"

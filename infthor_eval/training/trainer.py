@@ -6,6 +6,7 @@ loss per token.
 
 import json
 import math
+import shutil
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any, cast
 
 import torch
 import transformers
+from safetensors import SafetensorError
 from safetensors.torch import load_model, save_model
 
 from infthor_eval.errors import UsageError, wrap_errors
@@ -58,6 +60,14 @@ class _SequenceTrainer(transformers.Trainer):
             super()._save(output_dir, state_dict)
         else:
             save_model(self.accelerator.unwrap_model(self.model).model, str(folder / _WEIGHTS))
+
+    def _save_checkpoint(self, model: torch.nn.Module, trial: Any) -> None:
+        # Of torch, RuntimeError; of safetensors, its own.
+        failures = (OSError, RuntimeError, SafetensorError)
+        hint = "make room there and run the same command again, which resumes from the one before"
+        problem = f"{self.args.output_dir}: a checkpoint cannot be written"
+        with wrap_errors(problem, hint, catch=failures):
+            super()._save_checkpoint(model, trial)
 
     def _load_from_checkpoint(
         self, resume_from_checkpoint: str, model: torch.nn.Module | None = None
@@ -109,7 +119,7 @@ def train_with_trainer(
 
     Raises:
         UsageError: the sequences of a step cannot be divided evenly among the processes.
-        DataError: the last checkpoint cannot be read.
+        DataError: the last checkpoint cannot be read, or a new one cannot be written.
     """
     n_tokens = sum(sequence.n_tokens for sequence in sequences)
     trainer = _SequenceTrainer(
@@ -128,10 +138,11 @@ def train_with_trainer(
 
 
 def _last_complete_checkpoint(out: Path) -> str | None:
-    """Return the last checkpoint written completely; a run may be killed while writing one.
+    """Return the last checkpoint written completely, and remove later ones.
 
-    The Trainer itself would use the last folder, whatever it contains, and continue without the
-    optimizer if that is missing. The state file is the last to be written.
+    A run may be killed while writing one. The Trainer itself would use the last folder, whatever it
+    contains, and continue without the optimizer if that is missing. The state file is the last to
+    be written.
     """
     for folder in sorted(
         out.glob("checkpoint-*"), key=lambda path: int(path.name.rpartition("-")[2]), reverse=True
@@ -139,6 +150,8 @@ def _last_complete_checkpoint(out: Path) -> str | None:
         try:
             json.loads((folder / "trainer_state.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
+            # With all that is in it: parts of weights have a new name each time.
+            shutil.rmtree(folder, ignore_errors=True)  # another process of the run may, too
             continue
         return str(folder)
     return None

@@ -1,5 +1,5 @@
-"""`python -m infthor_sim.player [--data DIR] [--supplement FILE] [--controller PID] <arguments of a
-Unity player>`.
+"""`python -m infthor_sim.player [--data DIR] [--supplement FILE] [--controller PID [--files DIR]]
+<arguments of a Unity player>`.
 
 The Controller starts this process as if it were Unity and names the pipes in the environment. Of
 Unity's own arguments only the screen's size and the quality have an effect.
@@ -7,7 +7,9 @@ Unity's own arguments only the screen's size and the quality have an effect.
 
 import ctypes
 import os
+import shutil
 import sys
+import time
 from argparse import ArgumentParser
 from contextlib import closing
 from pathlib import Path
@@ -20,6 +22,8 @@ __all__ = ["main"]
 _M_TRIM_THRESHOLD = -1
 _M_MMAP_THRESHOLD = -3
 _KEPT = 1 << 25  # bytes; the pictures of one reply have less
+_DYING_S = 2.0  # that a process may take to die after its pipes have closed
+_POLL_S = 0.01
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -45,6 +49,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--data", type=Path)
     parser.add_argument("--supplement", type=Path)
     parser.add_argument("--controller", type=int, default=os.getppid())
+    parser.add_argument("--files", type=Path)
     parser.add_argument("-screen-width", dest="width", type=int, default=300)
     parser.add_argument("-screen-height", dest="height", type=int, default=300)
     parser.add_argument("-screen-quality", dest="quality", type=int, default=max(SMOOTH_LEVELS))
@@ -62,7 +67,22 @@ def main(arguments: list[str] | None = None) -> int:
     except SimulatorError as error:
         print(f"infthor_sim.player: {error}", file=sys.stderr)
         return error.exit_code
+    finally:
+        if options.files is not None:
+            _remove_if_orphaned(options.files, options.controller)
     return 0
+
+
+def _remove_if_orphaned(files: Path, controller: int) -> None:
+    """Remove the Controller's temporary folder if it has been killed, and cannot."""
+    # The pipes of a killed process close a moment before the system gives its children another
+    # parent. One that lives kills this process meanwhile, or removes its files when it ends.
+    end = time.monotonic() + _DYING_S
+    while os.getppid() == controller:
+        if time.monotonic() > end:
+            return
+        time.sleep(_POLL_S)
+    shutil.rmtree(files, ignore_errors=True)
 
 
 def _keep_freed_memory() -> None:

@@ -37,6 +37,21 @@ def test_lm_evals_readers_take_the_files(make_nieh_set, tmp_path, run_cli):
     assert document["task_hashes"]["nieh_gt"] == hash_string(hashes)
 
 
+def test_what_a_killed_run_left_of_its_files_is_gone_after_the_next(
+    make_nieh_set, tmp_path, run_cli
+):
+    arguments = option_words(
+        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "out"
+    )
+    assert run_cli(*arguments)[0] == 0
+    folder = find_one(tmp_path / "out", "lm_eval") / "oracle"
+    for name in ("samples_nieh_gt", "results"):
+        (folder / f".{name}.partial").write_text("half")
+        (folder / f".{name}.lock").touch()
+    assert run_cli(*arguments)[0] == 0
+    assert not list(folder.glob(".*"))
+
+
 def test_datasets_reads_the_samples(make_nieh_set, tmp_path, run_cli):
     from datasets import load_dataset
 

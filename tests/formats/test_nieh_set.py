@@ -167,7 +167,9 @@ def test_a_set_of_another_version_is_refused(make_nieh_set):
 
 def test_a_set_is_continued_by_the_same_simulator_of_the_same_version_alone(tmp_path):
     claim_for_simulator(tmp_path, "embedded")
+    (tmp_path / ".set.json.lock").touch()  # of a process that was killed just then
     claim_for_simulator(tmp_path, "embedded")
+    assert [path.name for path in tmp_path.iterdir()] == ["set.json"]
     with pytest.raises(
         DataError, match="of the embedded simulator; give another folder for the unity one"
     ):

@@ -13,7 +13,7 @@ from infthor_eval.generation.bundle import (
     read_manifest,
 )
 from infthor_eval.generation.questions.generate import generate_questions
-from infthor_eval.storage.digests import digest_of_file
+from infthor_eval.storage.digests import digest_of_file, fingerprint
 from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
@@ -91,6 +91,31 @@ def test_a_build_that_was_stopped_goes_on_with_what_it_had(tmp_path, monkeypatch
     assert again == expected
     assert [path.name for path in out.iterdir() if path.name.startswith(".")] == []
     assert digest_of_file(out / MANIFEST) == digest_of_file(undisturbed / MANIFEST)
+
+
+def test_a_build_that_was_killed_at_its_manifest_goes_on(tmp_path, monkeypatch):
+    manifest = Manifest("small", (TrajectoryRecipe("bathroom-3", 0, 1),), per_trajectory=2)
+    write = Path.write_bytes
+
+    def cut(self, content):
+        if MANIFEST not in self.name:
+            return write(self, content)
+        write(self, content[:40])
+        raise KeyboardInterrupt
+
+    with Simulator(embedded_launch()) as simulator:
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "write_bytes", cut)
+            with pytest.raises(KeyboardInterrupt):
+                build_bundle(manifest, simulator, tmp_path)
+        built, _ = build_bundle(manifest, simulator, tmp_path)
+        assert read_manifest(tmp_path / MANIFEST) == built
+        # As if it had been killed before the last of its hidden folder was removed.
+        recipe = msgspec.to_builtins(msgspec.structs.replace(built, files={}))
+        (tmp_path / f".building-{fingerprint(recipe)}" / "trajectories").mkdir(parents=True)
+        with pytest.raises(DataError, match="not empty; give a new folder"):
+            build_bundle(manifest, simulator, tmp_path)
+    assert not list(tmp_path.glob(".*"))
 
 
 def _stop_at_manifest(replace):

@@ -39,10 +39,13 @@ def generated(tmp_path_factory):
 def test_a_generated_trajectory_replays_whole(generated, tmp_path):
     with Simulator(embedded_launch()) as simulator:
         replayed = replay_set(select([generated]), simulator, tmp_path)
+        lock = tmp_path / "metadata" / f".{JOB.traj_id}.lock"
+        lock.touch()  # of a process that was killed just then
         again = replay_set(select([generated]), simulator, tmp_path)
     trajectory = next(iter_trajectories(generated))
     assert summarise(replayed).complete == 1 and not replayed.failures
     assert (again.resumed, replayed.resumed) == (1, 0)
+    assert not lock.exists()
     folder = tmp_path / "metadata" / trajectory.traj_id
     steps = read_steps(folder)
     frames = sorted((folder / "img").iterdir())
@@ -87,7 +90,10 @@ def test_the_seed_decides_and_what_exists_is_kept(generated, tmp_path):
     with Simulator(embedded_launch()) as simulator:
         generate_set([JOB], simulator, tmp_path)
         assert (tmp_path / generated.name).read_bytes() == generated.read_bytes()
+        lock = tmp_path / f".{generated.name}.lock"
+        lock.touch()  # of a process that was killed just then
         assert generate_set([JOB], simulator, tmp_path).resumed == 1
+        assert not lock.exists()
         other = TrajectorySettings(JOB.scene, JOB.seed, min_steps=41, min_subgoals=1)
         assert "other settings" in generate_set([other], simulator, tmp_path).failures[0]
 

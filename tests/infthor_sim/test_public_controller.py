@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from PIL import Image
 
@@ -28,6 +29,23 @@ controller = Controller(scene="bathroom-1", x_display="0.0", local_executable_pa
 controller.step(action="RotateRight")
 print(controller.last_event.metadata["sceneName"], sys.argv[1:], __name__)
 {ending}
+"""
+WAITING = """
+import time
+from infthor_sim import Controller
+
+class Waiting(Controller):
+    def _await_first_state(self, process):
+        if {is_early}:
+            wait()
+        super()._await_first_state(process)
+
+def wait():
+    print(flush=True)
+    time.sleep(999)
+
+controller = Waiting(scene="bathroom-1")
+wait()
 """
 
 
@@ -65,6 +83,22 @@ def test_it_needs_no_display_and_leaves_nothing_behind(monkeypatch, tmp_path):
     assert not alive(controller)
     assert [path.name for path in tmp_path.rglob("*")] == ["temporary"]
     controller.stop()  # once more does nothing
+
+
+@pytest.mark.parametrize("when", ["before the first state", "ready"])
+def test_killed_it_leaves_neither_files_nor_a_process(tmp_path, when):
+    (tmp_path / "script.py").write_text(WAITING.format(is_early=when != "ready"))
+    (tmp_path / "temporary").mkdir()
+    command = [sys.executable, tmp_path / "script.py"]
+    left = {"PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path / "temporary")}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, env={**os.environ, **left}) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        (simulator,) = psutil.Process(process.pid).children()
+        assert list((tmp_path / "temporary").iterdir())
+        process.kill()
+    wait_until(lambda: not list((tmp_path / "temporary").iterdir()))
+    wait_until(lambda: not simulator.is_running())
 
 
 def test_its_process_ends_with_python(tmp_path):

@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.storage import files
 from infthor_eval.storage.digests import digest, digest_of_file
-from infthor_eval.storage.files import file_name, hold_folder, write_atomically, writing_hint
+from infthor_eval.storage.files import (
+    file_name,
+    hold_folder,
+    is_written,
+    write_atomically,
+    writing_hint,
+)
 
 _TEXTS = st.text(st.characters(codec=None))  # with lone surrogates
 
@@ -71,6 +77,38 @@ def test_a_folder_appears_whole_and_leftovers_of_a_killed_process_are_gone(tmp_p
         (partial / "fresh").touch()
     assert [item.name for item in path.iterdir()] == ["fresh"]
     assert not leftover.exists()
+
+
+def test_leftovers_are_found_by_the_next_writer_whose_name_has_another_time_in_it(tmp_path):
+    leftovers = tmp_path / ".results.partial", tmp_path / ".results.lock"
+    for leftover in leftovers:
+        leftover.touch()
+    with write_atomically(tmp_path / "results_12-30.json", "results") as partial:
+        partial.touch()
+    assert [item.name for item in tmp_path.iterdir()] == ["results_12-30.json"]
+
+
+def test_leftovers_beside_what_is_written_already_are_removed(tmp_path):
+    path = tmp_path / "a.txt"
+    assert not is_written(path)
+    for name in (path, tmp_path / ".a.txt.lock", tmp_path / ".a.txt.partial"):
+        name.touch()
+    assert is_written(path)
+    assert [item.name for item in tmp_path.iterdir()] == ["a.txt"]
+    (tmp_path / ".a.txt.partial").mkdir()
+    (tmp_path / ".a.txt.lock").touch()
+    assert is_written(path)
+    assert [item.name for item in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_what_another_process_writes_again_is_waited_for(tmp_path, monkeypatch):
+    monkeypatch.setattr("infthor_eval.storage.files._WAIT_S", 0.0)
+    path = tmp_path / "a.txt"
+    path.touch()
+    with write_atomically(path) as partial:
+        partial.touch()
+        with pytest.raises(UsageError, match="another process is writing it"):
+            is_written(path)
 
 
 def test_a_file_has_the_digest_of_its_content(tmp_path):

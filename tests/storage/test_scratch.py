@@ -51,6 +51,26 @@ def test_cleaning_up_twice_is_safe(place):
     assert list(place.iterdir()) == []
 
 
+def test_each_command_removes_what_a_killed_process_left(place, run_cli):
+    process = _other_process(place)
+    assert run_cli("ls", "models")[0] == 0
+    assert len(list(place.iterdir())) == 1
+    process.kill()
+    process.wait()
+    scratch._remove_abandoned.cache_clear()  # as a new process begins
+    assert run_cli("ls", "models")[0] == 0
+    assert list(place.iterdir()) == []
+
+
+def test_without_a_place_for_temporary_files_commands_that_need_none_work(run_cli, monkeypatch):
+    def no_place():
+        raise FileNotFoundError("no usable temporary directory")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(tempfile, "gettempdir", no_place)
+        assert run_cli("ls", "models")[0] == 0
+
+
 def test_what_a_killed_process_left_is_removed(place):
     process = _other_process(place)
     process.send_signal(signal.SIGKILL)

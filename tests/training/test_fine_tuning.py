@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import pytest
+from safetensors import SafetensorError
 
 from infthor_eval.errors import InfthorError
 from infthor_eval.nieh.docs import doc_target
@@ -109,9 +110,48 @@ def test_a_run_that_is_killed_ends_with_the_weights_of_one_that_is_not(recipe, d
     shutil.copytree(next(states.glob("checkpoint-*")), states / "checkpoint-11")
     for name in ("optimizer.pt", "trainer_state.json"):
         (states / "checkpoint-11" / name).unlink(missing_ok=True)
+    (states / "checkpoint-11" / ".tmpAbCdEf").touch()  # safetensors writes under such names
     first, last = map(int, start("killed").communicate()[0].split())
     assert 1 < first <= last == 12
     assert same(read_weights(tmp_path / "killed"), read_weights(tmp_path / "whole"))
+    assert not list((tmp_path / "killed").rglob(".*"))
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), RuntimeError("no room")])
+def test_a_full_disk_at_a_checkpoint_is_one_line_and_the_run_goes_on_later(
+    recipe, data, tmp_path, run_cli, monkeypatch, error
+):
+    def full(*_):
+        raise error
+
+    words = ["train", "--recipe", recipe, "--data", data, "--out", tmp_path / "out"]
+    words += ["--set", "max_steps=1", "--set", "save_every=1"]
+    with monkeypatch.context() as patched:
+        patched.setattr("torch.save", full)
+        code, _, err = run_cli(*words)
+    assert code == 2
+    assert "Traceback" not in err
+    line = err.splitlines()[-1]
+    assert f"{tmp_path}/out/states: a checkpoint cannot be written (" in line
+    assert "make room there and run the same command again" in line
+    assert run_cli(*words)[0] == 0
+    assert (tmp_path / "out" / "checkpoint" / "config.json").is_file()
+
+
+def test_a_checkpoint_that_cannot_be_written_is_none(recipe, data, tmp_path, run_cli, monkeypatch):
+    def full(*_, **__):
+        raise SafetensorError("Error while serializing: No space left on device")
+
+    words = ["train", "--recipe", recipe, "--data", data, "--out", tmp_path / "out"]
+    words += ["--set", "max_steps=1"]
+    with monkeypatch.context() as patched:
+        patched.setattr("transformers.PreTrainedModel.save_pretrained", full)
+        code, _, err = run_cli(*words)
+    assert code == 2
+    assert "checkpoint: the checkpoint cannot be written (Error while" in err.splitlines()[-1]
+    assert not list((tmp_path / "out" / "checkpoint").iterdir())
+    assert run_cli(*words)[0] == 0
+    assert (tmp_path / "out" / "checkpoint" / "config.json").is_file()
 
 
 def test_a_folder_is_one_runs(recipe, data, tmp_path, run_cli):

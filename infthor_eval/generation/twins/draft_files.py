@@ -15,7 +15,7 @@ from infthor_eval.generation.replay_set import wrap_malformed
 from infthor_eval.generation.simulator_jobs import freeze_existing_objects
 from infthor_eval.generation.twins.drafting import TwinDraft, TwinSettings
 from infthor_eval.generation.twins.final_tasks import FinalTaskDraft
-from infthor_eval.storage.files import file_name, write_atomically
+from infthor_eval.storage.files import file_name, is_written, write_atomically
 
 __all__ = ["DRAFTS", "DraftOutcome", "Item", "count_edits", "draft_item", "failure_line"]
 
@@ -51,7 +51,7 @@ def draft_item(
     # Not `.json`, so that the set may be read as a folder of trajectories.
     file = out / DRAFTS / f"{file_name(trajectory.traj_id)}.draft"
     try:
-        if file.exists():
+        if is_written(file):
             return DraftOutcome(_read(file, source.digest, settings, form), is_resumed=True)
         with freeze_existing_objects(), wrap_malformed():
             draft = make()

@@ -1,0 +1,1 @@
+"""Runs of each kind, cut at each of their calls that change files."""
