@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import os
+    from typing import Any
 
     from pandas import DataFrame
 
-__all__ = ["__version__", "load_run"]
+__all__ = ["__version__", "evaluate", "load_run", "load_runs"]
 
 __version__ = "0.1.0"
 
@@ -34,4 +35,50 @@ def load_run(folder: str | os.PathLike[str]) -> DataFrame:
     from infthor_eval.plugins import import_target
 
     frame: DataFrame = import_target("infthor_eval.report.sample_table:load_run")(folder)
+    return frame
+
+
+def load_runs(*folders: str | os.PathLike[str]) -> DataFrame:
+    """Return the runs in some folders as a data frame of pandas.
+
+    Args:
+        folders: folders of runs, or folders above them ("results").
+
+    Returns:
+        A row per run and task: run, suite and task; state, whole or incomplete; score, low and
+        high, the primary metric with its 95 % interval, from 0 to 1, and n, the units in it;
+        answered, failed and not_asked, units of the whole run; requests, tokens_read,
+        tokens_cached, tokens_written and cost in US dollars, of the whole run; changed, in UTC; and
+        its folder. A run that cannot be read is left out with a warning.
+
+    Raises:
+        DataError: there is no such folder, or it cannot be searched.
+    """
+    from infthor_eval.plugins import import_target
+
+    frame: DataFrame = import_target("infthor_eval.report.run_table:load_runs")(*folders)
+    return frame
+
+
+def evaluate(model: str, tasks: str | list[str], **options: Any) -> DataFrame:
+    """Evaluate models on tasks as `infthor-eval --model MODEL --tasks TASKS` does, and continue a
+    run that was stopped.
+
+    Args:
+        model: names of models with commas between them.
+        tasks: names of tasks, likewise or as a list.
+        options: options of the command: `limit=20`, `data="my_set"`, `greedy=True`,
+            `model_args={"pretrained": "PATH"}`.
+
+    Returns:
+        The runs, as `load_runs` does.
+
+    Raises:
+        UsageError: an option or a name is unknown, or a value is not valid.
+        InfthorError: as the command would say in one line.
+    """
+    from infthor_eval.plugins import import_target
+
+    run = import_target("infthor_eval.cli.evaluation:evaluate")
+    frame: DataFrame = run({"model": model, "tasks": tasks, **options})
     return frame

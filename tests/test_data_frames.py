@@ -1,6 +1,7 @@
 """Runs as data frames: a row per sample, numbers as numbers, for every suite."""
 
 import io
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +13,7 @@ from pandas.api.types import is_bool_dtype, is_numeric_dtype
 
 import infthor_eval
 from infthor_eval.cli import main
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, UsageError
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.sample_columns import ENVELOPE
@@ -166,3 +167,37 @@ def test_the_package_is_imported_without_pandas() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=600
     )
     assert done.stdout.split() == []
+
+
+def test_a_call_runs_what_the_command_runs(tmp_path: Path) -> None:
+    given = {"limit": 4, "output": tmp_path / "called", "frames": None, "quiet": True}
+    frame = infthor_eval.evaluate(model="oracle,blind", tasks=["nieh_mini_gt"], **given)
+    assert list(frame["run"]) == ["oracle", "blind"]
+    assert list(frame["state"]) == ["whole", "whole"]
+    assert frame["score"].iloc[0] == 1.0
+    assert (frame["n"] == 4).all()
+    assert (frame["low"] <= frame["score"]).all()
+    typed = option_words(model="oracle,blind", tasks="nieh_mini_gt", limit=4, output=tmp_path / "o")
+    with pytest.raises(SystemExit):
+        main(typed)
+    there = infthor_eval.load_runs(tmp_path / "o").set_index("run")
+    numbers = ["suite", "task", "score", "low", "high", "answered", "failed", "not_asked"]
+    assert there.loc[frame["run"], numbers].equals(frame.set_index("run")[numbers])
+
+
+def test_a_call_with_what_the_command_refuses_raises(tmp_path: Path) -> None:
+    for options in ({"limit": "many"}, {"no_such": 1}, {"model_args": {"nothing": 1}}):
+        with pytest.raises(UsageError):
+            infthor_eval.evaluate(model="oracle", tasks="nieh_mini_gt", output=tmp_path, **options)
+    with pytest.raises(UsageError, match="unknown model"):
+        infthor_eval.evaluate(model="orakle", tasks="nieh_mini_gt", output=tmp_path)
+
+
+def test_a_run_that_cannot_be_read_is_left_out_with_a_warning(
+    runs: dict[str, Path], tmp_path: Path
+) -> None:
+    shutil.copytree(runs["nieh"], tmp_path / "good")
+    (tmp_path / "bad" / "journal").mkdir(parents=True)
+    with pytest.warns(UserWarning, match="bad: cannot be read"):
+        frame = infthor_eval.load_runs(tmp_path)
+    assert list(frame["folder"]) == [str(tmp_path / "good")]

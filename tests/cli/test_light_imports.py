@@ -98,7 +98,8 @@ OF_MODELS = {"torch", "transformers", "tokenizers", "accelerate", "safetensors",
     [
         ("oracle", AFTER_THE_QUESTIONS | OF_OTHERS | OF_MODELS),
         ("blind", AFTER_THE_QUESTIONS | OF_OTHERS | OF_MODELS),
-        ("qwen2.5-vl-nano", AFTER_THE_QUESTIONS | OF_OTHERS),
+        # Which scales its frames by compiled code.
+        ("qwen2.5-vl-nano", (AFTER_THE_QUESTIONS | OF_OTHERS) - {"numba"}),
     ],
     ids=["oracle", "blind", "qwen2.5-vl-nano"],
 )

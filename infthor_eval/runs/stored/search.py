@@ -14,6 +14,7 @@ from infthor_eval.runs.completeness import count_missing
 from infthor_eval.runs.journals.records import RunHeader
 from infthor_eval.runs.journals.shards import FOLDER, Tell, read_header, read_states
 from infthor_eval.runs.results import RESULTS
+from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = ["BrokenRun", "Results", "StoredRun", "find_runs", "read_results", "run_folders"]
 
@@ -30,6 +31,7 @@ class StoredRun:
         n_not_asked: number of units that were not attempted, or that a cap left out; None if
             neither header nor results tell.
         primary_metrics: primary metric of each task; empty if there are no results yet.
+        usage: requests, tokens and cost; of the results, so nothing before there are any.
         changed: time of the last change to the journal, in seconds since 1970.
     """
 
@@ -39,6 +41,7 @@ class StoredRun:
     n_failed: int
     n_not_asked: int | None
     primary_metrics: Mapping[str, Rate]
+    usage: Usage
     changed: float
 
 
@@ -55,6 +58,7 @@ class Results(msgspec.Struct, frozen=True):
 
     n_missing: int
     primary_metrics: dict[str, Rate] = {}
+    usage: Usage = NOTHING
 
 
 def find_runs(folder: Path, tell: Tell | None = None) -> Iterator[StoredRun | BrokenRun]:
@@ -125,5 +129,6 @@ def _read_run(folder: Path, tell: Tell | None) -> StoredRun:
         n_failed=states["failed"],
         n_not_asked=None if n_missing is None else n_missing + states["not asked"],
         primary_metrics=results.primary_metrics if results else {},
+        usage=results.usage if results else NOTHING,
         changed=max(path.stat().st_mtime for path in (folder / FOLDER).iterdir()),
     )
