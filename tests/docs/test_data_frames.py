@@ -14,7 +14,7 @@ PAGE, NOTEBOOK = "docs/howto/data-frames.md", "docs/howto/load_run.ipynb"
 def test_the_notebook_runs_on_the_run_that_the_page_names(tmp_path, monkeypatch, capsys):
     notebook = json.loads((ROOT / NOTEBOOK).read_text())
     (cell,) = notebook["cells"]
-    (shown,) = [block.text for block in blocks_of(PAGE) if block.language == "python"]
+    shown, *_ = [block.text for block in blocks_of(PAGE) if block.language == "python"]
     source = "".join(cell["source"])
     assert (notebook["nbformat"], source) == (4, shown.removesuffix("\n"))
     monkeypatch.chdir(tmp_path)

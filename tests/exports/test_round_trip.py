@@ -89,7 +89,7 @@ def test_a_failed_question_is_a_failed_one(
     back, _ = bring_back(samples_of(export(run, file_format)))
     failed = [record for record in read_run(back, RECORDS)[1] if record.failure]
     assert [(record.id, record.failure) for record in failed] == [(first["id"], first["failure"])]
-    assert results(back)[1]["by_clues"]["total"]["n_failed"] == 1
+    assert results(back)[0]["units"]["nieh_gt"]["failed"] == 1
 
 
 def test_a_control_comes_back_as_one(twin_set, tmp_path, run_cli, export, bring_back):

@@ -139,7 +139,9 @@ def test_groups_in_a_circle_are_told(tmp_path, run_cli, task_files):
 def test_a_larger_document_is_read_where_the_limit_is_raised(
     make_nieh_set, tmp_path, run_cli, task_files, monkeypatch
 ):
-    (task_files / "nieh" / "own.yaml").write_text(CLUES + "}\na: &a [1, 1, 1, 1]\nb: [*a, *a]\n")
+    (task_files / "nieh" / "own.yaml").write_text(
+        CLUES + "}\nmetadata: {suite: nieh, a: &a [1, 1, 1, 1], b: [*a, *a]}\n"
+    )
     arguments = option_words(
         model="oracle", tasks="own", data=make_nieh_set(size=56), output=tmp_path / "out"
     )

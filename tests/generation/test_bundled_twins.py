@@ -87,7 +87,8 @@ def test_the_manifest_has_the_digests_of_the_twins_files():
     files = _manifest().files
     assert {name: digest_of_file(BUNDLED / name) for name in files} == files
     there = {str(path.relative_to(BUNDLED)) for path in BUNDLED.rglob("*") if path.is_file()}
-    assert there == {*files, MANIFEST}
+    card = {"README.md", "croissant.json", "card.png"}
+    assert there == {*files, *card, MANIFEST}
 
 
 def test_the_choice_of_questions_is_within_its_limit(pairs):

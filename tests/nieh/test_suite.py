@@ -69,6 +69,7 @@ def test_the_results_file_says_what_the_summary_says(prepare_run):
         "name",
         "config",
         "n_missing",
+        "units",
         "primary_metrics",
         "summary",
         "usage",

@@ -230,7 +230,7 @@ def test_where_all_is_left_out_the_exit_code_says_so(run_cli, tmp_path):
     code, out, err = run_cli("run", *arguments)
     assert code == 1
     assert "scene FloorPlan7" in out and "--scenes DIR" in " ".join(out.split())
-    assert "no result: every sample was excluded" in err
+    assert "no result: every sample is excluded" in err
 
 
 BROKEN = {

@@ -150,7 +150,7 @@ def exported(records: list[Any]) -> Any:
     run = SimpleNamespace(request=request, suite=NiehSuite())
     summary = RunSummary.of(NiehSuite(), header_of("m"), records)
     return convert_run(
-        SimpleNamespace(run=run, records=records, samples=samples, summary=summary)  # type: ignore[arg-type]
+        SimpleNamespace(run=run, records=records, samples=samples, summary=summary, n_missing=2)  # type: ignore[arg-type]
     )
 
 

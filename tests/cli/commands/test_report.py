@@ -29,7 +29,7 @@ def test_figure_7_is_drawn_and_its_ends_are_printed(folders, tmp_path, run_cli):
     assert output.splitlines()[-2:] == [str(out / "figure7.png"), str(out / "figure7.svg")]
     assert all((out / name).stat().st_size > 1000 for name in ("figure7.png", "figure7.svg"))
     rows = [line.split() for line in output.splitlines()]
-    assert ["m", "3.00", "[3.00,", "3.00]", "100.0", "3", "20", "6", "0", "0"] in rows
+    assert ["m", "3.00", "[3.00,", "3.00]", "100.0", "3", "20", "6", "0"] in rows
 
 
 def test_runs_in_no_panel_are_named(folders, tmp_path, run_cli):
