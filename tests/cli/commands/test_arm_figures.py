@@ -53,7 +53,6 @@ def test_figure_6_is_drawn_and_its_ends_are_printed(folders, tmp_path, run_cli):
         "0.00",
         "5",
         "4",
-        "0",
     ] in rows
 
 

@@ -239,6 +239,6 @@ def test_out_of_memory_in_mid_run_costs_the_contexts_that_are_too_large(
         )
     assert "nieh_full: " in err
     assert any(
-        line.split()[:2] == ["cramped", "nieh_gt"] and line.split()[-1] == "1"
+        line.split()[:3] == ["cramped", "(incomplete)", "nieh_gt"] and line.split()[-1] == "1"
         for line in out.splitlines()
     )
