@@ -250,7 +250,7 @@ def _entries(path: Path, document: Any) -> list[dict[str, Any]]:
             return [document]
         case Layout.COLUMNS:
             return _rows(path, document)
-        case Layout.OBJECTS:
+        case _:  # objects; frames alone have no document
             # The published code counts the sorted pictures, so a frame's number is its place among
             # their names.
             listed = enumerate(
