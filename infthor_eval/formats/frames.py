@@ -7,6 +7,7 @@ A frame is a file, or a file with patches laid over it: twins have frames that d
 part (`shared_frames`).
 """
 
+import re
 import struct
 import zlib
 from collections.abc import Iterator
@@ -23,7 +24,7 @@ from infthor_eval.formats.reading import file_problem, require_file
 from infthor_eval.storage.digests import digest, digest_of_file
 from infthor_eval.storage.limits import IMAGE_ASPECT, IMAGE_MEGAPIXELS
 
-__all__ = ["FrameRef", "Patch"]
+__all__ = ["FrameRef", "Patch", "find_images"]
 
 Image.MAX_IMAGE_PIXELS = None  # `_wrong_size` has the limit, which users can raise
 
@@ -31,6 +32,8 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 _SIGNATURES = (_PNG, b"\xff\xd8\xff")  # PNG, JPEG
 _HEAD = 24  # bytes of a PNG up to the end of its width and height
 _HINT = "restore the frame"
+_SUFFIXES = {".png", ".jpg", ".jpeg"}
+_NUMBER = re.compile(r"([0-9]+)")
 # All that Pillow's decoders have raised on damaged or forged images.
 _DAMAGED = (
     OSError,
@@ -152,6 +155,30 @@ class FrameRef:
     @property
     def _paths(self) -> list[Path]:
         return [self.path, *(patch.path for patch in self.patches)]
+
+
+def find_images(folder: Path) -> dict[str, Path]:
+    """Return the PNG and JPEG files of a folder by stem, in the order of their names.
+
+    Numbers in names count as numbers: `2.png` comes before `10.png`.
+
+    Raises:
+        DataError: two of them have one stem.
+    """
+    images: dict[str, Path] = {}
+    paths = [path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES]
+    for path in sorted(paths, key=_by_numbers):
+        if path.stem in images:
+            raise DataError(
+                f"{folder}: two frames have the name {path.stem} (.png, .jpg); remove one of them"
+            )
+        images[path.stem] = path
+    return images
+
+
+def _by_numbers(path: Path) -> tuple[list[tuple[int, str]], str]:
+    parts = _NUMBER.split(path.stem)  # every second one is a number
+    return [(int(part), "") if at % 2 else (0, part) for at, part in enumerate(parts)], path.name
 
 
 def _digest_of(path: Path) -> str:

@@ -5,7 +5,8 @@ The folder has the layout of the published data (hub dataset `PEARLS-Lab/infini-
 `expert_log.json` and, in some sets, `<traj_id>_10fps.mp4`. The trajectory files are in a separate
 folder (published data) or inside the set (ours). Twins share pictures (`shared_frames`).
 
-Question files alone, without `metadata/`, are a set too: for whatever needs no frame.
+Question files alone, without `metadata/`, are a set too: for whatever needs no frame. So is a
+folder of one's own frames and questions (`own_folder`).
 """
 
 import hashlib
@@ -19,8 +20,9 @@ from typing import TypeVar
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.action_log import logged_action_frames, read_action_log
-from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.frames import FrameRef, find_images
 from infthor_eval.formats.outline import Outline, find_outline, read_outline, read_states
+from infthor_eval.formats.own_folder import OwnFolder, find_own_folder
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.set_info import simulator_of
@@ -40,7 +42,6 @@ _GIVE_A_SET = (
     "give the folder of an NIEH set, or download the published one with `infthor-eval fetch nieh`"
 )
 _IMAGE_FOLDERS = ("img", "img_768")
-_IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg"}
 
 
 class NiehSet:
@@ -71,11 +72,17 @@ class NiehSet:
         self.root = root
         self._folder = root if root.is_dir() else root.parent
         self._files = sorted(root.glob("qa_set*.csv")) if root.is_dir() else [root]
+        self.has_frames = (self._folder / "metadata").is_dir()
+        self._own: OwnFolder | None = None
+        if not self._files and not self.has_frames:
+            self._own = find_own_folder(root)
+        if self._own is not None:
+            self._files = [self._own.file]
+            self.has_frames = True
         if needs_questions and not self._files:
             raise DataError(
                 f"{root}: has no qa_set*.csv, as an NIEH set has beside metadata/; {_GIVE_A_SET}"
             )
-        self.has_frames = (self._folder / "metadata").is_dir()
         if not self.has_frames and not needs_questions:
             raise DataError(f"{root}: {_NO_FRAMES}")
         if trajectories is not None and not trajectories.is_dir():
@@ -146,14 +153,15 @@ class NiehSet:
         for file in self._files:
             digest.update(file.read_bytes())
         for traj_id in sorted({question.traj_id for question in self.questions if self.has_frames}):
-            digest.update(log_file(self.folder(traj_id)).read_bytes())
+            if self._own is None:  # one's own frames have no log
+                digest.update(log_file(self.folder(traj_id)).read_bytes())
             for index, frame in self._trajectory(traj_id).items():
                 digest.update(f"{traj_id}/{index}:{frame.name}:{frame.n_bytes}\n".encode())
         return digest.hexdigest()
 
     def _read_file(self, file: Path) -> tuple[Question | SkippedQuestion, ...]:
         name = file.stem if len(self._files) > 1 else ""
-        rows = read_questions(file)
+        rows = read_questions(file) if self._own is None else self._own.read_questions()
         are_twins = any(isinstance(row, Question) and row.pair for row in rows)
         bases = self._bases if are_twins else {}
         return tuple(
@@ -173,6 +181,8 @@ class NiehSet:
 
     def folder(self, traj_id: str) -> Path:
         """Return the folder of a trajectory's frames and metadata."""
+        if self._own is not None:
+            return self._own.folders.get(traj_id, self._folder)
         return self._folder / "metadata" / traj_id
 
     def frames(self, traj_id: str) -> tuple[FrameRef, ...]:
@@ -332,8 +342,8 @@ def _read_frames(folder: Path) -> dict[int, FrameRef]:
     shared = read_shared_frames(folder, [step.img_idx for step in steps])
     if shared is not None:
         return shared
-    home = next((folder / name for name in _IMAGE_FOLDERS if (folder / name).is_dir()), None)
-    if home is None:
+    home = next((folder / name for name in _IMAGE_FOLDERS if (folder / name).is_dir()), folder)
+    if home == folder and log_file(folder).exists():
         raise DataError(f"trajectory {folder.name}: neither img/ nor img_768/ in {folder}; {_HINT}")
     # By stem: published sets of other sizes (img_768) keep the names and change the suffix.
     names = [Path(step.img_filename).stem for step in steps]
@@ -347,7 +357,7 @@ def _read_frames(folder: Path) -> dict[int, FrameRef]:
                 f"trajectory {folder.name}: two entries of metadata.json have {what} {duplicate}; "
                 f"{_HINT}"
             )
-    by_stem = _images(home)
+    by_stem = find_images(home)
     unknown = sorted(by_stem.keys() - set(names))
     # Only a surplus of files is an error of the trajectory. A renamed frame is one unknown and one
     # missing file.
@@ -362,16 +372,6 @@ def _read_frames(folder: Path) -> dict[int, FrameRef]:
         step.img_idx: FrameRef(by_stem.get(name, home / Path(step.img_filename).name))
         for step, name in zip(steps, names, strict=True)
     }
-
-
-def _images(folder: Path) -> dict[str, Path]:
-    images = sorted(path for path in folder.iterdir() if path.suffix.lower() in _IMAGE_SUFFIXES)
-    duplicate = _first_duplicate([path.stem for path in images])
-    if duplicate is not None:
-        raise DataError(
-            f"{folder}: two frames have the name {duplicate} (.png, .jpg); remove one of them"
-        )
-    return {path.stem: path for path in images}
 
 
 def _first_duplicate(values: Sequence[T]) -> T | None:

@@ -19,6 +19,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import find_images
 from infthor_eval.formats.reading import find_packed, read_json, read_packed_bytes
 from infthor_eval.storage.files import write_packed
 
@@ -48,6 +49,7 @@ class Layout(StrEnum):
     ENTRY = "one entry"
     COLUMNS = "columns"
     OBJECTS = "img_idx as objects"
+    NONE = "frames alone"  # a folder of one's own (`own_folder`)
 
 
 class ObjectLog(msgspec.Struct, omit_defaults=False):
@@ -173,10 +175,15 @@ def log_file(folder: Path) -> Path:
 def read_steps(folder: Path) -> list[Step]:
     """Read the log of the trajectory in `metadata/<traj_id>`: an entry a frame, in file order.
 
+    A folder of frames alone, without a log, has an entry a frame that says only which it is.
+
     Raises:
         DataError: the file is missing, not JSON, or has none of the known layouts.
     """
     path = log_file(folder)
+    images = _unlogged_images(folder)
+    if images:
+        return [Step(index, image.name) for index, image in enumerate(images)]
     document = read_json(path, _HINT)
     return [_step(path, index, entry) for index, entry in enumerate(_entries(path, document))]
 
@@ -209,8 +216,17 @@ def layout_of(folder: Path) -> Layout:
     Raises:
         DataError: the file is missing, not JSON, or has none of the known layouts.
     """
+    if _unlogged_images(folder):
+        return Layout.NONE
     path = log_file(folder)
     return _layout(path, read_json(path, _HINT))
+
+
+def _unlogged_images(folder: Path) -> list[Path]:
+    """Return the frames that are in a folder itself, if it has no log of them."""
+    if log_file(folder).exists() or not folder.is_dir():
+        return []
+    return list(find_images(folder).values())
 
 
 def _layout(path: Path, document: Any) -> Layout:
@@ -234,7 +250,7 @@ def _entries(path: Path, document: Any) -> list[dict[str, Any]]:
             return [document]
         case Layout.COLUMNS:
             return _rows(path, document)
-        case Layout.OBJECTS:
+        case _:  # objects; frames alone have no document
             # The published code counts the sorted pictures, so a frame's number is its place among
             # their names.
             listed = enumerate(

@@ -3,6 +3,8 @@
 import json
 import re
 
+from PIL import Image
+
 from infthor_eval.nieh.contexts import CONTEXTS
 
 from .blocks import ROOT, written_files
@@ -37,6 +39,25 @@ def test_own_tasks_run_with_the_shared_files_of_this_package(tmp_path, run_cli, 
         "nieh_mini_words": ["one_word"],
         "nieh_mini_gt": ["reference", "strict"],
     }
+
+
+def test_a_folder_of_frames_and_a_csv_runs_with_no_other_file(tmp_path, run_cli, monkeypatch):
+    written_files("docs/own-tasks.md", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    for number in range(1, 12):
+        Image.new("RGB", (28, 28), (number, 0, 0)).save(tmp_path / f"my_folder/{number}.png")
+    code, _, err = run_cli("--model", "oracle", "--tasks", "nieh_gt", "--data", "my_folder")
+    assert code == 0, err
+    (results,) = tmp_path.rglob("results.json")
+    document = json.loads(results.read_text())
+    assert document["primary_metrics"]["nieh_gt"]["n"] == 2
+    assert document["primary_metrics"]["nieh_gt"]["mean"] == 1.0
+    code, _, err = run_cli("--model", "blind", "--tasks", "nieh_gt", "--data", "my_folder")
+    assert code == 0, err
+    code, _, err = run_cli("--model", "blind", "--tasks", "nieh_text_state", "--data", "my_folder")
+    assert (code, len(err.splitlines())) == (2, 1), "no trajectory file, no states"
+    code, _, err = run_cli("validate", "my_folder", "--models", "a,b,c,d", "--out", "out")
+    assert (code, len(err.splitlines())) == (2, 1)
 
 
 def test_own_tasks_are_refused_in_one_line(tmp_path, run_cli, monkeypatch):

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, in_one_line
 from infthor_eval.formats.archive import unpack_tar
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.storage.folders import user_cache
@@ -74,10 +74,9 @@ def _download(folder: Path, token: str | None, endpoint: str | None) -> None:
         ) from error
     # Each version of the hub's library has another one of the network.
     except Exception as error:
-        cause = " ".join(str(error).split())[:120]
         raise DataError(
-            f"{NIEH_REPOSITORY}: cannot be fetched ({cause}); go online, or copy the set to "
-            f"{folder} from a machine that has it"
+            f"{NIEH_REPOSITORY}: cannot be fetched ({in_one_line(error)}); go online, or copy the "
+            f"set to {folder} from a machine that has it"
         ) from error
     missing = [name for name in _FILES if not (folder / name).is_file()]
     if missing:

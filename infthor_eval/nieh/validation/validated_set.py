@@ -27,9 +27,14 @@ def check_output(out: Path, data: NiehSet) -> None:
     """Refuse an output folder that the validated set would damage, before the models run.
 
     Raises:
-        UsageError: it is the folder of the set itself.
+        UsageError: it is the folder of the set itself, or the set has no `metadata/` to link.
         DataError: it has the frames of another set, or an inspection list that cannot be read.
     """
+    if not (data.root / "metadata").is_dir():
+        raise UsageError(
+            f"{data.root}: has no metadata/, which a validated set links; give a set in the layout "
+            "of the published one"
+        )
     prepare_folder(out)
     if out.resolve() == data.root.resolve():
         raise UsageError(

@@ -51,6 +51,14 @@ def test_no_access_and_no_network_are_one_line_with_a_hint(hub, tmp_path, run_cl
     )
 
 
+def test_a_long_cause_is_marked_where_it_is_cut(tmp_path, run_cli, monkeypatch):
+    def fail(*_args, **_options):
+        raise ValueError("no way to the hub " * 30)
+
+    monkeypatch.setattr("huggingface_hub.HfApi.repo_info", fail)
+    assert_refused(run_cli("fetch", "nieh", "--dir", tmp_path / "d"), "...); go online")
+
+
 def test_an_archive_that_points_elsewhere_is_refused(hub, tmp_path, run_cli):
     endpoint, handler = hub
     with tarfile.open(tmp_path / "evil.tar", "w") as tar:

@@ -1,0 +1,96 @@
+import pytest
+from PIL import Image
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.step_log import Layout, layout_of, read_steps
+
+
+@pytest.fixture
+def make_folder(tmp_path):
+    """Return a function that writes pictures of these names and the lines of a CSV file."""
+
+    def write(names, *lines):
+        for name in names:
+            (tmp_path / name).parent.mkdir(exist_ok=True)
+            Image.new("RGB", (28, 28)).save(tmp_path / name)
+        (tmp_path / "questions.csv").write_text("\n".join(lines) + "\n")
+        return tmp_path
+
+    return write
+
+
+def clue_names(data):
+    return [[frame.name for frame in data.clue_frames(row)] for row in data.questions]
+
+
+def test_frames_come_in_the_order_of_the_numbers_in_their_names(make_folder):
+    root = make_folder(["f10.png", "f2.png", "f1.jpg"], "question,answer", "q,yes")
+    data = NiehSet(root)
+    (question,) = data.questions
+    assert [frame.name for frame in data.frames(question.traj_id)] == [
+        "f1.jpg",
+        "f2.png",
+        "f10.png",
+    ]
+    assert question.clues == (0, 1, 2), "without clue frames all are"
+    assert question.answers == ("yes",)
+    assert layout_of(root) is Layout.NONE
+    assert [step.img_filename for step in read_steps(root)] == ["f1.jpg", "f2.png", "f10.png"]
+
+
+@pytest.mark.parametrize(
+    ("names", "cell", "clues"),
+    [
+        (["3.png", "0004.png", "5.png"], "4", ["0004.png"]),  # numbers are names
+        (["a.png", "b.png", "c.png"], '"1, c, a.png"', ["b.png", "c.png", "a.png"]),
+    ],
+)
+def test_clue_frames_are_names_or_numbers(make_folder, names, cell, clues):
+    data = NiehSet(make_folder(names, "question,answer,clue_frames", f"q,yes,{cell}"))
+    assert clue_names(data) == [clues]
+
+
+def test_each_trajectory_has_a_folder_of_its_own(make_folder):
+    names = ["a/1.png", "b/1.png", "b/2.png"]
+    lines = ("trajectory,question,answer,clue_frames", "b,q,yes,2", "a,q,no,", "c,q,no,", "a,q,,")
+    data = NiehSet(make_folder(names, *lines))
+    assert [(row.traj_id, row.clues) for row in data.questions] == [("b", (1,)), ("a", (0,))]
+    assert [row.reason for row in data.skipped] == [
+        "questions.csv, line 4: trajectory is not the name of a folder of frames; it is one of "
+        "a, b",
+        "questions.csv, line 5: answer is empty; fill it or remove the row",
+    ]
+
+
+def test_the_fingerprint_is_that_of_questions_and_frames(make_folder):
+    root = make_folder(["1.png", "2.png"], "question,answer", "q,yes")
+    before = NiehSet(root).fingerprint
+    assert NiehSet(root).fingerprint == before
+    (root / "2.png").rename(root / "3.png")
+    assert NiehSet(root).fingerprint != before
+
+
+@pytest.mark.parametrize(
+    ("names", "lines", "message"),
+    [
+        (["1.png"], ["question,reply", "q,a"], "no column answer"),
+        (["1.png"], ["question,answer"], "no row is a question \\(it has none\\)"),
+        (["1.png"], ["question,answer,clue_frames", "q,a,7"], "an entry that is no frame"),
+        (["1.png", "1.jpg"], ["question,answer", "q,a"], "two frames have the name 1"),
+        (["1.png", "a/1.png"], ["question,answer", "q,a"], "frames in itself and in a/"),
+        ([], ["question,answer", "q,a"], "has no qa_set"),
+    ],
+)
+def test_a_folder_that_cannot_be_used_is_refused_in_one_line(make_folder, names, lines, message):
+    root = make_folder(names, *lines)
+    with pytest.raises(DataError, match=message) as error:
+        NiehSet(root)
+    assert "\n" not in str(error.value)
+
+
+def test_several_csv_files_are_refused(make_folder):
+    root = make_folder(["1.png"], "question,answer", "q,a")
+    (root / "more.csv").write_text("question,answer\n")
+    with pytest.raises(DataError, match=r"several CSV files \(more.csv, questions.csv\)"):
+        NiehSet(root)
