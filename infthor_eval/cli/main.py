@@ -40,6 +40,7 @@ _COMMANDS = {
     "Look at results": {
         "show": "Print the results of runs, also as CSV, LaTeX, Markdown or JSON.",
         "compare": "Compare two runs on the same data.",
+        "explain": "Say why two runs of the same questions differ.",
         "report": "Write a page with results and all samples, or a figure of the paper.",
         "watch-run": "Open a page on a run as it goes.",
         "watch": "Write a video of an agent or an arm.",

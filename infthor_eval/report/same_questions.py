@@ -31,11 +31,15 @@ class Side:
 
     Attributes:
         run: place of the run among those that are compared.
+        task: name of the task.
+        variant: the variant.
         label: names of run, task and variant.
         records: records of the units, all of one task, known by their questions.
     """
 
     run: int
+    task: str
+    variant: str
     label: str
     records: Sequence[Record]
 
@@ -59,7 +63,7 @@ def find_sides(runs: Sequence[PresentedRun]) -> list[Side]:
         for (task, variant), same in sorted(records.items()):
             name = run.label.replace(f" ({task})", "")  # runs of one name are told apart by it
             label = ", ".join(filter(None, (name, task, variant)))
-            sides.append(Side(number, label, same))
+            sides.append(Side(number, task, variant, label, same))
     return sides
 
 

@@ -1,0 +1,48 @@
+"""`infthor-eval explain`: why two runs of the same questions differ."""
+
+from pathlib import Path
+
+import click
+
+from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.options.values import PATH
+
+__all__ = ["command"]
+
+
+@click.command(
+    "explain",
+    cls=ExampleCommand,
+    example="infthor-eval explain results/A/RUN results/B/RUN",
+)
+@click.argument("first", metavar="A", type=PATH)
+@click.argument("second", metavar="B", type=PATH)
+@click.option("--all", "every", is_flag=True, help="Show every question that differs, not a few.")
+@click.pass_context
+def command(context: click.Context, first: Path, second: Path, every: bool) -> None:
+    """Print why the runs in the folders A and B differ, on the same questions.
+
+    Exit code 0 if their replies and scores are equal, 1 if they differ.
+    """
+    from infthor_eval.cli.progress.notes import print_failure
+    from infthor_eval.errors import UsageError
+    from infthor_eval.report.explanation import explain_runs
+    from infthor_eval.report.presented import read_report_runs
+    from infthor_eval.report.terminal import print_table, table_console
+    from infthor_eval.terminal import print_line
+
+    runs = read_report_runs((first, second), print_failure, twice=True)
+    if runs[0].suite.name != runs[1].suite.name:
+        raise UsageError(
+            f"{first} is a run of {runs[0].suite.name}, {second} of {runs[1].suite.name}; give "
+            "runs of one suite"
+        )
+    explanation = explain_runs(*runs)
+    for sentence in explanation.sentences():
+        print_line(sentence)
+    console = table_console()
+    if explanation.findings:
+        print_table(explanation.settings_table(), console)
+    if not explanation.are_equal:
+        print_table(explanation.questions_table(every=every), console)
+    context.exit(0 if explanation.are_equal else 1)

@@ -1,0 +1,225 @@
+"""Why two runs may differ: the settings that do, and what each can change.
+
+What a setting can change is what it is told by. Frames in another order make other requests, whose
+hashes differ; other sizes of images make requests of another length; another precision makes
+neither, and replies alone.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import msgspec
+
+from infthor_eval.runs import RunConfig
+
+__all__ = ["UNTOLD", "Cause", "Effect", "Setting", "differing_causes"]
+
+Path = tuple[str, ...]
+_ABSENT = "-"
+
+
+class Effect(StrEnum):
+    """How a question of two runs differs.
+
+    Attributes:
+        ASKED: it is in one of them alone.
+        FAILED: it is in both, and only one has a result.
+        SCORES: the replies are equal, the scores are not.
+        REQUEST: what was sent to the adapter is another: frames, words or gold answers.
+        LENGTH: the request is the same, and has another number of tokens.
+        CUT: one reply is the beginning of the other.
+        REPLY: the replies differ.
+    """
+
+    ASKED = "asked"
+    FAILED = "failed"
+    SCORES = "scores"
+    REQUEST = "request"
+    LENGTH = "length"
+    CUT = "cut"
+    REPLY = "reply"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A setting that differs, by its name in the config, and its value in both runs as text."""
+
+    name: str
+    first: str
+    second: str
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A cause that runs can differ by.
+
+    Attributes:
+        name: its name in sentences.
+        effects: what it can change.
+        settings: the settings that tell of it; none for what only the records tell.
+    """
+
+    name: str
+    effects: frozenset[Effect]
+    settings: tuple[Setting, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """Settings that are one cause, by the beginnings of their paths; "*" is any one name."""
+
+    name: str
+    effects: frozenset[Effect]
+    paths: tuple[str, ...]
+
+    def has(self, path: Path) -> bool:
+        return any(_begins(path, tuple(pattern.split("."))) for pattern in self.paths)
+
+
+_SENT = frozenset({Effect.REQUEST})
+_READ = frozenset({Effect.LENGTH, Effect.REPLY})
+_WRITTEN = frozenset({Effect.REPLY})
+_CUT = frozenset({Effect.CUT})
+_SCORED = frozenset({Effect.SCORES})
+_CHOSEN = frozenset({Effect.ASKED})
+_ANY = frozenset(Effect)
+
+
+def _each(parent: str, names: str) -> tuple[str, ...]:
+    """Return the paths of names that spaces separate, below one parent."""
+    return tuple(f"{parent}.{name}" for name in names.split())
+
+
+_TASK = "tasks.*"
+_FILE = "tasks.*.config"
+_CONTEXT = "tasks.*.config.dataset_kwargs"
+_DECODING = "tasks.*.decoding"
+
+# In the order in which they are named where the records do not tell them apart: what usually
+# changes more comes first. A setting is of the first kind that has it.
+_KINDS = (
+    _Kind("the frame ablation", _SENT, ("frames", f"{_TASK}.without_alike")),
+    _Kind("the question set or its frames", _SENT, ("simulator", *_each(_TASK, "data simulator"))),
+    _Kind(
+        "the words of the question",
+        _SENT,
+        ("prompt", f"{_CONTEXT}.prompt", *_each(_FILE, "doc_to_text doc_to_image")),
+    ),
+    _Kind(
+        "the memory",
+        _SENT,
+        ("memory", "memory_args", "budget", f"{_TASK}.sources.memory", f"{_CONTEXT}.budget"),
+    ),
+    _Kind(
+        "the context or its window",
+        _SENT | _CHOSEN,
+        (_CONTEXT, "k_tokens", "tokens_per_frame", *_each(_TASK, "film sources")),
+    ),
+    _Kind(
+        "the model",
+        _READ,
+        _each("model", "name checkpoint class n_parameters baseline model imported"),
+    ),
+    _Kind("the model's revision", _READ, ("model.revision",)),
+    _Kind("the chat template or system prompt", _READ, _each("model", "prompt chat_template")),
+    _Kind("the size of images", _READ, ("model.image_processor.size", "model.max_frames")),
+    _Kind("the preparation of images", _READ, _each("model", "image_processor image_backend")),
+    _Kind("the engine", _READ, ("host", "adapter", *_each("model", "engine base_url adapter"))),
+    _Kind(
+        "the limit of the model's context",
+        _CHOSEN | {Effect.FAILED} | _READ,
+        ("model.max_tokens",),
+    ),
+    _Kind("the temperature", _WRITTEN, _each(_DECODING, "temperature top_p")),
+    _Kind(
+        "the repetition penalty",
+        _WRITTEN,
+        (f"{_DECODING}.repetition_penalty", "model.generation.repetition_penalty"),
+    ),
+    _Kind("the allowed replies", _WRITTEN, (f"{_DECODING}.choices",)),
+    _Kind(
+        "where replies end",
+        _CUT,
+        (*_each(_DECODING, "max_new_tokens stop"), "model.generation.end_ids"),
+    ),
+    _Kind("the seed", _WRITTEN | _SENT | _CHOSEN, ("seed", "model.seed", f"{_DECODING}.seed")),
+    _Kind("the extension of the context (RoPE)", _WRITTEN, ("model.rope",)),
+    _Kind("the precision", _WRITTEN, _each("model", "dtype quantization")),
+    _Kind("the checkpoint's files", _READ, ("model.fingerprint",)),
+    _Kind("the versions of libraries", _READ, ("model.versions",)),
+    _Kind("other settings of the model", _READ, ("model",)),
+    _Kind(
+        "the scorer",
+        _SCORED,
+        ("rescored", f"{_TASK}.metrics", *_each(_FILE, "metric_list process_results")),
+    ),
+    _Kind("which questions are asked", _CHOSEN, ("limit", "repeats", f"{_TASK}.skipped")),
+    _Kind("the version of infthor-eval", _ANY, ("infthor_eval", "suite_code")),
+    _Kind("other settings", _ANY, ("*",)),
+)
+# Names of tasks, and what other settings tell too: decoding, the set's digest, the skipped.
+_TOLD_ELSEWHERE = _Kind(
+    "",
+    frozenset(),
+    (
+        *_each(_FILE, "task tag metadata generation_kwargs doc_to_target"),
+        f"{_CONTEXT}.bundled",
+        f"{_TASK}.n_samples",
+    ),
+)
+
+# What a difference is put down to that no setting can explain.
+UNTOLD = {
+    Effect.ASKED: Cause("questions that one run did not come to", _CHOSEN),
+    Effect.FAILED: Cause("questions that failed or were not asked", frozenset({Effect.FAILED})),
+    Effect.SCORES: Cause("the scores of equal replies", _SCORED),
+    Effect.REQUEST: Cause("frames or words that no setting tells of", _SENT),
+    Effect.LENGTH: Cause("numbers of tokens that no setting tells of", _READ),
+    Effect.CUT: Cause("nothing that is recorded", _WRITTEN),
+    Effect.REPLY: Cause("nothing that is recorded", _WRITTEN),
+}
+
+
+def differing_causes(first: RunConfig[Any], second: RunConfig[Any]) -> list[Cause]:
+    """Return the causes that the settings of two runs tell of, in the order of `_KINDS`.
+
+    The only task of one run is compared with the only one of the other, whatever their names.
+    """
+    settings = [dict(_flat(document)) for document in _documents(first, second)]
+    found: dict[str, list[Setting]] = {}
+    for path in dict.fromkeys((*settings[0], *settings[1])):
+        values = [of_run.get(path, _ABSENT) for of_run in settings]
+        if values[0] != values[1] and not _TOLD_ELSEWHERE.has(path):
+            kind = next(kind for kind in _KINDS if kind.has(path))
+            found.setdefault(kind.name, []).append(Setting(".".join(path), *values))
+    return [
+        Cause(kind.name, kind.effects, tuple(found[kind.name]))
+        for kind in _KINDS
+        if kind.name in found
+    ]
+
+
+def _documents(first: RunConfig[Any], second: RunConfig[Any]) -> list[dict[str, Any]]:
+    documents = [first.document, second.document]
+    tasks = [document.get("tasks", {}) for document in documents]
+    if all(len(of_run) == 1 for of_run in tasks) and tasks[0].keys() != tasks[1].keys():
+        for document, of_run in zip(documents, tasks, strict=True):
+            document["tasks"] = {"*": next(iter(of_run.values()))}
+    return documents
+
+
+def _flat(value: Any, path: Path = ()) -> Iterator[tuple[Path, str]]:
+    """Yield the path and the text of each value; a list is one value."""
+    if isinstance(value, Mapping) and value:
+        for name, item in value.items():
+            yield from _flat(item, (*path, name))
+    else:
+        yield path, value if isinstance(value, str) else msgspec.json.encode(value).decode()
+
+
+def _begins(path: Path, pattern: Sequence[str]) -> bool:
+    return len(path) >= len(pattern) and all(
+        wanted in ("*", name) for wanted, name in zip(pattern, path, strict=False)
+    )

@@ -1,0 +1,251 @@
+"""Where two runs of the same questions differ: question by question, and what that can be due to.
+
+What each question carries of the difference of the mean scores adds up to all of it: a question of
+both runs carries its own difference, one of one run alone what it moves that run's mean by.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import takewhile
+from statistics import fmean
+from typing import Any
+
+from infthor_eval.errors import DataError
+from infthor_eval.report.causes import Effect
+from infthor_eval.report.presented import PresentedRun
+from infthor_eval.report.presenter import THOUGHT
+from infthor_eval.report.same_questions import Side, find_sides
+from infthor_eval.runs import UnitKey, UnitRecord
+
+__all__ = ["Answer", "Compared", "QuestionDifference", "compare_questions"]
+
+Record = UnitRecord[Any]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a run has of a question.
+
+    Attributes:
+        state: the state of its record; "not in the run" if there is none.
+        reason: why there is no result; empty if there is one, or no record.
+        text: what the model thought, if it did, and its reply.
+        score: the score by the main metric; None without a result.
+    """
+
+    state: str
+    reason: str = ""
+    text: str = ""
+    score: float | None = None
+
+
+@dataclass(frozen=True)
+class QuestionDifference:
+    """A question that differs between two runs.
+
+    Attributes:
+        question: its words.
+        answers: what each of the runs has of it.
+        effects: how it differs.
+        possible: how it may differ besides, as the records do not tell.
+        carries: its part of the difference of the runs' mean scores, the second less the first.
+    """
+
+    question: str
+    answers: tuple[Answer, Answer]
+    effects: frozenset[Effect]
+    possible: frozenset[Effect]
+    carries: float
+
+    @property
+    def diverges_at(self) -> int | None:
+        """The first character that differs, from 1; None if the replies are equal, or one is
+        missing."""
+        first, second = self.answers
+        if first.score is None or second.score is None or first.text == second.text:
+            return None
+        letters = zip(first.text, second.text, strict=False)
+        return 1 + sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], letters))
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Two runs compared question by question.
+
+    Attributes:
+        n_shared: number of questions with a result in both, those that were repeated once for each
+            repetition.
+        means: the mean score of each run, over all of its results.
+        differences: the questions that differ, those that carry most first.
+    """
+
+    n_shared: int
+    means: tuple[float, float]
+    differences: Sequence[QuestionDifference]
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """A question of two runs: the records, and whether both decode replies alike."""
+
+    first: Record | None
+    second: Record | None
+    same_decoding: bool
+
+
+def compare_questions(first: PresentedRun, second: PresentedRun) -> Compared:
+    """Compare two runs of one suite question by question.
+
+    A task and variant (a depth) is compared with that of its name; a run's only one with the only
+    one of the other run, whatever its name.
+
+    Raises:
+        DataError: no question has a result in both.
+    """
+    runs = (first, second)
+    pairs = list(_pairs(runs))
+    answers = [(_answer(first, pair.first), _answer(second, pair.second)) for pair in pairs]
+    scores: tuple[list[float], list[float]] = ([], [])
+    shared: tuple[list[float], list[float]] = ([], [])
+    for both in answers:
+        is_shared = all(answer.score is not None for answer in both)
+        for place, answer in enumerate(both):
+            if answer.score is not None:
+                scores[place].append(answer.score)
+                if is_shared:
+                    shared[place].append(answer.score)
+    if not shared[0]:
+        raise DataError(
+            f"{first.folder} and {second.folder} share no question of one task with a result in "
+            "both; explain runs of the same questions"
+        )
+    carried = _Carried(
+        len(shared[0]),
+        (fmean(shared[0]), fmean(shared[1])),
+        (len(scores[0]), len(scores[1])),
+    )
+    differences = []
+    for pair, both in zip(pairs, answers, strict=True):
+        effects = _effects(runs, pair, both)
+        if effects:
+            record = pair.first or pair.second
+            assert record is not None
+            is_told = pair.same_decoding or Effect.REQUEST in effects
+            possible = frozenset() if is_told else frozenset({Effect.REQUEST})
+            title = first.presenter.describe(record).title
+            by = carried.by(both)
+            differences.append(QuestionDifference(title, both, effects, possible, by))
+    differences.sort(key=lambda difference: -abs(difference.carries))
+    return Compared(len(shared[0]), (fmean(scores[0]), fmean(scores[1])), differences)
+
+
+def _pairs(runs: tuple[PresentedRun, PresentedRun]) -> Iterator[_Pair]:
+    for first, second in _paired_sides(find_sides(runs)):
+        records = [_by_key(side) for side in (first, second)]
+        same = first is not None and second is not None and _decode_alike(runs, (first, second))
+        for key in dict.fromkeys((*records[0], *records[1])):
+            yield _Pair(records[0].get(key), records[1].get(key), same)
+
+
+def _paired_sides(sides: Sequence[Side]) -> Iterator[tuple[Side | None, Side | None]]:
+    by_run = [
+        {(side.task, side.variant): side for side in sides if side.run == run} for run in (0, 1)
+    ]
+    if all(len(of_run) == 1 for of_run in by_run):
+        yield next(iter(by_run[0].values())), next(iter(by_run[1].values()))
+        return
+    for name in dict.fromkeys((*by_run[0], *by_run[1])):
+        yield by_run[0].get(name), by_run[1].get(name)
+
+
+def _by_key(side: Side | None) -> dict[UnitKey, Record]:
+    return {} if side is None else {record.key: record for record in side.records}
+
+
+def _decode_alike(runs: tuple[PresentedRun, PresentedRun], sides: tuple[Side, Side]) -> bool:
+    """Return whether hashes of requests, which have the decoding in them, tell of the rest.
+
+    Those of imported replies are of the replies.
+    """
+    configs = [run.header.config for run in runs]
+    if any(config.model.get("imported") for config in configs):
+        return False
+    decoding = [
+        config.document["tasks"][side.task].get("decoding")
+        for config, side in zip(configs, sides, strict=True)
+    ]
+    return bool(decoding[0] == decoding[1])
+
+
+def _answer(run: PresentedRun, record: Record | None) -> Answer:
+    if record is None:
+        return Answer("not in the run")
+    if record.state != "answered":
+        return Answer(record.state, record.failure or record.excluded or "")
+    thought = run.presenter.details(record).get(THOUGHT)
+    reply = run.presenter.reply(record)
+    text = reply if thought is None else f"{thought}\n{reply}"
+    return Answer(record.state, text=text, score=run.main_score(record))
+
+
+def _effects(
+    runs: tuple[PresentedRun, PresentedRun], pair: _Pair, answers: tuple[Answer, Answer]
+) -> frozenset[Effect]:
+    n_answered = sum(answer.score is not None for answer in answers)
+    if n_answered == 0:
+        return frozenset()
+    if n_answered == 1:
+        is_absent = pair.first is None or pair.second is None
+        return frozenset({Effect.ASKED if is_absent else Effect.FAILED})
+    assert pair.first is not None
+    assert pair.second is not None
+    first, second = (answer.text for answer in answers)
+    if first == second:
+        scored = _scores_differ(runs, (pair.first, pair.second))
+        return frozenset({Effect.SCORES} if scored else ())
+    effects = {Effect.REPLY}
+    if first.startswith(second) or second.startswith(first):
+        effects.add(Effect.CUT)
+    return frozenset(effects | _request_effects(pair.first, pair.second, pair.same_decoding))
+
+
+def _scores_differ(runs: tuple[PresentedRun, PresentedRun], records: tuple[Record, Record]) -> bool:
+    first, second = (run.suite.scores(record) for run, record in zip(runs, records, strict=True))
+    if any(first[name] != second[name] for name in first.keys() & second.keys()):
+        return True
+    main = [run.main_score(record) for run, record in zip(runs, records, strict=True)]
+    return main[0] != main[1]
+
+
+def _request_effects(first: Record, second: Record, same_decoding: bool) -> set[Effect]:
+    """Return how the requests differ, as far as hashes and counts of tokens tell."""
+    if same_decoding and first.fingerprint != second.fingerprint:
+        return {Effect.REQUEST}
+    counts = (first.tokens.context, second.tokens.context)
+    if None in counts or counts[0] == counts[1]:
+        return set()
+    return {Effect.LENGTH} if same_decoding else {Effect.LENGTH, Effect.REQUEST}
+
+
+@dataclass(frozen=True)
+class _Carried:
+    """What questions carry of the difference of two means.
+
+    Attributes:
+        n_shared: number of questions with a result in both.
+        shared: mean scores over those.
+        n_answered: number of results of each run.
+    """
+
+    n_shared: int
+    shared: tuple[float, float]
+    n_answered: tuple[int, int]
+
+    def by(self, answers: tuple[Answer, Answer]) -> float:
+        first, second = (answer.score for answer in answers)
+        if first is not None and second is not None:
+            return (second - first) / self.n_shared
+        if second is not None:
+            return (second - self.shared[1]) / self.n_answered[1]
+        assert first is not None
+        return (self.shared[0] - first) / self.n_answered[0]
