@@ -65,7 +65,10 @@ def main(words: Sequence[str] | None = None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
         work = Work(write_frames(root, options.frames), QUESTIONS, options.new_tokens)
-        rows = [_try(name, root / name, work) for name in options.families]
+        rows = []
+        for name in options.families:
+            rows.append(_try(name, root / name, work))
+            print(_line(rows[-1]), rows[-1].note, file=sys.stderr, flush=True)
     text = report(rows)
     print(text)
     if options.out is not None:
@@ -100,7 +103,6 @@ def _try(name: str, folder: Path, work: Work) -> Row:
         return Row(name, None, len(work.questions), f"transformers' own way fails: {reference}")
     note = difference(replies, reference)
     equal = sum(ours == theirs for ours, theirs in zip(replies, reference.replies, strict=True))
-    print(f"{name}: {equal} of {len(replies)} {note}", file=sys.stderr, flush=True)
     return Row(name, equal, len(replies), note)
 
 
