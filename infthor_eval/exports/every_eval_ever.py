@@ -8,7 +8,8 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 from uuid import UUID
@@ -18,7 +19,14 @@ import msgspec
 import infthor_eval
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.exports.every_eval_ever_rows import SCHEMA_VERSION, result_id, sample_rows
-from infthor_eval.exports.gaps import describe_gaps, gap_notes, last_change, task_config, task_gaps
+from infthor_eval.exports.gaps import (
+    dataset_name,
+    describe_gaps,
+    gap_notes,
+    last_change,
+    task_document,
+    task_gaps,
+)
 from infthor_eval.exports.measures import LEVEL, Measure, counted, find_measures
 from infthor_eval.exports.request import ExportRequest, Written
 from infthor_eval.exports.samples import SampleReader
@@ -64,9 +72,7 @@ class _RunExport:
         self._run = run
         self._request = request
         self._facts = model_facts(run, request.model_id)
-        self._measures = [it for task in run.tasks for it in find_measures(run, task)]
-        if not self._measures:
-            raise DataError(f"{run.folder}: no unit of it counts; leave it out, or run it again")
+        self._measures = list(chain.from_iterable(find_measures(run).values()))
         self.reader = SampleReader(run, request.data)
         self._ran = last_change(run)
         self._now = f"{time.time():.3f}"
@@ -173,8 +179,7 @@ class _RunExport:
 
     def _source_data(self, task: str) -> Document:
         run = self._run
-        settings = task_config(run, task).dataset_kwargs
-        name = str(settings.get("bundled", task))
+        name = dataset_name(run, task)
         about = {"task": task, "simulator": run.simulator or UNKNOWN}
         if self._request.dataset is None:
             return {"dataset_name": name, "source_type": "other", "additional_details": about}
@@ -253,7 +258,7 @@ def _metric_config(measure: Measure, description: str) -> Document:
 
 def _generation_config(run: PresentedRun, task: str) -> Document:
     config = run.header.config
-    document: Mapping[str, Any] = msgspec.to_builtins(config.tasks[task], str_keys=True)
+    document = task_document(run, task)
     decoding = document.get("decoding") or {}
     arguments = {
         "temperature": decoding.get("temperature"),

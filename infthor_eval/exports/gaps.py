@@ -3,6 +3,9 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import Any
+
+import msgspec
 
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.presented import PresentedRun
@@ -11,10 +14,12 @@ from infthor_eval.runs.journals.shards import find_shards
 
 __all__ = [
     "TaskGaps",
+    "dataset_name",
     "describe_gaps",
     "gap_notes",
     "last_change",
     "task_config",
+    "task_document",
     "task_gaps",
 ]
 
@@ -52,6 +57,17 @@ def task_config(run: PresentedRun, task: str) -> TaskConfig:
     """Return the config of a task; an empty one if its suite has configs of another kind."""
     config = run.tasks[task]
     return config if isinstance(config, TaskConfig) else TaskConfig()
+
+
+def task_document(run: PresentedRun, task: str) -> Mapping[str, Any]:
+    """Return the config of a task as JSON values, whatever its suite."""
+    document: Mapping[str, Any] = msgspec.to_builtins(run.tasks[task], str_keys=True)
+    return document
+
+
+def dataset_name(run: PresentedRun, task: str) -> str:
+    """Return the name of a task's data set: the bundled one's, else the task's."""
+    return str(task_config(run, task).dataset_kwargs.get("bundled", task))
 
 
 def task_gaps(run: PresentedRun, task: str) -> TaskGaps:

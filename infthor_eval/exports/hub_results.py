@@ -6,16 +6,17 @@ documentation). Nothing is uploaded.
 """
 
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from infthor_eval.errors import DataError, UsageError, wrap_errors
+from infthor_eval.errors import UsageError, wrap_errors
 from infthor_eval.exports.gaps import describe_gaps, gap_notes, last_change, task_gaps
 from infthor_eval.exports.measures import Measure, find_measures
 from infthor_eval.exports.request import ExportRequest, Written
-from infthor_eval.exports.subjects import UNKNOWN, model_facts
+from infthor_eval.exports.subjects import UNKNOWN, ModelFacts, model_facts
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.runs import with_frames
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
@@ -45,9 +46,10 @@ def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
     paths: dict[Path, None] = {}
     notes = []
     for run in runs:
-        paths[_write_results(run, request)] = None
+        facts = model_facts(run, request.model_id)
+        paths[_write_results(run, facts, request)] = None
         notes += gap_notes(run)
-        if model_facts(run, request.model_id).developer == UNKNOWN:
+        if facts.developer == UNKNOWN:
             notes.append(f"{run.label}: not known: the model's developer; give --model-id")
     paths[_write_tasks(runs, request)] = None
     notes.append(
@@ -57,19 +59,18 @@ def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
     return Written(list(paths), _NO_PLACE, notes)
 
 
-def _write_results(run: PresentedRun, request: ExportRequest) -> Path:
-    facts = model_facts(run, request.model_id)
-    measures = [measure for task in run.tasks for measure in find_measures(run, task)]
-    primary = [measure for measure in measures if measure.is_primary]
-    if not primary:
-        raise DataError(f"{run.folder}: no unit of it counts; leave it out, or run it again")
+def _write_results(run: PresentedRun, facts: ModelFacts, request: ExportRequest) -> Path:
+    measures = chain.from_iterable(find_measures(run).values())
     owner, name = file_name(facts.developer), file_name(facts.short_name.replace("/", "_"))
     path = request.out / owner / name / _FOLDER / f"{_FRAMEWORK}_{file_name(run.folder.name)}.yaml"
-    _write_yaml(path, [_entry(run, measure, request) for measure in primary])
+    entries = [_entry(run, facts, measure, request) for measure in measures if measure.is_primary]
+    _write_yaml(path, entries)
     return path
 
 
-def _entry(run: PresentedRun, measure: Measure, request: ExportRequest) -> dict[str, Any]:
+def _entry(
+    run: PresentedRun, facts: ModelFacts, measure: Measure, request: ExportRequest
+) -> dict[str, Any]:
     """Return a result in the form of the hub's library, which writes the keys."""
     from huggingface_hub import EvalResultEntry, eval_result_entries_to_yaml
 
@@ -82,14 +83,13 @@ def _entry(run: PresentedRun, measure: Measure, request: ExportRequest) -> dict[
         date=last_change(run).isoformat(timespec="seconds"),
         source_url=request.source_url,
         source_name="runs of infthor-eval" if request.source_url else None,
-        notes=_notes(run, measure, factor),
+        notes=_notes(run, facts, measure, factor),
     )
     (document,) = eval_result_entries_to_yaml([entry])
     return document
 
 
-def _notes(run: PresentedRun, measure: Measure, factor: int) -> str:
-    facts = model_facts(run)
+def _notes(run: PresentedRun, facts: ModelFacts, measure: Measure, factor: int) -> str:
     unit = "%" if measure.is_share else "points"
     interval = measure.interval
     spread = ""

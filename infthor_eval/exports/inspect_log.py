@@ -13,10 +13,16 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
-from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.exports.gaps import describe_gaps, gap_notes, last_change, task_config, task_gaps
+from infthor_eval.errors import wrap_errors
+from infthor_eval.exports.gaps import (
+    dataset_name,
+    describe_gaps,
+    gap_notes,
+    last_change,
+    task_config,
+    task_document,
+    task_gaps,
+)
 from infthor_eval.exports.inspect_samples import SampleWriter, model_usage, sample_summary
 from infthor_eval.exports.measures import Measure, counted, find_measures
 from infthor_eval.exports.request import ExportRequest, Written
@@ -47,11 +53,8 @@ def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
     notes: list[str] = []
     for run in runs:
         reader = SampleReader(run, request.data)
-        measures = {task: find_measures(run, task) for task in run.tasks}
-        logs = [_Log(run, task, found, reader) for task, found in measures.items() if found]
-        if not logs:
-            raise DataError(f"{run.folder}: no unit of it counts; leave it out, or run it again")
-        for log in logs:
+        for task, measures in find_measures(run).items():
+            log = _Log(run, task, measures, reader)
             paths.append(log.write(request))
             notes += log.problems
         notes += [*gap_notes(run), *reader.problems]
@@ -126,9 +129,9 @@ class _Log:
             "task": with_frames(self._task, run.header),
             "task_id": self._id,
             "task_version": str(settings.get("metadata", {}).get("version", 0)),
-            "task_args": msgspec.to_builtins(config.tasks[self._task], str_keys=True),
+            "task_args": task_document(run, self._task),
             "dataset": {
-                "name": str(task_config(run, self._task).dataset_kwargs.get("bundled", self._task)),
+                "name": dataset_name(run, self._task),
                 "samples": len({record.key.once for record in records}),
                 "sample_ids": list(dict.fromkeys(str(record.key.once) for record in records)),
             },
@@ -162,8 +165,7 @@ class _Log:
         }
 
     def _plan(self) -> Document:
-        decoding = msgspec.to_builtins(self._run.tasks[self._task], str_keys=True).get("decoding")
-        known = decoding or {}
+        known = task_document(self._run, self._task).get("decoding") or {}
         config = {
             "temperature": known.get("temperature"),
             "top_p": known.get("top_p"),

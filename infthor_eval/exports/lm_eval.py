@@ -194,7 +194,7 @@ def _row(sample: UnitSample) -> dict[str, Any]:
 
 
 def _failure(record: UnitRecord[Any]) -> dict[str, Any]:
-    """Return why a unit counts as wrong without a reply, under a key of our own."""
+    """Return why a unit has no reply, under a key of our own."""
     return {} if record.failure is None else {"failure": record.failure}
 
 

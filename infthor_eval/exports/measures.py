@@ -1,7 +1,8 @@
 """The scores of a run's tasks as other formats have them: a mean, its interval, and each sample's.
 
-They are those of `show` and `results.json`: a unit that was repeated counts with its mean, one that
-failed with 0, and one that is excluded does not.
+A unit that was repeated counts with its mean, and one that is excluded does not. They are those of
+`show` and `results.json` where no unit failed: here one that did counts with 0, there it is in no
+score (docs/exports.md).
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,6 +11,7 @@ from functools import cached_property
 from statistics import fmean
 from typing import Any, NamedTuple
 
+from infthor_eval.errors import DataError
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.runs import UnitRecord
 from infthor_eval.statistics import MeanEstimate, bootstrap_interval, clustered_mean
@@ -93,8 +95,19 @@ def counted(run: PresentedRun, task: str) -> list[Record]:
     return sorted(records, key=lambda record: record.key)
 
 
-def find_measures(run: PresentedRun, task: str) -> list[Measure]:
-    """Return the metrics of a task, the primary one first; none if no unit counts."""
+def find_measures(run: PresentedRun) -> dict[str, list[Measure]]:
+    """Return the metrics of each task with a unit that counts, the primary one first.
+
+    Raises:
+        DataError: there is no such task.
+    """
+    found = {task: measures for task in run.tasks if (measures := _measures_of(run, task))}
+    if not found:
+        raise DataError(f"{run.folder}: no unit of it counts; leave it out, or run it again")
+    return found
+
+
+def _measures_of(run: PresentedRun, task: str) -> list[Measure]:
     records = counted(run, task)
     return [
         *_groups(run, task, records),
