@@ -41,9 +41,10 @@ def set_checks(root: Path, trajectories: Path | None) -> Iterator[Check]:
     Raises:
         DataError: the folder is no set.
     """
+    from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.set_contents import read_asked_tasks, read_contents
 
-    contents = read_contents(root)
+    contents = read_contents(NiehSet(root))
     yield from _questions(contents)
     yield from _trajectories(contents)
     if not contents.frames:

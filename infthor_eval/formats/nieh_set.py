@@ -49,6 +49,8 @@ class NiehSet:
 
     Attributes:
         root: folder of the set, or one question file.
+        directory: folder of the set's files.
+        question_files: its files with questions, sorted.
         has_frames: False if there are question files alone.
         trajectories: folder of its trajectories (`<traj_id>.json` or `.txt`), or None if they are
             inside the set.
@@ -70,16 +72,16 @@ class NiehSet:
         if not root.exists():
             raise DataError(f"{root}: no such folder; {_GIVE_A_SET}")
         self.root = root
-        self._folder = root if root.is_dir() else root.parent
-        self._files = sorted(root.glob("qa_set*.csv")) if root.is_dir() else [root]
-        self.has_frames = (self._folder / "metadata").is_dir()
+        self.directory = root if root.is_dir() else root.parent
+        self.question_files = sorted(root.glob("qa_set*.csv")) if root.is_dir() else [root]
+        self.has_frames = (self.directory / "metadata").is_dir()
         self._own: OwnFolder | None = None
-        if not self._files and not self.has_frames:
+        if not self.question_files and not self.has_frames:
             self._own = find_own_folder(root)
         if self._own is not None:
-            self._files = [self._own.file]
+            self.question_files = [self._own.file]
             self.has_frames = True
-        if needs_questions and not self._files:
+        if needs_questions and not self.question_files:
             raise DataError(
                 f"{root}: has no qa_set*.csv, as an NIEH set has beside metadata/; {_GIVE_A_SET}"
             )
@@ -91,8 +93,8 @@ class NiehSet:
                 "--trajectories"
             )
         self.trajectories = trajectories
-        self.simulator = simulator_of(self._folder)
-        self.files = {file.stem: self._read_file(file) for file in self._files}
+        self.simulator = simulator_of(self.directory)
+        self.files = {file.stem: self._read_file(file) for file in self.question_files}
         self._frames: dict[str, dict[int, FrameRef] | DataError] = {}
         # One tuple per trajectory, shared by all its questions: a copy each would be thousands of
         # references.
@@ -141,7 +143,7 @@ class NiehSet:
         Raises:
             DataError: `twins.jsonl` is missing or malformed.
         """
-        pairs = read_pairs(self._folder)
+        pairs = read_pairs(self.directory)
         return {name: pair for pair in pairs for name in pair.traj_ids}
 
     @cached_property
@@ -150,7 +152,7 @@ class NiehSet:
         # Not the content of frames, which would mean reading all of it: a record has the digests of
         # its own frames.
         digest = hashlib.blake2b(digest_size=16)
-        for file in self._files:
+        for file in self.question_files:
             digest.update(file.read_bytes())
         for traj_id in sorted({question.traj_id for question in self.questions if self.has_frames}):
             if self._own is None:  # one's own frames have no log
@@ -160,7 +162,7 @@ class NiehSet:
         return digest.hexdigest()
 
     def _read_file(self, file: Path) -> tuple[Question | SkippedQuestion, ...]:
-        name = file.stem if len(self._files) > 1 else ""
+        name = file.stem if len(self.question_files) > 1 else ""
         rows = read_questions(file) if self._own is None else self._own.read_questions()
         are_twins = any(isinstance(row, Question) and row.pair for row in rows)
         bases = self._bases if are_twins else {}
@@ -182,8 +184,8 @@ class NiehSet:
     def folder(self, traj_id: str) -> Path:
         """Return the folder of a trajectory's frames and metadata."""
         if self._own is not None:
-            return self._own.folders.get(traj_id, self._folder)
-        return self._folder / "metadata" / traj_id
+            return self._own.folders.get(traj_id, self.directory)
+        return self.directory / "metadata" / traj_id
 
     def frames(self, traj_id: str) -> tuple[FrameRef, ...]:
         """Return all frames of a trajectory in time order.

@@ -9,7 +9,7 @@ from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import read_json
 from infthor_eval.storage.files import is_written, write_atomically, writing_hint
 
-__all__ = ["FORMAT", "claim_for_simulator", "simulator_of"]
+__all__ = ["FORMAT", "claim_for_simulator", "simulator_of", "writer_of"]
 
 FORMAT = 1  # increased when the files of a set that we write change their meaning
 _FILE = "set.json"
@@ -28,6 +28,17 @@ def simulator_of(root: Path) -> str | None:
     if simulator is not None and not isinstance(simulator, str):
         raise DataError(f"{path}: simulator is {simulator!r:.40}, not a name; write the set again")
     return simulator
+
+
+def writer_of(root: Path) -> str | None:
+    """Return the version of infthor-eval that wrote a set, or None if it is not recorded.
+
+    Raises:
+        DataError: as `simulator_of`.
+    """
+    path = root / _FILE
+    version = _read(path).get("infthor_eval") if path.exists() else None
+    return None if version is None else str(version)
 
 
 def claim_for_simulator(root: Path, simulator: str) -> None:

@@ -68,13 +68,8 @@ class AskedTask:
     skipped: Counter[str]
 
 
-def read_contents(root: Path) -> SetContents:
-    """Read a set whole; what cannot be read is counted by reason.
-
-    Raises:
-        DataError: the folder is no set.
-    """
-    data = NiehSet(root)
+def read_contents(data: NiehSet) -> SetContents:
+    """Read a set whole; what cannot be read is counted by reason."""
     contents = SetContents()
     for name, rows in data.files.items():
         questions = [row for row in rows if isinstance(row, Question)]

@@ -178,12 +178,11 @@ def _file_set(name: str, encoding: str, includes: Sequence[str], text: str) -> d
 
 
 def _record_sets(facts: SetFacts) -> Iterator[dict[str, Any]]:
-    root = facts.data.root if facts.data.root.is_dir() else facts.data.root.parent
     for file in facts.question_files:
         name = Path(file.path).stem
         fields = [
             _field(name, column, _COLUMNS.get(column, column), file, {"column": column})
-            for column in _header(root / file.path)
+            for column in _header(facts.data.directory / file.path)
         ]
         yield {
             "@type": "cr:RecordSet",

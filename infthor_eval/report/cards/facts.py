@@ -2,7 +2,7 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.reading import read_json
+from infthor_eval.formats.set_info import writer_of
 from infthor_eval.formats.twins import TwinPair
 from infthor_eval.nieh.guessing.audit import Audit, audit
 from infthor_eval.nieh.guessing.chains import form_of
@@ -21,6 +22,7 @@ __all__ = ["About", "FileFact", "SetFacts", "read_facts"]
 
 _MANIFEST = "manifest.json"
 _PAIRS = "twins.jsonl"
+_HINT = "write the set again"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,18 +148,18 @@ def read_facts(root: Path) -> SetFacts:
     data = NiehSet(root)
     if not data.questions:
         raise DataError(f"{root}: no question can be asked; fix the set, or give another")
-    folder = root if root.is_dir() else root.parent
-    manifest, info = (_read_object(folder / name) for name in (_MANIFEST, "set.json"))
+    folder = data.directory
+    manifest = folder / _MANIFEST
     pairs = folder / _PAIRS
     return SetFacts(
         data=data,
-        contents=read_contents(root),
+        contents=read_contents(data),
         audited=audit(data),
         forms=Counter(map(form_of, data.questions)),
         scenes=_read_scenes(data),
-        manifest=manifest,
-        written_by=info.get("infthor_eval"),
-        question_files=list(_question_files(root, folder)),
+        manifest=read_json(manifest, _HINT, dict[str, Any]) if manifest.is_file() else {},
+        written_by=writer_of(folder),
+        question_files=[_file_fact(path, folder) for path in data.question_files],
         pairs_file=_file_fact(pairs, folder) if pairs.is_file() else None,
     )
 
@@ -170,20 +172,6 @@ def _read_scenes(data: NiehSet) -> Mapping[str, int]:
 
 def _twins(data: NiehSet) -> Mapping[str, TwinPair]:
     return data.twins if any(question.pair for question in data.questions) else {}
-
-
-def _read_object(path: Path) -> Mapping[str, Any]:
-    if not path.is_file():
-        return {}
-    content = read_json(path, "write the set again")
-    if not isinstance(content, dict):
-        raise DataError(f"{path}: not a JSON object; write the set again")
-    return content
-
-
-def _question_files(root: Path, folder: Path) -> Iterator[FileFact]:
-    for path in sorted(root.glob("qa_set*.csv")) if root.is_dir() else [root]:
-        yield _file_fact(path, folder)
 
 
 def _file_fact(path: Path, folder: Path) -> FileFact:

@@ -37,7 +37,7 @@ def _make_picture(folder: Path) -> Path:
 
 def _ask(folder: Path) -> None:
     """Prepare every question of the worlds, and load what is shown."""
-    read_contents(folder)
+    read_contents(NiehSet(folder))
     for context in ("clues", "trajectory"):
         open_set.cache_clear()
         found = find_samples({"context": context, "data": str(folder), **_SETTINGS})

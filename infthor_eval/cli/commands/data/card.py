@@ -67,7 +67,7 @@ def command(
     from infthor_eval.report.cards.facts import About, read_facts
     from infthor_eval.report.cards.markdown import card
     from infthor_eval.report.cards.pictures import draw_example
-    from infthor_eval.storage.files import write_atomically, writing_hint
+    from infthor_eval.storage.files import prepare_folder, write_atomically, writing_hint
     from infthor_eval.terminal import print_line
 
     about = About(
@@ -82,9 +82,8 @@ def command(
     with NOTES.status("counting what is in the set"):
         facts = read_facts(set_folder)
     print_left_out(facts.data.root, facts.data.skipped)
-    folder = out or (set_folder if set_folder.is_dir() else set_folder.parent)
+    folder = prepare_folder(out or facts.data.directory)
     with wrap_errors(f"{folder}: cannot be written", writing_hint(", or give another --out")):
-        folder.mkdir(parents=True, exist_ok=True)
         caption = draw_example(facts.data, folder / _PICTURE)
         described = json.dumps(croissant(facts, about), indent=1, ensure_ascii=False) + "\n"
         text = card(facts, about, {_PICTURE: caption} if caption else {})
