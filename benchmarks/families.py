@@ -46,10 +46,10 @@ __all__ = [
     "FAMILIES",
     "QUESTIONS",
     "Row",
-    "family_names",
     "main",
     "make",
     "report",
+    "trial_parser",
     "try_families",
     "write_frames",
 ]
@@ -142,24 +142,26 @@ def main(words: Sequence[str] | None = None) -> None:
 
 
 def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "--families",
-        type=family_names,
-        default=list(FAMILIES),
-        help="names with commas between them",
-    )
-    parser.add_argument("--frames", type=int, default=24)
-    parser.add_argument("--new-tokens", type=int, default=8)
-    parser.add_argument("--out", type=Path, help="file for the table, in Markdown")
+    parser = trial_parser(__doc__)
     parser.add_argument(
         "--torchvision", action="store_true", help="have torchvision, as `make test` sets it aside"
     )
     return parser.parse_args(words)
 
 
-def family_names(text: str) -> list[str]:
-    """Return the names of families that an option gives with commas between them."""
+def trial_parser(about: str) -> argparse.ArgumentParser:
+    """Return a parser of the options of a trial; `about` is its text, the first line a title."""
+    parser = argparse.ArgumentParser(description=about.splitlines()[0])
+    parser.add_argument(
+        "--families", type=_names, default=list(FAMILIES), help="names with commas between them"
+    )
+    parser.add_argument("--frames", type=int, default=24)
+    parser.add_argument("--new-tokens", type=int, default=8)
+    parser.add_argument("--out", type=Path, help="file for the table, in Markdown")
+    return parser
+
+
+def _names(text: str) -> list[str]:
     names = text.split(",")
     unknown = [name for name in names if name not in FAMILIES]
     if unknown:

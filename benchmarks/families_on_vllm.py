@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from families import FAMILIES, QUESTIONS, family_names, make, write_frames
+from families import QUESTIONS, make, trial_parser, write_frames
 from tiny_families.trial import Reference, Replies, Work, converse, reference_replies
 
 from infthor_eval.errors import InfthorError, ModelError, wrap_errors
@@ -76,16 +76,7 @@ def main(words: Sequence[str] | None = None) -> None:
 
 
 def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "--families",
-        type=family_names,
-        default=list(FAMILIES),
-        help="names with commas between them",
-    )
-    parser.add_argument("--frames", type=int, default=24)
-    parser.add_argument("--new-tokens", type=int, default=8)
-    parser.add_argument("--out", type=Path, help="file for the table, in Markdown")
+    parser = trial_parser(__doc__)
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)  # a checkpoint, asked by vLLM
     return parser.parse_args(words)
 
