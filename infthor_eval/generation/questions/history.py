@@ -194,6 +194,16 @@ class TrajectoryHistory:
         return frozenset(canonical_type(states[key].type) for states, key in shown if key in states)
 
     @cached_property
+    def seen(self) -> frozenset[str]:
+        """Ids of the objects that a frame shows large enough."""
+        return frozenset(
+            key
+            for frame in range(len(self))
+            for key in self.objects_in_frame(frame)
+            if self.shows(frame, key)
+        )
+
+    @cached_property
     def best_frames(self) -> dict[str, int]:
         """By type, in order, the frame that shows an object of it best, the earliest of equals."""
         best: dict[str, tuple[tuple[bool, int], int]] = {}

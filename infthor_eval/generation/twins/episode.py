@@ -55,17 +55,6 @@ class Episode:
         )
 
     @cached_property
-    def seen(self) -> frozenset[str]:
-        """Ids of the objects that a frame shows large enough."""
-        history = self.history
-        return frozenset(
-            key
-            for frame in range(len(history))
-            for key in history.objects_in_frame(frame)
-            if history.shows(frame, key)
-        )
-
-    @cached_property
     def task_shares(self) -> Counter[str]:
         """How often a task that is drawn at the start names each type of object."""
         return task_shares(self.start, self.trajectory.scene.floor_plan)

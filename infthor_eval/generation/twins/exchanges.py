@@ -151,7 +151,7 @@ class ExchangeKind:
 
 
 def _n_unseen(episode: Episode, pair: _Pair) -> int:
-    return sum(obj.object_id not in episode.seen for obj in pair)
+    return sum(obj.object_id not in episode.history.seen for obj in pair)
 
 
 def _spread(pairs: Iterable[_Pair]) -> list[_Pair]:

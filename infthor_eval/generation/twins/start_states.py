@@ -92,7 +92,7 @@ class Opened:
         used = Counter[str]()
 
         def rank(pair: tuple[ThorObject, ThorObject]) -> tuple[int, bool, int]:
-            is_unseen = pair[0].object_id not in episode.seen
+            is_unseen = pair[0].object_id not in episode.history.seen
             return (
                 used[pair[0].name],
                 is_unseen,
@@ -155,7 +155,7 @@ class Replace:
             pair
             for pair in Untouched().pairs(episode, rng)
             if all(map(episode.is_only_one, pair))
-            and all(obj.object_id in episode.seen for obj in pair)
+            and all(obj.object_id in episode.history.seen for obj in pair)
             and any(_can_be_missed(episode, pair))
         ]
         for pair in sorted(pairs, key=lambda pair: -sum(_can_be_missed(episode, pair))):

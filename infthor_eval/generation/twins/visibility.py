@@ -1,4 +1,4 @@
-"""Whether an eye sees in the pictures what differs: an action, and the answer to a question."""
+"""Whether an eye sees in the pictures what differs: objects, actions, the answer to a question."""
 
 from collections.abc import Iterator
 
@@ -7,11 +7,11 @@ from infthor_eval.formats.step_log import ObjectInFrame
 from infthor_eval.formats.twins import PairedQuestion
 from infthor_eval.generation.twins.comparison import Difference, World
 from infthor_eval.generation.twins.kinds import Worlds
-from infthor_eval.generation.twins.pairing import types_of_fact
+from infthor_eval.generation.twins.pairing import AskedWorld, types_of_fact
 from infthor_eval.generation.twins.pictures import are_clearly_unlike
 from infthor_eval.household.wording import canonical_type
 
-__all__ = ["check_insertions", "is_shown"]
+__all__ = ["check_insertions", "check_sightings", "is_shown"]
 
 
 def check_insertions(world: World, inserted: range) -> None:
@@ -23,6 +23,20 @@ def check_insertions(world: World, inserted: range) -> None:
     for index in inserted:
         if not are_clearly_unlike(world.files[index], world.files[index + 1]):
             raise Difference("an action that is added cannot be seen")
+
+
+def check_sightings(first: AskedWorld, second: AskedWorld) -> None:
+    """Check that frames show as many of the changed objects in one world as in the other.
+
+    Edits of objects that the episode shows are proposed first, so a world that hides one would be
+    the edited one.
+
+    Raises:
+        Difference: they do not.
+    """
+    n_seen, n_seen_there = (len(one.changed & one.history.seen) for one in (first, second))
+    if n_seen != n_seen_there:
+        raise Difference("one world shows a changed object that the other hides")
 
 
 def is_shown(question: PairedQuestion, worlds: Worlds, first: World, second: World) -> bool:

@@ -275,7 +275,7 @@ def test_what_is_replaced_and_what_replaces_it_are_both_seen(living_room):
     proposals = [*kind.propose(living_room, random.Random(1))]
     assert proposals
     for edit in proposals:
-        assert {edit.one.object_id, edit.other.object_id} <= living_room.seen
+        assert {edit.one.object_id, edit.other.object_id} <= living_room.history.seen
 
 
 def test_labels_are_drawn_by_coin():

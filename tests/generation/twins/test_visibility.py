@@ -7,9 +7,10 @@ from PIL import Image
 from infthor_eval.formats.step_log import ObjectInFrame
 from infthor_eval.formats.trajectory import ExpertPlan, InitAction, Scene, Trajectory
 from infthor_eval.formats.twins import PairedQuestion
-from infthor_eval.generation.twins.comparison import World
+from infthor_eval.generation.twins.comparison import Difference, World
 from infthor_eval.generation.twins.kinds import Worlds
-from infthor_eval.generation.twins.visibility import is_shown
+from infthor_eval.generation.twins.pairing import AskedWorld
+from infthor_eval.generation.twins.visibility import check_sightings, is_shown
 
 from ..questions.logs import history, state
 
@@ -64,3 +65,17 @@ def test_where_nothing_that_is_asked_about_is_in_view_all_counts(world):
 
 def test_equal_pictures_show_nothing(world):
     assert not is_shown(question(), WORLDS, world("closed"), world("closed"))
+
+
+def asked(*shown):
+    """A world of one frame that shows some of what changed."""
+    log = history({FRIDGE: state(FRIDGE), OVEN: state(OVEN)})
+    log.steps[0].seen = {key: ObjectInFrame(4000, (0, 0, 39, 99)) for key in shown}
+    return AskedWorld(log.steps, WORLDS.changed, 0)
+
+
+def test_a_world_that_hides_what_the_other_shows_is_no_twin():
+    check_sightings(asked(FRIDGE), asked(OVEN))
+    check_sightings(asked(), asked())
+    with pytest.raises(Difference, match="that the other hides"):
+        check_sightings(asked(FRIDGE, OVEN), asked(OVEN))
