@@ -1,7 +1,6 @@
 """The true history before a plan, and the protocol of what selects from it."""
 
 from collections.abc import Callable, Sequence
-from copy import deepcopy
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
@@ -76,8 +75,7 @@ class Past:
                 frame=blank_like(frame) if blank else frame,
                 action=action,
                 goal=of_step,
-                # A copy: the memory may change what it is given, and logs have other readers.
-                log=deepcopy(self.logs[number]) if privileged else None,
+                log=self.logs[number] if privileged else None,
             )
             for number, (frame, action, of_step) in enumerate(steps)
         ]

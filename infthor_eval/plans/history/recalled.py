@@ -2,7 +2,8 @@
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
+from copy import deepcopy
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from infthor_eval.errors import DataError, ModelError, UsageError
@@ -88,7 +89,9 @@ class RecalledHistory:
             )
         *steps, present = past.observations(self._blank, self._privileged)
         clues = (() if past.clue is None else (past.clue,)) if self._privileged else None
-        query = Query(text=f"{past.goal} {past.present.plan}", present=present, clues=clues)
+        query = Query(
+            text=f"{past.goal} {past.present.plan}", present=_copied(present), clues=clues
+        )
         size = self._tokens_per_frame(present, count)
         with self._in_use:
             self._observe(steps, size)
@@ -117,8 +120,13 @@ class RecalledHistory:
                 self._memory.begin(facts)
         for step in steps[n_known:]:
             with wrap_memory_errors(self._name):
-                self._memory.observe(step)
+                self._memory.observe(_copied(step))
         self._observed = list(steps)
+
+
+def _copied(step: Observation) -> Observation:
+    """Return a step with a log of its own: a memory may change what it is given."""
+    return replace(step, log=deepcopy(step.log))
 
 
 @dataclass(frozen=True)

@@ -184,10 +184,15 @@ def test_identity_has_options_and_budget():
     assert isinstance(history_named("full", MemoryChoice()), FullHistory)
 
 
-def test_a_memory_that_changes_its_logs_changes_nobody_elses():
-    logs = [ObjectLog(visible=["Mug"], recep_objs={"Sink": ["Mug"]}) for _ in range(3)]
-    given = replace(past(1), logs=logs).observations(privileged=True)
-    for step in given:
-        step.log.visible.clear()
-        step.log.recep_objs["Sink"].append("Apple")
-    assert logs == [ObjectLog(visible=["Mug"], recep_objs={"Sink": ["Mug"]})] * 3
+def test_a_memory_that_changes_its_logs_changes_nobody_elses_and_goes_on(tmp_path):
+    path = tmp_path / "spoiler.py"
+    observe = "        self.past.append(step)"
+    spoil = '        step.log.visible.clear()\n        step.log.recep_objs["Sink"].append("Apple")'
+    spoiler = OWN.replace("Capabilities()", "Capabilities(privileged=True)")
+    path.write_text(spoiler.replace(observe, f"{spoil}\n{observe}"))
+    logs = [ObjectLog(visible=["Mug"], recep_objs={"Sink": ["Mug"]}) for _ in range(5)]
+    history = RecalledHistory(f"{path}:Own")
+    for n_plans in (1, 2):
+        history.recall(replace(past(n_plans), logs=logs), no_count)
+    assert logs == [ObjectLog(visible=["Mug"], recep_objs={"Sink": ["Mug"]})] * 5
+    assert history._memory.begin.__globals__["SEEN"].count("begin") == 1
