@@ -27,7 +27,7 @@ from infthor_eval.exports.gaps import (
     task_document,
     task_gaps,
 )
-from infthor_eval.exports.measures import LEVEL, Measure, counted, find_measures
+from infthor_eval.exports.measures import LEVEL, Measure, find_measures, scored
 from infthor_eval.exports.request import ExportRequest, Written
 from infthor_eval.exports.samples import SampleReader
 from infthor_eval.exports.subjects import UNKNOWN, ModelFacts, model_facts
@@ -188,7 +188,7 @@ class _RunExport:
             "source_type": "hf_dataset",
             "hf_repo": self._request.dataset,
             "hf_split": "test",
-            "samples_number": len({record.key.once for record in counted(run, task)}),
+            "samples_number": len({record.key.once for record in scored(run, task)}),
             "additional_details": about,
         }
 

@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from infthor_eval.exports.measures import Measure, Scored
+from infthor_eval.exports.measures import Measure, Scored, counted
 from infthor_eval.exports.samples import ACT, Sample, SampleReader, describe_result
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.runs import with_frames
@@ -51,6 +51,11 @@ def sample_rows(
                 # The journal's own record of it once: it is as long as all else.
                 yield of_metric | _row(reader.read(record), score, is_first=name not in told)
                 told.add(name)
+        if measure.is_primary:
+            # A line has to have a score; the metric's own leaves these out.
+            failed = (it for it in counted(run, measure.task) if it.failure is not None)
+            for record in failed:
+                yield of_metric | _row(reader.read(record), 0.0, is_first=True)
 
 
 def _records_by_group(

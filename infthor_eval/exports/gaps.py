@@ -26,13 +26,13 @@ __all__ = [
 
 @dataclass(frozen=True)
 class TaskGaps:
-    """What is left out of a task's scores, or counts as wrong without a reply.
+    """What is left out of a task's scores.
 
     Attributes:
-        n_counted: number of records that count.
+        n_counted: number of records that are not excluded.
         n_missing: number of units of the whole run that were not attempted; None if unknown.
-        failed: failed records, which count as wrong, by reason.
-        excluded: records that do not count, by reason.
+        failed: failed records by reason.
+        excluded: excluded records by reason.
         skipped: units that could not be evaluated, by reason.
     """
 
@@ -88,7 +88,7 @@ def describe_gaps(gaps: TaskGaps) -> str:
     parts = [
         "it is not known whether all of the run is done" if n_missing is None else "",
         f"{n_missing} of the run's units not done" if n_missing else "",
-        f"{gaps.n_failed} of {gaps.n_counted} failed, counted as wrong" if gaps.failed else "",
+        f"{gaps.n_failed} of {gaps.n_counted} failed, in no score" if gaps.failed else "",
         f"{sum(gaps.excluded.values())} excluded" if gaps.excluded else "",
         f"{sum(gaps.skipped.values())} could not be evaluated" if gaps.skipped else "",
     ]

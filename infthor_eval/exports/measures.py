@@ -1,8 +1,7 @@
 """The scores of a run's tasks as other formats have them: a mean, its interval, and each sample's.
 
-A unit that was repeated counts with its mean, and one that is excluded does not. They are those of
-`show` and `results.json` where no unit failed: here one that did counts with 0, there it is in no
-score (docs/exports.md).
+They are those of `show` and `results.json`: a unit that was repeated counts with its mean; one that
+failed or is excluded is in no score.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,7 +15,7 @@ from infthor_eval.report.presented import PresentedRun
 from infthor_eval.runs import UnitRecord
 from infthor_eval.statistics import MeanEstimate, bootstrap_interval, clustered_mean
 
-__all__ = ["LEVEL", "Measure", "Scored", "counted", "find_measures"]
+__all__ = ["LEVEL", "Measure", "Scored", "counted", "find_measures", "scored"]
 
 LEVEL = 0.95  # of all intervals
 
@@ -90,25 +89,30 @@ class Measure:
 
 
 def counted(run: PresentedRun, task: str) -> list[Record]:
-    """Return the records of a task that count, in the order of their keys."""
+    """Return the records of a task that are not excluded, in the order of their keys."""
     records = (it for it in run.records if it.task == task and it.excluded is None)
     return sorted(records, key=lambda record: record.key)
 
 
+def scored(run: PresentedRun, task: str) -> list[Record]:
+    """Return those of them that did not fail."""
+    return [record for record in counted(run, task) if record.failure is None]
+
+
 def find_measures(run: PresentedRun) -> dict[str, list[Measure]]:
-    """Return the metrics of each task with a unit that counts, the primary one first.
+    """Return the metrics of each task with a unit that has a score, the primary one first.
 
     Raises:
         DataError: there is no such task.
     """
     found = {task: measures for task in run.tasks if (measures := _measures_of(run, task))}
     if not found:
-        raise DataError(f"{run.folder}: no unit of it counts; leave it out, or run it again")
+        raise DataError(f"{run.folder}: no unit of it has a score; leave it out, or run it again")
     return found
 
 
 def _measures_of(run: PresentedRun, task: str) -> list[Measure]:
-    records = counted(run, task)
+    records = scored(run, task)
     return [
         *_groups(run, task, records),
         *_metrics(run, task, records),
@@ -125,12 +129,9 @@ def _groups(run: PresentedRun, task: str, records: Sequence[Record]) -> Iterator
 
 
 def _metrics(run: PresentedRun, task: str, records: Sequence[Record]) -> Iterator[Measure]:
-    if not records:
-        return
     main = run.presenter.main_metric
     scores = [run.suite.scores(record) for record in records]
     names = list(dict.fromkeys(name for of_record in scores for name in of_record))
-    names = names or [main or "score"]  # where every unit failed
     names.sort(key=lambda name: name != main)
     has_groups = any(True for _ in run.presenter.group_scores(records))
     for number, name in enumerate(names):

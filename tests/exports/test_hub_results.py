@@ -43,7 +43,7 @@ def test_notes_say_the_interval_and_how_it_was_run(questions_run, export):
 def test_notes_say_what_is_not_whole(arm_run, export):
     _, entries = entries_of(export(arm_run, "hf-eval-results", "--dataset", "me/infthor"))
     notes = {entry.task_id: entry.notes for entry in entries}
-    assert "1 of 2 failed, counted as wrong; 1 excluded" in notes["arm_pickup"]
+    assert "1 of 2 failed, in no score; 1 excluded" in notes["arm_pickup"]
 
 
 @pytest.mark.parametrize(
