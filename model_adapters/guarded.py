@@ -47,6 +47,9 @@ class _ReplyLimits(msgspec.Struct):
     cost: Amount | None
     thinking: str | None
     n_watched: Count | None
+    context_hash: str | None
+    frames_hash: str | None
+    margins: tuple[Amount, ...] | None
 
 
 def guard(name: str, adapter: Any) -> Model | Policy:

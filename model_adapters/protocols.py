@@ -125,6 +125,12 @@ class Reply:
             thoughts between markers in the text are told from the answer where the reply is read
             (`model_adapters.thinking`).
         n_watched: different frames that a person looked at before replying; None for models.
+        context_hash: hash of the ids of the context's tokens, frames expanded (hex); None if they
+            are not known.
+        frames_hash: hash of the pixels of the context's frames as the model read them (hex); None
+            likewise.
+        margins: how much likelier the likeliest token was than the second, at each token of the
+            reply and the one that ends it, in nats; None unless the model was asked to say so.
     """
 
     text: str
@@ -136,6 +142,9 @@ class Reply:
     cost: float | None = None
     thinking: str | None = None
     n_watched: int | None = None
+    context_hash: str | None = None
+    frames_hash: str | None = None
+    margins: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

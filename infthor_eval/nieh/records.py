@@ -137,6 +137,9 @@ class NiehAnswer(
         thinking: what the model thought before the reply, which is empty if it was cut off there;
             None if it did not.
         n_watched: different frames that a person looked at before replying; None for models.
+        reply_ids: ids of the reply's tokens; empty unless the model was asked for margins.
+        margins: how much likelier the likeliest token was than the second, at each of these and at
+            the one that ends the reply, in nats; empty likewise.
     """
 
     question: str
@@ -153,6 +156,8 @@ class NiehAnswer(
     scores: dict[str, Number] = {}
     thinking: str | None = None
     n_watched: Count | None = None
+    reply_ids: tuple[Count, ...] = ()
+    margins: tuple[Amount, ...] = ()
 
     @classmethod
     def of(
@@ -176,17 +181,10 @@ class NiehAnswer(
         )
 
     def with_reply(
-        self,
-        reply: str,
-        scores: dict[str, float],
-        thinking: str | None = None,
-        n_watched: int | None = None,
+        self, reply: str, scores: dict[str, float], thinking: str | None = None
     ) -> "NiehAnswer":
-        """Return the same question with a reply, what a model thought before it, and how much a
-        person looked at."""
-        return msgspec.structs.replace(
-            self, reply=reply, scores=scores, thinking=thinking, n_watched=n_watched
-        )
+        """Return the same question with a reply, and what a model thought before it."""
+        return msgspec.structs.replace(self, reply=reply, scores=scores, thinking=thinking)
 
 
 class NiehNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="nieh_note"):

@@ -1,8 +1,8 @@
 """Why two runs may differ: the settings that do, and what each can change.
 
 What a setting can change is what it is told by. Frames in another order make other requests, whose
-hashes differ; other sizes of images make requests of another length; another precision makes
-neither, and replies alone.
+hashes differ; another template makes other tokens of the same request, other sizes of images other
+pixels; another precision makes neither, and replies alone.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,7 +28,8 @@ class Effect(StrEnum):
         FAILED: it is in both, and only one has a result.
         SCORES: the replies are equal, the scores are not.
         REQUEST: what was sent to the adapter is another: frames, words or gold answers.
-        LENGTH: the request is the same, and has another number of tokens.
+        TOKENS: the request is the same, and the model read other tokens.
+        PIXELS: the request is the same, and the model read other pixels of its frames.
         CUT: one reply is the beginning of the other.
         REPLY: the replies differ.
     """
@@ -37,7 +38,8 @@ class Effect(StrEnum):
     FAILED = "failed"
     SCORES = "scores"
     REQUEST = "request"
-    LENGTH = "length"
+    TOKENS = "tokens"
+    PIXELS = "pixels"
     CUT = "cut"
     REPLY = "reply"
 
@@ -79,7 +81,9 @@ class _Kind:
 
 
 _SENT = frozenset({Effect.REQUEST})
-_READ = frozenset({Effect.LENGTH, Effect.REPLY})
+_TOKENS = frozenset({Effect.TOKENS})
+_PIXELS = frozenset({Effect.PIXELS, Effect.TOKENS})  # images of other sizes have other tokens
+_READ = frozenset({Effect.TOKENS, Effect.PIXELS, Effect.REPLY})
 _WRITTEN = frozenset({Effect.REPLY})
 _CUT = frozenset({Effect.CUT})
 _SCORED = frozenset({Effect.SCORES})
@@ -123,9 +127,9 @@ _KINDS = (
         _each("model", "name checkpoint class n_parameters baseline model imported"),
     ),
     _Kind("the model's revision", _READ, ("model.revision",)),
-    _Kind("the chat template or system prompt", _READ, _each("model", "prompt chat_template")),
-    _Kind("the size of images", _READ, ("model.image_processor.size", "model.max_frames")),
-    _Kind("the preparation of images", _READ, _each("model", "image_processor image_backend")),
+    _Kind("the chat template or system prompt", _TOKENS, _each("model", "prompt chat_template")),
+    _Kind("the size of images", _PIXELS, ("model.image_processor.size", "model.max_frames")),
+    _Kind("the preparation of images", _PIXELS, _each("model", "image_processor image_backend")),
     _Kind("the engine", _READ, ("host", "adapter", *_each("model", "engine base_url adapter"))),
     _Kind(
         "the limit of the model's context",
@@ -176,7 +180,8 @@ UNTOLD = {
     Effect.FAILED: Cause("questions that failed or were not asked", frozenset({Effect.FAILED})),
     Effect.SCORES: Cause("the scores of equal replies", _SCORED),
     Effect.REQUEST: Cause("frames or words that no setting tells of", _SENT),
-    Effect.LENGTH: Cause("numbers of tokens that no setting tells of", _READ),
+    Effect.TOKENS: Cause("tokens that no setting tells of", _TOKENS),
+    Effect.PIXELS: Cause("pixels that no setting tells of", frozenset({Effect.PIXELS})),
     Effect.CUT: Cause("nothing that is recorded", _WRITTEN),
     Effect.REPLY: Cause("nothing that is recorded", _WRITTEN),
 }

@@ -13,11 +13,11 @@ from typing import Any
 from infthor_eval.errors import DataError
 from infthor_eval.report.causes import Effect
 from infthor_eval.report.presented import PresentedRun
-from infthor_eval.report.presenter import THOUGHT
+from infthor_eval.report.presenter import THOUGHT, ReplyTokens
 from infthor_eval.report.same_questions import Side, find_sides
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["Answer", "Compared", "QuestionDifference", "compare_questions"]
+__all__ = ["NEAR_TIE", "Answer", "Compared", "QuestionDifference", "compare_questions"]
 
 Record = UnitRecord[Any]
 
@@ -31,12 +31,14 @@ class Answer:
         reason: why there is no result; empty if there is one, or no record.
         text: what the model thought, if it did, and its reply.
         score: the score by the main metric; None without a result.
+        tokens: the reply's tokens, if they were recorded.
     """
 
     state: str
     reason: str = ""
     text: str = ""
     score: float | None = None
+    tokens: ReplyTokens | None = None
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,40 @@ class QuestionDifference:
         first, second = self.answers
         if first.score is None or second.score is None or first.text == second.text:
             return None
-        letters = zip(first.text, second.text, strict=False)
-        return 1 + sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], letters))
+        return 1 + _n_equal(first.text, second.text)
+
+    @property
+    def token(self) -> int | None:
+        """The first token of the reply that differs, from 1; None if there is none, or its tokens
+        were not recorded."""
+        tokens = [answer.tokens for answer in self.answers]
+        if tokens[0] is None or tokens[1] is None or tokens[0].ids == tokens[1].ids:
+            return None
+        return 1 + _n_equal(tokens[0].ids, tokens[1].ids)
+
+    @property
+    def margin(self) -> float | None:
+        """How much likelier than the second the token was that the surer run chose there, in nats;
+        None if that was not recorded."""
+        at = self.token
+        if at is None:
+            return None
+        margins = [answer.tokens.margins for answer in self.answers if answer.tokens is not None]
+        # One that was cut off at its longest has no token there.
+        return max((of_reply[at - 1] for of_reply in margins if len(of_reply) >= at), default=None)
+
+    @property
+    def is_near_tie(self) -> bool:
+        """Whether both runs read the same, and rounding alone may have chosen another token."""
+        margin = self.margin
+        is_alike = self.effects <= {Effect.REPLY, Effect.CUT} and not self.possible
+        return is_alike and margin is not None and margin <= NEAR_TIE
+
+
+def _n_equal(first: Sequence[Any], second: Sequence[Any]) -> int:
+    """Return how many items two sequences begin with alike."""
+    pairs = zip(first, second, strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
 @dataclass(frozen=True)
@@ -82,6 +116,11 @@ class Compared:
     n_shared: int
     means: tuple[float, float]
     differences: Sequence[QuestionDifference]
+
+
+# Nats between two tokens that rounding may exchange: both runs round a logit, and bfloat16 has
+# steps of an eighth where logits are from 16 to 32.
+NEAR_TIE = 0.25
 
 
 @dataclass(frozen=True)
@@ -130,8 +169,7 @@ def compare_questions(first: PresentedRun, second: PresentedRun) -> Compared:
         if effects:
             record = pair.first or pair.second
             assert record is not None
-            is_told = pair.same_decoding or Effect.REQUEST in effects
-            possible = frozenset() if is_told else frozenset({Effect.REQUEST})
+            possible = _untold(pair, effects)
             title = first.presenter.describe(record).title
             by = carried.by(both)
             differences.append(QuestionDifference(title, both, effects, possible, by))
@@ -185,7 +223,8 @@ def _answer(run: PresentedRun, record: Record | None) -> Answer:
     thought = run.presenter.details(record).get(THOUGHT)
     reply = run.presenter.reply(record)
     text = reply if thought is None else f"{thought}\n{reply}"
-    return Answer(record.state, text=text, score=run.main_score(record))
+    tokens = run.presenter.reply_tokens(record)
+    return Answer(record.state, text=text, score=run.main_score(record), tokens=tokens)
 
 
 def _effects(
@@ -218,13 +257,39 @@ def _scores_differ(runs: tuple[PresentedRun, PresentedRun], records: tuple[Recor
 
 
 def _request_effects(first: Record, second: Record, same_decoding: bool) -> set[Effect]:
-    """Return how the requests differ, as far as hashes and counts of tokens tell."""
+    """Return how what was read differs, as far as hashes and counts of tokens tell."""
     if same_decoding and first.fingerprint != second.fingerprint:
         return {Effect.REQUEST}
-    counts = (first.tokens.context, second.tokens.context)
-    if None in counts or counts[0] == counts[1]:
-        return set()
-    return {Effect.LENGTH} if same_decoding else {Effect.LENGTH, Effect.REQUEST}
+    read = first.read, second.read
+    effects: set[Effect] = set()
+    tokens = _differ(read[0].context, read[1].context)
+    if tokens or (tokens is None and _differ(first.tokens.context, second.tokens.context)):
+        effects.add(Effect.TOKENS)
+    if _differ(read[0].frames, read[1].frames):
+        effects.add(Effect.PIXELS)
+    return effects | ({Effect.REQUEST} if effects and not same_decoding else set())
+
+
+def _untold(pair: _Pair, effects: frozenset[Effect]) -> frozenset[Effect]:
+    """Return how what was read may differ besides, where the records do not tell."""
+    first, second = pair.first, pair.second
+    if Effect.REPLY not in effects or Effect.REQUEST in effects:
+        return frozenset()
+    assert first is not None
+    assert second is not None
+    tokens_known = _differ(first.read.context, second.read.context) is not None
+    frames_known = _differ(first.read.frames, second.read.frames) is not None
+    told = {
+        Effect.REQUEST: pair.same_decoding or (tokens_known and frames_known),
+        Effect.TOKENS: tokens_known or Effect.TOKENS in effects,
+        Effect.PIXELS: frames_known,
+    }
+    return frozenset(effect for effect, is_told in told.items() if not is_told)
+
+
+def _differ(first: object, second: object) -> bool | None:
+    """Return whether two values differ; None if one is not known."""
+    return None if first is None or second is None else first != second
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from infthor_eval.errors import UsageError
 from infthor_eval.report.causes import UNTOLD, Cause, Effect, differing_causes
 from infthor_eval.report.differences import (
+    NEAR_TIE,
     Answer,
     Compared,
     QuestionDifference,
@@ -25,14 +26,23 @@ _N_SHOWN = 5  # questions in the table, unless all are wanted
 _LONGEST = 36  # characters of a value or a reply in a cell
 _BEFORE = 12  # of these, before the first that differs
 # Of those that a setting must have, for it to explain the question; the first is the one to name.
-_TELLING = (Effect.ASKED, Effect.FAILED, Effect.SCORES, Effect.LENGTH, Effect.REQUEST)
+_TELLING = (
+    Effect.ASKED,
+    Effect.FAILED,
+    Effect.SCORES,
+    Effect.REQUEST,
+    Effect.TOKENS,
+    Effect.PIXELS,
+)
 _ADVICE = {
     Effect.ASKED: "Run the command of the run that stopped again: it continues.",
     Effect.SCORES: "Score both again with `infthor-eval rescore`.",
     Effect.REQUEST: "The hashes of the requests differ: the content of the frames, or the words, "
     "changed between the runs.",
-    Effect.LENGTH: "The same requests have other numbers of tokens: images or the template are "
-    "prepared otherwise where no setting tells.",
+    Effect.TOKENS: "The same requests became other tokens: the template, the tokenizer or the size "
+    "of images changed where no setting tells.",
+    Effect.PIXELS: "The same frames became other pixels: they were scaled otherwise where no "
+    "setting tells.",
     Effect.REPLY: "Ask one of them again with another --output to see whether the model repeats "
     "itself.",
 }
@@ -76,6 +86,11 @@ class Explanation:
         """Whether they have results of the same questions, with equal replies and scores."""
         return not self.compared.differences
 
+    @property
+    def are_near_ties(self) -> bool:
+        """Whether they differ, and everywhere by tokens that rounding may exchange."""
+        return not self.are_equal and all(it.is_near_tie for it in self.compared.differences)
+
     def sentences(self) -> Iterator[str]:
         """Yield what differs and why, the cause that explains most first."""
         for name, run in zip("AB", self.runs, strict=True):
@@ -87,6 +102,13 @@ class Explanation:
                 yield f"Settings differ, and made no difference: {names}."
             return
         yield self._what_differs()
+        near = sum(it.is_near_tie for it in self.compared.differences)
+        if near:
+            alone = "all" if self.are_near_ties else str(near)
+            yield (
+                f"Near ties: {alone} of these, which rounding can exchange. Both runs read the "
+                f"same, and the token that differs was at most {NEAR_TIE} nats ahead in both."
+            )
         explaining = [finding for finding in self.findings if finding.questions]
         is_shown = explaining[0].n_showing == len(explaining[0].questions)
         verb = "is" if is_shown else "can be"
@@ -171,9 +193,14 @@ class Explanation:
         differing = self.compared.differences
         shown = differing if every else differing[:_N_SHOWN]
         names = ("question", "A", "B")
-        numbers = ("character", "score A", "score B", "carries")
+        numbers = ("character", "token", "margin", "score A", "score B", "carries")
         columns = (*(Column(name, False) for name in names), *map(Column, numbers))
-        notes = ["character: the first that differs; records have no ids of tokens."]
+        notes = [
+            "character, token: the first that differs; margin: by how many nats the surer run "
+            "chose its token before the second."
+        ]
+        if not any(difference.margin is not None for difference in differing):
+            notes.append("Tokens and margins are recorded with --model-args margins=true.")
         if len(shown) < len(differing):
             notes.append(f"{len(differing) - len(shown)} more differ: --all shows them.")
         return Table("Where", columns, tuple(map(self._row, shown)), tuple(notes))
@@ -187,7 +214,13 @@ class Explanation:
         )
         carries = f"{self._factor * difference.carries:+.2f}"
         question = _short(difference.question)
-        return Row((question, *said, "-" if at is None else str(at), *scores, carries))
+        token, margin = difference.token, difference.margin
+        where = (
+            "-" if at is None else str(at),
+            "-" if token is None else str(token),
+            "-" if margin is None else f"{margin:.3f}",
+        )
+        return Row((question, *said, *where, *scores, carries))
 
 
 def explain_runs(first: PresentedRun, second: PresentedRun) -> Explanation:

@@ -14,6 +14,7 @@ from infthor_eval.report.presenter import (
     FindFrames,
     GroupScore,
     Replay,
+    ReplyTokens,
     Timelines,
 )
 from infthor_eval.report.runs import ReportRun
@@ -93,6 +94,10 @@ class PlainPresenter:
     def reply(self, record: UnitRecord[Any]) -> str:
         """See `Presenter.reply`: none, `details` has all fields."""
         return ""
+
+    def reply_tokens(self, record: UnitRecord[Any]) -> ReplyTokens | None:
+        """See `Presenter.reply_tokens`: none are known."""
+        return None
 
     def details(self, record: UnitRecord[Any]) -> Mapping[str, str]:
         """See `Presenter.details`: the fields of the record's payload."""

@@ -35,6 +35,7 @@ __all__ = [
     "Recording",
     "Replay",
     "ReplayFrame",
+    "ReplyTokens",
     "Timelines",
 ]
 
@@ -57,6 +58,19 @@ class Description(NamedTuple):
     target: str = ""
     kind: str = ""
     clues: str = ""
+
+
+class ReplyTokens(NamedTuple):
+    """The tokens of a reply.
+
+    Attributes:
+        ids: their ids.
+        margins: how much likelier the likeliest token was than the second, at each of them and at
+            the one that ends the reply, in nats.
+    """
+
+    ids: Sequence[int]
+    margins: Sequence[float]
 
 
 class GroupScore(NamedTuple):
@@ -306,6 +320,9 @@ class Presenter(Protocol):
 
     def reply(self, record: Record) -> str:
         """Return the reply of a record; empty if there is none."""
+
+    def reply_tokens(self, record: Record) -> ReplyTokens | None:
+        """Return the tokens of the reply; None if they were not recorded."""
 
     def details(self, record: Record) -> Mapping[str, str]:
         """Return further facts about a record, by name."""

@@ -4,6 +4,7 @@ from infthor_eval.runs.catalog import Catalog, TaskFile
 from infthor_eval.runs.completeness import UnitCounts, count_units, mark_incomplete
 from infthor_eval.runs.config import RunConfig, TaskConfig
 from infthor_eval.runs.journals.records import (
+    ReadHashes,
     RecordTypes,
     RunHeader,
     Tokens,
@@ -43,6 +44,7 @@ __all__ = [
     "Group",
     "Observer",
     "PreparedRun",
+    "ReadHashes",
     "RecordTypes",
     "RunConfig",
     "RunHeader",

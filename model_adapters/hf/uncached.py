@@ -25,6 +25,7 @@ from model_adapters.hf.checkpoint_model import HfModel
 from model_adapters.hf.global_settings import torch_threads
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.prompting.hashing import hash_frame, hash_frames, split_frames
 from model_adapters.hf.prompting.rendering import Marks, render, starts_with_bos
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
@@ -162,19 +163,22 @@ class UncachedModel(HfModel):
             ModelError: it fails, or does not return the tokens that are chosen here.
         """
         with torch_threads(self._threads):
-            self._generate(self._inputs(turns), Decoding(max_new_tokens=2))
+            self._generate(self._inputs(turns), 0, Decoding(max_new_tokens=2))
 
     def _answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
         inputs = self._inputs(turns)
         n_context = int(inputs["input_ids"].shape[1])
         check_limit(self.name, n_context, decoding.max_new_tokens, self.capabilities.max_tokens)
-        return self._generate(inputs, decoding)
+        n_frames = sum(isinstance(part, FrameRef) for turn in turns for part in turn.parts)
+        return self._generate(inputs, n_frames, decoding)
 
     @torch.inference_mode()
-    def _generate(self, inputs: Any, decoding: Decoding) -> Reply:
-        """Reply to what the processor made of a conversation."""
+    def _generate(self, inputs: Any, n_frames: int, decoding: Decoding) -> Reply:
+        """Reply to what the processor made of a conversation with so many frames."""
+        frames = [hash_frame(pixels) for pixels in split_frames(inputs, n_frames)]
         context: list[int] = inputs["input_ids"][0].tolist()
-        reply = begin_reply(self._loaded, decoding, context)
+        margins = self._options.margins
+        reply = begin_reply(self._loaded, decoding, context, keep_margins=margins)
         weight = self._loaded.model.get_input_embeddings().weight
         with wrap_model_errors(self.name), wrap_memory_errors(self.name, len(context)):
             output = self._loaded.model.generate(
@@ -186,7 +190,8 @@ class UncachedModel(HfModel):
                 stopping_criteria=StoppingCriteriaList([_StopWithReply(reply)]),
             )
         self._check_generated(output, context, reply)
-        return end_reply(self._loaded, reply, len(context), n_cached=0)
+        frames_hash = hash_frames(frames) if len(frames) == n_frames else None
+        return end_reply(self._loaded, reply, context, frames_hash, n_cached=0)
 
     def _check_generated(self, output: Any, context: list[int], reply: ReplyState) -> None:
         """Raise `ModelError` unless `generate` returned the reply's tokens, with or without an end

@@ -84,17 +84,20 @@ class Placement:
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """Form and length of a model's prompts, on any engine.
+    """Form and length of a model's prompts, and what is kept of its replies, on any engine.
 
     Attributes:
         prompt: chat renders conversations by the checkpoint's chat template; plain concatenates the
             texts and frames of all turns, without roles.
         rope: context extension TYPE:FACTOR (yarn:4, linear:2, dynamic:4, longrope:8,
             longrope-scaled:8) instead of the checkpoint's RoPE.
+        margins: record the ids of a reply's tokens, and how near a tie each was, for
+            `infthor-eval explain`.
     """
 
     prompt: str = "chat"
     rope: str | None = None
+    margins: bool = False
 
     def image_settings(self) -> dict[str, Any]:
         """Return the image processor settings that differ from the checkpoint's; some families

@@ -50,15 +50,18 @@ class EngineOutput:
     Attributes:
         ids: token ids of the reply, including the end token.
         text: text of the reply as vLLM decodes it.
-        n_context: tokens of the prompt, frames expanded.
+        context: token ids of the prompt, frames expanded.
         n_cached: tokens of the prompt that were not encoded again, or None if vLLM does not report
             them.
+        margins: how much likelier the likeliest token was than the second, at each of `ids`, in
+            nats; None unless `logprobs` was asked for.
     """
 
     ids: tuple[int, ...]
     text: str
-    n_context: int
+    context: tuple[int, ...]
     n_cached: int | None
+    margins: tuple[float, ...] | None
 
 
 def import_vllm(name: str) -> Any:
@@ -183,6 +186,18 @@ class Engine:
 
 def _engine_output(output: Any) -> EngineOutput:
     reply = output.outputs[0]
+    margins = None if reply.logprobs is None else tuple(map(_margin, reply.logprobs))
     return EngineOutput(
-        tuple(reply.token_ids), reply.text, len(output.prompt_token_ids), output.num_cached_tokens
+        tuple(reply.token_ids),
+        reply.text,
+        tuple(output.prompt_token_ids),
+        output.num_cached_tokens,
+        margins,
     )
+
+
+def _margin(likely: Mapping[int, Any]) -> float:
+    """Return the difference of the two likeliest of the tokens that vLLM lists; with a chosen one
+    that is less likely, it lists three."""
+    first, second = sorted((token.logprob for token in likely.values()), reverse=True)[:2]
+    return float(first - second)

@@ -11,6 +11,7 @@ from model_adapters.hf.cached.replies import reply_text, stop_ids
 from model_adapters.hf.checkpoint_model import CheckpointModel
 from model_adapters.hf.limits import check_limit, wrap_model_errors
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.prompting.hashing import hash_context
 from model_adapters.hf.prompting.prompt import Frame, Piece, n_common, n_tokens
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 from model_adapters.vllm.engine import Engine, EngineOutput, EngineRequest
@@ -163,6 +164,8 @@ class VllmModel(CheckpointModel):
             "repetition_penalty": own if penalty is None else penalty,
             "stop_token_ids": sorted(self._ends),
         }
+        if self._options.margins:
+            settings["logprobs"] = 2  # the likeliest two
         if not decoding.greedy:
             settings |= {"top_p": decoding.top_p, "seed": decoding.seed % _SEEDS}
         if decoding.stop and not decoding.choices:
@@ -192,9 +195,9 @@ class VllmModel(CheckpointModel):
 
     def _reply(self, prompt: Sequence[Piece], output: EngineOutput, decoding: Decoding) -> Reply:
         expected = n_tokens(prompt)
-        if output.n_context != expected:
+        if len(output.context) != expected:
             raise ModelError(
-                f"{self.name}: vLLM {self._engine.version} reads {output.n_context} tokens where "
+                f"{self.name}: vLLM {self._engine.version} reads {len(output.context)} tokens where "
                 f"the checkpoint's processor makes {expected}: it processes frames differently; "
                 "run it with --engine transformers"
             )
@@ -203,9 +206,11 @@ class VllmModel(CheckpointModel):
         return Reply(
             self._require_choice(output.text, decoding) if decoding.choices else free_text,
             n_reply_tokens=len(ids),
-            n_context_tokens=output.n_context,
+            n_context_tokens=len(output.context),
             n_cached_tokens=output.n_cached,
             token_ids=ids,
+            context_hash=hash_context(output.context),
+            margins=output.margins,
         )
 
     def _require_choice(self, text: str, decoding: Decoding) -> str:

@@ -22,7 +22,8 @@ __all__ = ["command"]
 def command(context: click.Context, first: Path, second: Path, every: bool) -> None:
     """Print why the runs in the folders A and B differ, on the same questions.
 
-    Exit code 0 if their replies and scores are equal, 1 if they differ.
+    Exit code 0 if their replies and scores are equal, 3 if they differ by near ties alone, which
+    rounding can exchange, 1 if they differ otherwise.
     """
     from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.errors import UsageError
@@ -45,4 +46,4 @@ def command(context: click.Context, first: Path, second: Path, every: bool) -> N
         print_table(explanation.settings_table(), console)
     if not explanation.are_equal:
         print_table(explanation.questions_table(every=every), console)
-    context.exit(0 if explanation.are_equal else 1)
+    context.exit(0 if explanation.are_equal else 3 if explanation.are_near_ties else 1)

@@ -28,7 +28,7 @@ from infthor_eval.nieh.records import NiehAnswer, NiehRecall
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.nieh.twins import twin_side
 from infthor_eval.nieh.units import NiehUnit, shown_clues
-from infthor_eval.runs import NOTHING, Session, Tokens, UnitRecord, Usage
+from infthor_eval.runs import NOTHING, ReadHashes, Session, Tokens, UnitRecord, Usage
 from infthor_eval.storage.digests import fingerprint
 from model_adapters import (
     Attended,
@@ -42,6 +42,8 @@ from model_adapters import (
 )
 
 __all__ = ["OpenAnswerer", "OpenBaseline", "OpenModel", "answer_units", "request_fingerprint"]
+
+_MARGIN_DIGITS = 3  # after the point, of margins in nats
 
 
 @dataclass(frozen=True)
@@ -92,13 +94,24 @@ class _UnitRequest:
             failure = session.describe_failure(self.unit, error)
         return self.unit.record(
             self.fingerprint,
-            self.unit.payload.with_reply(answer, scores, thinking, reply.n_watched),
+            self._answered(reply, answer, scores, thinking),
             failure=failure,
             faults=(*faults, *reply.faults),
             seconds=round(seconds, 4),
             tokens=Tokens(reply.n_context_tokens, reply.n_cached_tokens, reply.n_reply_tokens),
             usage=usage,
+            read=ReadHashes(reply.context_hash, reply.frames_hash),
         )
+
+    def _answered(
+        self, reply: Reply, answer: str, scores: dict[str, float], thinking: str | None
+    ) -> NiehAnswer:
+        payload = self.unit.payload.with_reply(answer, scores, thinking)
+        payload = replace_fields(payload, n_watched=reply.n_watched)
+        if reply.margins is None:
+            return payload
+        margins = tuple(round(margin, _MARGIN_DIGITS) for margin in reply.margins)
+        return replace_fields(payload, reply_ids=reply.token_ids or (), margins=margins)
 
 
 class OpenAnswerer(Protocol):

@@ -19,6 +19,7 @@ from infthor_eval.report.presenter import (
     FigureResult,
     FindFrames,
     GroupScore,
+    ReplyTokens,
     Timelines,
 )
 from infthor_eval.report.runs import ReportRun
@@ -139,6 +140,11 @@ class NiehPresenter(PlainPresenter):
     def reply(self, record: Record) -> str:
         """See `Presenter.reply`."""
         return record.payload.reply or ""
+
+    def reply_tokens(self, record: Record) -> ReplyTokens | None:
+        """See `Presenter.reply_tokens`."""
+        payload = record.payload
+        return ReplyTokens(payload.reply_ids, payload.margins) if payload.margins else None
 
     def details(self, record: Record) -> Mapping[str, str]:
         """See `Presenter.details`: evidence, guessing and thoughts; the rest is elsewhere."""

@@ -20,6 +20,7 @@ __all__ = [
     "Artifact",
     "ArtifactRecord",
     "Payload",
+    "ReadHashes",
     "RecordTypes",
     "RunHeader",
     "State",
@@ -78,6 +79,14 @@ class Tokens(msgspec.Struct, frozen=True, omit_defaults=True):
     reply: Count | None = None
 
 
+class ReadHashes(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Hashes of what the model read: the ids of the context's tokens, and the pixels of its frames;
+    None if they are not known."""
+
+    context: str | None = None
+    frames: str | None = None
+
+
 class RunHeader(
     msgspec.Struct, Generic[Config], frozen=True, kw_only=True, tag_field="type", tag="run"
 ):
@@ -127,6 +136,7 @@ class UnitRecord(
         seconds: duration.
         tokens: tokens of the unit.
         usage: usage of all its requests.
+        read: hashes of what the model read.
     """
 
     task: _Name
@@ -144,6 +154,7 @@ class UnitRecord(
     seconds: Amount = 0.0
     tokens: Tokens = Tokens()
     usage: Usage = NOTHING
+    read: ReadHashes = ReadHashes()
 
     @property
     def key(self) -> UnitKey:

@@ -37,6 +37,10 @@ _UNSUPPORTED: dict[str, tuple[Any, ...]] = {
 }
 
 
+# Of margins, in nats: where one token alone is allowed there is no second.
+_LARGEST_MARGIN = 1000.0
+
+
 @dataclass(frozen=True)
 class Generation:
     """The generation settings of a checkpoint that are used; requests have those of sampling.
@@ -93,11 +97,14 @@ class ReplyState:
         choices: allowed replies, or None for a free reply.
         finished: called with the ids of a free reply after each token; returns whether it ends
             here.
+        keep_margins: whether to keep how near a tie each choice was.
 
     Attributes:
         decoding: decoding of the reply.
         ids: ids of the reply so far, without the end token.
         done: true once the reply has ended.
+        margins: difference of the two largest scores at each choice of a token; None unless they
+            are kept.
     """
 
     def __init__(
@@ -108,10 +115,12 @@ class ReplyState:
         context: Iterable[int],
         choices: Choices | None,
         finished: Callable[[list[int]], bool],
+        keep_margins: bool = False,
     ) -> None:
         self.decoding = decoding
         self.ids: list[int] = []
         self.done = False
+        self.margins: list[float] | None = [] if keep_margins else None
         self._generation = generation
         self._choices = choices
         self._finished = finished
@@ -133,13 +142,14 @@ class ReplyState:
         waiting for it."""
         return self._restrict(self._penalise(logits.float()))
 
-    def take(self, scores: torch.Tensor, likeliest: int, score: float) -> None:
+    def take(self, scores: torch.Tensor, likeliest: int, score: float, second: float) -> None:
         """Choose the next token, or end the reply.
 
         Args:
             scores: scores of all tokens, (vocabulary,), on the CPU if a token is sampled.
             likeliest: token with the largest score.
             score: the largest score.
+            second: the second largest; read only if margins are kept.
 
         Raises:
             ModelError: no token has a score.
@@ -149,6 +159,8 @@ class ReplyState:
                 f"no token has a score after {len(self.ids)} tokens of the reply (NaN); try "
                 "dtype=float32"
             )
+        if self.margins is not None:
+            self.margins.append(min(score - second, _LARGEST_MARGIN))
         token = likeliest if self.decoding.greedy else self._sample(scores)
         if token in self._generation.end_ids:
             self.done = True
@@ -233,7 +245,10 @@ def extend_replies(replies: Sequence[tuple[ReplyState, torch.Tensor]]) -> None:
     if not all(reply.decoding.greedy for reply, _ in replies):
         scores = scores.cpu()  # where a seed gives the same samples on every machine
     best = scores.max(dim=-1)
+    seconds = best.values
+    if any(reply.margins is not None for reply, _ in replies):
+        seconds = scores.topk(2, dim=-1).values[:, 1]
     # One tensor, so one read: float32 represents every token id exactly.
-    pairs = torch.stack((best.values, best.indices.float())).T.tolist()
-    for (reply, _), row, (score, token) in zip(replies, scores, pairs, strict=True):
-        reply.take(row, int(token), score)
+    read = torch.stack((best.values, best.indices.float(), seconds)).T.tolist()
+    for (reply, _), row, (score, token, second) in zip(replies, scores, read, strict=True):
+        reply.take(row, int(token), score, second)

@@ -125,7 +125,11 @@ class TransformersModel(HfModel):
     def _answer_batch(self, prompts: Sequence[Sequence[Piece]], decoding: Decoding) -> list[Reply]:
         if not self._options.share_prefix:
             self._prefix.reset()
-        replies = [begin_reply(self._loaded, decoding, token_ids(prompt)) for prompt in prompts]
+        margins = self._options.margins
+        replies = [
+            begin_reply(self._loaded, decoding, token_ids(prompt), keep_margins=margins)
+            for prompt in prompts
+        ]
         decode = self._decode_branches if self._can_branch(prompts) else self._decode_each
         try:
             with (
@@ -139,7 +143,7 @@ class TransformersModel(HfModel):
             self._embed.clear()
             raise
         return [
-            end_reply(self._loaded, reply, n_tokens(prompt), cached)
+            end_reply(self._loaded, reply, [*token_ids(prompt)], self._embed.hash(prompt), cached)
             for reply, prompt, cached in zip(replies, prompts, n_cached, strict=True)
         ]
 

@@ -6,13 +6,20 @@ from typing import Any
 from model_adapters.hf.cached.choices import read_choices
 from model_adapters.hf.cached.decoding import ReplyState
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.prompting.hashing import hash_context
 from model_adapters.protocols import Decoding, Reply
 from model_adapters.thinking import cut_at_stop
 
 __all__ = ["begin_reply", "end_reply", "reply_text", "stop_ids"]
 
 
-def begin_reply(loaded: LoadedCheckpoint, decoding: Decoding, context: Iterable[int]) -> ReplyState:
+def begin_reply(
+    loaded: LoadedCheckpoint,
+    decoding: Decoding,
+    context: Iterable[int],
+    *,
+    keep_margins: bool = False,
+) -> ReplyState:
     """Return an empty reply; the context has all ids before it.
 
     Raises:
@@ -27,18 +34,40 @@ def begin_reply(loaded: LoadedCheckpoint, decoding: Decoding, context: Iterable[
 
     choices = read_choices(loaded.tokenizer, decoding)
     return ReplyState(
-        loaded.generation, decoding, context=context, choices=choices, finished=has_stopped
+        loaded.generation,
+        decoding,
+        context=context,
+        choices=choices,
+        finished=has_stopped,
+        keep_margins=keep_margins,
     )
 
 
-def end_reply(loaded: LoadedCheckpoint, state: ReplyState, n_context: int, n_cached: int) -> Reply:
-    """Return a finished reply; `n_cached` tokens of its context were not encoded again."""
+def end_reply(
+    loaded: LoadedCheckpoint,
+    state: ReplyState,
+    context: Sequence[int],
+    frames_hash: str | None,
+    n_cached: int,
+) -> Reply:
+    """Return a finished reply.
+
+    Args:
+        loaded: the model.
+        state: the reply.
+        context: the ids of all tokens before it.
+        frames_hash: hash of the pixels of its frames, if they are known.
+        n_cached: tokens of the context that were not encoded again.
+    """
     return Reply(
         state.choice or reply_text(loaded, state.ids, state.decoding),
         n_reply_tokens=len(state.ids),
-        n_context_tokens=n_context,
+        n_context_tokens=len(context),
         n_cached_tokens=n_cached,
         token_ids=tuple(state.ids),
+        context_hash=hash_context(context),
+        frames_hash=frames_hash,
+        margins=None if state.margins is None else tuple(state.margins),
     )
 
 

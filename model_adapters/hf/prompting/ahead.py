@@ -13,6 +13,7 @@ from threading import Barrier
 import torch
 
 from model_adapters.hf.family import Family, Pixels
+from model_adapters.hf.prompting.hashing import hash_frame
 from model_adapters.hf.prompting.prompt import Clip, Frame
 
 __all__ = ["Ahead", "PixelsAhead", "read_pixels"]
@@ -61,11 +62,15 @@ class PixelsAhead:
 
     For one thread, the model's. A frame that cannot be read raises its error when it is asked for,
     so only prompts that show it fail.
+
+    Attributes:
+        hashes: hash of the pixels of every frame and clip so far.
     """
 
     def __init__(self, prepare: Callable[[Frame | Clip], Pixels], ahead: Ahead) -> None:
         """Start no thread yet; `prepare` is called in several at the same time."""
-        self._prepare = prepare
+        self.hashes: dict[Frame | Clip, str] = {}
+        self._make = prepare
         self._n_threads = ahead.threads
         self._max_bytes = ahead.max_bytes
         self._threads: ThreadPoolExecutor | None = None
@@ -103,6 +108,11 @@ class PixelsAhead:
         if self._threads is not None:
             self._threads.shutdown()
             self._threads = None
+
+    def _prepare(self, piece: Frame | Clip) -> Pixels:
+        pixels = self._make(piece)
+        self.hashes[piece] = hash_frame(pixels)
+        return pixels
 
     def _forget(self) -> None:
         self._coming.clear()

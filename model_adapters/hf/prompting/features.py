@@ -8,6 +8,7 @@ import torch
 
 from model_adapters.hf.family import ClipShape, Pixels
 from model_adapters.hf.prompting.ahead import PixelsAhead
+from model_adapters.hf.prompting.hashing import hash_frames
 from model_adapters.hf.prompting.prompt import Clip, Frame
 
 __all__ = ["FeatureCache"]
@@ -65,6 +66,10 @@ class FeatureCache(Generic[T]):
     def expect(self, pieces: Sequence[Frame | Clip]) -> None:
         """Begin to read those pieces that are going to be asked for and are not cached."""
         self._pixels.expect([piece for piece in pieces if piece not in self._cache])
+
+    def hash(self, pieces: Sequence[Frame | Clip]) -> str:
+        """Return the hash of the pixels of pieces whose features were asked for."""
+        return hash_frames(self._pixels.hashes[piece] for piece in pieces)
 
     def clear(self) -> None:
         """Drop all features."""

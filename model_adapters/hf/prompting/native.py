@@ -162,6 +162,10 @@ class NativeEmbedder:
         """Begin to read the frames of pieces that are going to be embedded, in this order."""
         self._features.expect([piece for piece in pieces if not isinstance(piece, int)])
 
+    def hash(self, pieces: Sequence[Piece]) -> str:
+        """Return the hash of the pixels of the frames of pieces that were embedded."""
+        return self._features.hash([piece for piece in pieces if not isinstance(piece, int)])
+
     def clear(self) -> None:
         """Free the memory of cached features."""
         self._features.clear()

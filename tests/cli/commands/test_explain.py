@@ -153,6 +153,49 @@ def test_frames_as_jpeg_are_told_by_the_set_and_frames_of_one_size_by_hashes(
     assert "the content of the frames, or the words, changed" in out
 
 
+def test_other_tokens_and_other_pixels_of_the_same_request_are_told_by_their_hashes(
+    run, run_cli, tmp_path
+):
+    """As many tokens as before, and settings that are equal: the hashes alone tell."""
+
+    def change(name: str) -> Callable[[list[dict[str, Any]]], None]:
+        def edit(lines: list[dict[str, Any]]) -> None:
+            for line in lines[1:]:
+                line["read"][name] = "00000000"
+                line["payload"]["reply"] = "another"
+
+        return edit
+
+    for name, cause in (("context", "tokens"), ("frames", "pixels")):
+        other = edited(run(), tmp_path / name, change(name))
+        assert most(run_cli("explain", run(), other)[1]) == f"{cause} that no setting tells of"
+
+
+def test_near_ties_alone_have_an_exit_code_of_their_own(run, run_cli, tmp_path):
+    with_margins = run(model_args="margins=true")
+
+    def tie(margin: float) -> Callable[[list[dict[str, Any]]], None]:
+        def edit(lines: list[dict[str, Any]]) -> None:
+            for line in lines[1:]:
+                payload = line["payload"]
+                payload["reply"] += "s"
+                payload["reply_ids"][4] += 1
+                payload["margins"][4] = margin
+
+        return edit
+
+    close, near, far = (
+        edited(with_margins, tmp_path / f"{margin}", tie(margin)) for margin in (0.01, 0.02, 0.9)
+    )
+    code, out, _ = run_cli("explain", close, edited(near, tmp_path / "again", tie(0.02)))
+    assert code == 3
+    assert "Near ties: all of these" in out
+    assert "0.020" in out
+    code, out, _ = run_cli("explain", close, edited(far, tmp_path / "far again", tie(0.9)))
+    assert code == 1
+    assert "Near ties" not in out
+
+
 def test_another_revision_is_named(run, run_cli, tmp_path):
     def revise(revision: str) -> Callable[[list[dict[str, Any]]], None]:
         def edit(lines: list[dict[str, Any]]) -> None:
@@ -197,8 +240,8 @@ def test_what_questions_carry_adds_up_to_the_difference(source, run_cli, tmp_pat
     assert "Also: questions that one run did not come to (1 of the 2 questions that" in out
     where = out.split("Where")[1].splitlines()
     assert [line.split()[-1] for line in where if "not in the run" in line] == ["-16.67"]
-    assert [line.split()[-5:] for line in where if "Bed" in line] == [
-        ["Bed", "1", "100.00", "0.00", "-50.00"]
+    assert [line.split()[-7:] for line in where if "Bed" in line] == [
+        ["Bed", "1", "-", "-", "100.00", "0.00", "-50.00"]
     ]
 
 
@@ -224,7 +267,7 @@ def test_what_is_not_recorded_is_said_to_be_so(run, run_cli, tmp_path):
     assert "to see whether the model repeats itself" in out
     assert "\x1b" not in out
     rows = [line.split() for line in out.split("Where")[1].splitlines() if "+0.00" in line]
-    assert [row[-4] for row in rows] == ["8", "8", "8"]
+    assert [row[-6] for row in rows] == ["8", "8", "8"]
 
 
 def test_equal_runs_are_equal_also_with_settings_that_make_no_difference(run, run_cli):

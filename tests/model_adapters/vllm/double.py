@@ -60,6 +60,7 @@ class SamplingParams:
         self.stop: list[str] = arguments.get("stop", [])
         self.stop_token_ids: list[int] = arguments.get("stop_token_ids", [])
         self.repetition_penalty: float = arguments.get("repetition_penalty", 1.0)
+        self.logprobs: int | None = arguments.get("logprobs")
         self.ignore_eos: bool = arguments.get("ignore_eos", False)
         self.allowed_token_ids: list[int] | None = arguments.get("allowed_token_ids")
         self.structured_outputs: StructuredOutputsParams | None = arguments.get(
@@ -355,10 +356,16 @@ class _LLM:
             else self._model.write(read.ids, images, params)
         )
         prompt_ids = read.ids + [0] * self._double.expands
-        completion = SimpleNamespace(token_ids=ids, text=text)
+        likely = None if params.logprobs is None else [_likely(token) for token in ids]
+        completion = SimpleNamespace(token_ids=ids, text=text, logprobs=likely)
         return SimpleNamespace(
             outputs=[completion], prompt_token_ids=prompt_ids, num_cached_tokens=cached
         )
+
+
+def _likely(token: int) -> dict[int, Any]:
+    """A token two nats ahead of the second likeliest."""
+    return {token + 1: SimpleNamespace(logprob=-2.1), token: SimpleNamespace(logprob=-0.1)}
 
 
 def _as_read(name: str, value: Any) -> Any:

@@ -51,6 +51,7 @@ def test_replies_and_counts_are_those_of_transformers(
         replies = [talk.reply(up_to(8)) for talk in talks]
         assert facts(replies[0]) == facts(replies[1])
         assert replies[0].n_context_tokens == talks[0].n_tokens
+        assert replies[0].context_hash == replies[1].context_hash
 
 
 @pytest.mark.parametrize(
@@ -430,3 +431,14 @@ def test_the_double_takes_no_argument_that_vllm_does_not_take(vllm: Double) -> N
 def test_decoding_that_vllm_refuses_is_told(start: Start) -> None:
     with pytest.raises(ModelError, match=r"temperature must be in \[0, 2\]"):
         start().answer(user("x"), Decoding(max_new_tokens=2, temperature=3.0))
+
+
+def test_margins_are_of_the_two_likeliest_tokens(start: Start) -> None:
+    talk = start(margins="true").conversation()
+    talk.append("What is it?")
+    reply = talk.reply(up_to(3))
+    assert reply.margins == pytest.approx([2.0] * len(reply.margins))
+    assert len(reply.margins) >= len(reply.token_ids)
+    talk = start().conversation()
+    talk.append("What is it?")
+    assert talk.reply(up_to(3)).margins is None

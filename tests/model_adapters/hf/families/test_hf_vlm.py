@@ -93,19 +93,27 @@ def _require_equal_replies(shared: Any, whole: Any, frames: list[FrameRef]) -> N
 def test_any_architecture_runs_without_sharing(
     checkpoints: dict[str, Path], frames: list[FrameRef]
 ) -> None:
-    model = _load(checkpoints["gemma3"], share_prefix="false")
+    model = _load(checkpoints["gemma3"], share_prefix="false", margins="true")
     parts = (frames[0], "\nWhat is it?")
     talk = model.conversation()
     talk.append(*parts)
     inputs = process_turns(model._processor, model._loaded.template, talk.turns)
-    output = model._loaded.model.generate(**inputs, do_sample=False, max_new_tokens=6)
+    output = model._loaded.model.generate(
+        **inputs,
+        do_sample=False,
+        max_new_tokens=6,
+        output_scores=True,
+        return_dict_in_generate=True,
+    )
     expected = [
         token
-        for token in output[0, talk.n_tokens :].tolist()
+        for token in output.sequences[0, talk.n_tokens :].tolist()
         if token not in model._loaded.generation.end_ids
     ]
     reply = talk.reply(up_to(6))
     assert list(reply.token_ids) == expected
+    best = [scores[0].topk(2).values.tolist() for scores in output.scores]
+    assert reply.margins == pytest.approx([first - second for first, second in best], abs=1e-4)
     assert reply.n_cached_tokens == 0
     assert model.identity()["share_prefix"] is False
 
@@ -216,3 +224,22 @@ def test_a_template_without_images_or_texts_is_refused(
     file.write_text(file.read_text().replace(piece, "''"))
     with pytest.raises(ModelError, match=complaint):
         _load(folder)
+
+
+@pytest.mark.parametrize("name", ["llava", "gemma3"])
+def test_what_is_read_has_the_same_hashes_with_and_without_sharing(
+    name: str, checkpoints: dict[str, Path], frames: list[FrameRef]
+) -> None:
+    replies = []
+    for options in ({"share_prefix": "true", "margins": "true"}, {"share_prefix": "false"}):
+        talk = _load(checkpoints[name], **options).conversation()
+        talk.append(frames[0], " and ", frames[1], "\nWhat is it?")
+        replies.append(talk.reply(up_to(3)))
+        talk.append(frames[2])
+        replies.append(talk.reply(up_to(3)))
+    shared, more, whole, _ = replies
+    assert (shared.context_hash, shared.frames_hash) == (whole.context_hash, whole.frames_hash)
+    assert shared.frames_hash != more.frames_hash
+    assert shared.frames_hash is not None
+    assert len(shared.margins) >= len(shared.token_ids)
+    assert whole.margins is None
