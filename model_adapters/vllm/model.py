@@ -194,10 +194,10 @@ class VllmModel(CheckpointModel):
         return EngineRequest(ids, [self._images[digest] for digest in digests], digests)
 
     def _reply(self, prompt: Sequence[Piece], output: EngineOutput, decoding: Decoding) -> Reply:
-        expected = n_tokens(prompt)
-        if len(output.context) != expected:
+        expected, n_context = n_tokens(prompt), len(output.context)
+        if n_context != expected:
             raise ModelError(
-                f"{self.name}: vLLM {self._engine.version} reads {len(output.context)} tokens where "
+                f"{self.name}: vLLM {self._engine.version} reads {n_context} tokens where "
                 f"the checkpoint's processor makes {expected}: it processes frames differently; "
                 "run it with --engine transformers"
             )
@@ -206,7 +206,7 @@ class VllmModel(CheckpointModel):
         return Reply(
             self._require_choice(output.text, decoding) if decoding.choices else free_text,
             n_reply_tokens=len(ids),
-            n_context_tokens=len(output.context),
+            n_context_tokens=n_context,
             n_cached_tokens=output.n_cached,
             token_ids=ids,
             context_hash=hash_context(output.context),
