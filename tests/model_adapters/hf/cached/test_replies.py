@@ -34,7 +34,7 @@ def _written(loaded: Any, text: str, decoding: Decoding) -> Reply:
             extend_replies(
                 [(reply, torch.nn.functional.one_hot(torch.tensor(token), len(tokenizer)))]
             )
-    return end_reply(loaded, reply, 0, 0)
+    return end_reply(loaded, reply, (), None, 0)
 
 
 @pytest.mark.parametrize("special", [SPECIAL, SPECIAL[:2]])
