@@ -1,0 +1,100 @@
+"""Scores that exports say of their samples, which `import-replies` does not read: it scores anew.
+
+| form | sample | score |
+|---|---|---|
+| Every Eval Ever | `question_id`, `variant`, `repeat` in `metadata` | `evaluation.score` of the metric that `evaluation_result_id` names |
+| inspect_ai | the same, and `epoch` | `scores` by metric |
+| lm-eval | `doc.question_id`, `doc.variant`; of one repetition | a key for each metric |
+
+lm-eval has the task in the name of the file.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from infthor_eval.formats.reading import json_lines_of
+from infthor_eval.formats.replies.exported_samples import told_of
+from infthor_eval.formats.replies.inspect_logs import INSPECT_SUFFIX, inspect_documents
+from infthor_eval.nieh.scoring import SCORERS
+
+__all__ = ["ExportedScores", "read_exported_scores"]
+
+_HINT = "give the samples of the run"
+_LM_EVAL_NAME = re.compile(r"samples_(?P<task>.+)_\d{4}-\d\d-\d\dT.*\.jsonl(?:\.gz)?")
+_Unit = tuple[str, str, int]  # id of the question, variant, number of the repetition
+
+
+@dataclass
+class ExportedScores:
+    """Scores of an export.
+
+    Attributes:
+        tasks: names of the tasks that it tells.
+        models: names of models that it tells.
+        by_unit: scores by question, variant and repetition, and by metric.
+    """
+
+    tasks: set[str] = field(default_factory=set)
+    models: set[str] = field(default_factory=set)
+    by_unit: dict[_Unit, dict[str, float]] = field(default_factory=dict)
+
+    def add(self, unit: _Unit, metric: str, score: object) -> None:
+        """Add a score, if it is a number under one of our scorers."""
+        if metric in SCORERS and isinstance(score, int | float):
+            self.by_unit.setdefault(unit, {})[metric] = float(score)
+
+
+def read_exported_scores(path: Path) -> ExportedScores:
+    """Read the scores that a file of samples tells; a form without scores tells none.
+
+    Raises:
+        DataError: the file cannot be read.
+    """
+    found = ExportedScores()
+    if name := _LM_EVAL_NAME.fullmatch(path.name):
+        found.tasks.add(name["task"])
+    if path.suffix == INSPECT_SUFFIX:
+        for sample in inspect_documents(path):
+            _add_inspect(found, sample)
+        return found
+    for row in json_lines_of(path, _HINT):
+        if isinstance(row.get("doc"), Mapping):
+            _add_lm_eval(found, row)
+        elif "evaluation_id" in row:
+            _add_every_eval_ever(found, row)
+    return found
+
+
+def _unit(metadata: Mapping[str, Any], sample_id: str) -> tuple[str, _Unit]:
+    told = told_of(metadata, sample_id)
+    return told["task"], (told["question_id"], told["variant"], told["repeat"])
+
+
+def _add_every_eval_ever(found: ExportedScores, row: Mapping[str, Any]) -> None:
+    metadata = row.get("metadata") or {}
+    if "members" in metadata:
+        return
+    task, unit = _unit(metadata, str(row.get("sample_id")))
+    found.tasks |= {task} - {""}
+    found.models.add(str(row.get("model_id")))
+    metric = str(row.get("evaluation_result_id", "")).rpartition("/")[2]
+    found.add(unit, metric, (row.get("evaluation") or {}).get("score"))
+
+
+def _add_inspect(found: ExportedScores, sample: Mapping[str, Any]) -> None:
+    task, (question, variant, _) = _unit(sample.get("metadata") or {}, str(sample.get("id")))
+    found.tasks |= {task} - {""}
+    found.models |= {str((sample.get("output") or {}).get("model") or "")} - {""}
+    for metric, score in (sample.get("scores") or {}).items():
+        found.add((question, variant, sample.get("epoch", 1)), metric, score.get("value"))
+
+
+def _add_lm_eval(found: ExportedScores, row: Mapping[str, Any]) -> None:
+    doc = row["doc"]
+    if len(next(iter(row.get("resps") or [[]]))) == 1:
+        unit = str(doc.get("question_id")), str(doc.get("variant", "")), 1
+        for metric in SCORERS:
+            found.add(unit, metric, row.get(metric))
