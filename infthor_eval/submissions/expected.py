@@ -1,5 +1,6 @@
 """What a run of a task should have, by the checker's own task files and sets."""
 
+import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,10 +10,13 @@ from typing import Any
 from msgspec.structs import replace
 
 from infthor_eval.errors import DataError, UsageError
+from infthor_eval.formats.answer_key import AnswerKey, read_key
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig
+from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.rescoring.keyed import keyed_payload
 from infthor_eval.nieh.samples import find_set
 from infthor_eval.nieh.scoring import scores
 from infthor_eval.nieh.task import NiehTask, PreparedTask
@@ -38,6 +42,7 @@ class Expected:
         config: what the run should say of the task; None of an export.
         units: its units by their keys, made of our set.
         data: our set.
+        key: the key, where our set is the public part of a private one; else None.
     """
 
     name: str
@@ -45,6 +50,12 @@ class Expected:
     config: NiehTaskConfig | None
     units: Mapping[UnitKey, NiehUnit]
     data: NiehSet
+    key: AnswerKey | None = None
+
+    @property
+    def graded_data(self) -> NiehSet:
+        """The set with the answers."""
+        return self.data if self.key is None else self.key.data
 
     @property
     def records(self) -> list[Record]:
@@ -58,7 +69,22 @@ class Expected:
         Nothing but the reply, its tokens and times is taken from the submission.
         """
         given = {record.key: record for record in self.records}
-        return [_grade(unit, given.get(key)) for key, unit in self.units.items()]
+        return [_grade(self._keyed(unit), given.get(key)) for key, unit in self.units.items()]
+
+    def _keyed(self, unit: NiehUnit) -> NiehUnit:
+        """Return a unit with the answers of the key, if there is one."""
+        if self.key is None:
+            return unit
+        key = self.key
+        context = self.run.header.config.tasks[self.name].context
+        question = key.question(unit.key.id)
+        knowledge = visible_knowledge(context)
+        return dataclasses.replace(
+            unit,
+            cluster=question.cluster,
+            payload=keyed_payload(unit.payload, unit.key.id, key, unit.sample.frames),
+            find_guess=lambda: find_guesses(key.data, knowledge).get(question.id),
+        )
 
 
 def _grade(unit: NiehUnit, given: Record | None) -> Record:
@@ -78,13 +104,19 @@ def _grade(unit: NiehUnit, given: Record | None) -> Record:
 class Owner:
     """Who checks: the installed tasks, and sets of one's own for tasks without a bundled one."""
 
-    def __init__(self, sets: Sequence[Path] = (), include: Sequence[Path] = ()) -> None:
-        """Open the sets, and find the task files below further folders.
+    def __init__(
+        self,
+        sets: Sequence[Path] = (),
+        include: Sequence[Path] = (),
+        key: Path | None = None,
+    ) -> None:
+        """Open the sets and the key, and find the task files below further folders.
 
         Raises:
-            DataError: a set cannot be read.
+            DataError: a set or the key cannot be read.
         """
         self._sets = [NiehSet(path) for path in sets]
+        self._key = None if key is None else read_key(key)
         self._catalog = Catalog.find_installed(include)
 
     def find_set(self, task: str, fingerprint: str | None = None) -> NiehSet:
@@ -141,7 +173,19 @@ class Owner:
             None if run.is_export else task.config(ready, _video_input(config)),
             _units(name, ready, _n_repeats(run)),
             data,
+            self._key_of(data),
         )
+
+    def _key_of(self, data: NiehSet) -> AnswerKey | None:
+        """Return the key of a set that withholds its answers; None for any other."""
+        if not any(question.is_withheld for question in data.questions):
+            return None
+        if self._key is None or self._key.public != data.fingerprint:
+            raise UsageError(
+                f"{data.root}: withholds its answers; give its key with --key, or send the "
+                "submission to the owner of the set"
+            )
+        return self._key
 
 
 def _options(run: NiehConfig, task: NiehTaskConfig, file: TaskFile) -> NiehOptions:

@@ -104,12 +104,12 @@ def _joined_words(task: Expected) -> frozenset[str]:
     """Return words of the key that its questions write as two."""
     apart = {
         first + second
-        for question in task.data.questions
+        for question in task.graded_data.questions
         for first, second in pairwise(_words(question.text))
     }
     of_key = {
         word
-        for question in task.data.questions
+        for question in task.graded_data.questions
         for answer in question.answers
         for word in _words(str(answer))
     }

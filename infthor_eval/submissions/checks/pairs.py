@@ -68,7 +68,9 @@ class PairsWithSingles:
     """Who answers most single questions from the frames tells some worlds apart."""
 
     name: ClassVar[str] = "pairs and singles"
-    reason: ClassVar[str] = "four of five answers read off the frames, and no world told from its twin"
+    reason: ClassVar[str] = (
+        "four of five answers read off the frames, and no world told from its twin"
+    )
 
     def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
         """See `Check`."""
@@ -115,6 +117,6 @@ def _is_alike(pair: TwinRecords) -> bool:
 
 
 def _is_first_right(task: Expected, pair: TwinRecords) -> bool:
-    worlds = task.data.twins[pair.sides[0].twin.traj_id].traj_ids
+    worlds = task.graded_data.twins[pair.sides[0].twin.traj_id].traj_ids
     right = pair.sides[0] if pair.rights("strict")[0] else pair.sides[1]
     return right.twin.traj_id == worlds[0]

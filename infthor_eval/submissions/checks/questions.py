@@ -86,7 +86,9 @@ class AllThere:
         if task.config is not None:
             ours = {(it.question_id, it.variant) for it in task.config.skipped}
             skipped = task.run.header.config.tasks[task.name].skipped
-            left_out = [it.question_id for it in skipped if (it.question_id, it.variant) not in ours]
+            left_out = [
+                it.question_id for it in skipped if (it.question_id, it.variant) not in ours
+            ]
             if left_out:
                 yield (
                     f"{task.name}: leaves out {count('questions', left_out)} that can be asked; run "

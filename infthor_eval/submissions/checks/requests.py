@@ -28,7 +28,9 @@ class SameRequests:
         """See `Check`."""
         for task in case.tasks:
             if task.config is None:
-                text = f"{task.name}: an export has no hashes of frames; what was shown is not checked"
+                text = (
+                    f"{task.name}: an export has no hashes of frames; what was shown is not checked"
+                )
                 yield Problem(self.name, text, is_warning=True)
             elif task.config.context == _RETRIEVED:
                 text = f"{task.name}: its frames were retrieved by a model; they are not checked"
@@ -72,4 +74,3 @@ class SameRequests:
             except InfthorError as error:
                 reasons[str(error)] += 1
         return reasons
-
