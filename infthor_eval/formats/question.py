@@ -87,7 +87,7 @@ class Question:
 
     @property
     def is_withheld(self) -> bool:
-        """True if its gold answers are secret (`answer_key`), so that no reply to it has a score."""
+        """True if its gold answers are secret (`answer_key`): no reply to it has a score."""
         return self.answers == (WITHHELD,)
 
     @property

@@ -10,8 +10,8 @@ from typing import Any
 from msgspec.structs import replace
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.formats.answer_key import AnswerKey, read_key
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.replies.answer_key import AnswerKey, read_key
 from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig
 from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
 from infthor_eval.nieh.options import NiehOptions

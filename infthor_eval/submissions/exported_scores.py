@@ -2,7 +2,7 @@
 
 | form | sample | score |
 |---|---|---|
-| Every Eval Ever | `question_id`, `variant`, `repeat` in `metadata` | `evaluation.score` of the metric that `evaluation_result_id` names |
+| Every Eval Ever | `question_id`, `variant`, `repeat` in `metadata` | `evaluation.score` |
 | inspect_ai | the same, and `epoch` | `scores` by metric |
 | lm-eval | `doc.question_id`, `doc.variant`; of one repetition | a key for each metric |
 

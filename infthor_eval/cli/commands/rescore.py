@@ -92,7 +92,7 @@ def command(
     is 1 if your scorer fails on a reply, or the judge cannot be asked.
     """
     from infthor_eval.cli.progress.notes import print_failure, prints_as_notes
-    from infthor_eval.formats.answer_key import read_key
+    from infthor_eval.formats.replies.answer_key import read_key
     from infthor_eval.nieh.own_scorers import find_scorer
     from infthor_eval.nieh.rescoring.keyed import with_key
     from infthor_eval.nieh.rescoring.rescore import read_source, score_again

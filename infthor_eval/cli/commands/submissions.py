@@ -1,4 +1,4 @@
-"""`infthor-eval submit-check` and `leaderboard`: what strangers send, and the page of what passes."""
+"""`infthor-eval submit-check` and `leaderboard`: what strangers send, and what of it passes."""
 
 from __future__ import annotations
 

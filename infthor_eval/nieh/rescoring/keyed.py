@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from msgspec.structs import replace
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.answer_key import AnswerKey
+from infthor_eval.formats.replies.answer_key import AnswerKey
 from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.rescoring.rescore import Source

@@ -38,7 +38,8 @@ class PairsOfWhatDiffers:
                 yield Problem(
                     self.name,
                     f"{task.name}: of {len(alike):,} pairs whose frames are the same in both "
-                    f"worlds, {flipped:,} have two replies; nothing that was shown tells them apart",
+                    f"worlds, {flipped:,} have two replies; nothing that was shown tells them "
+                    "apart",
                 )
 
 

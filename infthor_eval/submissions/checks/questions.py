@@ -91,8 +91,8 @@ class AllThere:
             ]
             if left_out:
                 yield (
-                    f"{task.name}: leaves out {count('questions', left_out)} that can be asked; run "
-                    "it again"
+                    f"{task.name}: leaves out {count('questions', left_out)} that can be asked; "
+                    "run it again"
                 )
         states = {record.key: record.state for record in task.records}
         for state, what in (("not asked", "were not asked"), ("excluded", "are excluded")):

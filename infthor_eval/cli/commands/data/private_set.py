@@ -61,7 +61,8 @@ def command(
 
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note
-    from infthor_eval.generation.private_set import make_private_set, read_secret
+    from infthor_eval.generation.private.making import make_private_set
+    from infthor_eval.generation.private.secrets import read_secret
     from infthor_eval.nieh.scoring import score
     from infthor_eval.storage.files import hold_folder
     from infthor_eval.terminal import print_line, progress_bar
