@@ -156,6 +156,7 @@ class Owner:
         return file
 
     def _expect(self, run: SubmittedRun, name: str, config: NiehTaskConfig) -> Expected:
+        _refuse_code(name, run.header.config)
         data = self.find_set(name, config.data)
         request = TaskRequest(
             tasks=[self._file(name)],
@@ -186,6 +187,15 @@ class Owner:
                 "submission to the owner of the set"
             )
         return self._key
+
+
+def _refuse_code(name: str, run: NiehConfig) -> None:
+    """Refuse a memory in a file: what strangers send is read, and never run."""
+    if run.memory is not None and (":" in run.memory or "/" in run.memory):
+        raise UsageError(
+            f"{name}: its memory {run.memory!r:.60} is code in a file, which is not run here; "
+            "send replies with a memory of `ls memories`"
+        )
 
 
 def _options(run: NiehConfig, task: NiehTaskConfig, file: TaskFile) -> NiehOptions:

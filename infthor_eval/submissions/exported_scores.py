@@ -10,7 +10,8 @@ lm-eval has the task in the name of the file.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -58,14 +59,28 @@ def read_exported_scores(path: Path) -> ExportedScores:
         found.tasks.add(name["task"])
     if path.suffix == INSPECT_SUFFIX:
         for sample in inspect_documents(path):
-            _add_inspect(found, sample)
+            _add(found, sample, _add_inspect)
         return found
     for row in json_lines_of(path, _HINT):
         if isinstance(row.get("doc"), Mapping):
-            _add_lm_eval(found, row)
+            _add(found, row, _add_lm_eval)
         elif "evaluation_id" in row:
-            _add_every_eval_ever(found, row)
+            _add(found, row, _add_every_eval_ever)
     return found
+
+
+def _add(
+    found: ExportedScores,
+    row: Mapping[str, Any],
+    add: Callable[[ExportedScores, Mapping[str, Any]], None],
+) -> None:
+    with suppress(ValueError):  # of a row that is no reply, either: it is named as such
+        add(found, row)
+
+
+def _mapping(value: object) -> Mapping[str, Any]:
+    """Return a mapping, and an empty one for anything else: whoever reads replies says that."""
+    return value if isinstance(value, Mapping) else {}
 
 
 def _unit(metadata: Mapping[str, Any], sample_id: str) -> tuple[str, _Unit]:
@@ -74,27 +89,31 @@ def _unit(metadata: Mapping[str, Any], sample_id: str) -> tuple[str, _Unit]:
 
 
 def _add_every_eval_ever(found: ExportedScores, row: Mapping[str, Any]) -> None:
-    metadata = row.get("metadata") or {}
+    metadata = _mapping(row.get("metadata"))
     if "members" in metadata:
         return
     task, unit = _unit(metadata, str(row.get("sample_id")))
     found.tasks |= {task} - {""}
     found.models.add(str(row.get("model_id")))
     metric = str(row.get("evaluation_result_id", "")).rpartition("/")[2]
-    found.add(unit, metric, (row.get("evaluation") or {}).get("score"))
+    found.add(unit, metric, _mapping(row.get("evaluation")).get("score"))
 
 
 def _add_inspect(found: ExportedScores, sample: Mapping[str, Any]) -> None:
-    task, (question, variant, _) = _unit(sample.get("metadata") or {}, str(sample.get("id")))
+    task, (question, variant, _) = _unit(_mapping(sample.get("metadata")), str(sample.get("id")))
+    epoch = sample.get("epoch", 1)
+    if not isinstance(epoch, int):
+        return
     found.tasks |= {task} - {""}
-    found.models |= {str((sample.get("output") or {}).get("model") or "")} - {""}
-    for metric, score in (sample.get("scores") or {}).items():
-        found.add((question, variant, sample.get("epoch", 1)), metric, score.get("value"))
+    found.models |= {str(_mapping(sample.get("output")).get("model") or "")} - {""}
+    for metric, score in _mapping(sample.get("scores")).items():
+        found.add((question, variant, epoch), metric, _mapping(score).get("value"))
 
 
 def _add_lm_eval(found: ExportedScores, row: Mapping[str, Any]) -> None:
     doc = row["doc"]
-    if len(next(iter(row.get("resps") or [[]]))) == 1:
+    resps = row.get("resps")
+    if isinstance(resps, list) and resps and isinstance(resps[0], list) and len(resps[0]) == 1:
         unit = str(doc.get("question_id")), str(doc.get("variant", "")), 1
         for metric in SCORERS:
             found.add(unit, metric, row.get(metric))

@@ -148,7 +148,7 @@ def _exports(folder: Path, runs: Sequence[Path]) -> list[Path]:
     files = [
         path
         for path in sorted(folder.rglob("*"))
-        if path.name.endswith(_EXPORTS) and path.is_file()
+        if path.name.endswith(_EXPORTS) and path.is_file() and not path.is_symlink()
     ]
     return [path for path in files if not any(path.is_relative_to(run) for run in runs)]
 

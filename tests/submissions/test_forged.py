@@ -158,6 +158,19 @@ def the_better_of_two_answers(material, root):
     return edit_journal(folder, lambda lines: lines.append(msgspec.to_builtins(second)))
 
 
+@forgery("once", "2 runs with the same settings")
+def the_better_of_two_runs(material, root):
+    run = honest(material)
+    return submit(root, "forged", run, with_config(run, seed=1))
+
+
+@forgery("readable", "is code in a file, which is not run here")
+def code_in_place_of_a_memory(material, root):
+    code = root / "memory.py"
+    code.write_text("raise SystemExit('run')")
+    return submit(root, "forged", with_config(honest(material), memory=f"{code}:Memory"))
+
+
 @forgery("questions", "are of no question of the set")
 def easy_questions_added(material, root):
     run = honest(material)

@@ -1,9 +1,12 @@
 """All questions of the set there, once, and none of another."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar
 
+from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.scoring import plain_form
+from infthor_eval.storage.digests import canonical_json
 from infthor_eval.submissions.case import Case, count
 from infthor_eval.submissions.expected import Expected
 from infthor_eval.submissions.reading import Problem
@@ -115,6 +118,13 @@ class AskedOnce:
 
     def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
         """See `Check`; two equal results are one that two workers had."""
+        names = Counter(_run_settings(task) for task in case.tasks)
+        for (task, *_), n in names.items():
+            if n > 1:
+                yield Problem(
+                    self.name,
+                    f"{task}: {n} runs with the same settings; send one, or ask with --repeats",
+                )
         for run in case.submission.runs:
             replies: dict[Any, set[str]] = {}
             for record in run.results:
@@ -131,6 +141,14 @@ class AskedOnce:
             again = [text for text in run.unread if "again" in text]
             if again:
                 yield Problem(self.name, f"{run.path.name}: {count('rows', again)}; give each once")
+
+
+def _run_settings(task: Expected) -> tuple[str, ...]:
+    """Return task, context, frames and memory, of which a submission has one run each."""
+    config = task.run.header.config
+    kwargs = canonical_json(dict(config.tasks[task.name].dataset_kwargs))
+    memory = (config.memory, config.memory_args, config.budget, config.prompt)
+    return task.name, config.frames or SHOWN, kwargs, *map(str, memory)
 
 
 class NoneOfAnotherSet:

@@ -32,6 +32,9 @@ class SameRequests:
                     f"{task.name}: an export has no hashes of frames; what was shown is not checked"
                 )
                 yield Problem(self.name, text, is_warning=True)
+            elif task.run.header.config.model.get("imported"):
+                text = f"{task.name}: imported replies have no hashes of frames; not checked"
+                yield Problem(self.name, text, is_warning=True)
             elif task.config.context == _RETRIEVED:
                 text = f"{task.name}: its frames were retrieved by a model; they are not checked"
                 yield Problem(self.name, text, is_warning=True)
@@ -52,6 +55,8 @@ class SameRequests:
     def _reasons(task: Expected) -> Counter[str]:
         assert task.config is not None
         theirs = task.run.header.config.tasks[task.name]
+        if not isinstance(theirs.decoding.get("seed"), int):
+            return Counter({"its decoding has no seed": len(task.records)})
         ours = replace(task.config, decoding=theirs.decoding)
         config = replace(task.run.header.config, tasks={task.name: ours})
         reasons: Counter[str] = Counter()

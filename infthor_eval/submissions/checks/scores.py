@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import ClassVar
 
+from infthor_eval.nieh.config import MetricsConfig
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.nieh.suite import NiehSuite
@@ -29,12 +30,17 @@ class SameScorers:
         """See `Check`."""
         for task in case.tasks:
             theirs = task.run.header.config.tasks[task.name].metrics
-            if task.config is not None and theirs != task.config.metrics:
+            if task.config is not None and _code(theirs) != _code(task.config.metrics):
                 yield Problem(
                     self.name,
-                    f"{task.name}: was scored by other scorers, or rules, than the installed ones; "
-                    "run it with this version, or rescore it",
+                    f"{task.name}: was scored by other scorers than the installed task's; run that "
+                    "task",
                 )
+
+
+def _code(metrics: MetricsConfig) -> tuple[object, ...]:
+    """Return what tells scorers apart; rules of another version show in the scores."""
+    return sorted(metrics.names), metrics.process_results, metrics.source
 
 
 class SameScores:

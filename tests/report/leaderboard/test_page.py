@@ -114,6 +114,24 @@ def test_it_is_as_wide_as_the_page_and_readable(open_rows, size, scheme):
     assert before != after
 
 
+def test_no_number_or_heading_is_broken_on_a_screen(open_rows):
+    counts = {"tokens_read": 1_234_567.0, "cost": 1234.56, "seconds": 12.34, "n": 12_345}
+    long = row("lab/long", 0.4, engine="transformers 5.20.2", date="2026-10-01", **counts)
+    tab = open_rows([*ROWS, long, *published_rows()]).tab
+    heights = {
+        key: tab.locator(f"tbody td[data-key={key}]").first.evaluate(
+            "it => { const range = document.createRange(); range.selectNodeContents(it);"
+            " return new Set([...range.getClientRects()].map(box => box.top)).size; }"
+        )
+        for key in ("read", "cost", "seconds", "date")
+    }
+    assert set(heights.values()) == {1}
+    for heading in tab.locator("thead button").all():
+        words = heading.inner_text().split()
+        widest = max(len(word) for word in words)
+        assert heading.bounding_box()["width"] > 4.5 * widest
+
+
 def test_numbers_have_their_names_on_a_phone_and_it_is_sorted_there(open_rows):
     tab = open_rows(ROWS).tab
     tab.set_viewport_size(PHONE)
