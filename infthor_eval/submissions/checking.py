@@ -9,7 +9,7 @@ from infthor_eval.submissions.case import Case, Check
 from infthor_eval.submissions.checks.copies import CopiedRecords, CopiedReplies
 from infthor_eval.submissions.checks.floors import AboveBlind, AboveOtherHome
 from infthor_eval.submissions.checks.identity import CompleteIdentity, SameModel, UneditedConfig
-from infthor_eval.submissions.checks.key import KeyForm, KeySpelling, KeyWords
+from infthor_eval.submissions.checks.key import KeyForm, KeyScore, KeySpelling, KeyWords
 from infthor_eval.submissions.checks.pairs import (
     PairsOfBothWorlds,
     PairsOfWhatDiffers,
@@ -48,6 +48,7 @@ CHECKS: Sequence[Check] = (
     KeyForm(),
     KeySpelling(),
     KeyWords(),
+    KeyScore(),
     PairsOfWhatDiffers(),
     PairsOfBothWorlds(),
     PairsWithSingles(),

@@ -221,6 +221,29 @@ def the_key_with_errors(material, root):
     return submit(root, "forged", reply_with(material.runs["homes", "shown"], reply))
 
 
+@forgery("key score", "as only the key is")
+def the_key_reworded(material, root):
+    return submit(root, "forged", reply_with(material.runs["homes", "shown"], reader(1.0, "x")))
+
+
+@forgery("results", "scores.jsonl has other scores")
+def the_file_of_scores_edited(material, root):
+    folder = submit(root, "forged", honest(material))
+    (path,) = folder.rglob("scores.jsonl")
+    path.write_text(path.read_text().replace('"strict":0.0', '"strict":1.0', 3))
+    return folder
+
+
+@forgery("copied", "letter by letter")
+def a_guessers_replies_under_another_name(material, root):
+    def reply(record):
+        return f"{record.payload.question.split()[-1]} mug"
+
+    run = material.runs["homes", "shown"]
+    submit(root / "others", "first", reply_with(run, reply, model="lab/first"))
+    return submit(root, "forged", reply_with(run, reply, model="lab/second"), date="2026-06-02")
+
+
 @forgery("key spelling", "spelled as the key alone spells")
 def half_of_the_key(material, root):
     draw = random.Random(3)

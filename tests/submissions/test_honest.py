@@ -1,5 +1,6 @@
 """Honest submissions: they pass, whatever they are made of."""
 
+import json
 from pathlib import Path
 
 import msgspec
@@ -180,6 +181,21 @@ def test_an_export_with_an_edited_score_is_refused(material, check, export, tmp_
     path.write_text(path.read_text().replace('"score":0.0,', '"score":1.0,', 1))
     refusals = {problem.check: problem.text for problem in check(folder).refusals}
     assert "1 stored scores" in refusals["scores"]
+
+
+def test_an_export_with_an_edited_summary_is_refused(material, check, export, tmp_path):
+    folder = exported(material, tmp_path, export, "every-eval-ever", ".json")
+    samples = exported(material, tmp_path / "again", export, "every-eval-ever", ".jsonl")
+    (path,) = samples.glob("*.jsonl")
+    path.rename(folder / path.name)
+    assert check(folder).refusals == []
+    (summary,) = folder.glob("*.json")
+    document = json.loads(summary.read_text())
+    for result in document["evaluation_results"]:
+        result["score_details"]["score"] = 0.99
+    summary.write_text(json.dumps(document))
+    refusals = {problem.check: problem.text for problem in check(folder).refusals}
+    assert "its results have 99.00 %" in refusals["results"]
 
 
 def test_an_export_without_some_questions_is_refused(material, check, export, tmp_path):

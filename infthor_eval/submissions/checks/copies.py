@@ -24,6 +24,8 @@ Record = UnitRecord[NiehAnswer]
 _LEAST_S = 0.01  # shorter durations are equal by chance
 _EQUAL_TIMES = 10
 _LEAST = 10  # wrong answers that both have, from which on they are compared
+_MANY = 30  # replies that may not all be equal
+_DIFFERENT = 10  # of which so many are different ones
 _MOST = 0.9  # of these, the share that two models may have in common
 
 
@@ -66,6 +68,13 @@ class CopiedReplies:
         for task, other, theirs in _shared(case, others):
             if _is_same_model(case, other):
                 continue
+            if _are_identical(task, theirs):
+                yield Problem(
+                    self.name,
+                    f"{task.name}: every reply is, letter by letter, that of "
+                    f"{other.submission.name}; its replies were copied",
+                )
+                continue
             compared = [
                 (_said(record), _said(same))
                 for record in task.graded
@@ -81,6 +90,14 @@ class CopiedReplies:
                     f"{task.name}: of {len(compared):,} wrong answers that nobody guesses, "
                     f"{equal:,} are those of {other.submission.name}; its replies were copied",
                 )
+
+
+def _are_identical(task: Expected, theirs: Mapping[UnitKey, Record]) -> bool:
+    """Return True if all replies are equal, of which there are enough, and different ones."""
+    replies = {it.key: it.payload.reply for it in task.graded if it.payload.reply is not None}
+    of_other = {key: it.payload.reply for key, it in theirs.items() if it.payload.reply is not None}
+    enough = len(replies) >= _MANY and len(set(replies.values())) >= _DIFFERENT
+    return enough and replies == of_other
 
 
 def _shared(

@@ -14,7 +14,7 @@ from infthor_eval.submissions.case import Case
 from infthor_eval.submissions.expected import Expected
 from infthor_eval.submissions.reading import Problem
 
-__all__ = ["KeyForm", "KeySpelling", "KeyWords"]
+__all__ = ["KeyForm", "KeyScore", "KeySpelling", "KeyWords"]
 
 Record = UnitRecord[NiehAnswer]
 
@@ -22,7 +22,9 @@ _LISTS = 3
 _JOINED = 5
 _RIGHT = 0.95  # of the replies in the key's spelling
 _OPEN = 20
-_VERBATIM = 0.8  # of open answers; of the small model, which learned the key's words, it is 0.28
+_MANY = 50
+_ALL_RIGHT = 0.97  # of many questions; some are hard to see for anybody
+_VERBATIM = 0.85  # of open answers; of the small model, which learned the key's words, it is 0.28
 # Words that are one in English, too.
 _ENGLISH = frozenset({"cellphone", "countertop", "keychain", "teapot", "bathtub", "armchair"})
 
@@ -81,6 +83,25 @@ class KeyWords:
                     self.name,
                     f"{task.name}: {verbatim:,} of {len(replied):,} open questions are answered "
                     "in the key's words to the letter; they were copied from the key",
+                )
+
+
+class KeyScore:
+    """Not all is right."""
+
+    name: ClassVar[str] = "key score"
+    reason: ClassVar[str] = "who reworded the key is right about what nobody can see"
+
+    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
+        """See `Check`."""
+        for task in case.shown:
+            records = task.graded
+            right = sum(it.payload.scores.get("strict", 0.0) >= 1 for it in records)
+            if len(records) >= _MANY and right >= _ALL_RIGHT * len(records):
+                yield Problem(
+                    self.name,
+                    f"{task.name}: {right:,} of {len(records):,} answers are right, as only the "
+                    "key is; look at its replies before you allow it",
                 )
 
 
