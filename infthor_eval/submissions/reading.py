@@ -164,14 +164,12 @@ def _read_export(path: Path, statement: Statement, find_set: FindSet) -> list[Su
     imported = import_logs([path], data, statement.model)
     runs = []
     for run in imported:
+        told = {record.key: scores.of(run.task, record.key) for record in run.records}
         # A form that does not tell its task answers the one that the statement names.
-        name = run.task if run.task in scores.tasks else task
-        run.records[:] = [_of_task(record, name) for record in run.records]
-        run.task = name
-        told = {
-            record.key: scores.by_unit.get((record.id, record.variant, record.repeat), {})
-            for record in run.records
-        }
+        if run.task not in scores.tasks:
+            told = {key._replace(task=task): of_unit for key, of_unit in told.items()}
+            run.records[:] = [replace(record, task=task) for record in run.records]
+            run.task = task
         unread = [f"line {row.line} {row.reason}" for row in run.refused]
         answered = [record for record in run.records if record.payload.reply is not None]
         runs.append(
@@ -187,7 +185,3 @@ def _read_export(path: Path, statement: Statement, find_set: FindSet) -> list[Su
             )
         )
     return runs
-
-
-def _of_task(record: Record, task: str) -> Record:
-    return replace(record, task=task)

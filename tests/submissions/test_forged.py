@@ -395,7 +395,7 @@ def singles_from_the_key_and_pairs_from_nowhere(material, root):
     return submit(
         root,
         "forged",
-        honest(material, skill=0.9),
+        honest(material, skill=0.96),
         reply_with(material.runs["twins", "shown"], reader(0.0, "x")),
     )
 

@@ -178,7 +178,10 @@ def test_what_is_at_a_guess_is_said_and_not_refused(material, check, tmp_path):
 def test_an_export_with_an_edited_score_is_refused(material, check, export, tmp_path):
     folder = exported(material, tmp_path, export, "every-eval-ever", ".jsonl")
     (path,) = folder.glob("*.jsonl")
-    path.write_text(path.read_text().replace('"score":0.0,', '"score":1.0,', 1))
+    rows = [json.loads(line) for line in path.read_text().splitlines()]
+    wrong = next(row for row in rows if row["evaluation"]["score"] == 0)
+    wrong["evaluation"]["score"] = 1.0
+    path.write_text("".join(f"{json.dumps(row)}\n" for row in rows))
     refusals = {problem.check: problem.text for problem in check(folder).refusals}
     assert "1 stored scores" in refusals["scores"]
 

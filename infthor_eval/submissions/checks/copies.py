@@ -115,11 +115,11 @@ def _shared(
 
 
 def _is_later(other: Case, case: Case) -> bool:
-    """Return True if the other one came later, so that it is the copy."""
+    """Return True if the other one came later, or says no day, so that it is the copy."""
     ours, theirs = case.submission.statement, other.submission.statement
-    return (
-        other.is_candidate and ours is not None and theirs is not None and theirs.date > ours.date
-    )
+    if not other.is_candidate or ours is None:
+        return False
+    return theirs is None or theirs.date > ours.date
 
 
 def _is_same_model(case: Case, other: Case) -> bool:
