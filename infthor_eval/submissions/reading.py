@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from infthor_eval.errors import DataError, InfthorError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.config import NiehConfig
-from infthor_eval.nieh.published.imported_replies import import_logs
+from infthor_eval.nieh.published.imported_replies import ImportedRun, import_logs
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.runs import RunHeader, UnitKey, UnitRecord, read_header
 from infthor_eval.runs.journals.shards import (
@@ -19,7 +19,7 @@ from infthor_eval.runs.journals.shards import (
     read_run,
 )
 from infthor_eval.runs.stored.search import run_folders
-from infthor_eval.submissions.exported_scores import read_exported_scores
+from infthor_eval.submissions.exported_scores import ExportedScores, read_exported_scores
 from infthor_eval.submissions.statement import Statement, read_statement
 
 __all__ = ["Problem", "Submission", "SubmittedRun", "read_submission"]
@@ -155,33 +155,37 @@ def _exports(folder: Path, runs: Sequence[Path]) -> list[Path]:
 
 def _read_export(path: Path, statement: Statement, find_set: FindSet) -> list[SubmittedRun]:
     scores = read_exported_scores(path)
-    task = statement.task or next(iter(scores.tasks), "")
-    if not task:
+    tasks = sorted(scores.tasks) or [statement.task]
+    if tasks == [""]:
         raise DataError(
             f"{path}: does not tell its task; name it in submission.yaml (task: nieh_mini_gt)"
         )
-    data = find_set(task)
-    imported = import_logs([path], data, statement.model)
-    runs = []
-    for run in imported:
-        told = {record.key: scores.of(run.task, record.key) for record in run.records}
-        # A form that does not tell its task answers the one that the statement names.
-        if run.task not in scores.tasks:
-            told = {key._replace(task=task): of_unit for key, of_unit in told.items()}
-            run.records[:] = [replace(record, task=task) for record in run.records]
-            run.task = task
-        unread = [f"line {row.line} {row.reason}" for row in run.refused]
-        answered = [record for record in run.records if record.payload.reply is not None]
-        runs.append(
-            SubmittedRun(
-                path,
-                run.header(data),
-                run.records,
-                answered,
-                told,
-                sorted(scores.models),
-                unread,
-                is_export=True,
-            )
-        )
-    return runs
+    of_sets: dict[NiehSet, list[str]] = {}
+    for task in tasks:
+        of_sets.setdefault(find_set(task), []).append(task)
+    return [
+        _exported_run(path, run, scores, data, names[0])
+        for data, names in of_sets.items()
+        for run in import_logs([path], data, statement.model, names)
+    ]
+
+
+def _exported_run(
+    path: Path, run: ImportedRun, scores: ExportedScores, data: NiehSet, task: str
+) -> SubmittedRun:
+    """Return a run of an export; one that does not tell its task is of the given one."""
+    told = {record.key: scores.of(run.task, record.key) for record in run.records}
+    if run.task not in scores.tasks:
+        told = {key._replace(task=task): of_unit for key, of_unit in told.items()}
+        run.records[:] = [replace(record, task=task) for record in run.records]
+        run.task = task
+    return SubmittedRun(
+        path,
+        run.header(data),
+        run.records,
+        [record for record in run.records if record.payload.reply is not None],
+        told,
+        sorted(scores.models),
+        [f"line {row.line} {row.reason}" for row in run.refused],
+        is_export=True,
+    )

@@ -37,7 +37,7 @@ def test_one_that_passes(run_cli, sent, homes):
 def test_one_that_is_refused(run_cli, sent, homes):
     code, output, _ = run_cli("submit-check", sent, "--data", homes)
     assert code == 1
-    assert "key: refused, 2 reasons" in output
+    assert "key: refused, 3 reasons" in output
     assert "  key words: nieh_gt: 48 of 48 open questions" in output
 
 
@@ -71,5 +71,5 @@ def test_no_published_rows(run_cli, sent, homes, tmp_path):
 
 def test_misuse(run_cli, sent, tmp_path):
     assert_refused(run_cli("submit-check", tmp_path / "none"), "no such folder")
-    assert_refused(run_cli("submit-check", sent, "--allow", "frame"), "did you mean frames?")
+    assert_refused(run_cli("submit-check", sent, "--allow", "frame"), "did you mean 'frames'?")
     assert_refused(run_cli("submit-check", sent, "--key", tmp_path), "no key.json")
