@@ -24,6 +24,7 @@ from infthor_eval.workers import WorkerSettings
 
 __all__ = ["PrivateSet", "make_private_set"]
 
+_OWNER_ALONE = 0o700
 _KINDS = ("kitchen", "living-room", "bedroom")  # of homes, in turn
 
 
@@ -75,6 +76,7 @@ def make_private_set(
         DataError: no twins can be made, or something cannot be written.
     """
     key = prepare_folder(out / "key")
+    key.chmod(_OWNER_ALONE)
     trajectories = prepare_folder(key / "trajectories")
     jobs = [_home(secret, number, min_steps) for number in range(n_homes)]
     generated = generate_with_workers(

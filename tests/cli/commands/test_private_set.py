@@ -23,6 +23,7 @@ def test_a_set_from_a_secret(run_cli, tmp_path):
     scenes = {pair.floor_plan for pair in key.data.twins.values()}
     assert all(int(scene.rpartition("-")[2]) > 2**40 for scene in scenes)
     assert "5eed5eed" not in output + err
+    assert (out / "key").stat().st_mode & 0o077 == 0
 
 
 def test_what_is_no_secret(run_cli, tmp_path):
