@@ -15,7 +15,6 @@ from infthor_eval.generation.private.secrets import Secret
 from infthor_eval.generation.replay_set import select
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.twins.drafting import TwinSettings
-from infthor_eval.generation.twins.kinds import KINDS
 from infthor_eval.generation.twins.pairing import ScoreReply
 from infthor_eval.generation.twins.twin_set import make_twins
 from infthor_eval.storage.files import prepare_folder
@@ -52,6 +51,7 @@ def make_private_set(
     out: Path,
     score: ScoreReply,
     *,
+    kinds: tuple[str, ...],
     n_homes: int,
     min_steps: int,
     per_trajectory: int,
@@ -65,6 +65,7 @@ def make_private_set(
         secret: what all is drawn from.
         out: folder of both parts; a stopped run is continued.
         score: see `make_twins`.
+        kinds: names of the kinds of edits.
         n_homes: number of homes, with a trajectory each.
         min_steps: least number of steps of each.
         per_trajectory: most pairs of questions of each.
@@ -92,7 +93,7 @@ def make_private_set(
         selection,
         embedded_launch(),
         key,
-        TwinSettings(KINDS.names, secret.seed("twins")),
+        TwinSettings(kinds, secret.seed("twins")),
         score,
         per_trajectory=per_trajectory,
         worker_settings=worker_settings,

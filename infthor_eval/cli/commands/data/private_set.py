@@ -28,6 +28,7 @@ __all__ = ["command"]
 @click.option(
     "--homes", type=click.IntRange(1), default=12, show_default=True, help="A trajectory in each."
 )
+@click.option("--kinds", help="Kinds of edits, with commas; default: all.")
 @click.option(
     "--min-steps",
     type=click.IntRange(1),
@@ -47,6 +48,7 @@ def command(
     seed_file: Path,
     out: Path,
     homes: int,
+    kinds: str | None,
     min_steps: int,
     per_trajectory: int,
     **workers: Any,
@@ -59,6 +61,7 @@ def command(
     """
     from functools import partial
 
+    from infthor_eval.cli.commands.data.questions import parse_kinds
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note
     from infthor_eval.generation.private.making import make_private_set
@@ -75,6 +78,7 @@ def command(
             secret,
             out,
             partial(score, scorer="strict"),
+            kinds=parse_kinds(kinds),
             n_homes=homes,
             min_steps=min_steps,
             per_trajectory=per_trajectory,
