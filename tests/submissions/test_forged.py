@@ -437,7 +437,7 @@ def test_who_came_first_is_not_refused_for_the_copy(material, owner, tmp_path):
 
 def test_the_owner_may_allow_what_a_check_refuses(material, check, tmp_path):
     folder = submit(tmp_path, "key", reply_with(material.runs["homes", "shown"], key))
-    allowed = ("key words", "key spelling")
+    allowed = ("key words", "key spelling", "key score")
     assert check(folder, allowed=allowed).refusals == []
     assert set(allowed) <= {problem.check for problem in check(folder, allowed=allowed).warnings}
 
