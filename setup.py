@@ -22,6 +22,9 @@ setup(
         "infthor_eval.nieh": ["*.yaml"],
         "infthor_eval.report": [
             "inspection.*",
+            "leaderboard/*.html",
+            "leaderboard/*.css",
+            "leaderboard/*.js",
             "web/*.html",
             "web/*.css",
             "web/*.js",

@@ -61,6 +61,7 @@ _SECTIONS = {
         "infthor_eval/report/",
         "infthor_eval/statistics.py",
         "infthor_eval/storage/",
+        "infthor_eval/submissions/",
     ),
     "Training": ("infthor_eval/training/",),
 }

@@ -9,7 +9,7 @@ from infthor_eval.errors import UsageError
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.runs import RunHeader, read_header
 
-__all__ = ["UNKNOWN", "ModelFacts", "model_facts", "require_one_model"]
+__all__ = ["UNKNOWN", "ModelFacts", "engine_of", "model_facts", "require_one_model"]
 
 UNKNOWN = "unknown"
 _OWN = "infthor-eval"  # developer of baselines
@@ -76,7 +76,7 @@ def model_facts(run: PresentedRun, model_id: str | None = None) -> ModelFacts:
     """
     header = read_header(run.folder)
     identity: Mapping[str, Any] = header.config.model
-    engine, engine_version = _engine(identity)
+    engine, engine_version = engine_of(identity)
     platform, deployment = _place(identity)
     return ModelFacts(
         name=header.name,
@@ -99,7 +99,8 @@ def _id(identity: Mapping[str, Any], name: str) -> str:
     return named if developer and rest else f"{UNKNOWN}/{named.replace('/', '_') or name}"
 
 
-def _engine(identity: Mapping[str, Any]) -> tuple[str, str]:
+def engine_of(identity: Mapping[str, Any]) -> tuple[str, str]:
+    """Return library and version that ran a model, by its identity; empty if not known."""
     if "baseline" in identity:
         import infthor_eval
 

@@ -6,9 +6,10 @@ from typing import Literal
 
 from infthor_eval.storage.digests import digest
 
-__all__ = ["ABSENCE", "Answer", "PublishedColumns", "Question", "SkippedQuestion"]
+__all__ = ["ABSENCE", "WITHHELD", "Answer", "PublishedColumns", "Question", "SkippedQuestion"]
 
 Answer = str | int | float
+WITHHELD = "(withheld)"  # in place of the gold answers, in the public part of a private set
 ABSENCE = "absence"  # column of the absence questions (no frame is evidence)
 
 
@@ -83,6 +84,11 @@ class Question:
         if file == "single" or self.n_clues == 1:
             return "" if file == "multi" else "1"
         return "2" if self.n_clues == 2 else ">=3"
+
+    @property
+    def is_withheld(self) -> bool:
+        """True if its gold answers are secret (`answer_key`): no reply to it has a score."""
+        return self.answers == (WITHHELD,)
 
     @property
     def has_evidence(self) -> bool:

@@ -58,6 +58,7 @@ class NiehTaskConfig(TaskConfig, frozen=True, kw_only=True, omit_defaults=True):
         simulator: simulator that rendered its frames; None if the set does not say.
         sources: what the frames depend on besides the set and the settings.
         film: how the model is given films; None where there are none.
+        withheld: True if the gold answers are secret: scores are 0 until their owner gives the key.
         without_alike: trajectories that other homes of another kind of room stand for, as the set
             has no further one of theirs.
     """
@@ -71,6 +72,7 @@ class NiehTaskConfig(TaskConfig, frozen=True, kw_only=True, omit_defaults=True):
     sources: dict[str, Any] = msgspec.field(default_factory=dict)
     film: Literal["video", "images"] | None = None
     without_alike: tuple[str, ...] = ()
+    withheld: bool = False
 
     def __post_init__(self) -> None:
         """Check what summaries read; msgspec turns the error into its own."""

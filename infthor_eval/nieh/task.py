@@ -163,6 +163,7 @@ class NiehTask:
             ),
             film=film,
             without_alike=without,
+            withheld=any(it.question.is_withheld for it in samples.samples),
         )
 
 

@@ -1,5 +1,6 @@
 """Small sets of twins: worlds of two trajectories, of which some frames differ."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import msgspec
@@ -22,17 +23,18 @@ _ASKED = (
 )
 
 
-def write_twin_set(root: Path) -> Path:
-    """Write a set of two pairs of worlds, with two pairs of questions each; frames are colours.
+def write_twin_set(root: Path, bases: Iterable[int] = (1, 2)) -> Path:
+    """Write a set of a pair of worlds of each base, two by default, with two pairs of questions
+    each; frames are colours.
 
     The mug of the first world is the cup of the second, in what differs and in the logged actions.
     """
     pairs = []
     questions = []
-    for base in (1, 2):
+    for base in bases:
         worlds = (f"kitchen-{base}-a", f"kitchen-{base}-b")
         for shade, (world, thing) in enumerate(zip(worlds, ("Mug", "Cup"), strict=True)):
-            _write_world(root, world, thing, (60 * base, 200 * shade))
+            _write_world(root, world, thing, (60 * base % 256, 200 * shade))
         for number, (text, answers) in enumerate(_ASKED, 1):
             for world, answer in zip(worlds, answers, strict=True):
                 named = {"pair": f"swap-{base}/{number}", "fact": f"swap-{base}/mug"}

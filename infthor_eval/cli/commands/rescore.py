@@ -69,6 +69,9 @@ _JUDGE_PROMPT = "yes-no"
     help="Seed of the sample that measures the judge.",
 )
 @click.option(
+    "--key", type=PATH, metavar="KEY", help="Key of a private set, for a run on its public part."
+)
+@click.option(
     "--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs."
 )
 def command(
@@ -79,6 +82,7 @@ def command(
     judge_prompt: str | None,
     judge_tokens: int | None,
     seed: int,
+    key: Path | None,
     output: Path,
 ) -> int:
     """Score the replies in the journal of RUN, a run of NIEH, with today's scorers, and store them
@@ -88,7 +92,9 @@ def command(
     is 1 if your scorer fails on a reply, or the judge cannot be asked.
     """
     from infthor_eval.cli.progress.notes import print_failure, prints_as_notes
+    from infthor_eval.formats.replies.answer_key import read_key
     from infthor_eval.nieh.own_scorers import find_scorer
+    from infthor_eval.nieh.rescoring.keyed import with_key
     from infthor_eval.nieh.rescoring.rescore import read_source, score_again
 
     if judge is None and judge_args:
@@ -98,6 +104,8 @@ def command(
     if judge is not None and len(judge) > 1:
         raise click.UsageError(f"--judge names {len(judge)} models; give one")
     source = read_source(folder, print_failure)
+    if key is not None:
+        source = with_key(source, read_key(key))
     prompt = judge_prompt or _JUDGE_PROMPT
     settings = (judge_tokens or _JUDGE_TOKENS[prompt], seed, prompt)
     with _load_judge(judge[0], judge_args, *settings) if judge else nullcontext() as loaded:

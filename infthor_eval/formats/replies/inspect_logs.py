@@ -21,7 +21,7 @@ from infthor_eval.formats.replies.logged import LoggedReply
 from infthor_eval.quantities import Amount, Count
 from infthor_eval.storage.limits import FILE_MB
 
-__all__ = ["INSPECT_SUFFIX", "inspect_rows"]
+__all__ = ["INSPECT_SUFFIX", "inspect_documents", "inspect_rows"]
 
 INSPECT_SUFFIX = ".eval"
 _HEADER = ("header.json", "_journal/start.json")  # the second of a run that was stopped
@@ -84,6 +84,20 @@ def inspect_rows(path: Path) -> Iterator[tuple[int, Callable[[], Sequence[Logged
     Raises:
         DataError: the file is no such log, or too large.
     """
+    for number, (spec, document) in enumerate(_samples(path), start=1):
+        yield number, partial(_read, number, document, spec)
+
+
+def inspect_documents(path: Path) -> Iterator[Mapping[str, Any]]:
+    """Yield the document of each sample that is a JSON object.
+
+    Raises:
+        DataError: as `inspect_rows`.
+    """
+    yield from (document for _, document in _samples(path) if isinstance(document, Mapping))
+
+
+def _samples(path: Path) -> Iterator[tuple[_Spec, Any]]:
     require_file(path, _HINT)
     try:
         with zipfile.ZipFile(path) as archive:
@@ -92,9 +106,9 @@ def inspect_rows(path: Path) -> Iterator[tuple[int, Callable[[], Sequence[Logged
             if header is None:
                 raise DataError(f"{path}: has no {_HEADER[0]}; {_HINT}")
             spec = msgspec.convert(_document(archive, header), _Header).eval
-            samples = [it for name, it in members.items() if name.startswith(_SAMPLES)]
-            for number, member in enumerate(samples, start=1):
-                yield number, partial(_read, number, _document(archive, member), spec)
+            for name, member in members.items():
+                if name.startswith(_SAMPLES):
+                    yield spec, _document(archive, member)
     except (*_DAMAGED, ValueError) as error:  # msgspec's errors are ValueErrors
         raise DataError(f"{path}: not a log of inspect_ai ({in_one_line(error)}); {_HINT}") from (
             error

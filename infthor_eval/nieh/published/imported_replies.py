@@ -1,7 +1,7 @@
 """Replies that others made, as runs: scored, with journal and results like runs of our own."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
@@ -110,13 +110,19 @@ class ImportedRun:
         )
 
 
-def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -> list[ImportedRun]:
+def import_logs(
+    logs: Sequence[Path],
+    data: NiehSet,
+    model: str | None = None,
+    tasks: Collection[str] | None = None,
+) -> list[ImportedRun]:
     """Return the runs in logs: those of one model and mode, on different questions, are one run.
 
     Args:
         logs: files with replies (`infthor_eval.formats.replies.logs`).
         data: the set that they answer.
         model: name of the model; None for the one in the names of published logs.
+        tasks: tasks of the set; replies that name another one are left out. None for any task.
 
     Raises:
         UsageError: a log names no model and none is given, or no row of a log answers a question of
@@ -131,6 +137,8 @@ def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -
         name = _PUBLISHED_NAME.match(log.name)
         for part in _parts_of(rows_of[log]):
             first = next(iter(_replies(part)), None)
+            if tasks is not None and first and first.task and first.task not in tasks:
+                continue
             of_model = model or (name and name["model"]) or (first.model if first else "")
             if first and not of_model:
                 raise UsageError(f"{log}: its name has no model; give one with --model")

@@ -48,6 +48,10 @@ _EMBEDDED = (
     "Questions on frames of the embedded simulator: not comparable with the published rows, which "
     "are on AI2-THOR's own frames."
 )
+_WITHHELD = (
+    "The answers of this set are withheld, so every score here is 0. Send the run to the owner of "
+    "the set, who has the key."
+)
 
 
 def tables(runs: Sequence[RunSummary]) -> list[Table]:
@@ -173,11 +177,15 @@ def _notes(runs: Sequence[RunSummary]) -> list[str]:
     embedded = (
         [_EMBEDDED] if any(task.simulator == "embedded" for _, _, task in _tasks(runs)) else []
     )
+    is_withheld = any(
+        config.withheld for run in runs for config in run.header.config.tasks.values()
+    )
     sources = dict.fromkeys(
         source for run in runs for source in sources_of(run.header.config).items()
     )
     return [
         *embedded,
+        *([_WITHHELD] if is_withheld else []),
         *without_alike_notes(runs),
         *(f"{metric}: {source}." for metric, source in sources if metric not in SCORERS),
     ]

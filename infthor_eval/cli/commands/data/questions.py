@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from infthor_eval.generation.twins.final_task_set import FinalTaskSummary
     from infthor_eval.generation.twins.twin_set import TwinSummary
 
-__all__ = ["questions", "twins"]
+__all__ = ["parse_kinds", "questions", "twins"]
 
 
 @click.command(
@@ -184,7 +184,7 @@ def twins(
     from infthor_eval.thor.supplement import supplement_file
 
     worker_settings = parse_worker_settings(**workers)
-    settings = TwinSettings(_parse_kinds(kinds, final_tasks), seed, per_kind)
+    settings = TwinSettings(parse_kinds(kinds, final_tasks), seed, per_kind)
     notes = error_console()
     with ExitStack() as held:
         held.enter_context(hold_folder(out))
@@ -218,7 +218,7 @@ def twins(
     context.exit(1 if summary.failures else 0)
 
 
-def _parse_kinds(names: str | None, final_tasks: bool) -> tuple[str, ...]:
+def parse_kinds(names: str | None, final_tasks: bool = False) -> tuple[str, ...]:
     """Return the names of kinds that an option gives; an unknown one is an error."""
     from infthor_eval.generation.twins.final_tasks import MOVING_KINDS
     from infthor_eval.generation.twins.kinds import KINDS, EditKind

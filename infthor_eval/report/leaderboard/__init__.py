@@ -1,0 +1,1 @@
+"""A page of checked submissions, in one file."""

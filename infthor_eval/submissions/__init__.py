@@ -1,0 +1,1 @@
+"""Submissions of others: read, checked before they are believed, and put into rows."""

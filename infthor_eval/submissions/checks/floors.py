@@ -1,0 +1,71 @@
+"""Whether a score is above what blindness and knowledge of homes give.
+
+Both are warnings: who is no better than a guess is not thereby dishonest. The row says it.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import ClassVar
+
+from infthor_eval.nieh.options import OTHER
+from infthor_eval.nieh.results.above_guessing import above_guessing
+from infthor_eval.statistics import paired_difference
+from infthor_eval.submissions.case import Case
+from infthor_eval.submissions.expected import Expected
+from infthor_eval.submissions.reading import Problem
+
+__all__ = ["AboveBlind", "AboveOtherHome"]
+
+
+class AboveBlind:
+    """The score is above what can be guessed without a frame."""
+
+    name: ClassVar[str] = "above blind"
+    reason: ClassVar[str] = "a score at the best guess shows no memory"
+
+    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
+        """See `Check`."""
+        for task in case.shown:
+            if not self.is_above(task):
+                yield Problem(
+                    self.name,
+                    f"{task.name}: is not above what can be guessed without a frame",
+                    is_warning=True,
+                )
+
+    @staticmethod
+    def is_above(task: Expected) -> bool:
+        """Return True if the whole interval of the score above guessing is above 0."""
+        of_task = above_guessing(task.graded, "strict")
+        return of_task.low is not None and of_task.low > 0
+
+
+class AboveOtherHome:
+    """The score is above that on another home of the same kind."""
+
+    name: ClassVar[str] = "above other home"
+    reason: ClassVar[str] = "knowledge of homes looks like memory of this one"
+
+    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
+        """See `Check`."""
+        controls = {task.name: task for task in case.controls(OTHER)}
+        for task in case.shown:
+            control = controls.get(task.name)
+            if control is None:
+                text = f"{task.name}: no run on another home; send one (--frames {OTHER})"
+                yield Problem(self.name, text, is_warning=True)
+            elif not self._is_above(task, control):
+                text = f"{task.name}: is not above the same model's score on another home"
+                yield Problem(self.name, text, is_warning=True)
+
+    @staticmethod
+    def _is_above(task: Expected, control: Expected) -> bool:
+        theirs = {it.key: it.payload.scores.get("strict", 0.0) for it in control.graded}
+        shared = [it for it in task.graded if it.key in theirs]
+        difference = paired_difference(
+            [theirs[it.key] for it in shared],
+            [it.payload.scores.get("strict", 0.0) for it in shared],
+            [it.cluster for it in shared],
+            most=1.0,
+        )
+        low = difference.estimate.low
+        return low is not None and low > 0
