@@ -47,6 +47,7 @@ class _ReplyLimits(msgspec.Struct):
     cost: Amount | None
     thinking: str | None
     n_watched: Count | None
+    seconds: Amount | None
 
 
 def guard(name: str, adapter: Any) -> Model | Policy:
@@ -136,6 +137,11 @@ class _GuardedPerson(_GuardedModel):
         """See `Attended`."""
         with wrap_request_errors(self.name):
             self._adapter.tell(notice)
+
+    def tell_position(self, number: int, n_units: int) -> None:
+        """See `Attended`."""
+        with wrap_request_errors(self.name):
+            self._adapter.tell_position(number, n_units)
 
 
 class _GuardedConversation:

@@ -125,6 +125,8 @@ class Reply:
             thoughts between markers in the text are told from the answer where the reply is read
             (`model_adapters.thinking`).
         n_watched: different frames that a person looked at before replying; None for models.
+        seconds: seconds that the reply took, where that is not the duration of the request: a
+            person's, while the question was on the screen.
     """
 
     text: str
@@ -136,6 +138,7 @@ class Reply:
     cost: float | None = None
     thinking: str | None = None
     n_watched: int | None = None
+    seconds: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -337,6 +340,7 @@ class Notice:
 
     Attributes:
         title: heading of what is asked.
+        unit: what a unit of the run is called ("question").
         facts: names and values, in order.
         news: what became of the last reply; empty if there is nothing to say.
         words: words that complete what is typed.
@@ -345,6 +349,7 @@ class Notice:
     """
 
     title: str = ""
+    unit: str = ""
     facts: tuple[tuple[str, str], ...] = ()
     news: str = ""
     words: tuple[str, ...] = ()
@@ -357,3 +362,9 @@ class Attended(Model, Protocol):
 
     def tell(self, notice: Notice) -> None:
         """Take what is shown with the next request, and those after it until the next notice."""
+
+    def tell_position(self, number: int, n_units: int) -> None:
+        """Take which unit of the run the next requests belong to, from 1, and of how many.
+
+        It is told where one person answers all of the run, which that person may stop.
+        """
