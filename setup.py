@@ -22,6 +22,7 @@ setup(
         "infthor_eval.nieh": ["*.yaml"],
         "infthor_eval.report": [
             "inspection.*",
+            "sample.html",
             "web/*.html",
             "web/*.css",
             "web/*.js",
