@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-    from infthor_eval.report.sample import Sample
-
 __all__ = ["__version__", "evaluate", "load_figure", "load_run", "load_runs", "load_sample"]
 
 __version__ = "0.1.0"
@@ -65,7 +63,7 @@ def load_runs(*folders: str | os.PathLike[str]) -> DataFrame:
 
 def load_sample(
     folder: str | os.PathLike[str], name: str, data: str | os.PathLike[str] | None = None
-) -> Sample:
+) -> Any:
     """Return a sample of a run, which a notebook shows with frames, request, reply and score.
 
     Args:
@@ -74,14 +72,16 @@ def load_sample(
             repetitions the first, or the one whose whole key this is.
         data: folder of its data set, if the run does not name it.
 
+    Returns:
+        A `Sample` of `infthor_eval.report.sample`.
+
     Raises:
         DataError: the run cannot be read.
         UsageError: there is no such sample.
     """
     from infthor_eval.plugins import import_target
 
-    sample: Sample = import_target("infthor_eval.report.sample:load_sample")(folder, name, data)
-    return sample
+    return import_target("infthor_eval.report.sample:load_sample")(folder, name, data)
 
 
 def load_figure(

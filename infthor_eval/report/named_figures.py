@@ -21,7 +21,7 @@ __all__ = ["build_figure", "load_figure"]
 
 
 def build_figure(
-    folders: Sequence[Path], name: str, request: FigureRequest, tell: Callable[[str], object]
+    folders: Sequence[Path], name: str, request: FigureRequest, tell: Callable[[str], None]
 ) -> FigureResult:
     """Read runs and build a figure of them.
 
