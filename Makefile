@@ -2,7 +2,9 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+# What the package itself needs; and beside it what its tests, linters and documentation need.
 INSTALLED := $(VENV)/.installed
+DEVELOPED := $(VENV)/.developed
 # lm-eval's own multimodal model insists on torchvision, which has no CPU build; one test loads its Python half from
 # here. It must stay out of the environment itself, where transformers would find it and fail.
 PEERS := $(VENV)/test-peers
@@ -42,16 +44,16 @@ demo: $(INSTALLED)
 shell: $(INSTALLED)
 	@. $(BIN)/activate && exec "$${SHELL:-/bin/sh}"
 
-test: $(INSTALLED) $(PEERS) $(INSPECT)
+test: $(DEVELOPED) $(PEERS) $(INSPECT)
 	$(COMPILE)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 # The slow ones too; half an hour on two cores.
-test-all: $(INSTALLED) $(PEERS) $(INSPECT)
+test-all: $(DEVELOPED) $(PEERS) $(INSPECT)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile
 
 # Measures all tests, and lists those that are slow in tests/slow_tests.txt.
-test-times: $(INSTALLED) $(PEERS) $(INSPECT)
+test-times: $(DEVELOPED) $(PEERS) $(INSPECT)
 	$(COMPILE)
 	rm -rf build/processor_times
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -p tests.processor_times
@@ -68,15 +70,15 @@ $(VLLM)/.installed: $(REAL)/install.sh pyproject.toml
 
 # Damaged inputs for every reader of the project, so many seconds each; what is found is printed, and ends with 1.
 FUZZ_SECONDS ?= 60
-fuzz: $(INSTALLED)
+fuzz: $(DEVELOPED)
 	OMP_NUM_THREADS=1 $(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS)
 
 # The figures that no change may move unseen (benchmarks/vitals.py); six minutes. DATA: recorded data, if there is any.
 DATA ?= ../shared/data
-vitals: $(INSTALLED)
+vitals: $(DEVELOPED)
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/vitals.py --data $(DATA)
 
-lint: $(INSTALLED)
+lint: $(DEVELOPED)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -84,7 +86,7 @@ lint: $(INSTALLED)
 	$(BIN)/python .ci/style.py
 
 # The documentation as a site, build/site/index.html; a link that leads nowhere ends it.
-docs: $(INSTALLED)
+docs: $(DEVELOPED)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 	@echo "the site: $(CURDIR)/build/site/index.html"
 
@@ -99,7 +101,7 @@ audit: $(TOOLS)/.installed
 		$(TOOLS)/bin/pip-audit --strict --no-deps --disable-pip --progress-spinner off -r $$file || exit 1; done
 
 # Wheel, source distribution and list of what is in them (SBOM, CycloneDX) of the last commit: dist.
-release: $(INSTALLED) $(TOOLS)/.installed
+release: $(DEVELOPED) $(TOOLS)/.installed
 	$(BIN)/python .ci/release.py dist
 	{ cat requirements.lock; grep '^torch==' constraints.txt; } | $(TOOLS)/bin/cyclonedx-py requirements \
 		--pyproject pyproject.toml --output-reproducible --of JSON -o dist/infthor-eval.cdx.json -
@@ -112,14 +114,18 @@ $(TOOLS)/.installed: .ci/release-tools.lock
 $(INSTALLED): pyproject.toml setup.py constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.11 ...")'
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	touch $@
+
+$(DEVELOPED): $(INSTALLED)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,docs]'
 	touch $@
 
-$(PEERS): $(INSTALLED)
+$(PEERS): $(DEVELOPED)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt --no-deps --upgrade --target $@ torchvision
 	touch $@
 
-$(INSPECT): $(INSTALLED)
+$(INSPECT): $(DEVELOPED)
 	$(PYTHON) -m venv $@
 	$@/bin/pip install --quiet --disable-pip-version-check 'inspect_ai==0.3.285'
 	touch $@

@@ -25,6 +25,7 @@ setup(
             "leaderboard/*.html",
             "leaderboard/*.css",
             "leaderboard/*.js",
+            "sample.html",
             "web/*.html",
             "web/*.css",
             "web/*.js",

@@ -8,9 +8,10 @@ if TYPE_CHECKING:
     import os
     from typing import Any
 
+    from matplotlib.figure import Figure
     from pandas import DataFrame
 
-__all__ = ["__version__", "evaluate", "load_run", "load_runs"]
+__all__ = ["__version__", "evaluate", "load_figure", "load_run", "load_runs", "load_sample"]
 
 __version__ = "0.1.0"
 
@@ -58,6 +59,54 @@ def load_runs(*folders: str | os.PathLike[str]) -> DataFrame:
 
     frame: DataFrame = import_target("infthor_eval.report.run_table:load_runs")(*folders)
     return frame
+
+
+def load_sample(
+    folder: str | os.PathLike[str], name: str, data: str | os.PathLike[str] | None = None
+) -> Any:
+    """Return a sample of a run, which a notebook shows with frames, request, reply and score.
+
+    Args:
+        folder: folder of the run.
+        name: id of the sample (`load_run` has it in the column `id`); of several variants or
+            repetitions the first, or the one whose whole key this is.
+        data: folder of its data set, if the run does not name it.
+
+    Returns:
+        A `Sample` of `infthor_eval.report.sample`.
+
+    Raises:
+        DataError: the run cannot be read.
+        UsageError: there is no such sample.
+    """
+    from infthor_eval.plugins import import_target
+
+    return import_target("infthor_eval.report.sample:load_sample")(folder, name, data)
+
+
+def load_figure(
+    *folders: str | os.PathLike[str],
+    name: str,
+    task: str | None = None,
+    panels: str | os.PathLike[str] | None = None,
+) -> Figure:
+    """Return a figure of the report as one of matplotlib, to be changed or saved.
+
+    Args:
+        folders: folders of runs.
+        name: name of the figure, as `infthor-eval report --figure NAME` takes it.
+        task: task to draw; None for what the runs share.
+        panels: YAML file with the runs of each panel; None draws all in one.
+
+    Raises:
+        UsageError: there is no such figure, or not of these runs.
+        DataError: a run or the file of panels cannot be read.
+    """
+    from infthor_eval.plugins import import_target
+
+    build = import_target("infthor_eval.report.named_figures:load_figure")
+    figure: Figure = build(folders, name, task, panels)
+    return figure
 
 
 def evaluate(model: str, tasks: str | list[str], **options: Any) -> DataFrame:

@@ -88,9 +88,10 @@ class _Description(TextColumn):
 
 
 def progress_bar(on: Console) -> Progress:
-    """Return a bar that disappears when done; it draws nothing where there is no terminal."""
+    """Return a bar that disappears when done; it is disabled but on a terminal or in a notebook."""
     columns = (_Description(), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    return Progress(*columns, console=on, transient=True, disable=not on.is_terminal)
+    is_shown = on.is_terminal or on.is_jupyter
+    return Progress(*columns, console=on, transient=True, disable=not is_shown)
 
 
 def print_line(text: str) -> None:

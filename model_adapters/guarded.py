@@ -50,6 +50,7 @@ class _ReplyLimits(msgspec.Struct):
     context_hash: str | None
     frames_hash: str | None
     margins: tuple[Amount, ...] | None
+    seconds: Amount | None
 
 
 def guard(name: str, adapter: Any) -> Model | Policy:
@@ -139,6 +140,11 @@ class _GuardedPerson(_GuardedModel):
         """See `Attended`."""
         with wrap_request_errors(self.name):
             self._adapter.tell(notice)
+
+    def tell_position(self, number: int, n_units: int) -> None:
+        """See `Attended`."""
+        with wrap_request_errors(self.name):
+            self._adapter.tell_position(number, n_units)
 
 
 class _GuardedConversation:

@@ -131,6 +131,8 @@ class Reply:
             likewise.
         margins: how much likelier the likeliest token was than the second, at each token of the
             reply and the one that ends it, in nats; None unless the model was asked to say so.
+        seconds: seconds that the reply took, where that is not the duration of the request: a
+            person's, while the question was on the screen.
     """
 
     text: str
@@ -145,6 +147,7 @@ class Reply:
     context_hash: str | None = None
     frames_hash: str | None = None
     margins: tuple[float, ...] | None = None
+    seconds: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -346,6 +349,7 @@ class Notice:
 
     Attributes:
         title: heading of what is asked.
+        unit: what a unit of the run is called ("question").
         facts: names and values, in order.
         news: what became of the last reply; empty if there is nothing to say.
         words: words that complete what is typed.
@@ -354,6 +358,7 @@ class Notice:
     """
 
     title: str = ""
+    unit: str = ""
     facts: tuple[tuple[str, str], ...] = ()
     news: str = ""
     words: tuple[str, ...] = ()
@@ -366,3 +371,9 @@ class Attended(Model, Protocol):
 
     def tell(self, notice: Notice) -> None:
         """Take what is shown with the next request, and those after it until the next notice."""
+
+    def tell_position(self, number: int, n_units: int) -> None:
+        """Take which unit of the run the next requests belong to, from 1, and of how many.
+
+        It is told where one person answers all of the run, which that person may stop.
+        """

@@ -201,3 +201,54 @@ def test_a_run_that_cannot_be_read_is_left_out_with_a_warning(
     with pytest.warns(UserWarning, match="bad: cannot be read"):
         frame = infthor_eval.load_runs(tmp_path)
     assert list(frame["folder"]) == [str(tmp_path / "good")]
+
+
+_TELL_STATE = """
+import gc, json, logging, os, resource, signal, sys, warnings
+
+def state():
+    return {
+        "frozen": gc.get_freeze_count(),
+        "collection": gc.get_threshold(),
+        "signals": [str(signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM)],
+        "handlers": [str(handler) for handler in logging.getLogger().handlers],
+        "level": logging.getLogger().level,
+        "warnings": [str(one) for one in warnings.filters],
+        "streams": [sys.stdout.errors, sys.stderr.errors],
+        "memory": resource.getrlimit(resource.RLIMIT_AS),
+        "environment": dict(os.environ),
+    }
+"""
+
+
+def test_importing_the_package_changes_nothing_of_the_process(tmp_path: Path) -> None:
+    """What the command does to its own process is not done to that of a notebook."""
+    code = (
+        _TELL_STATE
+        + f"""
+# Of other packages, whose imports add filters of warnings.
+import matplotlib.figure, numpy, pandas, pyarrow, rich, torch, transformers
+before = state()
+import infthor_eval
+infthor_eval.load_run, infthor_eval.load_runs, infthor_eval.load_sample, infthor_eval.load_figure
+import infthor_eval.cli.evaluation, infthor_eval.report.sample, infthor_eval.report.named_figures
+assert state() == before, (before, state())
+infthor_eval.evaluate(model="blind", tasks="nieh_mini_gt", limit=2, output={str(tmp_path)!r})
+after = state()
+for changed in ("warnings", "environment"):  # by lm-eval and others that it needs
+    before.pop(changed), after.pop(changed)
+assert after == before, (before, after)
+"""
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=600
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_bar_is_shown_in_a_notebook_and_lines_elsewhere(monkeypatch) -> None:
+    from infthor_eval.terminal import PlainConsole, progress_bar
+
+    assert progress_bar(PlainConsole(file=io.StringIO())).disable
+    assert not progress_bar(PlainConsole(file=io.StringIO(), force_jupyter=True)).disable
+    assert not progress_bar(PlainConsole(file=io.StringIO(), force_terminal=True)).disable

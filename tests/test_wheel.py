@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from .docs.commands import code_of
 from .helpers.benchmarks import load_benchmark
 from .helpers.command_line import option_words
 
@@ -27,17 +28,22 @@ def installed(wheel, tmp_path_factory):
 
 
 @pytest.fixture
-def command(installed, tmp_path):
+def environment(installed):
+    """The environment of a shell in which the wheel's commands are those that are found."""
+    folders = (str(installed / "bin"), str(Path(sys.executable).parent), os.environ["PATH"])
+    return {**os.environ, "PYTHONPATH": str(installed), "PATH": os.pathsep.join(folders)}
+
+
+@pytest.fixture
+def command(environment, tmp_path):
     """Runs the installed command in an empty folder, where no checkout is in sight."""
 
     def command(*words):
-        env = {**os.environ, "PYTHONPATH": str(installed)}
-        script = installed / "bin" / "infthor-eval"
         done = subprocess.run(
-            [sys.executable, script, *words],
+            ["infthor-eval", *words],
             check=False,
             cwd=tmp_path,
-            env=env,
+            env=environment,
             capture_output=True,
             text=True,
         )
@@ -84,6 +90,24 @@ def test_it_runs_in_an_empty_folder(command, tmp_path):
     assert "Qwen2.5-VL 7B" in table  # the published numbers came with it
     # The first: $XDG_CACHE_HOME.
     assert {path.name for path in tmp_path.iterdir()} - {"cache"} == {"results"}
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/tutorial.md", "docs/howto/lm-eval.md"])
+def test_every_command_of_a_page_runs_as_typed(page, environment, tmp_path):
+    """Those that need weights, a server or files of the reader's have a reason."""
+    commands = [command for code in code_of(page) for command in code.commands]
+    typed = [command for command in commands if command.reason is None]
+    assert typed
+    for command in typed:
+        done = subprocess.run(
+            ["bash", "-c", command.text],
+            check=False,
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == command.exit_code, f"{command.text}\n{done.stderr}"
 
 
 def test_lm_evals_command_knows_its_tasks(command):

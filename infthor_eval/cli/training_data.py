@@ -3,7 +3,7 @@
 from functools import partial
 from pathlib import Path
 
-from infthor_eval.cli.progress.bar import PacedBar
+from infthor_eval.cli.progress.bar import JobBar, PacedBar
 from infthor_eval.cli.progress.notes import NOTES, print_note
 from infthor_eval.errors import DataError
 from infthor_eval.formats.qa_csv import write_questions
@@ -75,7 +75,13 @@ def _generate(
     with progress_bar(NOTES) as progress:
         bar = PacedBar(progress, "trajectories", len(jobs))
         generated = generate_with_workers(
-            jobs, embedded_launch(), trajectories, worker_settings, bar.advance, print_note
+            jobs,
+            embedded_launch(),
+            trajectories,
+            worker_settings,
+            bar.advance,
+            print_note,
+            JobBar(progress).tell,
         )
     _require_whole(trajectories, generated.failures)
 
@@ -91,6 +97,7 @@ def _replay(trajectories: Path, replayed_set: Path, worker_settings: WorkerSetti
             worker_settings,
             progress=bar.advance,
             say=print_note,
+            tell=JobBar(progress).tell,
         )
     failures = [f"{failure.place}: {failure.message}" for failure in replayed.failures]
     _require_whole(replayed_set, failures)

@@ -21,6 +21,7 @@ from infthor_eval.generation.rehearsal import rehearse
 from infthor_eval.generation.rollout import Rollout
 from infthor_eval.generation.sampling import TaskPool
 from infthor_eval.generation.settings import TrajectorySettings
+from infthor_eval.generation.simulator_jobs import JobProgress, TellProgress, tell_nobody
 from infthor_eval.generation.statistics import AttemptStatistics, RollBack
 from infthor_eval.generation.trace import RolloutError, Trace
 from infthor_eval.generation.walking import Walker
@@ -51,14 +52,21 @@ class GeneratedTrajectory:
     problems: list[str]
 
 
-def generate(settings: TrajectorySettings, simulator: Simulator) -> GeneratedTrajectory:
+def generate(
+    settings: TrajectorySettings, simulator: Simulator, tell: TellProgress = tell_nobody
+) -> GeneratedTrajectory:
     """Generate one trajectory in a simulator, which loads its scene.
+
+    Args:
+        settings: settings of the trajectory.
+        simulator: the simulator.
+        tell: told how far it is, after each task that was tried.
 
     Raises:
         UsageError: the trajectory gave up, with fewer steps than `save_floor`.
         SimulatorError: the simulator fails, or has no such scene.
     """
-    factory = _Factory(settings, simulator)
+    factory = _Factory(settings, simulator, tell)
     try:
         while not factory.long_enough():
             factory.extend()
@@ -95,9 +103,12 @@ class _Outcome:
 
 
 class _Factory:
-    def __init__(self, settings: TrajectorySettings, simulator: Simulator) -> None:
+    def __init__(
+        self, settings: TrajectorySettings, simulator: Simulator, tell: TellProgress
+    ) -> None:
         """Load the scene and place the agent at random."""
         self._settings = settings
+        self._tell = tell
         self._name = f"scene {settings.scene}, seed {settings.seed}"
         self._simulator = simulator
         # One stream for all random choices, seeded by a text, which Python hashes alike in every
@@ -172,7 +183,9 @@ class _Factory:
             if task is None:
                 self._begin_pool_again(candidates)
                 continue
-            self._count(self._try(task, room))
+            outcome = self._try(task, room)
+            self._tell(self._progress())
+            self._count(outcome)
             if self._n_in_row > self._settings.max_fail:
                 self._roll_back()
                 length = self._draft.length
@@ -269,6 +282,18 @@ class _Factory:
             f"no further task works after {self._draft.length.low} steps and {n_failed} failed "
             f"tasks ({causes or 'no possible task'}); {hint}"
         )
+
+    def _progress(self) -> JobProgress:
+        """Return how far the trajectory is; as many steps a sub-goal as before are expected."""
+        n_steps, n_subgoals = self._draft.length.low, self._draft.n_subgoals
+        expected = n_steps * self._settings.min_subgoals // max(1, n_subgoals)
+        refused = self._statistics.reasons + self._statistics.not_executed
+        detail = ""
+        if refused:
+            ((most, n_most),) = refused.most_common(1)
+            detail = f"{refused.total()} task(s) refused, {n_most} as {most}"
+        name, n_units = self._settings.traj_id, max(self._settings.min_steps, expected)
+        return JobProgress(name, n_steps, n_units, detail)
 
     # -- one task
 

@@ -13,8 +13,10 @@ from infthor_eval.generation.factory import GeneratedTrajectory, generate
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.simulator_jobs import (
     SimulatorWorker,
+    TellProgress,
     collect_outcomes,
     freeze_existing_objects,
+    tell_nobody,
 )
 from infthor_eval.generation.statistics import AttemptStatistics
 from infthor_eval.household.pddl import DOMAIN
@@ -160,6 +162,7 @@ def generate_with_workers(
     worker_settings: WorkerSettings,
     progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
+    tell: TellProgress = tell_nobody,
 ) -> GeneratedSet:
     """Generate as `generate_set` does, with equal files and errors, by workers of one folder.
 
@@ -170,11 +173,13 @@ def generate_with_workers(
         worker_settings: number and place of the workers.
         progress: see `generate_set`.
         say: called with messages about the workers.
+        tell: told how far a trajectory is, if this process is the worker.
     """
     out.mkdir(parents=True, exist_ok=True)
     # Frames are drawn by the replay. A dead end goes back some tasks, whose states are kept.
     simulator = partial(Simulator, launch, image=False, max_copies=_MAX_COPIES)
-    start = partial(SimulatorWorker, simulator, partial(_generate_one, out=out))
+    told = tell if worker_settings.is_local else tell_nobody
+    start = partial(SimulatorWorker, simulator, partial(_generate_one, out=out, tell=told))
     return _summarise(run_jobs(start, jobs, worker_settings, say), progress)
 
 
@@ -201,13 +206,15 @@ def _summarise(
     return result
 
 
-def _generate_one(job: TrajectorySettings, simulator: Simulator, out: Path) -> _GenerationOutcome:
+def _generate_one(
+    job: TrajectorySettings, simulator: Simulator, out: Path, tell: TellProgress = tell_nobody
+) -> _GenerationOutcome:
     path = out / f"{file_name(job.traj_id)}.json"
     try:
         if is_written(path):
             return _GenerationOutcome(path, _check_earlier(path, job))
         with freeze_existing_objects():
-            generated = generate(job, simulator)
+            generated = generate(job, simulator, tell)
     except InfthorError as error:
         return _GenerationOutcome(failure=str(error))
     # Outside of `try`: if this file has no room, generating the other trajectories would be wasted.

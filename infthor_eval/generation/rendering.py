@@ -23,6 +23,7 @@ from infthor_eval.errors import DataError, SimulatorError
 from infthor_eval.formats.trajectory import LowAction, Trajectory, TrajectorySource
 from infthor_eval.generation.motion import intermediate_views
 from infthor_eval.generation.replay import ActionReplay, ReplayReport
+from infthor_eval.generation.simulator_jobs import TellProgress, tell_nobody
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView
 
@@ -68,7 +69,12 @@ class RenderSettings(msgspec.Struct, frozen=True):
         return RenderReport
 
     def write(
-        self, source: TrajectorySource, trajectory: Trajectory, simulator: Simulator, folder: Path
+        self,
+        source: TrajectorySource,
+        trajectory: Trajectory,
+        simulator: Simulator,
+        folder: Path,
+        tell: TellProgress = tell_nobody,
     ) -> "RenderReport":
         """Write the pictures and the timeline of a trajectory.
 
@@ -77,7 +83,7 @@ class RenderSettings(msgspec.Struct, frozen=True):
         """
         scene = trajectory.scene.floor_plan
         report = RenderReport(trajectory.traj_id, source.digest, scene, self.smooth, settings=self)
-        actions = ActionReplay(simulator, trajectory, report)
+        actions = ActionReplay(simulator, trajectory, report, tell)
         film = _Film(folder / "frames", self.jpeg_quality)
         film.add(simulator.view)
         log = _StepLog(trajectory)

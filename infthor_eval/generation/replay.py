@@ -16,6 +16,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import write_steps
 from infthor_eval.formats.trajectory import LowAction, Trajectory, TrajectorySource
 from infthor_eval.generation.motion import intermediate_views
+from infthor_eval.generation.simulator_jobs import JobProgress, TellProgress, tell_nobody
 from infthor_eval.household.sequence_text import sequence_text
 from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.thor.actions import text_of
@@ -86,7 +87,12 @@ class ReplayReport(msgspec.Struct):
 
 
 def replay(
-    trajectory: Trajectory, simulator: Simulator, folder: Path, digest: str, frames: int = 1
+    trajectory: Trajectory,
+    simulator: Simulator,
+    folder: Path,
+    digest: str,
+    frames: int = 1,
+    tell: TellProgress = tell_nobody,
 ) -> ReplayReport:
     """Run a trajectory and write its frames and logs into a folder.
 
@@ -100,12 +106,13 @@ def replay(
         digest: hash of the trajectory's JSON, for the report.
         frames: number of frames of each action that moves the agent or its camera; other actions
             have one.
+        tell: told how far it is, after each action.
 
     Raises:
         SimulatorError: the simulator fails, or has no such scene.
     """
     report = ReplayReport(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames)
-    actions = ActionReplay(simulator, trajectory, report)
+    actions = ActionReplay(simulator, trajectory, report, tell)
     (folder / "img").mkdir()
     run = _Run(simulator, actions, folder / "img", frames)
     for index, low in enumerate(trajectory.plan.low_actions):
@@ -136,10 +143,15 @@ class SetForm:
     report_type: type[ReplayReport] = ReplayReport
 
     def write(
-        self, source: TrajectorySource, trajectory: Trajectory, simulator: Simulator, folder: Path
+        self,
+        source: TrajectorySource,
+        trajectory: Trajectory,
+        simulator: Simulator,
+        folder: Path,
+        tell: TellProgress = tell_nobody,
     ) -> ReplayReport:
         """Write the frames and logs of a replay, and the trajectory as it came."""
-        report = replay(trajectory, simulator, folder, source.digest, self.frames)
+        report = replay(trajectory, simulator, folder, source.digest, self.frames, tell)
         (folder / "traj_data.json").write_bytes(source.raw.strip() + b"\n")
         return report
 
@@ -173,10 +185,18 @@ class ActionReplay:
         SimulatorError: the simulator fails, or has no such scene.
     """
 
-    def __init__(self, simulator: Simulator, trajectory: Trajectory, report: ReplayReport) -> None:
+    def __init__(
+        self,
+        simulator: Simulator,
+        trajectory: Trajectory,
+        report: ReplayReport,
+        tell: TellProgress = tell_nobody,
+    ) -> None:
         report.restore = restore(simulator, trajectory.scene).lines()
         self._simulator = simulator
         self._report = report
+        self._tell = tell
+        self._n_actions = len(trajectory.plan.low_actions)
         self._grounding = Grounding(simulator.view)
 
     def execute(self, index: int, low: LowAction) -> tuple[str | None, str | None]:
@@ -191,7 +211,15 @@ class ActionReplay:
             self._report.accepted[name] = self._report.accepted.get(name, 0) + 1
         else:
             self._report.refusals.append(Refusal(index, _text_of(low), error))
+        self._tell(self._progress(index))
         return target, error
+
+    def _progress(self, index: int) -> JobProgress:
+        refusals = self._report.refusals
+        detail = ""
+        if refusals:
+            detail = f"{len(refusals)} action(s) refused, the last: {refusals[-1].error}"
+        return JobProgress(self._report.traj_id, index + 1, self._n_actions, detail)
 
     def _call(self, index: int, low: LowAction) -> tuple[str | None, str | None]:
         before = self._simulator.view

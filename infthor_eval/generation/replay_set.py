@@ -28,8 +28,10 @@ from infthor_eval.formats.trajectory import (
 from infthor_eval.generation.replay import ReplayReport, SetForm
 from infthor_eval.generation.simulator_jobs import (
     SimulatorWorker,
+    TellProgress,
     collect_outcomes,
     freeze_existing_objects,
+    tell_nobody,
 )
 from infthor_eval.storage.files import file_name, is_written, write_atomically, writing_hint
 from infthor_eval.thor.launch import Launch
@@ -72,9 +74,14 @@ class ReplayForm(Protocol):
         ...
 
     def write(
-        self, source: TrajectorySource, trajectory: Trajectory, simulator: Simulator, folder: Path
+        self,
+        source: TrajectorySource,
+        trajectory: Trajectory,
+        simulator: Simulator,
+        folder: Path,
+        tell: TellProgress = tell_nobody,
     ) -> ReplayReport:
-        """Replay a trajectory into an existing, empty folder."""
+        """Replay a trajectory into an existing, empty folder; `tell` is told how far it is."""
         ...
 
     def require_same(self, report: Any, folder: Path) -> None:
@@ -194,6 +201,7 @@ def replay_with_workers(
     form: ReplayForm = _SET,
     progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
+    tell: TellProgress = tell_nobody,
 ) -> ReplayedSet:
     """Replay as `replay_set` does, with the same files, by workers that share the folder.
 
@@ -205,8 +213,11 @@ def replay_with_workers(
         form: see `replay_set`.
         progress: see `replay_set`.
         say: called with messages about the workers.
+        tell: told how far a trajectory is, if this process is the worker.
     """
-    replay_one = partial(_replay_one, out=_prepare_set(out, launch.label, form), form=form)
+    told = tell if worker_settings.is_local else tell_nobody
+    folder = _prepare_set(out, launch.label, form)
+    replay_one = partial(_replay_one, out=folder, form=form, tell=told)
     open_simulator = partial(Simulator, launch, **form.simulator_options)
     start = partial(SimulatorWorker, open_simulator, replay_one)
     return _collect(run_jobs(start, selection.items, worker_settings, say), selection, progress)
@@ -242,11 +253,17 @@ def _collect(
     return result
 
 
-def _replay_one(item: Item, simulator: Simulator, out: Path, form: ReplayForm) -> _ReplayOutcome:
+def _replay_one(
+    item: Item,
+    simulator: Simulator,
+    out: Path,
+    form: ReplayForm,
+    tell: TellProgress = tell_nobody,
+) -> _ReplayOutcome:
     source, trajectory = item
     try:
         with freeze_existing_objects(), wrap_malformed():
-            return _replay_or_check(source, trajectory, simulator, out, form)
+            return _replay_or_check(source, trajectory, simulator, out, form, tell)
     except InfthorError as error:
         return _failure_outcome(item, error)
 
@@ -290,6 +307,7 @@ def _replay_or_check(
     simulator: Simulator,
     out: Path,
     form: ReplayForm,
+    tell: TellProgress,
 ) -> _ReplayOutcome:
     final = out / file_name(trajectory.traj_id)
     if is_written(final):
@@ -301,7 +319,7 @@ def _replay_or_check(
         write_atomically(final) as folder,
     ):
         folder.mkdir()
-        report = form.write(source, trajectory, simulator, folder)
+        report = form.write(source, trajectory, simulator, folder, tell)
         report.seconds = round(time.monotonic() - started, 3)
         (folder / _REPORT).write_bytes(msgspec.json.encode(report) + b"\n")
     return _ReplayOutcome(report)

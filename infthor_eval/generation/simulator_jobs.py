@@ -1,14 +1,46 @@
-"""Jobs that each need a simulator, done by workers with one simulator each."""
+"""Jobs that each need a simulator, done by workers with one simulator each, and how far one is."""
 
 import gc
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from infthor_eval.errors import InfthorError
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["SimulatorWorker", "collect_outcomes", "freeze_existing_objects"]
+__all__ = [
+    "JobProgress",
+    "SimulatorWorker",
+    "TellProgress",
+    "collect_outcomes",
+    "freeze_existing_objects",
+    "tell_nobody",
+]
+
+
+@dataclass(frozen=True)
+class JobProgress:
+    """How far a job is.
+
+    Attributes:
+        name: name of its trajectory.
+        n_done: low-level actions so far.
+        n_units: low-level actions in all, as far as that is known.
+        detail: what was refused so far, in words; empty for nothing.
+    """
+
+    name: str
+    n_done: int
+    n_units: int
+    detail: str = ""
+
+
+TellProgress = Callable[[JobProgress], None]
+
+
+def tell_nobody(_: JobProgress) -> None:
+    """Do nothing: who runs the job does not follow it."""
 
 
 class _JobOutcome(Protocol):

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from PIL import Image
 
@@ -20,6 +20,9 @@ from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.tables import Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as MatplotlibFigure
 
 __all__ = [
     "THOUGHT",
@@ -122,13 +125,12 @@ class FigureResult:
 
     Attributes:
         table: the numbers of the figure.
-        draw: writes the files of the figure into a folder, under a name without suffix, and returns
-            their paths.
+        plot: draws it with matplotlib, in whatever style is in effect (`report.figures.style`).
         notes: remarks to print below the table, a line each.
     """
 
     table: Table
-    draw: Callable[[Path, str], list[Path]]
+    plot: "Callable[[], MatplotlibFigure]"
     notes: tuple[str, ...] = ()
 
 

@@ -2,9 +2,9 @@
 
 import itertools
 import threading
-import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from model_adapters.human.clock import ScreenClock
 from model_adapters.protocols import Decoding, Notice, Turn
 
 __all__ = ["Answer", "Desk", "Inquiry", "Question", "StaleError"]
@@ -19,30 +19,33 @@ class StaleError(Exception):
 
 @dataclass(frozen=True)
 class Inquiry:
-    """What is put before a person: the turns that a model would be given, the decoding, and what is
-    told beside."""
+    """What is put before a person: the turns that a model would be given, the decoding, what is
+    told beside, and which unit of the run it belongs to (from 1, and of how many; None where that
+    is not known)."""
 
     turns: tuple[Turn, ...]
     decoding: Decoding
     notice: Notice
+    position: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A person's answer, and the number of different frames that were looked at."""
+    """A person's answer, the number of different frames that were looked at, and the seconds for
+    which the question was on the screen; None if no page has told that it was."""
 
     text: str
     n_watched: int
+    seconds: float | None
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked; `number` counts from 1, and `since` is the monotonic time in seconds at which
-    it was put."""
+    """What is asked; `number` counts from 1, and `clock` the time for which it is on a screen."""
 
     number: int
     inquiry: Inquiry
-    since: float
+    clock: ScreenClock = field(default_factory=ScreenClock)
 
 
 class Desk:
@@ -55,7 +58,8 @@ class Desk:
         self._answer: Answer | None = None
         self._version = 0
         self._has_readers = False
-        self._is_told = False
+        self._n_reading = 0  # pages that wait for a change
+        self._is_told = self._is_awaited = False
         self._n_kept = 0
         self._in_hand: int | None = None  # number of an answer that may not be on disk yet
         self._is_closed = self._is_stopped = False
@@ -97,7 +101,7 @@ class Desk:
         with self._changed:
             self._settle(is_kept=True)
             number = next(self._numbers)
-            self._question = Question(number, inquiry, time.monotonic())
+            self._question = Question(number, inquiry)
             self._answer = None
             self._change()
             try:
@@ -111,8 +115,8 @@ class Desk:
                 self._question = None
                 self._change()
 
-    def give(self, number: int, answer: Answer) -> None:
-        """Answer the question of this number.
+    def give(self, number: int, text: str, n_watched: int) -> None:
+        """Answer the question of this number; see `Answer`.
 
         Raises:
             StaleError: it is not the one that is asked.
@@ -124,8 +128,18 @@ class Desk:
                 or self._answer is not None
             ):
                 raise StaleError
-            self._answer = answer
+            self._answer = Answer(text, n_watched, self._question.clock.seconds)
             self._changed.notify_all()
+
+    def tell_screen(self, number: int, page: str, *, shows: bool) -> None:
+        """Take whether a page shows the question of this number, frames and all.
+
+        What is told of another question, which is answered by now, is of no interest.
+        """
+        with self._changed:
+            if self._question is not None and self._question.number == number:
+                clock = self._question.clock
+                (clock.show if shows else clock.hide)(page)
 
     def wait_until_kept(self, number: int) -> bool:
         """Wait until the answer to a question is kept; False if the run has ended before."""
@@ -137,7 +151,9 @@ class Desk:
         """Wait until there is another version than this one, or for so many seconds."""
         with self._changed:
             self._has_readers = True
+            self._n_reading += 1
             self._changed.wait_for(lambda: self._version != version, timeout_s)
+            self._n_reading -= 1
 
     def tell_closed(self) -> None:
         """Say that a page has learned that nothing will be asked any more."""
@@ -145,23 +161,32 @@ class Desk:
             self._is_told = True
             self._changed.notify_all()
 
-    def wait_until_told(self, timeout_s: float) -> None:
-        """Wait until a page, if there is one, knows that it is over: so many seconds at most."""
+    def wait_until_told(self, timeout_s: float, absent_s: float) -> None:
+        """Wait until a page, if there is one, knows that it is over.
+
+        Args:
+            timeout_s: seconds to wait at most for a page that waited for a change when it closed.
+            absent_s: seconds to wait at most for one that did not, and may be closed itself.
+        """
         with self._changed:
-            self._changed.wait_for(lambda: self._is_told or not self._has_readers, timeout_s)
+            self._changed.wait_for(
+                lambda: self._is_told or not self._has_readers,
+                timeout_s if self._is_awaited else absent_s,
+            )
 
     def stop(self) -> None:
         """Let the run end as Ctrl-C does: what is asked now stays unanswered, and is asked when the
         run goes on."""
         with self._changed:
             self._is_stopped = True
-            self._changed.notify_all()
+            self._change()
 
     def close(self, *, is_kept: bool = True) -> None:
         """Say that nothing will be asked any more, and whether the last answer is on disk."""
         with self._changed:
             self._settle(is_kept=is_kept)
             self._is_closed = True
+            self._is_awaited = self._n_reading > 0
             self._change()
 
     def _settle(self, *, is_kept: bool) -> None:

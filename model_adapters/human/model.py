@@ -14,7 +14,12 @@ from model_adapters.human.serving import serve_desk
 from model_adapters.protocols import Capabilities, Conversation, Decoding, Notice, Reply, Turn
 from model_adapters.thinking import cut_at_stop
 
-__all__ = ["HumanModel"]
+__all__ = ["UNTIMED", "HumanModel"]
+
+UNTIMED = (
+    "the page never told that the question was on the screen: its seconds count from when it was "
+    "asked"
+)
 
 
 class HumanModel:
@@ -25,6 +30,7 @@ class HumanModel:
         self._options = options
         self._desk = Desk()
         self._notice = Notice()
+        self._position: tuple[int, int] | None = None
         self._listening = listening
         self._page = ExitStack()
         self._page.enter_context(listening)
@@ -56,13 +62,20 @@ class HumanModel:
         """See `Attended`."""
         self._notice = notice
 
+    def tell_position(self, number: int, n_units: int) -> None:
+        """See `Attended`."""
+        self._position = number, n_units
+
     def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
         """Show what a model would be given, and wait for the answer; see `Conversation.reply`."""
         self._open()
-        answer = self._desk.ask(Inquiry(tuple(turns), decoding, self._notice))
+        answer = self._desk.ask(Inquiry(tuple(turns), decoding, self._notice, self._position))
         before_stop = None if decoding.choices else cut_at_stop(answer.text, decoding.stop)
         return Reply(
-            answer.text if before_stop is None else before_stop, n_watched=answer.n_watched
+            answer.text if before_stop is None else before_stop,
+            n_watched=answer.n_watched,
+            seconds=answer.seconds,
+            faults=() if answer.seconds is not None else (UNTIMED,),
         )
 
     def answer_each(

@@ -5,7 +5,10 @@ const strip = new Strip(byId);
 const MOVES = { ArrowUp: "moveahead", ArrowLeft: "rotateleft", ArrowRight: "rotateright", PageUp: "lookup", PageDown: "lookdown" };
 const UNKNOWN = "I do not know";
 const N_WORDS = 6, AGAIN_MS = 1000;
-let question = null, shownAt = 0, chosen = -1;
+const PAGE = String(Math.random()).slice(2);
+const KEPT = "All answers are kept: start the same command again, and open the address that it prints.";
+let coming = null, question = null, chosen = -1;
+const clock = { before: 0, since: null }; // milliseconds for which the question is on the screen
 
 // A model's marks in a history ("<|act|>"), which are in the whole prompt, too.
 const unmarked = (text) => text.replace(/<\|\w+\|>/g, " ").replace(/\s*\n\s*|  +/g, "  ").trim();
@@ -30,9 +33,10 @@ async function follow() {
       show(state);
       if (state.closed) return;
     } catch (error) {
-      say("The run has stopped. All answers are kept: start the same command again, and open the address that it prints.", true);
-      byId("desk").hidden = true;
-      question = null;
+      say(`The run has stopped. ${KEPT}`, true);
+      byId("desk").hidden = byId("stop").hidden = true;
+      leave();
+      coming = null;
       seen = "";
       await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
     }
@@ -40,38 +44,85 @@ async function follow() {
 }
 
 function show(state) {
-  byId("answered").textContent = `${state.answered} answered`;
+  byId("answered").textContent = `${state.answered} answered in this sitting`;
+  // One of several pages cannot stop the run: its questions would go to another.
+  if (state.question !== null) byId("stop").hidden = !state.question.position;
+  if (state.closed || state.stopped) byId("stop").hidden = true;
   if (state.closed) {
-    question = null;
+    leave();
     byId("desk").hidden = true;
+    byId("unit").textContent = "";
     byId("title").textContent = state.stopped ? "Stopped." : "All is answered. Thank you.";
-    say(state.stopped ? "All answers are kept: start the same command again, and open the address that it prints."
-      : "The results are where the command says. This page can be closed.");
+    say(state.stopped ? KEPT : "The results are where the command says. This page can be closed.");
+  } else if (state.stopped) {
+    say("Stopping ...");
   } else if (state.question === null) {
-    if (question !== null) say("The next one comes ...");
-    question = null;
-  } else if (question === null || question.number !== state.question.number) {
+    leave();
+    coming = null;
+    say("The next one comes ...");
+  } else if (state.question.number !== (coming || {}).number) {
+    leave();
+    coming = state.question;
+    say("The frames are on their way ...");
     showQuestion(state.question);
   }
 }
 
-function showQuestion(asked) {
+// A question is on the screen with its frames or not at all: who could read it before would have time that is not counted.
+async function showQuestion(asked) {
+  const { frames, last } = inOrder(asked);
+  const at = isActing(asked) ? frames.length - 1 : 0;
+  await strip.fetch(frames, at);
+  if (coming !== asked) return;
+  byId("desk").classList.add("unseen");
+  fill(asked, last);
+  await strip.load(frames, at);
+  byId("desk").classList.remove("unseen");
+  if (coming !== asked) return;
   question = asked;
-  shownAt = performance.now() - 1000 * asked.seconds;
-  say("");
   byId("desk").hidden = false;
+  say("");
+  Object.assign(clock, { before: 1000 * asked.seconds, since: null });
+  tellScreen();
+}
+
+function leave() {
+  pauseClock();
+  question = null;
+}
+
+function pauseClock() {
+  if (clock.since !== null) clock.before += performance.now() - clock.since;
+  clock.since = null;
+}
+
+// Tells the run whether the question is on the screen, once it is painted: the clock of the run goes as long as it is.
+async function tellScreen() {
+  const asked = question;
+  if (asked === null) return;
+  if (!document.hidden) await painted();
+  if (question !== asked) return;
+  pauseClock();
+  if (!document.hidden) clock.since = performance.now();
+  const body = JSON.stringify({ number: asked.number, page: PAGE, shows: !document.hidden });
+  fetch("screen", { method: "POST", body, keepalive: true, headers: { "Content-Type": "application/json" } }).catch(() => {});
+}
+
+// A frame that is asked for is drawn before the next one is asked for.
+const painted = () => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+
+function fill(asked, last) {
   byId("title").textContent = asked.title || "Question";
+  byId("unit").textContent = asked.position ? `${asked.unit} ${asked.position[0]} of ${asked.position[1]}` : "";
   byId("news").textContent = asked.news;
   byId("facts").replaceChildren(...asked.facts.flatMap(([name, value]) => [element("dt", name), element("dd", value)]));
-  const { frames, last } = inOrder(asked);
-  byId("question").textContent = isActing() ? "" : last;
-  byId("label").textContent = isActing() ? "Your action" : "Your answer";
+  byId("question").textContent = isActing(asked) ? "" : last;
+  byId("label").textContent = isActing(asked) ? "Your action" : "Your answer";
   byId("parts").replaceChildren(...asked.parts.map((part) => element("li", "frame" in part ? `[frame ${part.frame + 1}]` : part.text)));
-  strip.load(frames, isActing() ? frames.length - 1 : 0);
   showReplies(asked.replies);
   byId("text").value = "";
   byId("text").blur(); // so that the keys move through the frames again
-  byId("unknown").hidden = asked.only || isActing();
+  byId("unknown").hidden = asked.only || isActing(asked);
   complete();
 }
 
@@ -88,7 +139,7 @@ function inOrder(asked) {
   return { frames, last: text.trim() };
 }
 
-const isActing = () => question !== null && question.replies.some((reply) => plain(reply) === MOVES.ArrowUp);
+const isActing = (asked = question) => asked !== null && asked.replies.some((reply) => plain(reply) === MOVES.ArrowUp);
 
 function showReplies(replies) {
   const keys = Object.fromEntries(Object.entries(MOVES).map(([key, move]) => [move, key.replace("Arrow", "")]));
@@ -187,17 +238,18 @@ document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey) return;
   const at = document.activeElement;
   if (at === byId("text")) inField(event);
-  // Buttons and selections keep the keys that they have themselves.
-  else if (!(at instanceof HTMLButtonElement && [" ", "Enter"].includes(event.key)) && !(at instanceof HTMLSelectElement)
+  // What can be pressed, unfolded or selected keeps the keys that it has itself.
+  else if (!(at.matches("button, summary") && [" ", "Enter"].includes(event.key)) && !(at instanceof HTMLSelectElement)
     && !(at instanceof HTMLInputElement && !isActing() && /^(Arrow|Page|Home|End)/.test(event.key))) elsewhere(event);
 });
 byId("text").addEventListener("input", complete);
 byId("form").addEventListener("submit", (event) => { event.preventDefault(); send(byId("text").value); });
 byId("unknown").addEventListener("click", () => send(UNKNOWN));
-byId("stop").addEventListener("click", () => fetch("stop", { method: "POST" }));
+byId("stop").addEventListener("click", () => { say("Stopping ..."); fetch("stop", { method: "POST" }); });
 byId("help").addEventListener("click", toggleKeys);
+document.addEventListener("visibilitychange", tellScreen);
 setInterval(() => {
-  const seconds = Math.floor((performance.now() - shownAt) / 1000);
+  const seconds = Math.floor((clock.before + (clock.since === null ? 0 : performance.now() - clock.since)) / 1000);
   byId("clock").textContent = question === null ? "" : `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
 }, 250);
 follow();

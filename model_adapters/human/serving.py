@@ -6,6 +6,7 @@ import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from socket import socket
+from typing import Annotated
 
 import msgspec
 from starlette.background import BackgroundTask
@@ -17,13 +18,14 @@ from starlette.routing import BaseRoute, Route
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.pages.server import file_route, serve_pages
 from model_adapters.human.adapter import HumanOptions
-from model_adapters.human.desk import Answer, Desk, StaleError
+from model_adapters.human.desk import Desk, StaleError
 from model_adapters.human.view import frames_of, state_of
 
 __all__ = ["desk_routes", "serve_desk"]
 
 _WAIT_S = 20.0  # a page asks again after so long without a change
-_LAST_LOOK_S = 3.0  # for open pages to learn that it is over
+# For pages to learn that it is over: those that wait for news, and those that may be closed.
+_LAST_NEWS_S, _LAST_LOOK_S = 30.0, 3.0
 _LONGEST = 2000  # characters of an answer
 _DIGITS = 15  # of a number of a question, frame or version
 _PACKAGE = "model_adapters.human"
@@ -37,6 +39,14 @@ class _AnswerForm(msgspec.Struct):
     watched: int = 0
 
 
+class _ScreenForm(msgspec.Struct):
+    """What a page tells of its screen: whether it shows a question; `page` tells pages apart."""
+
+    number: int
+    page: Annotated[str, msgspec.Meta(max_length=40)]
+    shows: bool
+
+
 @contextmanager
 def serve_desk(desk: Desk, options: HumanOptions, listening: socket) -> Iterator[None]:
     """Serve the page of a desk on a socket until the context ends, and say where it is."""
@@ -45,7 +55,7 @@ def serve_desk(desk: Desk, options: HumanOptions, listening: socket) -> Iterator
         if options.browser and _has_screen():
             webbrowser.open(server.address)
         yield
-        desk.wait_until_told(_LAST_LOOK_S)
+        desk.wait_until_told(_LAST_NEWS_S, _LAST_LOOK_S)
 
 
 def desk_routes(desk: Desk) -> list[BaseRoute]:
@@ -57,6 +67,7 @@ def desk_routes(desk: Desk) -> list[BaseRoute]:
         Route("/state.json", page.state),
         Route("/frames/{number}/{index}", page.frame),
         Route("/answer", page.answer, methods=["POST"]),
+        Route("/screen", page.screen, methods=["POST"]),
         Route("/stop", page.stop, methods=["POST"]),
     ]
 
@@ -95,6 +106,15 @@ class _Page:
             return _problem("not an answer", 400)
         return await run_in_threadpool(_take, self._desk, form)
 
+    async def screen(self, request: Request) -> Response:
+        """Take what a page tells of its screen."""
+        try:
+            form = msgspec.json.decode(await request.body(), type=_ScreenForm)
+        except (msgspec.ValidationError, msgspec.DecodeError):
+            return _problem("not what a page tells of its screen", 400)
+        self._desk.tell_screen(form.number, form.page, shows=form.shows)
+        return JSONResponse({})
+
     async def stop(self, _request: Request) -> Response:
         """End the run, which can go on later."""
         self._desk.stop()
@@ -116,7 +136,7 @@ def _take(desk: Desk, form: _AnswerForm) -> Response:
         return _problem("only the listed replies are possible here", 400)
     n_frames = 0 if question is None else len(frames_of(question.inquiry.turns))
     try:
-        desk.give(form.number, Answer(text, min(max(0, form.watched), n_frames)))
+        desk.give(form.number, text, min(max(0, form.watched), n_frames))
     except StaleError:
         return _problem("this question was answered already, perhaps in another tab", 409)
     if not desk.wait_until_kept(form.number):

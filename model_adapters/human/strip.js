@@ -14,14 +14,32 @@ class Strip {
     this.parts.speed.addEventListener("change", () => this.timer && (this.stop(), this.start()));
   }
 
-  // Takes the frames of a new question. What goes on from the frames before shows the newest, else the first.
-  load(frames, at) {
+  // Fetches and decodes the frames that are shown first, out of sight; a frame that is none is shown as one that is missing.
+  async fetch(frames, at) {
+    await Promise.allSettled(this.around(frames, at).map(([frame]) => {
+      const image = new Image();
+      image.src = frame.address;
+      return image.decode();
+    }));
+  }
+
+  // Takes the frames of a new question. What goes on from the frames before shows the newest, else the first. Waits until
+  // the pictures are decoded.
+  async load(frames, at) {
     this.stop();
     this.frames = frames;
     this.watched = new Set();
     this.parts.scrub.max = Math.max(frames.length - 1, 0);
     for (const part of ["frame", "player", "strip"]) this.parts[part].hidden = !frames.length;
     if (frames.length) this.show(at); else this.parts.caption.textContent = "No frames are shown with this question.";
+    const images = frames.length ? [this.parts.frame, ...this.parts.strip.querySelectorAll("img")] : [];
+    await Promise.allSettled(images.map((image) => image.decode()));
+  }
+
+  // The frame of a place and those beside it, each with its place.
+  around(frames, at) {
+    const first = Math.max(0, Math.min(at - Strip.BESIDE, frames.length - 2 * Strip.BESIDE - 1));
+    return frames.slice(first, first + 2 * Strip.BESIDE + 1).map((frame, offset) => [frame, first + offset]);
   }
 
   show(place) {
@@ -39,10 +57,8 @@ class Strip {
   }
 
   showBeside() {
-    const first = Math.max(0, Math.min(this.at - Strip.BESIDE, this.frames.length - 2 * Strip.BESIDE - 1));
-    const items = this.frames.slice(first, first + 2 * Strip.BESIDE + 1).map((frame, offset) => {
+    const items = this.around(this.frames, this.at).map(([frame, place]) => {
       const item = document.createElement("li"), button = document.createElement("button"), image = document.createElement("img");
-      const place = first + offset;
       image.src = frame.address;
       image.alt = `frame ${place + 1}`;
       button.type = "button";

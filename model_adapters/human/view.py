@@ -1,6 +1,5 @@
 """What is asked, as the page is given it: JSON values, and the frames by their place."""
 
-import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -46,11 +45,13 @@ def _parts(turns: tuple[Turn, ...]) -> Iterator[dict[str, Any]]:
 
 def _question(question: Question) -> dict[str, Any]:
     inquiry = question.inquiry
-    notice = question.inquiry.notice
+    notice = inquiry.notice
     return {
         "number": question.number,
-        "seconds": round(time.monotonic() - question.since, 1),
+        "seconds": round(question.clock.seconds or 0.0, 1),
         "title": notice.title,
+        "unit": notice.unit,
+        "position": inquiry.position,
         "facts": [list(fact) for fact in notice.facts],
         "news": notice.news,
         "words": list(notice.words),

@@ -1,6 +1,8 @@
-"""The commands in the documentation: those of README and tutorials run, the others are parsed."""
+"""The code in the documentation: commands and Python run, page by page and in order, but for those
+that cannot; their options are known all the same."""
 
 import functools
+import os
 import re
 import subprocess
 import sys
@@ -15,27 +17,21 @@ from infthor_eval.suites import baseline_suites
 from model_adapters import has_option, is_known, name_on_engine, names
 
 from .blocks import ROOT, written_files
-from .commands import CANNOT_RUN, FLOOR_PLANS, Command, command_blocks
+from .commands import (
+    CANNOT_RUN,
+    PARSED_PAGES,
+    Command,
+    all_pages,
+    code_of,
+    count_commands,
+)
 
-RUN_PAGES = (
-    "README.md",
-    "docs/tutorial.md",
-    "docs/own-models.md",
-    "docs/own-tasks.md",
-    "docs/training.md",
-)
-PAGES = sorted(
-    str(path.relative_to(ROOT))
-    for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md"))
-)
-COMMANDS = [
-    (page, command) for page in PAGES for block in command_blocks(page) for command in block
-]
+COMMANDS = [command for page in all_pages() for code in code_of(page) for command in code.commands]
 BLOCKS = [
-    pytest.param(page, block, id=f"{page}-{number}")
-    for page in RUN_PAGES
-    for number, block in enumerate(command_blocks(page))
-    if any(command.reason is None for command in block)
+    pytest.param(page, code, id=f"{page}-{number}")
+    for page in all_pages()
+    for number, code in enumerate(code_of(page))
+    if code.runs
 ]
 
 
@@ -54,27 +50,38 @@ def folder_of(tmp_path_factory):
     return folder_of
 
 
+@pytest.fixture(scope="module")
+def names_of():
+    """Gives the names that a page's Python has made so far."""
+    return functools.cache(lambda page: {})
+
+
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize(("page", "block"), BLOCKS)
+@pytest.mark.parametrize(("page", "code"), BLOCKS)
 def test_the_commands_of_a_page_run_one_after_the_other(
-    page, block, folder_of, run_cli, monkeypatch
+    page, code, folder_of, names_of, run_cli, monkeypatch
 ):
     monkeypatch.chdir(folder_of(page))
-    for command in block:
-        if command.reason == FLOOR_PLANS:
-            break  # what follows asks about what it makes
+    if code.python:
+        exec(compile(code.python, page, "exec"), names_of(page))
+    for command in code.commands:
         if command.reason is None:
-            code, _, err = (_apart if "lm-eval" in command.words else run_cli)(
-                *_with_globs(command.words[1:])
+            apart = command.needs_shell or "lm-eval" in command.words
+            ended, _, err = (
+                _in_shell(command) if apart else run_cli(*_with_globs(command.words[1:]))
             )
-            assert code == 0, f"{page}: {command.text}\n{err}"
+            assert ended == command.exit_code, f"{page}: {command.text}\n{err}"
 
 
-def _apart(*words):
-    """In a process of its own: lm-eval remembers which model it has loaded."""
-    code = "import sys; from infthor_eval.cli import main; main(sys.argv[1:])"
+def _in_shell(command):
+    """In a process of its own, as typed. (lm-eval remembers which model it has loaded.)"""
+    environment = {
+        **os.environ,
+        "PATH": os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"])),
+        "PYTHONPATH": str(ROOT),
+    }
     done = subprocess.run(
-        [sys.executable, "-c", code, *words], check=False, capture_output=True, text=True
+        ["bash", "-c", command.text], check=False, capture_output=True, text=True, env=environment
     )
     return done.returncode, done.stdout, done.stderr
 
@@ -90,14 +97,17 @@ def _with_globs(words):
 @pytest.mark.parametrize(
     "command",
     [
-        pytest.param(command, id=f"{page}: {command.text}"[:110])
-        for page, command in COMMANDS
+        pytest.param(command, id=f"{command.page}: {command.text}"[:110])
+        for command in COMMANDS
         if command.is_ours
     ],
 )
 def test_the_options_of_every_command_are_known(command, monkeypatch):
     monkeypatch.setattr(click.Path, "convert", lambda self, value, parameter, context: Path(value))
-    context = _infthor_eval.make_context("infthor-eval", list(command.words[1:]))
+    words = list(command.words[1:])
+    if ">" in words:  # the shell's
+        words = words[: words.index(">")]
+    context = _infthor_eval.make_context("infthor-eval", words)
     while isinstance(context.command, click.Group):
         name, inner, rest = context.command.resolve_command(
             context, [*context._protected_args, *context.args]
@@ -126,12 +136,23 @@ def _check_names(given):
 
 
 def test_every_exception_is_still_needed():
-    ours = [command.text for _, command in COMMANDS if command.is_ours]
+    texts = [command.text for command in COMMANDS if command.page not in PARSED_PAGES]
     for pattern in CANNOT_RUN:
-        assert any(re.search(pattern, text) for text in ours), pattern
+        assert any(re.search(pattern, text) for text in texts), pattern
+    assert set(PARSED_PAGES) <= {command.page for command in COMMANDS}
+
+
+def test_what_does_not_run_has_a_reason_and_is_counted():
+    counts = count_commands()
+    n_python = sum(bool(code.python) for page in all_pages() for code in code_of(page))
+    assert sum(counts.values()) == len(COMMANDS) + n_python
+    assert counts["run"] >= 50
+    assert all(counts.values())
 
 
 def test_a_renamed_option_would_be_found(monkeypatch):
     words = ("infthor-eval", "--model", "oracle", "--tasks", "nieh_mini", "--limits", "3")
     with pytest.raises(click.ClickException, match="No such option"):
-        test_the_options_of_every_command_are_known(Command(" ".join(words), words), monkeypatch)
+        test_the_options_of_every_command_are_known(
+            Command("README.md", " ".join(words), words), monkeypatch
+        )

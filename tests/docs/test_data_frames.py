@@ -1,28 +1,57 @@
-"""The notebook of `load_run` is the page's example, and runs."""
+"""The notebook of the docs runs, cell by cell, and shows what it says."""
 
+import ast
 import json
 
+import matplotlib
+import matplotlib.pyplot as plt
 import pytest
 
-from infthor_eval.cli import main
+from .blocks import ROOT
 
-from .blocks import ROOT, blocks_of
-
-PAGE, NOTEBOOK = "docs/howto/data-frames.md", "docs/howto/load_run.ipynb"
+NOTEBOOK = "docs/howto/notebook.ipynb"
 
 
-def test_the_notebook_runs_on_the_run_that_the_page_names(tmp_path, monkeypatch, capsys):
+@pytest.fixture
+def cells():
     notebook = json.loads((ROOT / NOTEBOOK).read_text())
-    (cell,) = notebook["cells"]
-    shown, *_ = [block.text for block in blocks_of(PAGE) if block.language == "python"]
-    source = "".join(cell["source"])
-    assert (notebook["nbformat"], source) == (4, shown.removesuffix("\n"))
+    assert notebook["nbformat"] == 4
+    return {cell["id"]: "".join(cell["source"]) for cell in notebook["cells"]}
+
+
+def run(source, names):
+    """Run a cell as a notebook does, and return its last value."""
+    *statements, last = ast.parse(source, NOTEBOOK).body
+    assert isinstance(last, ast.Expr)
+    exec(compile(ast.Module(statements, []), NOTEBOOK, "exec"), names)
+    return eval(compile(ast.Expression(last.value), NOTEBOOK, "eval"), names)
+
+
+def test_the_notebook_runs_from_its_first_cell_to_its_last(cells, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as ended:
-        main(["--model", "blind", "--tasks", "nieh_mini_gt", "--limit", "20"])
-    assert ended.value.code == 0
-    capsys.readouterr()
-    exec(compile(source, NOTEBOOK, "exec"), {})
-    printed = capsys.readouterr().out
-    assert "question_type" in printed
-    assert "seconds" in printed
+    names = {}
+    shown = {
+        name: run(source, names)
+        for name, source in cells.items()
+        if name != "title" and not name.startswith("about-")
+    }
+    runs = shown["evaluate"]
+    assert list(runs["run"]) == ["oracle", "blind"]
+    assert list(runs["state"]) == ["whole", "whole"]
+    assert runs["score"][0] == 1.0
+    assert sorted(shown["load-runs"]["run"]) == ["blind", "oracle"]
+    assert shown["load-run"]["count"].sum() == 20
+    page = shown["load-sample"]._repr_html_()
+    assert page.count("data:image/webp;base64,") >= 1
+    for words in ("gold answer", "reply", "score", "request"):
+        assert words in page
+    figure = shown["load-figure"]
+    assert isinstance(figure, matplotlib.figure.Figure)
+    legends = [legend for axes in figure.axes if (legend := axes.get_legend()) is not None]
+    assert {text.get_text() for text in legends[0].get_texts()} == {"oracle", "blind"}
+    assert plt.get_fignums() == []  # the figure is the caller's, nothing is kept of it
+
+
+def test_every_code_cell_is_explained(cells):
+    code = [name for name in cells if name != "title" and not name.startswith("about-")]
+    assert [f"about-{name}" for name in code] == [name for name in cells if "about-" in name]

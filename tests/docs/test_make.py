@@ -32,3 +32,21 @@ def test_the_demo_ends_with_how_to_activate_the_environment(venv):
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
     assert f". {venv}/bin/activate" in done.stdout.splitlines()[-1]
     assert "make shell" in done.stdout.splitlines()[-1]
+
+
+def test_the_demo_installs_the_core_alone_and_the_tests_add_the_rest(tmp_path):
+    def installs(target, *has):
+        venv = tmp_path / "-".join((target, *has))
+        venv.mkdir()
+        for name in has:
+            (venv / name).touch()
+        words = ["make", "--dry-run", "--no-print-directory", target, f"VENV={venv}"]
+        done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+        lines = [line for line in done.stdout.splitlines() if "pip install" in line]
+        return [line.split()[-1].strip("'") for line in lines if " -e " in line]
+
+    assert installs("demo") == ["."]
+    assert installs("shell") == ["."]
+    for target in ("test", "lint", "docs", "vitals", "fuzz"):
+        assert installs(target) == [".", ".[dev,docs]"]
+    assert installs("test", ".installed") == [".[dev,docs]"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
     from infthor_eval.cli.progress.bar import PacedBar
-    from infthor_eval.report.presenter import Figure, FigureRequest
-    from infthor_eval.report.runs import ReportRun
+    from infthor_eval.report.presenter import FigureRequest
     from infthor_eval.report.web.build import PageRequest
 
 __all__ = ["command"]
@@ -160,48 +159,16 @@ class _PageBars:
 
 def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Path) -> None:
     from infthor_eval.cli.progress.notes import print_failure
-    from infthor_eval.errors import UsageError
-    from infthor_eval.report.presented import read_report_runs
+    from infthor_eval.report.figures.style import save_figure
+    from infthor_eval.report.named_figures import build_figure
     from infthor_eval.report.terminal import print_table, table_console
     from infthor_eval.storage.files import prepare_folder, require_writable
-    from infthor_eval.suites import find_presenter, suite_names
     from infthor_eval.terminal import print_line
 
-    owners: dict[str, Mapping[str, Figure]] = {
-        suite: find_presenter(suite).figures for suite in suite_names()
-    }
-    if not any(name in figures for figures in owners.values()):
-        known = [item for figures in owners.values() for item in figures.items()]
-        abouts = sorted(f"{key} ({figure.about})" for key, figure in known)
-        raise UsageError(
-            f"--figure {name}: is none that can be drawn; there are {', '.join(abouts)}"
-        )
-    runs = read_report_runs(folders, print_failure)
-    figure = _require_figure(runs, name, owners)
-    if request.panels is not None and not figure.has_panels:
-        raise UsageError(f"--panels: figure {name} has panels of its own; leave it out")
     require_writable(out)
-    result = figure.build(runs, request)
-    paths = result.draw(prepare_folder(out), f"figure{name}" if name.isdigit() else name)
+    result = build_figure(folders, name, request, print_failure)
+    file_name = f"figure{name}" if name.isdigit() else name
+    paths = save_figure(result.plot, prepare_folder(out), file_name)
     print_table(result.table, table_console())
     for line in (*result.notes, *map(str, paths)):
         print_line(line)
-
-
-def _require_figure(
-    runs: Sequence[ReportRun], name: str, owners: Mapping[str, Mapping[str, Figure]]
-) -> Figure:
-    """Return the figure of a name; of different ones of two packages the first run decides."""
-    from infthor_eval.errors import UsageError
-
-    first = runs[0].suite.name
-    owner = first
-    if name not in owners[first]:
-        owner = next(suite for suite, figures in owners.items() if name in figures)
-    for run in runs:
-        if run.suite.name != owner:
-            raise UsageError(
-                f"{run.folder}: is a run of {run.suite.name}, and figure {name} is of {owner}; "
-                "leave it out"
-            )
-    return owners[owner][name]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,8 +18,7 @@ from infthor_eval.formats.trajectory import is_trajectory_file
 from infthor_eval.terminal import print_line
 
 if TYPE_CHECKING:
-    from infthor_eval.report.presented import PresentedRun
-    from infthor_eval.runs import UnitRecord
+    pass
 
 __all__ = ["command"]
 
@@ -83,39 +81,12 @@ def _print_trajectories(paths: tuple[Path, ...], options: ShowOptions) -> None:
 
 
 def _print_question(folders: tuple[Path, ...], name: str) -> None:
-    from infthor_eval.errors import unknown_name
     from infthor_eval.report.presented import read_report_runs
+    from infthor_eval.report.sample import find_samples
 
-    runs = read_report_runs(folders, print_failure)
-    found = [
-        (run, record)
-        for run in runs
-        for record in run.records
-        if name in (record.id, str(record.key))
-    ]
-    if not found:
-        raise unknown_name("question", name, {record.id for run in runs for record in run.records})
-    for run, record in found:
-        for line in _sample_lines(run, record):
+    for sample in find_samples(read_report_runs(folders, print_failure), name):
+        for line in sample.lines():
             print_line(line)
-
-
-def _sample_lines(run: PresentedRun, record: UnitRecord[Any]) -> Iterator[str]:
-    """Yield a sample in words: what was asked, what was replied, and why it got its score."""
-    sample = run.presenter.describe(record)
-    yield f"{run.label}, {record.task}, {record.key}"
-    yield f"  {sample.title}"
-    yield f"  {run.presenter.target_label}: {sample.target}"
-    if record.state != "answered":
-        yield f"  {record.state}, in no score: {record.failure or record.excluded}"
-        return
-    yield f"  {run.presenter.reply_label}: {run.presenter.reply(record) or '(empty)'}"
-    scores = (f"{name} {score:g}" for name, score in run.suite.scores(record).items())
-    yield f"  scores: {', '.join(scores) or '-'}"
-    for line in run.presenter.explain(record):
-        yield f"    {line}"
-    for name, value in run.presenter.details(record).items():
-        yield f"  {name}: {value}"
 
 
 def _print_samples(folders: tuple[Path, ...], options: ShowOptions) -> None:

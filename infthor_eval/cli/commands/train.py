@@ -160,8 +160,10 @@ def _fine_tune(
     """Fine-tune a model; for a machine (GPUs, TFLOP/s of each), print an estimate instead."""
     from infthor_eval.training.fine_tuning import fine_tune, prepare_run
 
-    run = prepare_run(recipe, folders)
     is_first_process = os.environ.get("RANK", "0") == "0"  # set by torchrun
+    if is_first_process:  # it takes minutes, and nobody knows how many sequences there will be
+        print_note(f"{recipe.title}: building the sequences of {', '.join(map(str, folders))}")
+    run = prepare_run(recipe, folders)
     if is_first_process:
         _print_data(run)
     if machine is not None:

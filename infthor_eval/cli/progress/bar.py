@@ -1,12 +1,18 @@
 """Progress of long work: a bar on a terminal, elsewhere lines with its rate and the time left."""
 
+from __future__ import annotations
+
 import time
+from typing import TYPE_CHECKING
 
 from rich.progress import Progress
 
 from infthor_eval.cli.progress.pace import Pace
 
-__all__ = ["PacedBar", "StepBars"]
+if TYPE_CHECKING:
+    from infthor_eval.generation.simulator_jobs import JobProgress
+
+__all__ = ["JobBar", "PacedBar", "StepBars"]
 
 
 class PacedBar:
@@ -45,10 +51,38 @@ class PacedBar:
         self.pace.count(resumed, now, context, cached)
         name = f"{self._name}: {detail}" if detail else self._name
         self._progress.update(self._bar, advance=1, description=f"{name}  {self.pace.speed(now)}")
-        if not self._progress.console.is_terminal and self.pace.is_due(now):
+        if self._progress.disable and self.pace.is_due(now):
             self._progress.console.print(
                 f"{self._name}: {self.pace.line(now)}{f'; {detail}' if detail else ''}"
             )
+
+
+class JobBar:
+    """Shows how far the present one of several jobs is, below the bar of all of them."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._bar = progress.add_task("", visible=False)
+        self._name = ""
+        self._told_at = time.monotonic()
+        self._pace = Pace(0, self._told_at)
+
+    def tell(self, job: JobProgress) -> None:
+        """Take how far a job is; one of another name than before begins anew."""
+        if job.name != self._name:
+            self._name, self._pace = job.name, Pace(job.n_units, self._told_at)
+        self._told_at = now = time.monotonic()
+        self._pace.go_on(job.n_done, job.n_units)
+        detail = f"; {job.detail}" if job.detail else ""
+        self._progress.update(
+            self._bar,
+            completed=job.n_done,
+            total=job.n_units,
+            description=f"{job.name}  {self._pace.speed(now)}{detail}",
+            visible=True,
+        )
+        if self._progress.disable and self._pace.is_due(now):
+            self._progress.console.print(f"{job.name}: {self._pace.line(now)}{detail}")
 
 
 class StepBars:

@@ -47,6 +47,10 @@ class Pace:
             self._context_tokens += context
             self._cached_tokens += cached
 
+    def go_on(self, n_new: int, n_units: int) -> None:
+        """Take how many units this run has done so far, and how many there are by now in all."""
+        self.n_new, self._n_units = n_new, n_units
+
     def speed(self, now: float) -> str:
         """Return the pace, `1.3 a second, 83 % of tokens cached`; empty before a new unit."""
         rate = self._rate(now)

@@ -169,7 +169,11 @@ class OpenModel:
         decoding = requests[0].decoding
         if self._person is not None:
             self._person.tell(
-                Notice(title="Question", words=requests[0].prepared.task_samples.words)
+                Notice(
+                    title="Question",
+                    unit="question",
+                    words=requests[0].prepared.task_samples.words,
+                )
             )
         with wrap_request_errors(self._name):
             if any(request.context != context for request in requests[1:]):
@@ -372,7 +376,8 @@ def _answer(
         return
     seconds = (time.perf_counter() - start) / len(requests)
     for request, reply in zip(requests, replies, strict=True):
-        yield request.record(reply, seconds, faults, answerer.usage(reply), session)
+        took = seconds if reply.seconds is None else reply.seconds
+        yield request.record(reply, took, faults, answerer.usage(reply), session)
 
 
 def _is_asked(error: Exception) -> bool:

@@ -37,7 +37,13 @@ class PersonActor(ModelActor):
         }
         replies = tuple(map(str, possible))
         self._person.tell(
-            Notice(title=self._title, facts=tuple(facts.items()), news=self._news, replies=replies)
+            Notice(
+                title=self._title,
+                unit="plan",
+                facts=tuple(facts.items()),
+                news=self._news,
+                replies=replies,
+            )
         )
         return super().act()
 

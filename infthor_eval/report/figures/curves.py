@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -17,11 +16,10 @@ from infthor_eval.report.figures.style import (
     add_legend,
     add_words,
     looks_of,
-    save_figure,
 )
 from infthor_eval.terminal import printable
 
-__all__ = ["curves_figure", "draw_curves"]
+__all__ = ["curves_figure"]
 
 # inches; the width of one of many
 _PANEL = (4.6, 2.7)
@@ -29,13 +27,6 @@ _NARROW = 3.5
 _MARGIN = 1.1  # inches around the panels
 _IN_THOUSANDS = 10_000  # end of an x axis from which its ticks are in thousands
 _LINE = 0.2  # inches of a line of the legend
-
-
-def draw_curves(
-    curves: RewardCurves, panels: Sequence[Panel], folder: Path, name: str
-) -> list[Path]:
-    """Write `curves_figure` into files; see `save_figure`."""
-    return save_figure(lambda: curves_figure(curves, panels), folder, name)
 
 
 def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:

@@ -1,7 +1,6 @@
 """Success by the radius of the hand's sphere, as a figure and as a table."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -17,11 +16,10 @@ from infthor_eval.report.figures.style import (
     add_legend,
     add_words,
     looks_of,
-    save_figure,
 )
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["draw_radii", "radii_figure", "radii_table"]
+__all__ = ["radii_figure", "radii_table"]
 
 _FLOOR = "in the sphere at the start"
 _FLOOR_LOOK = Look("#9a9a9a", "solid", 3.0)
@@ -30,11 +28,6 @@ _OFFSET = 0.004  # metres between the intervals of two lines
 _PANEL = (4.4, 2.9)
 _MARGIN = 1.1
 _LINE = 0.2
-
-
-def draw_radii(success: SuccessByRadius, folder: Path, name: str) -> list[Path]:
-    """Write `radii_figure` into files; see `save_figure`."""
-    return save_figure(lambda: radii_figure(success), folder, name)
 
 
 def radii_table(success: SuccessByRadius) -> Table:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import matplotlib
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -26,6 +27,7 @@ __all__ = [
     "add_words",
     "inline_svg",
     "looks_of",
+    "plot_in_style",
     "save_figure",
 ]
 
@@ -121,6 +123,15 @@ def save_figure(draw: Callable[[], Figure], folder: Path, name: str) -> list[Pat
     with _in_style():
         figure = draw()
         return [_save(figure, folder / f"{name}.{kind}", kind) for kind in ("png", "svg")]
+
+
+def plot_in_style(draw: Callable[[], Figure]) -> Figure:
+    """Return a figure as the files of `save_figure` show it, for who goes on with it."""
+    with _in_style():
+        figure = draw()
+        FigureCanvasAgg(figure)  # a notebook shows no figure without a canvas
+        figure.draw_without_rendering()  # what is laid out and styled only when it is drawn
+    return figure
 
 
 def inline_svg(draw: Callable[[], Figure]) -> str:

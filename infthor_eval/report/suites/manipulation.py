@@ -115,12 +115,10 @@ def _build_figure_6(runs: Sequence[ReportRun], request: FigureRequest) -> Figure
 
 
 def _build_radius_figure(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
-    from infthor_eval.report.figures.radius import draw_radii, radii_table
+    from infthor_eval.report.figures.radius import radii_figure, radii_table
 
     by_radius = success_by_radius(_model_runs(runs), request.task)
-    return FigureResult(
-        radii_table(by_radius), lambda folder, name: draw_radii(by_radius, folder, name)
-    )
+    return FigureResult(radii_table(by_radius), lambda: radii_figure(by_radius))
 
 
 class ManipulationPresenter(PlainPresenter):

@@ -17,7 +17,6 @@ from infthor_eval.report.figures.style import (
     add_words,
     inline_svg,
     looks_of,
-    save_figure,
 )
 from infthor_eval.report.presenter import FigureRequest, FigureResult
 from infthor_eval.report.runs import ReportRun
@@ -74,10 +73,7 @@ def build_pairs_figure(runs: Sequence[ReportRun], request: FigureRequest) -> Fig
             "nieh_twins"
         )
     lines = _lines(runs, task)
-    return FigureResult(
-        _table(task, lines),
-        lambda folder, name: save_figure(lambda: _pairs_figure(task, lines), folder, name),
-    )
+    return FigureResult(_table(task, lines), lambda: _pairs_figure(task, lines))
 
 
 def _tasks(runs: Sequence[ReportRun]) -> list[str]:

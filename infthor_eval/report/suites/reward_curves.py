@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from infthor_eval.episodes.curves import RewardCurves
 from infthor_eval.errors import InfthorError
 from infthor_eval.report.figures.curve_tables import curves_table, one_panel, read_panels
-from infthor_eval.report.figures.curves import curves_figure, draw_curves
+from infthor_eval.report.figures.curves import curves_figure
 from infthor_eval.report.figures.style import inline_svg
 from infthor_eval.report.presenter import FigureResult
 from infthor_eval.report.web.sections import Chart, Section
@@ -56,6 +56,4 @@ def curves_result(curves: RewardCurves, panels_file: Path | None) -> FigureResul
     drawn = {label for panel in panels for label in panel.labels}
     left_out = [run.label for run in curves.runs if not run.is_bound and run.label not in drawn]
     notes = (f"in no panel: {', '.join(left_out)}",) if left_out else ()
-    return FigureResult(
-        curves_table(curves), lambda folder, name: draw_curves(curves, panels, folder, name), notes
-    )
+    return FigureResult(curves_table(curves), lambda: curves_figure(curves, panels), notes)

@@ -1,6 +1,7 @@
 """Who does a run's work: this process, or several workers; either way the same records."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any, Generic, Protocol
 
@@ -23,6 +24,7 @@ from infthor_eval.runs.suite import BoundEvaluation, Group, Session, UnitSample,
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.runs.work.binding import bind_run
 from infthor_eval.runs.work.scheduling import run_groups
+from model_adapters import Attended
 
 __all__ = ["Executor", "LocalExecutor", "Recorded", "UnrecordedSession", "group_records"]
 
@@ -75,14 +77,27 @@ class LocalExecutor(Generic[SuiteUnit, Payload]):
         session = JournalSession(journal)
         evaluation = self._bound.evaluation
         in_flight = self._bound.subject.capabilities.max_in_flight
-        for record in run_groups(
+        records = run_groups(
             self.workload.groups,
             lambda group: group_records(evaluation, group, session, self._gate),
             in_flight,
-        ):
+        )
+        for record in self._telling_positions(records):
             yield session.append_new(record)
             if should_stop():
                 return
+
+    def _telling_positions(
+        self, records: Iterator[UnitRecord[Payload]]
+    ) -> Iterator[UnitRecord[Payload]]:
+        """Yield the records, and tell a person which unit comes next, before it is asked."""
+        subject, n_units = self._bound.subject, self.workload.n_units
+        if not isinstance(subject, Attended):
+            yield from records
+            return
+        for number in range(1, n_units + 1):
+            subject.tell_position(number, n_units)
+            yield from islice(records, 1)
 
     def samples(self, records: Sequence[UnitRecord[Payload]]) -> Iterator[UnitSample]:
         """See `Executor`."""

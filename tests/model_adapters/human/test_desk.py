@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from model_adapters import Decoding, Notice, Turn
+from model_adapters.human.clock import ScreenClock
 from model_adapters.human.desk import Answer, Desk, Inquiry, StaleError
 
 ASKED = Inquiry((Turn("user", ("Where is the mug?",)),), Decoding(max_new_tokens=5), Notice())
@@ -40,16 +41,16 @@ def test_a_question_waits_for_its_answer_and_is_gone_then() -> None:
     desk = Desk()
     thread, answers = asking(desk)
     assert desk.question is not None and desk.question.number == 1
-    desk.give(1, Answer("Fridge", 7))
+    desk.give(1, "Fridge", 7)
     thread.join()
-    assert (answers, desk.question) == ([Answer("Fridge", 7)], None)
+    assert (answers, desk.question) == ([Answer("Fridge", 7, None)], None)
 
 
 @pytest.mark.parametrize("is_kept", [True, False])
 def test_an_answer_counts_once_the_run_has_kept_it(is_kept: bool) -> None:
     desk = Desk()
     thread, _ = asking(desk)
-    desk.give(1, Answer("Fridge", 7))
+    desk.give(1, "Fridge", 7)
     thread.join()
     kept: list[bool] = []
     telling = threading.Thread(target=lambda: kept.append(desk.wait_until_kept(1)), daemon=True)
@@ -70,15 +71,15 @@ def test_an_answer_counts_once_the_run_has_kept_it(is_kept: bool) -> None:
 def test_an_answer_to_another_question_is_refused_and_the_first_of_two_counts() -> None:
     desk = Desk()
     with pytest.raises(StaleError):
-        desk.give(1, Answer("too early", 0))
+        desk.give(1, "too early", 0)
     thread, answers = asking(desk)
     with pytest.raises(StaleError):
-        desk.give(2, Answer("another", 0))
-    desk.give(1, Answer("first", 0))
+        desk.give(2, "another", 0)
+    desk.give(1, "first", 0)
     with pytest.raises(StaleError):
-        desk.give(1, Answer("second", 0))
+        desk.give(1, "second", 0)
     thread.join()
-    assert answers == [Answer("first", 0)]
+    assert answers == [Answer("first", 0, None)]
     thread, _ = asking(desk)
     assert desk.question is not None and desk.question.number == 2
     desk.stop()
@@ -107,12 +108,64 @@ def test_who_waits_for_a_change_learns_of_it() -> None:
 def test_it_ends_when_a_page_has_learned_of_it_or_when_there_is_none() -> None:
     desk = Desk()
     desk.close()
-    desk.wait_until_told(60.0)  # nobody has asked: returns at once
+    desk.wait_until_told(60.0, 60.0)  # nobody has asked: returns at once
     desk.wait_for_change(-1, 60.0)
-    ending = threading.Thread(target=desk.wait_until_told, args=(60.0,), daemon=True)
+    ending = threading.Thread(target=desk.wait_until_told, args=(0.0, 60.0), daemon=True)
     ending.start()
     ending.join(0.05)
     assert ending.is_alive()
     desk.tell_closed()
     ending.join(60.0)
     assert not ending.is_alive()
+
+
+def test_a_page_that_waits_for_news_is_waited_for_longer_than_one_that_may_be_closed() -> None:
+    desk = Desk()
+    reading = threading.Thread(target=desk.wait_for_change, args=(0, 60.0), daemon=True)
+    reading.start()
+    until(lambda: desk._n_reading == 1)
+    desk.close()
+    reading.join(60.0)
+    ending = threading.Thread(target=desk.wait_until_told, args=(60.0, 0.0), daemon=True)
+    ending.start()
+    ending.join(0.05)
+    assert ending.is_alive()
+    desk.tell_closed()
+    ending.join(60.0)
+    assert not ending.is_alive()
+
+
+def test_the_clock_goes_while_a_page_shows_the_question(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr("model_adapters.human.clock.time.monotonic", lambda: now[0])
+    clock = ScreenClock()
+    now[0] += 30.0  # the frames are on their way
+    assert clock.seconds is None
+    clock.show("a")
+    now[0] += 2.0
+    clock.show("a")  # told twice
+    clock.show("b")
+    now[0] += 3.0
+    clock.hide("a")
+    now[0] += 4.0
+    clock.hide("b")
+    now[0] += 1000.0  # a break
+    assert clock.seconds == 9.0
+    clock.hide("b")
+    clock.show("c")  # taken up again
+    now[0] += 1.0
+    assert clock.seconds == 10.0
+
+
+def test_what_a_page_tells_of_another_question_is_not_counted() -> None:
+    desk = Desk()
+    thread, answers = asking(desk)
+    desk.tell_screen(2, "a", shows=True)
+    assert desk.question is not None and desk.question.clock.seconds is None
+    desk.tell_screen(1, "a", shows=True)
+    desk.give(1, "Fridge", 0)
+    desk.tell_screen(1, "a", shows=False)
+    thread.join()
+    assert [answer.seconds is not None for answer in answers if isinstance(answer, Answer)] == [
+        True
+    ]

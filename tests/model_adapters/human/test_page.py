@@ -4,6 +4,7 @@ controls."""
 import json
 import re
 import subprocess
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
@@ -16,9 +17,11 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.plans.records import RECORDS as PLAN_RECORDS
 from infthor_eval.runs import UnitRecord, read_run
+from model_adapters.human.model import UNTIMED
 
 from ...helpers.processes import cli_words
 from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
+from ...helpers.waiting import PATIENCE_S
 
 HOSTILE = "Is </script><img src=x onerror='document.title=\"hacked\"'> here?"
 KEY = ("yes", "no", "Fridge", "3", "SideTable, Desk")
@@ -58,16 +61,23 @@ class Session:
                 return match[1]
         pytest.fail("the run ended without a page")
 
-    def new_tab(self, browser: Any) -> Any:
+    def new_tab(self, browser: Any, slow_s: float = 0.0) -> Any:
+        """Open the page in a tab, which gets the first frame so many seconds late."""
         tab = browser.new_page(viewport={"width": 1280, "height": 900})
+        # A simulator that starts, or an action in it, can take more than the usual 30 s where the
+        # machine is busy.
+        tab.set_default_timeout(1000 * PATIENCE_S)
         tab.on("pageerror", lambda error: self.errors.append(str(error)))
-        tab.goto(self.address)
+        if slow_s:
+            tab.route("**/frames/1/0", lambda route: (time.sleep(slow_s), route.continue_()))
+        with tab.expect_response("**/screen"):  # what is asked is on the screen, and the run knows
+            tab.goto(self.address)
         tab.locator("#desk").wait_for()
         return tab
 
     def await_answered(self, number: int) -> None:
         """Wait until so many are answered and the next one is shown, or that there is none."""
-        self.tab.get_by_text(f"{number} answered", exact=True).wait_for()
+        self.tab.get_by_text(f"{number} answered in this sitting", exact=True).wait_for()
         self.tab.locator("#state:empty, #desk[hidden]").first.wait_for(state="attached")
 
     @property
@@ -274,11 +284,88 @@ def test_a_run_that_is_killed_goes_on_where_it_was(
     } | dict.fromkeys(questions, "I do not know")
 
 
-def test_a_run_is_stopped_from_the_page(session: Callable[..., Session], data: Path) -> None:
-    one = session("--tasks", "nieh_gt", "--data", data)
+def test_a_run_is_stopped_from_the_page_by_keys_and_taken_up_again(
+    session: Callable[..., Session], data: Path, tmp_path: Path
+) -> None:
+    words = ("--tasks", "nieh_gt", "--data", data, "--limit", 4)
+    one = session(*words)
     one.await_answered(0)
-    one.tab.locator("#stop").click()
+    place = one.tab.locator("#unit")
+    assert place.inner_text() == "question 1 of 4"
+    one.tab.keyboard.press("n")
+    one.await_answered(1)
+    assert place.inner_text() == "question 2 of 4"
+    one.tab.locator("#stop").focus()
+    one.tab.keyboard.press("Enter")
+    one.tab.get_by_text("Stopped.", exact=True).wait_for()
+    assert one.tab.locator("#stop").is_hidden()  # it would do nothing any more
     assert one.end() == 130
+    assert len(records(tmp_path)) == 1
+    again = session(*words)
+    for number in range(3):
+        again.await_answered(number)
+        assert again.tab.locator("#unit").inner_text() == f"question {number + 2} of 4"
+        again.tab.keyboard.press("n")
+    again.tab.get_by_text("All is answered. Thank you.").wait_for()
+    assert again.tab.locator("#stop").is_hidden()
+    assert again.end() == 0
+    assert len(records(tmp_path)) == 4
+
+
+def test_one_of_several_pages_cannot_stop_the_run(
+    session: Callable[..., Session], data: Path
+) -> None:
+    one = session("--tasks", "nieh_gt", "--data", data, "--workers", 2)
+    one.await_answered(0)
+    assert one.tab.locator("#stop").is_hidden()
+    # It does not know how many the others have answered.
+    assert one.tab.locator("#unit").inner_text() == ""
+
+
+def test_the_clock_starts_when_the_frames_are_shown_and_stands_while_nobody_looks(
+    session: Callable[..., Session], data: Path, tmp_path: Path, browser: Any
+) -> None:
+    before = time.monotonic()
+    one = session("--tasks", "nieh_full", "--data", data, "--limit", 2)
+    one.await_answered(0)
+    one.tab.goto("about:blank")  # the person leaves the page
+    one.tab.wait_for_timeout(2000)
+    late = one.new_tab(browser, slow_s=1.0)  # and comes back, to a frame that takes so long
+    late.route("**/screen", lambda route: route.abort())  # of the next question it tells nothing
+    late.locator("#unknown").click()
+    late.get_by_text("1 answered in this sitting").wait_for()
+    took = time.monotonic() - before
+    late.locator("#state:empty").wait_for(state="attached")
+    late.locator("#unknown").click()
+    late.get_by_text("All is answered. Thank you.").wait_for()
+    late.close()
+    assert one.end() == 0
+    first, second = records(tmp_path)
+    assert 0.0 < first.seconds < took - 3.0
+    assert (first.faults, second.faults) == ((), (UNTIMED,))
+    assert second.seconds > 0.0
+
+
+def test_all_controls_are_reached_and_used_by_keys(
+    session: Callable[..., Session], data: Path
+) -> None:
+    one = session("--tasks", "nieh_full", "--data", data, "--limit", 1)
+    one.await_answered(0)
+    reached = set()
+    for _ in range(20):
+        one.tab.keyboard.press("Tab")
+        reached.add(one.tab.evaluate("document.activeElement.id || document.activeElement.tagName"))
+    controls = {"stop", "help", "play", "scrub", "speed", "text", "send", "unknown", "SUMMARY"}
+    assert controls <= reached
+    one.tab.locator("#whole summary").focus()
+    one.tab.keyboard.press("Enter")
+    assert one.tab.locator("#parts").is_visible()
+    one.tab.keyboard.press("Space")
+    assert one.tab.locator("#parts").is_hidden()
+    one.tab.keyboard.press("?")
+    assert one.tab.locator("#keys").is_visible()
+    one.tab.keyboard.press("n")
+    assert one.end() == 0
 
 
 @pytest.mark.parametrize("by", ["keyboard", "mouse"])

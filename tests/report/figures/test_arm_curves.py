@@ -7,8 +7,9 @@ from PIL import Image
 from infthor_eval.manipulation.recorded.curves import arm_curves
 from infthor_eval.manipulation.recorded.radii import success_by_radius
 from infthor_eval.report.figures.curve_tables import curves_table, one_panel
-from infthor_eval.report.figures.curves import draw_curves
-from infthor_eval.report.figures.radius import draw_radii, radii_table
+from infthor_eval.report.figures.curves import curves_figure
+from infthor_eval.report.figures.radius import radii_figure, radii_table
+from infthor_eval.report.figures.style import save_figure
 
 from ...helpers.arm_runs import make_arm_planner_run, make_arm_run, make_episode_record
 from .drawings import read_texts
@@ -34,7 +35,7 @@ def runs():
 
 def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
     curves = arm_curves([replace(run, label=f"run {number}") for number, run in enumerate(runs())])
-    _, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure6")
+    _, svg = save_figure(lambda: curves_figure(curves, one_panel(curves)), tmp_path, "figure6")
     words_drawn = read_texts(svg)
     for words in (
         "Pick-up and put",
@@ -73,7 +74,9 @@ def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
 
 def test_success_by_radius_is_drawn_with_its_floor(tmp_path):
     curves = success_by_radius(runs())
-    one, other = (draw_radii(curves, tmp_path, name)[1] for name in ("one", "other"))
+    one, other = (
+        save_figure(lambda: radii_figure(curves), tmp_path, name)[1] for name in ("one", "other")
+    )
     assert one.read_bytes() == other.read_bytes()
     for words in (
         "Pick-up",

@@ -1,6 +1,7 @@
 """Pictures of curves, and the command that draws them."""
 
 import re
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -15,8 +16,8 @@ from infthor_eval.report.figures.curve_tables import (
     one_panel,
     read_panels,
 )
-from infthor_eval.report.figures.curves import draw_curves
-from infthor_eval.report.figures.style import looks_of
+from infthor_eval.report.figures.curves import curves_figure
+from infthor_eval.report.figures.style import looks_of, save_figure
 from infthor_eval.runs import read_run
 
 from ...helpers.command_line import option_words
@@ -52,7 +53,7 @@ def runs(**about):
 
 def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
     curves = plan_curves(runs())
-    png, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure7")
+    png, svg = save_figure(lambda: curves_figure(curves, one_panel(curves)), tmp_path, "figure7")
     with Image.open(png) as picture:
         assert min(picture.size) > 300
         assert len(picture.convert("RGB").getcolors(1 << 20)) > 10
@@ -77,14 +78,16 @@ def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
 
 def test_a_name_in_letters_that_the_font_lacks_is_no_warning(tmp_path, recwarn):
     curves = plan_curves([make_plans_run("模型", records(1.0))])
-    _, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure7")
+    _, svg = save_figure(lambda: curves_figure(curves, one_panel(curves)), tmp_path, "figure7")
     assert "模型" in read_texts(svg)
     assert not recwarn.list
 
 
 def test_the_same_curves_give_the_same_bytes(tmp_path):
     first, second = (
-        draw_curves(curves, one_panel(curves), tmp_path, name)[1].read_bytes()
+        save_figure(partial(curves_figure, curves, one_panel(curves)), tmp_path, name)[
+            1
+        ].read_bytes()
         for name, curves in (("one", plan_curves(runs())), ("two", plan_curves(runs())))
     )
     assert first == second
@@ -92,7 +95,7 @@ def test_the_same_curves_give_the_same_bytes(tmp_path):
 
 def test_a_bound_without_tokens_leaves_one_column(tmp_path):
     curves = plan_curves([make_plans_run("m", records(1.0, tokens=False))])
-    _, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure7")
+    _, svg = save_figure(lambda: curves_figure(curves, one_panel(curves)), tmp_path, "figure7")
     assert "at most" in read_texts(svg)
     assert not any("(tokens)" in words for words in read_texts(svg))
 
@@ -128,7 +131,9 @@ def test_panels_have_their_runs_and_the_bound(tmp_path):
     curves = plan_curves(runs())
     file = tmp_path / "panels.yaml"
     file.write_text("First: ['model $x$ & <y>']\nSecond: [_random]\n")
-    _, svg = draw_curves(curves, read_panels(file, curves), tmp_path, "figure7")
+    _, svg = save_figure(
+        lambda: curves_figure(curves, read_panels(file, curves)), tmp_path, "figure7"
+    )
     words_drawn = read_texts(svg)
     assert [words_drawn.count(words) for words in ("First", "Second", "planner", "_random")] == [
         1,

@@ -6,6 +6,7 @@ import pytest
 
 from infthor_eval.errors import UsageError
 from infthor_eval.nieh.suite import NiehSuite
+from infthor_eval.report.figures.style import save_figure
 from infthor_eval.report.presenter import FigureRequest
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.nieh import NiehPresenter
@@ -73,7 +74,7 @@ def test_the_figure_has_a_panel_per_curve_and_a_row_per_class(runs, tmp_path):
     assert rows["remembers", by_distance, "0-49"] == ("100.0 [34.2, 100.0]", "2")
     assert rows["guesses", "number of frames shown", "<=8"] == ("0.0 [0.0, 65.8]", "2")
     assert len(rows) == 2 * (2 + 2 + 1)
-    paths = result.draw(tmp_path, "pairs")
+    paths = save_figure(result.plot, tmp_path, "pairs")
     assert [path.name for path in paths] == ["pairs.png", "pairs.svg"]
     svg = paths[1].read_text()
     assert svg.count("pairs right (%)") == 3

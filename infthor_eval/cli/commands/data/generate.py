@@ -130,7 +130,7 @@ def command(
 
     Trajectories in the folder are not generated again. Exit code 1 if one cannot be generated.
     """
-    from infthor_eval.cli.progress.bar import PacedBar
+    from infthor_eval.cli.progress.bar import JobBar, PacedBar
     from infthor_eval.formats.object_ids import Words
     from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
@@ -159,7 +159,13 @@ def command(
     with hold_folder(out), progress_bar(notes) as progress:
         bar = PacedBar(progress, "generate", len(jobs))
         result = generate_with_workers(
-            jobs, embedded_launch(data), out, worker_settings, bar.advance, notes.print
+            jobs,
+            embedded_launch(data),
+            out,
+            worker_settings,
+            bar.advance,
+            notes.print,
+            JobBar(progress).tell,
         )
     if as_json:
         import msgspec

@@ -66,7 +66,7 @@ def command(
     trajectory itself. Trajectories in the set are not replayed again. Refused actions are reported,
     and the replay continues. Exit code 1 if a trajectory cannot be replayed at all.
     """
-    from infthor_eval.cli.progress.bar import PacedBar
+    from infthor_eval.cli.progress.bar import JobBar, PacedBar
     from infthor_eval.generation.replay_set import replay_with_workers, select
     from infthor_eval.generation.replay_summary import summarise
     from infthor_eval.storage.files import hold_folder
@@ -87,7 +87,14 @@ def command(
         with progress_bar(notes) as progress:
             bar = PacedBar(progress, "replay", len(selection.items))
             replayed = replay_with_workers(
-                selection, start, out, worker_settings, form, bar.advance, notes.print
+                selection,
+                start,
+                out,
+                worker_settings,
+                form,
+                bar.advance,
+                notes.print,
+                JobBar(progress).tell,
             )
     if as_json:
         import msgspec

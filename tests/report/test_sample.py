@@ -1,0 +1,71 @@
+"""A sample of a run: in words, and as the cell of a notebook."""
+
+from pathlib import Path
+
+import pytest
+
+import infthor_eval
+from infthor_eval.errors import UsageError
+from infthor_eval.nieh.records import RECORDS
+from tests.helpers.command_line import option_words
+from tests.helpers.journals import write_journal
+from tests.helpers.nieh_runs import make_config, make_header, make_record
+
+HOSTILE = "<script>alert(1)</script>"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A run of two questions, one of which failed, on a set that is not there."""
+    config = make_config(model="m", checkpoint=None, n_parameters=None)
+    records = (
+        make_record(0, HOSTILE, ("Bed",)),
+        make_record(1, None, ("Bed",), failure="the server is away"),
+    )
+    return write_journal(tmp_path / "run", make_header(config, "m"), records, RECORDS)
+
+
+def names_of(folder: Path) -> list[str]:
+    frame = infthor_eval.load_run(folder)
+    return list(frame.sort_values("state")["id"])  # the answered one first
+
+
+def test_texts_of_a_reply_are_no_markup(folder: Path) -> None:
+    answered, _ = names_of(folder)
+    page = infthor_eval.load_sample(folder, answered)._repr_html_()
+    assert HOSTILE not in page
+    assert "&lt;script&gt;" in page
+    assert "no frames:" in page  # and why, as the set is not there
+    assert "cannot be shown:" in page
+
+
+def test_a_failed_sample_has_its_reason_and_no_score(folder: Path) -> None:
+    _, failed = names_of(folder)
+    sample = infthor_eval.load_sample(folder, failed)
+    assert sample.scores == {}
+    assert "failed, in no score: the server is away" in repr(sample)
+    page = sample._repr_html_()
+    assert "the server is away" in page
+    assert "(empty)" not in page
+
+
+def test_a_name_that_no_sample_has_is_refused(folder: Path) -> None:
+    with pytest.raises(UsageError, match="unknown question"):
+        infthor_eval.load_sample(folder, "nothing")
+
+
+def test_printed_it_is_what_the_command_prints(folder: Path, run_cli) -> None:
+    answered, _ = names_of(folder)
+    code, out, _ = run_cli("show", folder, "--question", answered)
+    assert code == 0
+    assert out.rstrip("\n") == repr(infthor_eval.load_sample(folder, answered))
+
+
+def test_an_episode_has_its_steps(tmp_path: Path, run_cli) -> None:
+    words = option_words(model="still", tasks="manipulathor_mini", limit=1, output=tmp_path)
+    assert run_cli(*words)[0] == 0
+    (folder,) = (tmp_path / "still").iterdir()
+    name = infthor_eval.load_run(folder)["id"][0]
+    sample = infthor_eval.load_sample(folder, name)
+    assert f"{len(sample.steps)} steps" in sample._repr_html_()
+    assert sample.prompt is None
