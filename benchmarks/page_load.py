@@ -138,7 +138,11 @@ def copy_set(small: Path, folder: Path, n_questions: int) -> NiehSet:
 def copy_run(small: Path, folder: Path, large: NiehSet, n_words: int) -> Path:
     """Write a run on the larger set, with the records of a run on the small one."""
     header, records = read_run(small, RECORDS)
-    header.config["tasks"][_TASK]["data"] = large.fingerprint
+    config = header.config
+    task = msgspec.structs.replace(config.tasks[_TASK], data=large.fingerprint)
+    config = msgspec.structs.replace(config, tasks={_TASK: task})
+    counts = {"n_units": len(large.questions), "units_by_task": {_TASK: len(large.questions)}}
+    header = msgspec.structs.replace(header, config=config, **counts)
     draw = random.Random(0)
     words = sorted({word for record in records for word in record.payload.question.split()})
     by_question = {(record.cluster, record.payload.question): record for record in records}

@@ -93,7 +93,7 @@ def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path
     (questions,) = (section for section in page.sections if section.key == "nieh")
     (chart,) = (chart for chart in questions.charts if chart.title == "Gain over blank frames")
     assert chart.description == "oracle, nieh_mini_gt +0.0"
-    assert "95 % interval" in chart.svg
+    assert "95 % interval" in chart.caption
 
 
 def test_frames_that_there_is_no_room_for_are_counted_and_clues_come_first(make_page, nieh_runs):
