@@ -39,7 +39,7 @@ def _curves(runs: Sequence[ReportRun], task: str) -> dict[str, list[Point]]:
             by_memory.setdefault((run.model, memory), []).append(point)
     several = len({subject for subject, _ in by_memory}) > 1
     return {
-        f"{subject}, {memory}" if several else memory: sorted(points)
+        f"{subject}, {memory}" if several else memory: sorted(points, key=lambda point: point.cost)
         for (subject, memory), points in by_memory.items()
     }
 

@@ -100,9 +100,9 @@
     if (clicked) choose(Number(clicked.dataset.place));
   });
 
-  const filter = setsAddress => {
+  const filter = (setsAddress, fromTop = false) => {
     const tests = setFilters();
-    const before = shown[chosen];
+    const before = fromTop ? undefined : shown[chosen];
     const order = orderOf(byId("sort").value, byId("run").value, byId("descending").checked);
     shown = tests.length ? order.filter(at => tests.every(test => test(samples[at], at))) : order;
     byId("descending").parentElement.hidden = !byId("sort").value;
@@ -166,10 +166,10 @@
     event.preventDefault();
   });
   // An address that the page has is that of the sample shown; a page without one gets it with the first choice.
-  const filterAnew = () => filter(hasAddress());
+  const filterAnew = ({ target }) => filter(hasAddress(), ["sort", "descending"].includes(target.id)); // another order begins at its top
   byId("filters").addEventListener("input", filterAnew);
   byId("filters").addEventListener("submit", event => event.preventDefault());
-  byId("filters").addEventListener("reset", () => setTimeout(filterAnew)); // the fields have their values after the event
+  byId("filters").addEventListener("reset", () => setTimeout(() => filter(hasAddress()))); // the fields have their values after the event
   addEventListener("hashchange", openAddressed);
   filter(false);
   openAddressed();

@@ -1,4 +1,4 @@
-"""The browser of samples: one question side by side, orders, and questions that runs disagree on."""
+"""The browser of samples: a question side by side, orders, questions that runs disagree on."""
 
 import msgspec
 import pytest
@@ -73,7 +73,8 @@ def test_questions_that_two_runs_disagree_on(page, open_page):
 
 
 def test_runs_of_different_contexts_disagree_by_question(page, open_page):
-    first, other = page.samples[:2]
+    first = page.samples[0]
+    other = next(sample for sample in page.samples if sample.id != first.id)
     right, wrong = (
         msgspec.structs.replace(first.results[0], outcome=it) for it in ("right", "wrong")
     )
