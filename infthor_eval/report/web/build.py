@@ -9,7 +9,6 @@ from pathlib import Path
 import infthor_eval
 from infthor_eval.errors import DataError
 from infthor_eval.report.comparison import compare, comparison_table
-from infthor_eval.report.figures.curve_tables import embedded_note
 from infthor_eval.report.headline.results import TaskResult, task_results
 from infthor_eval.report.headline.sentence import headline
 from infthor_eval.report.headline.tables import cost_chart, results_chart, results_table
@@ -133,8 +132,10 @@ def _title(runs: Sequence[PresentedRun]) -> str:
 def _footnote(runs: Sequence[PresentedRun]) -> str:
     """Return the remark on the runs of the page in the embedded simulator; empty without any."""
     embedded = [run.label for run in runs if "embedded" in run.header.config.simulators]
-    note = embedded_note(embedded, len(runs), "numbers")
-    return "" if note is None else f"{note[0].upper()}{note[1:]}."
+    if not embedded:
+        return ""
+    which = "" if len(embedded) == len(runs) else f" ({', '.join(embedded)})"
+    return f"Numbers from the embedded simulator{which} are not comparable with published ones."
 
 
 def _suite_sections(runs: Sequence[PresentedRun]) -> Iterator[Section]:

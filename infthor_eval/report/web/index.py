@@ -172,7 +172,8 @@ def _index_page(made: Iterable[_Made], failures: Sequence[tuple[str, str]]) -> P
         table = Table("", columns, tuple(map(Row, failures)))
         sections.append(Section("unread", "Not read", tables=(table,)))
     n_embedded = sum(bool(one.footnote) for one in read)
-    count = "All runs are" if n_embedded == len(read) else f"{n_embedded} of the runs are"
+    which = "" if n_embedded == len(read) else f" ({n_embedded} of the runs)"
+    footnote = f"Numbers from the embedded simulator{which} are not comparable with published ones."
     return Page(
         title=f"{len(read)} {'run' if len(read) == 1 else 'runs'}",
         version=infthor_eval.__version__,
@@ -182,7 +183,5 @@ def _index_page(made: Iterable[_Made], failures: Sequence[tuple[str, str]]) -> P
         samples=(),
         metrics=(),
         pictures=(),
-        footnote=f"{count} of the embedded simulator: not comparable with the paper's numbers."
-        if n_embedded
-        else "",
+        footnote=footnote if n_embedded else "",
     )
