@@ -1,4 +1,4 @@
 """What the page opens with: a sentence, a chart and a table of runs, made from their numbers.
 
-To change the words of a suite's sentence: `finding` of its presenter.
+The words of a suite's sentence are its presenter's (`Presenter.finding_of`).
 """
