@@ -110,6 +110,10 @@ def _classes(curve: PairCurve, lines: Sequence[_Line]) -> list[str]:
 
 def _chart(task: str, curve: PairCurve, names: Sequence[str], lines: Sequence[_Line]) -> Chart:
     rates = [curve.rates(line.pairs) for line in lines]
+    described = []
+    for line, of_line in zip(lines, rates, strict=True):
+        texts = [f"{100 * of_line[name].mean:.1f} % at {name}" for name in names if name in of_line]
+        described.append(f"{line.label} {', '.join(texts)}")
     rows = []
     for name in names:
         known = [of_line.get(name) for of_line in rates]
@@ -127,6 +131,7 @@ def _chart(task: str, curve: PairCurve, names: Sequence[str], lines: Sequence[_L
             label=curve.title,
             series=[line.series for line in lines],
             rows=rows,
+            description="; ".join(described),
         )
     )
 

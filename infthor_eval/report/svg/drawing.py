@@ -113,7 +113,7 @@ def draw_legend(
     parts: list[str] = []
     x = 0.0
     y = LINE / 2
-    keys = [(one.name, one, "") for one in series if one.name]
+    keys: list[tuple[str, Series | None, str]] = [(one.name, one, "") for one in series if one.name]
     keys += [(name, None, dash) for name, dash in ((dashed, "4 3"), (solid, "")) if name]
     for name, one, dash in keys:
         lines = wrap(name, WIDTH - 24)
