@@ -102,8 +102,8 @@ class DotsChart:
 
 def dot_of(estimate: Estimate, n: int | None = None) -> Dot:
     """Return the dot of a share."""
-    ends = (None if end is None else 100 * end for end in (estimate.low, estimate.high))
-    return Dot(100 * (estimate.mean or 0.0), *ends, n)
+    low, high = (None if end is None else 100 * end for end in (estimate.low, estimate.high))
+    return Dot(100 * (estimate.mean or 0.0), low, high, n)
 
 
 def dots_chart(contents: DotsChart) -> Chart:
