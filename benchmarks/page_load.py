@@ -23,11 +23,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import msgspec
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Page, sync_playwright
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.records import RECORDS
@@ -43,7 +44,7 @@ _UNTIL_PAINTED = """change => new Promise(resolve => {
   new Function(change)();
   requestAnimationFrame(() => setTimeout(() => resolve(performance.now() - start)));
 })"""
-_DRAWN = (
+DRAWN = (
     "new Promise(resolve => requestAnimationFrame(() => setTimeout(() => "
     "resolve(performance.now()))))"
 )
@@ -138,7 +139,11 @@ def copy_set(small: Path, folder: Path, n_questions: int) -> NiehSet:
 def copy_run(small: Path, folder: Path, large: NiehSet, n_words: int) -> Path:
     """Write a run on the larger set, with the records of a run on the small one."""
     header, records = read_run(small, RECORDS)
-    header.config["tasks"][_TASK]["data"] = large.fingerprint
+    config = header.config
+    task = msgspec.structs.replace(config.tasks[_TASK], data=large.fingerprint)
+    config = msgspec.structs.replace(config, tasks={_TASK: task})
+    counts = {"n_units": len(large.questions), "units_by_task": {_TASK: len(large.questions)}}
+    header = msgspec.structs.replace(header, config=config, **counts)
     draw = random.Random(0)
     words = sorted({word for record in records for word in record.payload.question.split()})
     by_question = {(record.cluster, record.payload.question): record for record in records}
@@ -156,25 +161,31 @@ def copy_run(small: Path, folder: Path, large: NiehSet, n_words: int) -> Path:
 
 def measure(page: Path) -> dict[str, Any]:
     """Return the times of a page in a browser."""
-    path = next(filter(None, map(shutil.which, _BROWSERS)))
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        tab = browser.new_page(viewport={"width": 1400, "height": 1000})
+    with browser_tab() as tab:
         opened = []
         for _ in range(_ROUNDS):
             tab.goto("about:blank")
             tab.goto(page.as_uri())
             tab.wait_for_selector(".item")
-            opened.append(tab.evaluate(_DRAWN) / 1000)
+            opened.append(tab.evaluate(DRAWN) / 1000)
         times = {
             name: max(tab.evaluate(_UNTIL_PAINTED, change) for _ in range(_ROUNDS))
             for name, change in changes()
         }
-        browser.close()
     return {
         "opened_s": round(statistics.median(opened), 2),
         "longest_ms": {name: round(value) for name, value in times.items()},
     }
+
+
+@contextmanager
+def browser_tab() -> Iterator[Page]:
+    """Open a tab of Chromium, as wide as a screen."""
+    path = next(filter(None, map(shutil.which, _BROWSERS)))
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield browser.new_page(viewport={"width": 1400, "height": 1000})
+        browser.close()
 
 
 def changes() -> Iterator[tuple[str, str]]:
@@ -191,7 +202,12 @@ def changes() -> Iterator[tuple[str, str]]:
         ("kind", 1),
         ("kind", 0),
         ("run", 1),
+        ("against", 2),
+        ("against", 0),
         ("run", 0),
+        ("sort", 1),
+        ("sort", 4),
+        ("sort", 0),
     ):
         yield (
             f"{name} {place}",

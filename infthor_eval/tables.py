@@ -72,11 +72,13 @@ class Row:
 
     Attributes:
         ends_section: True if a line is drawn below it.
+        link: address that its first cell leads to on a page; empty for none.
     """
 
     cells: tuple[str, ...]
     is_published: bool = False
     ends_section: bool = False
+    link: str = ""
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ class PlainPresenter:
 
     title: str = ""
     measure: str = "primary metric"
+    finding: str = "reaches {} in the primary metric"
     target_label: str = "target"
     reply_label: str = "reply"
     member_label: str = "part"
@@ -46,6 +47,14 @@ class PlainPresenter:
     def measure_of(self, task: str, summary: Any) -> str:
         """See `Presenter.measure_of`: `measure`."""
         return self.measure
+
+    def finding_of(self, task: str, summary: Any) -> str:
+        """See `Presenter.finding_of`: `finding`."""
+        return self.finding
+
+    def chance(self, task: str, summary: Any, records: Sequence[UnitRecord[Any]]) -> float | None:
+        """See `Presenter.chance`: not known."""
+        return None
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`: a metric with a value below 0 or above 1 is none."""
@@ -106,6 +115,10 @@ class PlainPresenter:
             field.name: getattr(payload, field.name) for field in msgspec.structs.fields(payload)
         }
         return {name: _text(value) for name, value in fields.items() if value is not None}
+
+    def recalled(self, record: UnitRecord[Any]) -> Sequence[int | str]:
+        """See `Presenter.recalled`: nothing."""
+        return ()
 
     def steps(self, record: UnitRecord[Any]) -> Sequence[StepRow]:
         """See `Presenter.steps`: none."""

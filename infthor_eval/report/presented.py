@@ -17,7 +17,7 @@ from infthor_eval.runs.stored.command import read_stored_command
 from infthor_eval.runs.stored.search import read_results
 from infthor_eval.suites import find_presenter, find_suite
 
-__all__ = ["PresentedRun", "read_report_runs"]
+__all__ = ["PresentedRun", "read_report_run", "read_report_runs"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,12 +62,20 @@ def read_report_runs(
     headers = [read_header(folder) for folder in folders]
     names = distinct_names(folders, headers)
     return [
-        _read(folder, header.suite, name, tell)
+        read_report_run(folder, header.suite, name, tell)
         for folder, header, name in zip(folders, headers, names, strict=True)
     ]
 
 
-def _read(folder: Path, suite_name: str, name: str, tell: Tell | None) -> PresentedRun:
+def read_report_run(
+    folder: Path, suite_name: str, name: str, tell: Tell | None = None
+) -> PresentedRun:
+    """Read a run of a suite by the name that it has beside others (`distinct_names`).
+
+    Raises:
+        UsageError: the suite is not known here.
+        DataError: the folder has no journal, or it cannot be read.
+    """
     suite = find_suite(suite_name)
     header, log = read_run_log(folder, suite.records, tell)
     results = read_results(folder)

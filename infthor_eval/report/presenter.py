@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as MatplotlibFigure
 
 __all__ = [
+    "PAIRS_FINDING",
     "THOUGHT",
     "Description",
     "EpisodeSelection",
@@ -43,6 +44,7 @@ __all__ = [
 ]
 
 Record = UnitRecord[Any]
+PAIRS_FINDING = "gets {} of the pairs right"  # of twins, in any suite
 THOUGHT = "thought"  # name of the detail of a record that a model thought before its reply
 FindFrames = Callable[[Record], Sequence[FrameRef]]
 
@@ -252,6 +254,7 @@ class Presenter(Protocol):
     Attributes:
         title: heading of the suite's section; empty for the suite's name.
         measure: what the primary metric measures, in words.
+        finding: the primary metric as the predicate of a sentence ("gets {} of the plans done").
         target_label: what a sample's target is called.
         reply_label: what the reply to a sample is called.
         member_label: what each record of a group is called, before its letter ("world").
@@ -266,6 +269,7 @@ class Presenter(Protocol):
 
     title: str
     measure: str
+    finding: str
     target_label: str
     reply_label: str
     member_label: str
@@ -278,6 +282,13 @@ class Presenter(Protocol):
     def measure_of(self, task: str, summary: Any) -> str:
         """Return what the primary metric of a task measures, by the suite's summary of a run;
         `measure`, unless tasks of the suite measure different things."""
+
+    def finding_of(self, task: str, summary: Any) -> str:
+        """Return `finding`, as `measure_of` returns `measure`."""
+
+    def chance(self, task: str, summary: Any, records: Sequence[Record]) -> float | None:
+        """Return what guessing without a frame scores in the primary metric of a task, on its
+        answered records, 0 to 1; None if that is not known."""
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """Whether a metric with these scores is a share, which is shown in percent; others are
@@ -328,6 +339,10 @@ class Presenter(Protocol):
 
     def details(self, record: Record) -> Mapping[str, str]:
         """Return further facts about a record, by name."""
+
+    def recalled(self, record: Record) -> Sequence[int | str]:
+        """Return what a memory recalled for a record: places of frames in the trajectory, and
+        texts; empty without a memory."""
 
     def steps(self, record: Record) -> Sequence[StepRow]:
         """Return the steps of a recorded episode; empty if it has none."""

@@ -118,7 +118,8 @@ def test_the_page_with_its_tables_charts_and_samples(planted: Path, whole: Path,
     (results,) = [section for section in page.sections if section.key == "results"]
     row, _ = results.tables[0].rows
     assert row.cells[0] == "m (incomplete)"
-    assert (row.cells[3], row.cells[5]) == ("75.0 of 4 answered", "8")
+    assert (row.cells[3], row.cells[6]) == ("75.0 of 4 answered", "8")
+    assert "m (incomplete)" in results.lead and "(4 of 8 answered)" in results.lead
     left_out = next(section for section in page.sections if section.key == "left-out").tables[0]
     assert [row.cells[2] for row in left_out.rows] == ["failed", "not asked", "not asked"]
     first_run = [sample.results[0] for sample in page.samples]

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _PAGE = Path("results/report.html")
+_INDEX = Path("results/report")
+_TABLE_FORMS = ("csv", "latex", "markdown")
 _FOLDER = Path("results/figures")
 
 
@@ -33,8 +35,8 @@ _FOLDER = Path("results/figures")
 @click.option(
     "--out",
     type=PATH,
-    help=f"The page, an .html file, or the folder of a figure's files.  [default: {_PAGE}, "
-    f"{_FOLDER}]",
+    help=f"The page, an .html file; or the folder of an index, or of a figure's files.  [default: "
+    f"{_PAGE}, {_INDEX}, {_FOLDER}]",
 )
 @click.option(
     "--data",
@@ -51,6 +53,11 @@ _FOLDER = Path("results/figures")
     show_default=True,
     metavar="N",
     help="Number of episodes of each run to replay, so that the page shows their frames.",
+)
+@click.option(
+    "--tables",
+    type=click.Choice(_TABLE_FORMS),
+    help="Print the table of the runs in this form instead, as for a paper.",
 )
 @click.option(
     "--figure",
@@ -74,12 +81,16 @@ def command(
     data: Path | None,
     scenes: Path | None,
     episodes: int,
+    tables: str | None,
     figure: str | None,
     panels: Path | None,
     task: str | None,
 ) -> None:
     """Write the results of the runs in the folders RUN... as one page that works offline: numbers,
     charts, samples.
+
+    Of a folder with runs below it, or with a folder as --out, write an index: a page with all runs,
+    and a page for each.
 
     With --figure, draw a figure of the paper instead, as PNG and SVG. A run of the baseline
     `planner`, or `planner-arm`, among them is the upper bound. Only trajectories that all runs have
@@ -89,16 +100,51 @@ def command(
     from infthor_eval.report.presenter import FigureRequest
     from infthor_eval.report.web.build import PageRequest
 
+    if figure is not None and tables is not None:
+        raise UsageError("--tables: is not for a figure; leave out one of both")
     if figure is not None:
         _draw(runs, figure, FigureRequest(task, panels), out or _FOLDER)
         return
     for option, value in {"--panels": panels, "--task": task}.items():
         if value is not None:
             raise UsageError(f"{option}: is for a figure; give --figure too, or leave it out")
-    _write_page(runs, PageRequest(data, scenes, episodes), out or _PAGE)
+    is_above = any(map(_is_above_runs, runs))
+    folders = _runs_among(runs)
+    if tables is not None:
+        _print_table(folders, tables)
+        return
+    request = PageRequest(data, scenes, episodes)
+    if (is_above and out is None) or (out is not None and not out.suffix):
+        _write_index(folders, request, out or _INDEX)
+    else:
+        _write_page(folders, request, out or _PAGE)
 
 
-def _write_page(folders: tuple[Path, ...], request: PageRequest, out: Path) -> None:
+def _print_table(folders: Sequence[Path], form: str) -> None:
+    from infthor_eval.cli.progress.notes import print_failure
+    from infthor_eval.report.exporting import export_tables
+    from infthor_eval.report.headline.results import task_results
+    from infthor_eval.report.headline.tables import results_table
+    from infthor_eval.report.presented import read_report_runs
+
+    runs = read_report_runs(folders, print_failure)
+    table = results_table([result for run in runs for result in task_results(run)])
+    click.echo(export_tables([table], form), nl=False)
+
+
+def _write_index(folders: Sequence[Path], request: PageRequest, out: Path) -> None:
+    from infthor_eval.cli.progress.notes import print_failure
+    from infthor_eval.report.web.index import write_index
+    from infthor_eval.terminal import error_console, print_line, progress_bar
+
+    with progress_bar(error_console()) as progress:
+        index = write_index(folders, out, request, _PageBars(progress))
+    for problem in index.problems:
+        print_failure(problem)
+    print_line(f"{index.n_runs:,} runs, {index.size / 1e6:.1f} MB: {index.path}")
+
+
+def _write_page(folders: Sequence[Path], request: PageRequest, out: Path) -> None:
     from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.errors import UsageError
     from infthor_eval.report.presented import read_report_runs
@@ -110,7 +156,7 @@ def _write_page(folders: tuple[Path, ...], request: PageRequest, out: Path) -> N
     if out.suffix.lower() not in (".html", ".htm"):
         raise UsageError(f"--out {out}: the page is an .html file; name one")
     path = prepare_file(out)
-    runs = read_report_runs(_runs_among(folders), print_failure)
+    runs = read_report_runs(folders, print_failure)
     with progress_bar(error_console()) as progress:
         page = build_page(runs, request, _PageBars(progress))
     size = write_page(page, path)
@@ -120,23 +166,33 @@ def _write_page(folders: tuple[Path, ...], request: PageRequest, out: Path) -> N
     )
 
 
+def _is_above_runs(path: Path) -> bool:
+    """Whether a path is a folder with runs below it, and no run itself."""
+    from infthor_eval.runs.stored.search import run_folders
+
+    if not path.is_dir():
+        return False
+    first = next(run_folders(path), None)
+    return first is not None and first != path
+
+
 def _runs_among(paths: Sequence[Path]) -> list[Path]:
-    """Return the folders of runs; of another path, such as an earlier page, it is said that it is
-    none."""
+    """Return the folders of runs, also below other folders; of another path, such as an earlier
+    page, it is said that it is none."""
     from infthor_eval.cli.progress.notes import print_note
     from infthor_eval.errors import UsageError
     from infthor_eval.runs.stored.search import run_folders
 
     # What does not exist is refused where it is read.
-    runs = [
-        path
+    found = {
+        path: list(run_folders(path)) if path.is_dir() else [] if path.exists() else [path]
         for path in paths
-        if not path.exists() or (path.is_dir() and any(run_folders(path, depth=0)))
-    ]
+    }
+    runs = [run for below in found.values() for run in below]
     if not runs:
         raise UsageError(f"{paths[0]}: no run, nor is another of the paths; give folders of runs")
-    for path in paths:
-        if path not in runs:
+    for path, below in found.items():
+        if not below:
             print_note(f"skipped: {path}: no run", "yellow")
     return runs
 

@@ -17,9 +17,12 @@ from infthor_eval.report.figures.style import (
     add_words,
     looks_of,
 )
+from infthor_eval.report.svg.dots import DotRow, DotsChart, dot_of, dots_chart
+from infthor_eval.report.svg.drawing import Series
+from infthor_eval.report.web.sections import Chart
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["radii_figure", "radii_table"]
+__all__ = ["radii_chart", "radii_figure", "radii_table"]
 
 _FLOOR = "in the sphere at the start"
 _FLOOR_LOOK = Look("#9a9a9a", "solid", 3.0)
@@ -52,6 +55,37 @@ def _row(
     rates = dict(points)
     cells = (format_percent(rates.get(radius)) for radius in radii)
     return Row((label, KIND_NAMES[kind], *cells, str(points[0][1].n)))
+
+
+def radii_chart(success: SuccessByRadius) -> Chart:
+    """Return the chart of the page: a row per kind and radius, with a dot per model."""
+    labels = list(dict.fromkeys(line.label for line in success.lines))
+    floor = dict(success.floor)
+    rows = []
+    for kind in dict.fromkeys(line.kind for line in success.lines):
+        rates = {line.label: dict(line.points) for line in success.lines if line.kind == kind}
+        radii = sorted(set().union(*rates.values()))
+        for radius in radii:
+            known = [rates.get(label, {}).get(radius) for label in labels]
+            dots = [None if rate is None else dot_of(rate, rate.n) for rate in known]
+            of_floor = floor.get(radius) if kind == ManipulationKind.PICKUP else None
+            chance = None if of_floor is None else 100 * of_floor.mean
+            heading = KIND_NAMES[kind] if radius == radii[0] else ""
+            rows.append(DotRow(f"{radius:g} m", dots, chance, heading))
+    return dots_chart(
+        DotsChart(
+            title="Success by the hand's radius",
+            caption=(
+                "A row is a radius of the hand's sphere, a dot a model with its 95 % interval; of "
+                "pick-ups the dashed line is an arm that only closes its hand."
+            ),
+            axis="success (%)",
+            label="kind and radius",
+            series=[Series(label, place) for place, label in enumerate(labels)],
+            rows=rows,
+            dashed=_FLOOR,
+        )
+    )
 
 
 def radii_figure(success: SuccessByRadius) -> Figure:

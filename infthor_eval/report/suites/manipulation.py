@@ -126,6 +126,7 @@ class ManipulationPresenter(PlainPresenter):
 
     title = "Pick-ups and puts"
     measure = "successful episodes"
+    finding = "succeeds in {} of the episodes"
     target_label = "target"
     reply_label = "ended"
     main_metric = "success"
@@ -149,7 +150,7 @@ class ManipulationPresenter(PlainPresenter):
     def sections(self, runs: Sequence[ReportRun]) -> Iterator[Section]:
         """See `Presenter.sections`: reward along trajectories, and success by radius where there
         are several radii."""
-        from infthor_eval.report.figures.radius import radii_figure, radii_table
+        from infthor_eval.report.figures.radius import radii_chart, radii_table
         from infthor_eval.report.suites.reward_curves import (
             DrawnFigure,
             curves_on_page,
@@ -158,11 +159,7 @@ class ManipulationPresenter(PlainPresenter):
 
         def radii_on_page() -> DrawnFigure:
             by_radius = success_by_radius(_model_runs(runs))
-            return DrawnFigure(
-                lambda: radii_figure(by_radius),
-                radii_table(by_radius),
-                "the numbers are in the table",
-            )
+            return DrawnFigure([radii_chart(by_radius)], radii_table(by_radius))
 
         arm_runs = _runs_by_radius(runs)
         title = "Reward of pick-ups and puts"

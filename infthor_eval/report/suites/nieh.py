@@ -3,15 +3,17 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from statistics import fmean
 
 from infthor_eval.nieh.records import Guess, NiehAnswer
 from infthor_eval.nieh.rescoring.judging import JUDGED
 from infthor_eval.nieh.results.above_guessing import score_above_guessing, score_range
 from infthor_eval.nieh.results.pair_summary import score_pairs
-from infthor_eval.nieh.results.summary import NiehSummary
+from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
+    PAIRS_FINDING,
     THOUGHT,
     Description,
     Figure,
@@ -53,6 +55,7 @@ class NiehPresenter(PlainPresenter):
 
     title = "Questions"
     measure = "questions right"
+    finding = "gets {} of the questions right"
     target_label = "gold answer"
     member_label = "world"
     main_metric = "strict"
@@ -67,6 +70,25 @@ class NiehPresenter(PlainPresenter):
     def measure_of(self, task: str, summary: NiehSummary) -> str:
         """See `Presenter.measure_of`: of twins, pairs count."""
         return self.measure if summary.tasks[task].pairs is None else "pairs right"
+
+    def finding_of(self, task: str, summary: NiehSummary) -> str:
+        """See `Presenter.finding_of`."""
+        return self.finding if summary.tasks[task].pairs is None else PAIRS_FINDING
+
+    def chance(self, task: str, summary: NiehSummary, records: Sequence[Record]) -> float | None:
+        """See `Presenter.chance`: of questions by the best guesser of each form; who does not see
+        a pair's difference says the same in both worlds, and has none right."""
+        of_task = summary.tasks[task]
+        if of_task.pairs is not None:
+            return 0.0
+        metric = main_metric(of_task)
+        guesses = [
+            None if record.payload.guess is None else record.payload.guess.scores.get(metric)
+            for record in records
+            if record.state == "answered"
+        ]
+        known = [guess for guess in guesses if guess is not None]
+        return fmean(known) if known and len(known) == len(guesses) else None
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`: all of them, although the reference scorer can exceed 1."""
@@ -162,6 +184,11 @@ class NiehPresenter(PlainPresenter):
         if payload.thinking is not None:
             details[THOUGHT] = payload.thinking
         return details
+
+    def recalled(self, record: Record) -> Sequence[int | str]:
+        """See `Presenter.recalled`."""
+        recall = record.payload.recall
+        return () if recall is None else recall.recalled
 
     def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
         """See `Presenter.prompts`."""

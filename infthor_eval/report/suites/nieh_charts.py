@@ -2,15 +2,13 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
-from infthor_eval.distances import DISTANCES
+from infthor_eval.distances import DISTANCES, LENGTHS
 from infthor_eval.formats.question import ABSENCE
-from infthor_eval.nieh.results.above_guessing import AboveGuessing
-from infthor_eval.nieh.results.cells import Cell, Score, mean_cell
+from infthor_eval.nieh.results.above_guessing import AboveGuessing, FormScore
+from infthor_eval.nieh.results.cells import Cell, mean_cell
 from infthor_eval.nieh.results.evidence_tables import short_name
 from infthor_eval.nieh.results.gains import find_gains, name_of
 from infthor_eval.nieh.results.summary import (
@@ -19,30 +17,28 @@ from infthor_eval.nieh.results.summary import (
     TaskSummary,
     main_metric,
 )
-from infthor_eval.report.figures.style import LEGEND, Look, add_legend, inline_svg, looks_of
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.memory_chart import memory_charts
+from infthor_eval.report.svg.dots import Dot, DotRow, DotsChart, dot_of, dots_chart
+from infthor_eval.report.svg.drawing import Series
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.statistics import MeanEstimate
-from infthor_eval.terminal import printable
+from infthor_eval.tables import Column, Row, Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["nieh_charts"]
 
 _COLUMNS = (*CLUE_COLUMNS, ABSENCE)
-_SPREAD = 0.6  # share of a column's width that the dots of several runs are spread over
-# inches
-_PANEL = (4.6, 2.6)
-_ROW = 0.34
 _DEPTH = "depth="
-_GAIN = looks_of(("gain",))["gain"].colour
 
 
 class _Line(NamedTuple):
     """Results of a run on a task."""
 
-    label: str
+    series: Series
     task: TaskSummary
-    look: Look
 
     @property
     def metric(self) -> str:
@@ -51,25 +47,60 @@ class _Line(NamedTuple):
 
 def nieh_charts(runs: Sequence[ReportRun]) -> list[Chart]:
     """Draw all charts that the runs have numbers for."""
-    looks = looks_of(run.label for run in runs)
-    charts = []
+    charts: list[Chart] = []
     for task in dict.fromkeys(name for run in runs for name in run.summary.summary.tasks):
         lines = [
-            _Line(run.label, run.summary.summary.tasks[task], looks[run.label])
-            for run in runs
+            _Line(Series(run.label, place), run.summary.summary.tasks[task])
+            for place, run in enumerate(runs)
             if task in run.summary.summary.tasks and run.summary.summary.tasks[task].n
         ]
         if lines:
-            charts += [_by_clues(task, lines), _by_type(task, lines), *_by_evidence(task, lines)]
+            charts += _charts_of_task(task, lines)
     summaries = [_gains_chart(runs), _above_guessing_chart(runs)]
     heat_maps = [_heat_map(run) for run in runs]
     drawn = [chart for chart in (*summaries, *heat_maps) if chart is not None]
     return [*charts, *memory_charts(runs), *drawn]
 
 
-def _by_clues(task: str, lines: Sequence[_Line]) -> Chart:
-    title = f"{task}: accuracy by number of clues"
-    return _by_columns(title, lines, _COLUMNS, lambda line: line.task.by_clues, "clues (questions)")
+def _charts_of_task(task: str, lines: Sequence[_Line]) -> Iterator[Chart]:
+    clues = [name for name in _COLUMNS if any(line.task.by_clues[name].n for line in lines)]
+    yield _by_class(
+        _Classes(task, "number of clues", clues, lambda line: line.task.by_clues), lines
+    )
+    types = sorted({name for line in lines for name in line.task.by_question_type})
+    if len(types) > 1:
+        yield _by_class(
+            _Classes(task, "type of question", types, lambda line: line.task.by_question_type),
+            lines,
+        )
+    if any(len(_forms(line)) > 1 for line in lines):
+        yield _by_form(task, lines)
+    variants = sorted({name for line in lines for name in line.task.by_variant})
+    depths = [name for name in variants if name.startswith(_DEPTH)]
+    if len(depths) > 1:
+        yield _by_class(
+            _Classes(task, "depth of the needle", depths, lambda line: line.task.by_variant), lines
+        )
+    known_lengths = set().union(*(line.task.by_length for line in lines))
+    lengths = [name for name in LENGTHS if name in known_lengths]
+    if len(lengths) > 1:
+        classes = _Classes(task, "length of the context, thousand tokens", lengths, _by_length)
+        yield _by_class(classes, lines)
+    yield from _by_evidence(task, lines)
+
+
+@dataclass(frozen=True)
+class _Classes:
+    """Classes of a task's questions: what they are by, their names, and their cells of a run."""
+
+    task: str
+    by: str
+    names: Sequence[str]
+    cells_of: Callable[[_Line], Mapping[str, Cell]]
+
+
+def _by_length(line: _Line) -> Mapping[str, Cell]:
+    return {name: length.cell for name, length in line.task.by_length.items()}
 
 
 def _by_evidence(task: str, lines: Sequence[_Line]) -> Iterator[Chart]:
@@ -84,106 +115,78 @@ def _by_evidence(task: str, lines: Sequence[_Line]) -> Iterator[Chart]:
             return line.task.evidence[file].by_distance if file in line.task.evidence else {}
 
         if any(cells_by_share(line).keys() - {"all"} for line in lines):
-            title = f"{of_file}: accuracy by clue frames shown"
-            yield _by_columns(
-                title,
-                lines,
-                SHOWN_CLUES,
-                cells_by_share,
-                "of the clue frames were shown (questions)",
-            )
+            by = "clue frames shown"
+            yield _by_class(_Classes(of_file, by, SHOWN_CLUES, cells_by_share), lines)
         known = set().union(*map(far, lines))
         distances = [name for name in DISTANCES if name in known]
         if len(distances) > 1 and any(line.task.context != "clues" for line in lines):
-            title = f"{of_file}: accuracy by distance of the last clue from the end"
-            yield _by_columns(
-                title, lines, distances, far, "frames after the last clue (questions)"
-            )
+            by = "frames between the last clue and the end"
+            yield _by_class(_Classes(of_file, by, distances, far), lines)
 
 
-def _by_columns(
-    title: str,
-    lines: Sequence[_Line],
-    names: Sequence[str],
-    cells_of: Callable[[_Line], Mapping[str, Cell]],
-    label: str,
-) -> Chart:
-    """Draw a column per name, with the dots of all lines and the counts of the first."""
-
-    def draw() -> Figure:
-        figure = Figure(figsize=(_PANEL[0] + LEGEND, _PANEL[1]), layout="constrained")
-        axes = figure.subplots()
-        for number, line in enumerate(lines):
-            cells = cells_of(line)
-            _dots(axes, [cells.get(name) for name in names], line, _offset(number, len(lines)))
-        first = cells_of(lines[0])
-        counts = [first[name].n if name in first else 0 for name in names]
-        axes.set_xticks(
-            range(len(names)), [f"{name}\n({n})" for name, n in zip(names, counts, strict=True)]
+def _by_class(classes: _Classes, lines: Sequence[_Line]) -> Chart:
+    """Draw a row per class with the dots of all lines, and the counts of the first."""
+    cells = [classes.cells_of(line) for line in lines]
+    rows = []
+    for name in classes.names:
+        dots = [_dot(of_line.get(name), line) for of_line, line in zip(cells, lines, strict=True)]
+        n = next((of_line[name].n for of_line in cells if name in of_line), 0)
+        rows.append(DotRow(f"{name.removeprefix(_DEPTH)} ({n:,})", dots))
+    return dots_chart(
+        DotsChart(
+            title=f"{classes.task}: accuracy by {classes.by}",
+            caption=(
+                "A row is a class of questions, with their number in parentheses; a dot is a run, "
+                "its line the 95 % interval over trajectories."
+            ),
+            axis=f"{lines[0].metric} (%)",
+            label=classes.by,
+            series=[line.series for line in lines],
+            rows=rows,
+            description=_describe(lines),
         )
-        axes.set_ylim(-3, 103)
-        axes.set_ylabel(f"{lines[0].metric} (%)")
-        axes.set_xlabel(label)
-        axes.grid(axis="x", visible=False)
-        add_legend(axes, [(line.label, line.look) for line in lines])
-        return figure
-
-    return Chart(title, inline_svg(draw), _describe(lines))
-
-
-def _by_type(task: str, lines: Sequence[_Line]) -> Chart:
-    types = sorted({name for line in lines for name in line.task.by_question_type}, reverse=True)
-
-    def draw() -> Figure:
-        height = max(_PANEL[1], 0.8 + _ROW * len(types))
-        figure = Figure(figsize=(_PANEL[0] + LEGEND, height), layout="constrained")
-        axes = figure.subplots()
-        for number, line in enumerate(lines):
-            cells = [line.task.by_question_type.get(name) for name in types]
-            _dots(axes, cells, line, -_offset(number, len(lines)), is_flat=True)
-        axes.set_yticks(range(len(types)), [printable(name)[:40] for name in types])
-        axes.set_xlim(-3, 103)
-        axes.set_xlabel(f"{lines[0].metric} (%)")
-        axes.grid(axis="y", visible=False)
-        add_legend(axes, [(line.label, line.look) for line in lines])
-        return figure
-
-    return Chart(f"{task}: accuracy by type of question", inline_svg(draw), _describe(lines))
-
-
-def _offset(number: int, n_lines: int) -> float:
-    return 0.0 if n_lines == 1 else _SPREAD * (number / (n_lines - 1) - 0.5)
-
-
-def _dots(
-    axes: Axes, cells: Sequence[Cell | None], line: _Line, offset: float, *, is_flat: bool = False
-) -> None:
-    """Draw a dot with its interval for each cell that has questions."""
-    for at, cell in enumerate(cells):
-        if cell is not None and cell.scores:
-            _dot(axes, cell.scores[line.metric], at + offset, line.look.colour, is_flat=is_flat)
-
-
-def _dot(
-    axes: Axes,
-    score: Score | MeanEstimate | AboveGuessing,
-    where: float,
-    colour: str,
-    *,
-    is_flat: bool,
-) -> None:
-    mean = 100 * (score.mean or 0)
-    axes.plot(
-        *((mean, where) if is_flat else (where, mean)), marker="o", ms=4.5, color=colour, zorder=3
     )
-    if score.low is not None and score.high is not None:
-        span = axes.hlines if is_flat else axes.vlines
-        span(where, 100 * score.low, 100 * score.high, color=colour, lw=1.3, zorder=2.8)
+
+
+def _dot(cell: Cell | None, line: _Line) -> Dot | None:
+    if cell is None or not cell.scores:
+        return None
+    return dot_of(cell.scores[line.metric], cell.n_answered)
+
+
+def _forms(line: _Line) -> Mapping[str, FormScore]:
+    above = line.task.above_guessing.get(line.metric)
+    return {} if above is None else above.forms
+
+
+def _by_form(task: str, lines: Sequence[_Line]) -> Chart:
+    """Draw a row per form of question, with what guessing scores in it."""
+    forms = [_forms(line) for line in lines]
+    rows = []
+    for name in sorted(set().union(*forms)):
+        known = [of_line.get(name) for of_line in forms]
+        first = next(form for form in known if form is not None)
+        dots = [None if form is None else Dot(100 * form.score, n=form.n) for form in known]
+        rows.append(DotRow(f"{name} ({first.n:,})", dots, 100 * first.guess))
+    return dots_chart(
+        DotsChart(
+            title=f"{task}: accuracy by form, beside guessing",
+            caption=(
+                "A row is a form of question, with the number of those answered in parentheses: "
+                "dots to the right of the dashed line know more than the best guesser."
+            ),
+            axis=f"{lines[0].metric} (%)",
+            label="form",
+            series=[line.series for line in lines],
+            rows=rows,
+            description=_describe(lines),
+        )
+    )
 
 
 def _describe(lines: Sequence[_Line]) -> str:
     """Return the totals in words."""
-    totals = ((line.label, mean_cell(line.task.total, line.metric, 1)) for line in lines)
+    totals = ((line.series.name, mean_cell(line.task.total, line.metric, 1)) for line in lines)
     return "; ".join(f"{label} {mean} %" for label, mean in totals)
 
 
@@ -195,7 +198,8 @@ def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
         total = gain.total()
         if gain.metric == main_metric(gain.seeing) and total is not None:
             rows.append((f"{name_of(gain.run)}, {gain.task}", total))
-    return _by_rows("Gain over blank frames", rows, "gain, in points, and its 95 % interval")
+    caption = "Dots to the right of 0 gain by seeing the frames; lines are 95 % intervals."
+    return _by_rows("Gain over blank frames", caption, rows, "gain, in points")
 
 
 def _above_guessing_chart(runs: Sequence[ReportRun]) -> Chart | None:
@@ -207,40 +211,41 @@ def _above_guessing_chart(runs: Sequence[ReportRun]) -> Chart | None:
         if (above := task.above_guessing.get(main_metric(task))) is not None
         and above.mean is not None
     ]
-    return _by_rows("Above guessing", rows, "% above guessing, and 95 % interval")
+    caption = "0 is the best guesser, 100 all right; lines are 95 % intervals."
+    return _by_rows("Above guessing", caption, rows, "% above guessing")
 
 
 def _by_rows(
-    title: str, rows: Sequence[tuple[str, MeanEstimate | AboveGuessing]], label: str
+    title: str, caption: str, rows: Sequence[tuple[str, MeanEstimate | AboveGuessing]], axis: str
 ) -> Chart | None:
-    """Draw a row with a dot for each value, around a line at 0; None without rows."""
+    """Draw a row with a dot for each value, around 0; None without rows."""
     if not rows:
         return None
-
-    def draw() -> Figure:
-        figure = Figure(
-            figsize=(_PANEL[0] + LEGEND, max(_PANEL[1], 0.8 + _ROW * len(rows))),
-            layout="constrained",
-        )
-        axes = figure.subplots()
-        axes.axvline(0, color="#444444", lw=0.8)
-        for height, (_, value) in enumerate(reversed(rows)):
-            _dot(axes, value, height, _GAIN, is_flat=True)
-        axes.set_yticks(range(len(rows)), [printable(name)[:60] for name, _ in reversed(rows)])
-        axes.set_ylim(-0.6, len(rows) - 0.4)
-        low, high = axes.get_xlim()
-        # Nothing at all would be drawn on a scale of hundredths.
-        axes.set_xlim(min(low, -5), max(high, 5))
-        axes.set_xlabel(label)
-        axes.grid(axis="y", visible=False)
-        return figure
-
     description = "; ".join(f"{name} {100 * (value.mean or 0):+.1f}" for name, value in rows)
-    return Chart(title, inline_svg(draw), description)
+    drawn = [DotRow(name, (dot_of(value),)) for name, value in rows]
+    # Nothing at all would be drawn on a scale of hundredths.
+    limits = (-5.0, 5.0)
+    series = (Series("value"),)
+    return dots_chart(
+        DotsChart(
+            title,
+            caption,
+            axis,
+            "run and task",
+            series,
+            drawn,
+            limits=limits,
+            description=description,
+        )
+    )
 
 
 def _heat_map(run: ReportRun) -> Chart | None:
     """Draw accuracy by depth of the needle and context size; None if no task has depths."""
+    from matplotlib.figure import Figure
+
+    from infthor_eval.report.figures.style import inline_svg
+
     tasks: dict[int, TaskSummary] = {}
     for name, task in run.summary.summary.tasks.items():
         if any(variant.startswith(_DEPTH) for variant in task.by_variant):
@@ -256,7 +261,7 @@ def _heat_map(run: ReportRun) -> Chart | None:
     for depth in depths:
         means.append([_percent(tasks[size].by_variant.get(depth), metric) for size in sizes])
 
-    def draw() -> Figure:
+    def draw() -> "Figure":
         figure = Figure(
             figsize=(2.2 + 0.9 * len(sizes), 1.4 + 0.5 * len(depths)), layout="constrained"
         )
@@ -269,7 +274,7 @@ def _heat_map(run: ReportRun) -> Chart | None:
                 ink = "white" if value > 55 else "#222222"
                 text = "-" if math.isnan(value) else f"{value:.0f}"
                 axes.text(column, row, text, ha="center", va="center", color=ink)
-        axes.set_xticks(range(len(sizes)), [f"{size}K" if size else "all" for size in sizes])
+        axes.set_xticks(range(len(sizes)), list(map(_size, sizes)))
         axes.set_yticks(range(len(depths)), [depth.removeprefix(_DEPTH) for depth in depths])
         axes.set_xlabel("context (thousand tokens)")
         axes.set_ylabel("depth of the needle")
@@ -280,7 +285,24 @@ def _heat_map(run: ReportRun) -> Chart | None:
         f"{run.label}: accuracy by depth and size of the context",
         inline_svg(draw),
         "see the table by depth",
+        f"Darker is better: {metric} in percent, by where the needle is and how long the context.",
+        _heat_table(depths, sizes, means),
     )
+
+
+def _heat_table(
+    depths: Sequence[str], sizes: Sequence[int], means: Sequence[Sequence[float]]
+) -> Table:
+    columns = (Column("depth", False), *(Column(_size(size)) for size in sizes))
+    rows = []
+    for depth, values in zip(depths, means, strict=True):
+        cells = ("-" if math.isnan(value) else f"{value:.2f}" for value in values)
+        rows.append(Row((depth.removeprefix(_DEPTH), *cells)))
+    return Table("", columns, tuple(rows))
+
+
+def _size(size: int) -> str:
+    return f"{size}K" if size else "all"
 
 
 def _percent(cell: Cell | None, metric: str) -> float:

@@ -4,7 +4,7 @@ Of twins: the clues, and frames that differ between both worlds; the same ones o
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import msgspec
@@ -15,12 +15,13 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import LoggedPose, Step, read_steps
 from infthor_eval.formats.twins import TwinPair
+from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.report.presenter import Timelines
 from infthor_eval.report.runs import ReportRun, choose_evenly, records_by_unit
 from infthor_eval.report.suites.nieh_sets import RunSets
 from infthor_eval.report.web.samples import FrameFacts, Numbered, Timeline, TimelineFrame
 from infthor_eval.report.web.thumbnails import ThumbnailStore
-from infthor_eval.runs import UnitKey
+from infthor_eval.runs import UnitKey, UnitRecord
 
 __all__ = ["find_timelines"]
 
@@ -46,17 +47,25 @@ def find_timelines(
             continue
         try:
             facts_of_frames = logs.read(opened.folder(question.traj_id))
-            chosen[key] = _choose_frames(opened, question, facts_of_frames)
+            choice = _choose_frames(opened, question, facts_of_frames)
+            chosen[key] = replace(choice, recalled=_recalled(records) - choice.shown)
         # The question was skipped or failed for it, and its record has the reason.
         except DataError:
             continue
     thumbnails.expect(
         len(
-            {choice.frames[at] for choice in chosen.values() for at in choice.clues | choice.others}
+            {
+                choice.frames[at]
+                for choice in chosen.values()
+                for at in choice.shown | choice.recalled
+            }
         )
     )
     for choice in chosen.values():
         for index in sorted(choice.clues):
+            _picture(choice.frames[index], thumbnails)
+    for choice in chosen.values():
+        for index in sorted(choice.others):
             _picture(choice.frames[index], thumbnails)
     notes = [f"{task}: no frames are shown: {problem}" for task, problem in sets.problems.items()]
     facts = Numbered[FrameFacts]()
@@ -73,6 +82,7 @@ class _FrameChoice:
         facts: what the set's log says of each of them.
         clues: indices of the clues.
         others: indices of further frames.
+        recalled: indices of frames beyond these that a memory recalled.
         changed: types of what is in view and differs from the twin's frame, by the frame's index,
             for all frames whose pictures differ.
     """
@@ -82,6 +92,12 @@ class _FrameChoice:
     clues: frozenset[int]
     others: frozenset[int]
     changed: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
+    recalled: frozenset[int] = frozenset()
+
+    @property
+    def shown(self) -> frozenset[int]:
+        """Indices of the clues and the further frames."""
+        return self.clues | self.others
 
 
 class _TrajectoryFacts:
@@ -112,6 +128,18 @@ def _choose_frames(data: NiehSet, question: Question, facts: Sequence[FrameFacts
     return _FrameChoice(frames, facts, clues, frozenset(others - clues))
 
 
+def _recalled(records: Sequence[UnitRecord[NiehAnswer] | None]) -> frozenset[int]:
+    """Return the indices of the frames that the runs' memories recalled for a question."""
+    recalls = [
+        record.payload.recall
+        for record in records
+        if record is not None and record.payload.recall is not None
+    ]
+    return frozenset(
+        part for recall in recalls for part in recall.recalled if isinstance(part, int)
+    )
+
+
 def _changed(pair: TwinPair, traj_id: str) -> dict[int, tuple[str, ...]]:
     """Return the types of what differs in one world's frames, by the indices of those frames."""
     is_first = traj_id == pair.traj_ids[0]
@@ -126,24 +154,24 @@ def _changed(pair: TwinPair, traj_id: str) -> dict[int, tuple[str, ...]]:
 def _timeline(
     choice: _FrameChoice, thumbnails: ThumbnailStore, facts: Numbered[FrameFacts]
 ) -> Timeline:
-    frames = []
-    for index in sorted(choice.clues | choice.others):
+    def frame(index: int) -> TimelineFrame:
         known = msgspec.structs.replace(choice.facts[index], changed=choice.changed.get(index, ()))
-        frames.append(
-            TimelineFrame(
-                index,
-                _picture(choice.frames[index], thumbnails),
-                index in choice.clues,
-                index in choice.changed,
-                facts.number(known),
-            )
+        return TimelineFrame(
+            index,
+            _picture(choice.frames[index], thumbnails),
+            index in choice.clues,
+            index in choice.changed,
+            facts.number(known),
         )
+
     note = (
         ""
         if choice.clues
         else "absence question: no frame is evidence, so five frames are shown, evenly spaced"
     )
-    return Timeline(len(choice.frames), tuple(frames), note)
+    frames = tuple(map(frame, sorted(choice.shown)))
+    recalled = tuple(map(frame, sorted(choice.recalled)))
+    return Timeline(len(choice.frames), frames, note, recalled)
 
 
 def _picture(frame: FrameRef, thumbnails: ThumbnailStore) -> int | None:

@@ -15,11 +15,12 @@ from infthor_eval.report.figures.style import (
     Look,
     add_legend,
     add_words,
-    inline_svg,
     looks_of,
 )
 from infthor_eval.report.presenter import FigureRequest, FigureResult
 from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.svg.dots import DotRow, DotsChart, dot_of, dots_chart
+from infthor_eval.report.svg.drawing import Series
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.tables import Column, Row, Table
 
@@ -37,6 +38,11 @@ class _Line(NamedTuple):
     label: str
     pairs: PairSummary
     look: Look
+    place: int
+
+    @property
+    def series(self) -> Series:
+        return Series(self.label, self.place)
 
 
 def pairs_section(runs: Sequence[ReportRun]) -> Section | None:
@@ -86,8 +92,8 @@ def _lines(runs: Sequence[ReportRun], task: str) -> list[_Line]:
     looks = looks_of(run.label for run in runs)
     summaries = [(run.label, run.summary.summary.tasks.get(task)) for run in runs]
     return [
-        _Line(label, summary.pairs, looks[label])
-        for label, summary in summaries
+        _Line(label, summary.pairs, looks[label], place)
+        for place, (label, summary) in enumerate(summaries)
         if summary is not None and summary.pairs is not None
     ]
 
@@ -99,20 +105,31 @@ def _classes(curve: PairCurve, lines: Sequence[_Line]) -> list[str]:
 
 
 def _chart(task: str, curve: PairCurve, names: Sequence[str], lines: Sequence[_Line]) -> Chart:
-    def draw() -> Figure:
-        figure = Figure(figsize=(_PANEL[0] + LEGEND, _PANEL[1]), layout="constrained")
-        axes = figure.subplots()
-        _draw(axes, curve, names, lines)
-        add_legend(axes, [(line.label, line.look) for line in lines])
-        return figure
-
+    rates = [curve.rates(line.pairs) for line in lines]
     described = []
-    for line in lines:
-        rates = curve.rates(line.pairs)
-        texts = [f"{100 * rates[name].mean:.1f} % at {name}" for name in names if name in rates]
+    for line, of_line in zip(lines, rates, strict=True):
+        texts = [f"{100 * of_line[name].mean:.1f} % at {name}" for name in names if name in of_line]
         described.append(f"{line.label} {', '.join(texts)}")
-    title = f"{task}: pairs of twins right, by {curve.title}"
-    return Chart(title, inline_svg(draw), "; ".join(described))
+    rows = []
+    for name in names:
+        known = [of_line.get(name) for of_line in rates]
+        n = next(rate.n for rate in known if rate is not None)
+        dots = [None if rate is None else dot_of(rate, rate.n) for rate in known]
+        rows.append(DotRow(f"{name} ({n:,})", dots))
+    return dots_chart(
+        DotsChart(
+            title=f"{task}: pairs of twins right, by {curve.title}",
+            caption=(
+                "A row is a class of pairs, with their number in parentheses; a dot is a run, its "
+                "line the 95 % interval; who does not see the difference has 0."
+            ),
+            axis="pairs right (%)",
+            label=curve.title,
+            series=[line.series for line in lines],
+            rows=rows,
+            description="; ".join(described),
+        )
+    )
 
 
 def _draw(axes: Axes, curve: PairCurve, names: Sequence[str], lines: Sequence[_Line]) -> None:

@@ -17,6 +17,7 @@ from infthor_eval.plans.summary import PlansSummary
 from infthor_eval.plans.twins.results import score_pairs
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
+    PAIRS_FINDING,
     Description,
     EpisodeSelection,
     Figure,
@@ -103,6 +104,7 @@ class PlansPresenter(PlainPresenter):
 
     title = "Plans"
     measure = "plans completed"
+    finding = "completes {} of the plans"
     target_label = "goal"
     reply_label = "ended"
     main_metric = "success"
@@ -123,6 +125,10 @@ class PlansPresenter(PlainPresenter):
     def measure_of(self, task: str, summary: PlansSummary) -> str:
         """See `Presenter.measure_of`: of twins, pairs count."""
         return self.measure if summary.tasks[task].twins is UNSET else "pairs right"
+
+    def finding_of(self, task: str, summary: PlansSummary) -> str:
+        """See `Presenter.finding_of`."""
+        return self.finding if summary.tasks[task].twins is UNSET else PAIRS_FINDING
 
     def group_scores(self, records: Sequence[Record]) -> Iterator[GroupScore]:
         """See `Presenter.group_scores`: whether the place looked at first is right in both

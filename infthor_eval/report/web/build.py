@@ -9,17 +9,20 @@ from pathlib import Path
 import infthor_eval
 from infthor_eval.errors import DataError
 from infthor_eval.report.comparison import compare, comparison_table
+from infthor_eval.report.headline.results import TaskResult, task_results
+from infthor_eval.report.headline.sentence import headline
+from infthor_eval.report.headline.tables import cost_chart, results_chart, results_table
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.web.page import About, Page, SuiteLabels
 from infthor_eval.report.web.progress import PageProgress, Silent
 from infthor_eval.report.web.replays import EpisodeReplays
-from infthor_eval.report.web.run_tables import costs_table, left_out_table, primary_metrics_table
+from infthor_eval.report.web.run_tables import costs_table, left_out_table
 from infthor_eval.report.web.sample_list import SharedTexts, build_samples
 from infthor_eval.report.web.samples import PageSample
 from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 
-__all__ = ["PageRequest", "build_page"]
+__all__ = ["PageRequest", "build_page", "results_section"]
 
 _SUMMARIES = "runs summarised"
 _FEW = 4  # runs of which each is compared with each
@@ -35,12 +38,14 @@ class PageRequest:
         scenes: folder of recorded floor plans, for replays.
         episodes: number of episodes of each run to replay.
         pictures: maximum size of all pictures together, in bytes.
+        is_packed: see `Page`.
     """
 
     data: Path | None = None
     scenes: Path | None = None
     episodes: int = 12
     pictures: int = 15_000_000
+    is_packed: bool = False
 
 
 def build_page(
@@ -58,11 +63,17 @@ def build_page(
         by_suite.setdefault(run.suite.name, []).append(run)
         _ = run.summary  # computed once, here, where it is seen to take its time
         progress.advance(_SUMMARIES, run.label)
-    sections = [Section("results", "Results", tables=(primary_metrics_table(runs),))]
+    results = [
+        result for place, run in enumerate(runs) for result in task_results(run, f"#run-{place}")
+    ]
+    sections = [results_section(results)]
     for same in by_suite.values():
         sections += _suite_sections(same)
     sections += _comparisons(by_suite.values())
-    sections.append(Section("cost", "Speed and cost", tables=(costs_table(runs),)))
+    costs = cost_chart(results)
+    sections.append(
+        Section("cost", "Speed and cost", () if costs is None else (costs,), (costs_table(runs),))
+    )
     left_out = left_out_table(runs)
     if left_out is not None:
         sections.append(Section("left-out", "Failed, not asked, skipped", tables=(left_out,)))
@@ -82,6 +93,8 @@ def build_page(
         notes.append(f"{thumbnails.n_left_out:,} pictures left out, to keep the page small")
     return Page(
         title=_title(runs),
+        is_packed=request.is_packed,
+        footnote=_footnote(runs),
         version=infthor_eval.__version__,
         runs=[_about(run) for run in runs],
         suites={name: _labels(runs, same) for name, same in by_suite.items()},
@@ -94,12 +107,35 @@ def build_page(
         frames=texts.frames.values,
         prompts=texts.prompts.values,
         tracebacks=texts.tracebacks.values,
+        explanations=texts.explanations.values,
+    )
+
+
+def results_section(results: Sequence[TaskResult]) -> Section:
+    """Return the section that a page opens with."""
+    chart = results_chart(results)
+    return Section(
+        "results",
+        "Results",
+        () if chart is None else (chart,),
+        (results_table(results),),
+        lead=headline(results),
+        is_sortable=True,
     )
 
 
 def _title(runs: Sequence[PresentedRun]) -> str:
     names = ", ".join(run.label for run in runs)
     return names if len(names) <= 60 else f"{len(runs)} runs"
+
+
+def _footnote(runs: Sequence[PresentedRun]) -> str:
+    """Return the remark on the runs of the page in the embedded simulator; empty without any."""
+    embedded = [run.label for run in runs if "embedded" in run.header.config.simulators]
+    if not embedded:
+        return ""
+    which = "" if len(embedded) == len(runs) else f" ({', '.join(embedded)})"
+    return f"Numbers from the embedded simulator{which} are not comparable with published ones."
 
 
 def _suite_sections(runs: Sequence[PresentedRun]) -> Iterator[Section]:

@@ -1,7 +1,12 @@
-"use strict";
 // What the parts of the browser of samples share. Whatever the data hold is put into the page as text, never as markup.
 const byId = id => document.getElementById(id);
-const { runs, suites, metrics, samples, details, pictures, large, frames, prompts, tracebacks } = JSON.parse(byId("data").textContent);
+// A page of an index has its data compressed.
+const dataOf = async ({ dataset, textContent }) => {
+  if (dataset.packed === undefined) return textContent;
+  const packed = new Blob([Uint8Array.from(atob(textContent), letter => letter.charCodeAt(0))]);
+  return new Response(packed.stream().pipeThrough(new DecompressionStream("deflate"))).text();
+};
+const { runs, suites, metrics, samples, details, pictures, large, frames, prompts, tracebacks, explanations } = JSON.parse(await dataOf(byId("data")));
 const MARKS = { right: "✓", partly: "◐", wrong: "✗", failed: "!", "not asked": "·", excluded: "–" };
 
 const make = (name, attributes = {}, ...children) => {

@@ -1,19 +1,23 @@
 """The page itself: a file that needs no others."""
 
+import base64
 import json
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import resources
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import msgspec
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.pages.policy import file_policy
+from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.web.samples import FrameFacts, Numbered, PageSample, Prompt
 from infthor_eval.report.web.sections import Section
 from infthor_eval.storage.files import write_atomically
@@ -21,13 +25,17 @@ from infthor_eval.storage.files import write_atomically
 __all__ = ["About", "Page", "SuiteLabels", "write_page"]
 
 _SCRIPTS = (
+    "theme.js",
+    "tables.js",
     "elements.js",
     "address.js",
     "enlarged.js",
     "prompts.js",
     "blink.js",
     "group.js",
+    "answers.js",
     "sample.js",
+    "orders.js",
     "report.js",
 )  # one script on the page, in this order
 
@@ -85,15 +93,18 @@ class Page:
         version: version of the package that built it.
         runs: settings of the runs.
         suites: how samples are shown, by suite.
-        sections: tables and charts; the first section is above the runs.
+        sections: tables and charts; the first section answers what the page is opened for.
         samples: samples for the browser.
         metrics: names of the metrics, those that decide the outcome first.
         pictures: WebP in base64, by their numbers in the samples.
         notes: remarks on the samples.
+        is_packed: whether the data of the samples are compressed, to a sixth of their size.
+        footnote: a remark at the end, on what the numbers are not comparable with; empty for none.
         large: number of the enlarged picture by that of its thumbnail.
         frames: what is known of frames, by their numbers in the samples.
         prompts: requests as they were sent, by their numbers in the samples.
         tracebacks: tracebacks of failures, by their numbers in the samples.
+        explanations: why replies got their scores, by their numbers in the samples.
     """
 
     title: str
@@ -105,10 +116,13 @@ class Page:
     metrics: Sequence[str]
     pictures: Sequence[str]
     notes: Sequence[str] = ()
+    is_packed: bool = False
+    footnote: str = ""
     large: Mapping[int, int] = field(default_factory=dict)
     frames: Sequence[FrameFacts] = ()
     prompts: Sequence[Prompt] = ()
     tracebacks: Sequence[str] = ()
+    explanations: Sequence[str] = ()
 
 
 def write_page(page: Page, path: Path) -> int:
@@ -119,17 +133,14 @@ def write_page(page: Page, path: Path) -> int:
     """
     style = _read("report.css")
     script = "".join(map(_read, _SCRIPTS))
-    # Questions and replies come from data files and models: whatever they hold is shown as text.
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    text = environment.from_string(_read("report.html")).render(
+    text = _template().render(
         page=page,
         css=Markup(style),
         js=Markup(script),
         policy=Markup(file_policy(style=style, script=script)),
         data=_data(page),
         svg=Markup,
+        csv=lambda table: export_tables([table], "csv"),
     )
     encoded = text.encode("utf-8", "backslashreplace")
     with (
@@ -138,6 +149,15 @@ def write_page(page: Page, path: Path) -> int:
     ):
         partial.write_bytes(encoded)
     return len(encoded)
+
+
+@cache
+def _template() -> Template:
+    # Questions and replies come from data files and models: whatever they hold is shown as text.
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.from_string(_read("report.html"))
 
 
 def _read(name: str) -> str:
@@ -158,10 +178,13 @@ def _data(page: Page) -> Markup:
         "frames": msgspec.to_builtins(page.frames),
         "prompts": msgspec.to_builtins(page.prompts),
         "tracebacks": list(page.tracebacks),
+        "explanations": list(page.explanations),
     }
     text = json.dumps(document, ensure_ascii=False, separators=(",", ":"))
     for letter, escaped in _ESCAPED.items():
         text = text.replace(letter, escaped)
+    if page.is_packed:
+        text = base64.b64encode(zlib.compress(text.encode("utf-8", "backslashreplace"))).decode()
     return Markup(text)
 
 

@@ -1,18 +1,5 @@
-// The page: light or dark, and the browser of samples with its filters, its list and its keys.
+// The browser of samples with its filters, its list and its keys.
 (() => {
-  const root = document.documentElement;
-  const toggleTheme = () => {
-    const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-    root.dataset.theme = dark ? "light" : "dark";
-  };
-  byId("theme").addEventListener("click", toggleTheme);
-  // Tables that are wider than the page say that they scroll.
-  const markWide = (part = document) => {
-    for (const scroll of part.querySelectorAll(".scroll")) {
-      scroll.toggleAttribute("data-wide", scroll.scrollWidth > scroll.clientWidth);
-    }
-  };
-  addEventListener("resize", () => markWide());
   if (!byId("samples")) {
     markWide();
     addEventListener("keydown", event => { if (event.key === "t") toggleTheme(); });
@@ -31,10 +18,17 @@
   fill("kind", distinct("kind"), "all");
   fill("clues", distinct("clues"), "all");
   fill("run", runs.map((label, at) => [String(at), label]), "any");
+  fill("against", runs.map((label, at) => [String(at), label]), "-");
+  fill("sort", [...Object.keys(ORDERS), ...metrics].map(name => [name, name]), "as asked");
   fill("outcome", Object.keys(MARKS).map(name => [name, name]), "all");
   if (metrics.length < 2 || !Object.values(suites).some(labels => labels.compares_scorers)) byId("disagree").parentElement.hidden = true;
   if (runs.length < 2) byId("differ").parentElement.hidden = true;
 
+  // Two runs disagree where the outcomes of a question differ, in whichever context each was asked it.
+  const outcomesOf = (sample, at) => sample.results[at] ? [sample.results[at].outcome]
+    : sameQuestion(sample).map(({ results }) => results[at]?.outcome).filter(Boolean);
+  const disagreeOn = (sample, one, other) => Boolean(sample.results[one] ?? sample.results[other])
+    && outcomesOf(sample, one).some(outcome => outcomesOf(sample, other).some(theirs => theirs !== outcome));
   const disagrees = result => {
     const scores = metrics.map(name => result.scores?.[name]).filter(score => score !== undefined);
     return new Set(scores).size > 1;
@@ -56,7 +50,7 @@
   // The tests of the filters that are set. They are read once, not for each of many thousand samples; the search is
   // last, as it takes longest.
   const setFilters = () => {
-    const [task, kind, clues, run, outcome] = ["task", "kind", "clues", "run", "outcome"].map(id => byId(id).value);
+    const [task, kind, clues, run, against, outcome] = ["task", "kind", "clues", "run", "against", "outcome"].map(id => byId(id).value);
     const wanted = byId("search").value.trim().toLowerCase();
     const of = run === "" ? resultsOf : sample => [sample.results[Number(run)]].filter(Boolean);
     return [
@@ -65,6 +59,7 @@
       clues && (sample => sample.clues === clues),
       run && (sample => sample.results[Number(run)]),
       outcome && (sample => of(sample).some(result => result.outcome === outcome)),
+      against && (sample => (run === "" ? runs.map((_, at) => at) : [Number(run)]).some(at => disagreeOn(sample, at, Number(against)))),
       byId("disagree").checked && (sample => suites[sample.suite].compares_scorers && membersOf(sample).flatMap(of).some(disagrees)),
       byId("differ").checked && (sample => new Set(ofSuite(sample).map(([result]) => result?.outcome)).size > 1),
       wanted && contains(wanted),
@@ -105,10 +100,12 @@
     if (clicked) choose(Number(clicked.dataset.place));
   });
 
-  const filter = setsAddress => {
+  const filter = (setsAddress, fromTop = false) => {
     const tests = setFilters();
-    const before = shown[chosen];
-    shown = [...samples.keys()].filter(at => tests.every(test => test(samples[at], at)));
+    const before = fromTop ? undefined : shown[chosen];
+    const order = orderOf(byId("sort").value, byId("run").value, byId("descending").checked);
+    shown = tests.length ? order.filter(at => tests.every(test => test(samples[at], at))) : order;
+    byId("descending").parentElement.hidden = !byId("sort").value;
     byId("count").textContent = `${shown.length} of ${samples.length}`;
     chosen = -1;
     list.scrollTop = 0;
@@ -169,10 +166,10 @@
     event.preventDefault();
   });
   // An address that the page has is that of the sample shown; a page without one gets it with the first choice.
-  const filterAnew = () => filter(hasAddress());
+  const filterAnew = ({ target }) => filter(hasAddress(), ["sort", "descending"].includes(target.id)); // another order begins at its top
   byId("filters").addEventListener("input", filterAnew);
   byId("filters").addEventListener("submit", event => event.preventDefault());
-  byId("filters").addEventListener("reset", () => setTimeout(filterAnew)); // the fields have their values after the event
+  byId("filters").addEventListener("reset", () => setTimeout(() => filter(hasAddress()))); // the fields have their values after the event
   addEventListener("hashchange", openAddressed);
   filter(false);
   openAddressed();

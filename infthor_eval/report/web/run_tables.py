@@ -1,44 +1,16 @@
-"""Tables of all runs: primary metrics, costs, and what was left out."""
+"""Tables of all runs: costs, and what was left out."""
 
 from collections.abc import Iterator, Sequence
 
-from infthor_eval.rates import Rate
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.presented import PresentedRun
-from infthor_eval.runs import TaskConfig, UnitCounts
-from infthor_eval.tables import Column, Row, Table, answered_cell, interval_cell
+from infthor_eval.runs import TaskConfig
+from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["costs_table", "left_out_table", "primary_metrics_table"]
+__all__ = ["costs_table", "left_out_table"]
 
 _NAMES = (Column("run", False), Column("task", False))
 _MEASURABLE_S = 0.05  # less is the clock's noise: baselines take microseconds
-
-
-def primary_metrics_table(runs: Sequence[PresentedRun]) -> Table:
-    """Return the primary metric of each run and task, with a row for each."""
-    rows = []
-    for run in runs:
-        summary = run.summary.summary
-        rates = run.suite.primary_metrics(summary)
-        for task, rate in rates.items():
-            measure = run.presenter.measure_of(task, summary)
-            rows.append(Row((run.label, task, measure, *_cells(rate), str(rate.n_all or rate.n))))
-        for task, counts in run.summary.units.items():
-            if task not in rates and not counts.is_whole:
-                rows.append(Row((run.label, task, run.presenter.measure, *_no_score(counts))))
-    columns = (*_NAMES, Column("measure", False), *map(Column, ("%", "95 % interval", "samples")))
-    return Table("", columns, tuple(rows))
-
-
-def _cells(rate: Rate) -> tuple[str, str]:
-    low, high = (None if end is None else 100 * end for end in (rate.low, rate.high))
-    mean = answered_cell(f"{100 * rate.mean:.1f}", rate.n, rate.n_all or rate.n)
-    return mean, interval_cell(low, high, pattern="{}–{}")
-
-
-def _no_score(counts: UnitCounts) -> tuple[str, str, str]:
-    n_all = counts.answered + counts.failed + counts.not_asked
-    return answered_cell("", 0, n_all), interval_cell(None, None), str(n_all)
 
 
 def costs_table(runs: Sequence[PresentedRun]) -> Table:

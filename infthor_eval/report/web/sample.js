@@ -9,6 +9,7 @@ const partsOf = sample => {
     make("div", { class: "head" }, make("h3", {}, sample.title), linkTo(sample)),
     ...targets(sample),
     sample.members ? groupResults(sample) : results(sample),
+    ...answers(sample),
     ...shown,
     ...ofEach(episodes),
     ...ofEach((member, name) => folded(name && `Further facts, ${name}`, detailRows(member))),

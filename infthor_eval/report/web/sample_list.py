@@ -51,6 +51,7 @@ class SharedTexts:
 
     prompts: Numbered[Prompt] = field(default_factory=Numbered)
     tracebacks: Numbered[str] = field(default_factory=Numbered)
+    explanations: Numbered[str] = field(default_factory=Numbered)
     frames: Numbered[FrameFacts] = field(default_factory=Numbered)
 
 
@@ -115,6 +116,10 @@ class _Source:
         text = "" if record.failure is None else self.tracebacks.find(record.key, record.attempt)
         return self.texts.tracebacks.number(text) if text else None
 
+    def explanation(self, record: Record) -> int | None:
+        lines = self.run.presenter.explain(record)
+        return self.texts.explanations.number("\n".join(lines)) if lines else None
+
 
 def _sample(
     key: UnitKey,
@@ -162,6 +167,8 @@ def _result(source: _Source, record: Record, pictures: EpisodePictures) -> Sampl
         note=pictures.note,
         prompt=source.prompt(record),
         traceback=source.traceback(record),
+        why=source.explanation(record),
+        recalled=tuple(presenter.recalled(record)),
     )
 
 

@@ -84,21 +84,26 @@ class Timeline(msgspec.Struct, frozen=True, omit_defaults=True):
         n_frames: number of frames of the trajectory.
         frames: the shown ones in time order.
         note: a remark on the choice of frames.
+        recalled: further ones, which some run's memory recalled.
     """
 
     n_frames: int
     frames: tuple[TimelineFrame, ...] = ()
     note: str = ""
+    recalled: tuple[TimelineFrame, ...] = ()
 
     def renumbered(self, numbers: Sequence[int]) -> "Timeline":
         """Return the same timeline, with other numbers of facts."""
-        frames = (
-            frame
-            if frame.facts is None
-            else msgspec.structs.replace(frame, facts=numbers[frame.facts])
-            for frame in self.frames
+
+        def renumber(frame: TimelineFrame) -> TimelineFrame:
+            if frame.facts is None:
+                return frame
+            return msgspec.structs.replace(frame, facts=numbers[frame.facts])
+
+        frames = tuple(map(renumber, self.frames))
+        return msgspec.structs.replace(
+            self, frames=frames, recalled=tuple(map(renumber, self.recalled))
         )
-        return msgspec.structs.replace(self, frames=tuple(frames))
 
 
 class PromptFrames(msgspec.Struct, frozen=True):
@@ -171,6 +176,8 @@ class SampleResult(msgspec.Struct, frozen=True, omit_defaults=True):
         note: how the replay differs from the recorded episode.
         prompt: number of the request among the prompts of the page; None if the suite shows none.
         traceback: number of the failure's traceback among those of the page; None if there is none.
+        why: number of the explanation of its scores among those of the page; None if there is none.
+        recalled: what a memory recalled: places of frames in the trajectory, and texts.
     """
 
     outcome: str
@@ -187,6 +194,8 @@ class SampleResult(msgspec.Struct, frozen=True, omit_defaults=True):
     note: str = ""
     prompt: int | None = None
     traceback: int | None = None
+    why: int | None = None
+    recalled: tuple[int | str, ...] = ()
 
 
 class PageSample(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -15,11 +15,15 @@ class Chart:
         title: heading of the chart.
         svg: the chart as an SVG element.
         description: contents in words, for screen readers.
+        caption: how it is read, in a sentence.
+        table: its numbers; None if a table of the page has them.
     """
 
     title: str
     svg: str
     description: str
+    caption: str = ""
+    table: Table | None = None
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,8 @@ class Section:
         charts: charts, above the tables.
         tables: tables with the numbers.
         notes: remarks, a paragraph each.
+        lead: what it says, in sentences, above all else.
+        is_sortable: whether a click on a column's heading sorts its tables.
         is_linked: whether the head of the page has a link to it; parts of another section have
             none.
     """
@@ -41,6 +47,8 @@ class Section:
     charts: tuple[Chart, ...] = ()
     tables: tuple[Table, ...] = ()
     notes: tuple[str, ...] = ()
+    lead: str = ""
+    is_sortable: bool = False
     is_linked: bool = True
 
     @property

@@ -78,7 +78,7 @@ def test_misuse_is_one_line(folders, tmp_path, run_cli):
         "--task: is for a figure; give --figure too, or leave it out",
     )
     assert_refused(
-        run_cli("report", *folders, "--out", tmp_path / "page"),
+        run_cli("report", *folders, "--out", tmp_path / "page.txt"),
         "the page is an .html file; name one",
     )
     assert_refused(run_cli("report", "--figure", "7"), "RUN...")
@@ -154,3 +154,39 @@ def test_what_is_no_run_is_skipped_and_said(make_nieh_set, tmp_path, run_cli):
         run_cli("show", tmp_path / "nope"), "nope: no such folder; `infthor-eval ls runs`"
     )
     assert_refused(run_cli("show", tmp_path / "out"), f"give the folder of a run, such as {run}")
+
+
+def test_a_folder_of_runs_becomes_an_index_with_a_page_for_each(folders, tmp_path, run_cli):
+    broken = tmp_path / "results" / "broken" / "journal"
+    broken.mkdir(parents=True)
+    (broken / "worker-0.jsonl").write_text("no header\n")
+    out = tmp_path / "index"
+    code, output, err = run_cli("report", tmp_path / "results", "--out", out)
+    assert code == 0
+    assert re.fullmatch(r"3 runs, [\d.]+ MB: .*index.html", output.strip().replace("\n", ""))
+    assert f"{broken.parent}: not read: " in err
+    index = (out / "index.html").read_text()
+    links = re.findall(r'<a href="(runs/[^"]+)">', index)
+    assert len(links) == 3
+    assert "Not read" in index and str(broken.parent) in index
+    for link in links:
+        page = (out / link).read_text()
+        assert "data-packed" in page and "1 run" not in page
+    assert "planner" in (out / links[-1]).read_text()
+
+
+def test_a_folder_of_runs_can_be_one_page(folders, tmp_path, run_cli):
+    page = tmp_path / "page.html"
+    assert run_cli("report", tmp_path / "results", "--out", page, "--episodes", "0")[0] == 0
+    assert "3 runs" in page.read_text() or "m, n" in page.read_text()
+
+
+def test_the_table_of_runs_is_printed_for_a_paper(folders, run_cli):
+    code, output, err = run_cli("report", *folders, "--tables", "latex")
+    assert (code, err) == (0, "")
+    assert output.startswith(r"\begin{tabular}{lllrrrrrrr}")
+    assert output.count(r"plans completed") == 3
+    assert_refused(
+        run_cli("report", *folders, "--tables", "csv", "--figure", "7"),
+        "--tables: is not for a figure; leave out one of both",
+    )

@@ -65,9 +65,11 @@ def test_pictures_of_a_sample_load(page, open_page):
     tab = open_page(page).tab
     tab.locator("#sample").scroll_into_view_if_needed()
     tab.eval_on_selector_all(
-        "#sample img", "them => Promise.all(them.map(it => it.decode())).then(() => true)"
+        "#sample > .frames img", "them => Promise.all(them.map(it => it.decode())).then(() => true)"
     )
-    widths = tab.eval_on_selector_all("#sample img", "them => them.map(it => it.naturalWidth)")
+    widths = tab.eval_on_selector_all(
+        "#sample > .frames img", "them => them.map(it => it.naturalWidth)"
+    )
     assert len(widths) == len(page.samples[0].timeline.frames)
     assert all(width > 100 for width in widths)
 
@@ -81,7 +83,7 @@ def test_an_absence_has_five_frames_and_no_clue(page, open_page):
     )
     tab.fill("#search", page.samples[place].title)
     tab.select_option("#clues", "absence")
-    assert tab.locator("#sample .frames figure").count() == 5
+    assert tab.locator("#sample > .frames figure").count() == 5
     assert tab.locator("#sample .clue").count() == 0
     assert "no frame is evidence" in tab.locator("#sample").inner_text()
     assert "orange" not in tab.locator("#sample").inner_text()
@@ -212,7 +214,7 @@ def test_a_frame_opens_large_with_its_step_and_the_arrows_go_on(page, open_page)
     opened = open_page(page)
     tab, frames = opened.tab, page.samples[0].timeline.frames
     tab.fill("#search", page.samples[0].title)
-    tab.locator("#sample button.frame").nth(1).click()
+    tab.locator("#sample > .frames button.frame").nth(1).click()
     image = tab.locator("#enlarged img")
     image.evaluate("it => it.decode()")
     assert image.evaluate("it => it.naturalWidth") == 300  # the set's own size

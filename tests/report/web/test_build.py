@@ -1,10 +1,12 @@
 """What stands on the page of real runs."""
 
+import dataclasses
 import json
 import shutil
 from collections import Counter
 from itertools import pairwise
 
+import msgspec
 import pytest
 
 from infthor_eval.nieh.samples import open_set
@@ -15,6 +17,20 @@ from infthor_eval.storage.folders import packaged_folder
 from ...helpers.command_line import option_words
 
 DATA = packaged_folder("sets/nieh_mini")
+
+
+def replace_simulator(runs, simulator):
+    """The same runs, of a set that another simulator rendered."""
+    replaced = []
+    for run in runs:
+        tasks = {
+            name: msgspec.structs.replace(task, simulator=simulator)
+            for name, task in run.header.config.tasks.items()
+        }
+        config = msgspec.structs.replace(run.header.config, tasks=tasks)
+        header = msgspec.structs.replace(run.header, config=config)
+        replaced.append(dataclasses.replace(run, header=header))
+    return replaced
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +109,7 @@ def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path
     (questions,) = (section for section in page.sections if section.key == "nieh")
     (chart,) = (chart for chart in questions.charts if chart.title == "Gain over blank frames")
     assert chart.description == "oracle, nieh_mini_gt +0.0"
-    assert "95 % interval" in chart.svg
+    assert "95 % interval" in chart.caption
 
 
 def test_frames_that_there_is_no_room_for_are_counted_and_clues_come_first(make_page, nieh_runs):
@@ -138,6 +154,13 @@ def test_a_run_that_was_stopped_and_has_failures_says_so(make_page, nieh_runs, t
     assert facts["failed"] == ("1", "the frame is gone")
     assert facts["not asked"][0] == "3"
     assert sum(sample.results[0].outcome == "failed" for sample in page.samples) == 1
+
+
+def test_the_footer_names_the_embedded_simulator_only_where_it_was_used(page, make_page, nieh_runs):
+    embedded = [run for run in read_report_runs(nieh_runs) if "embedded" in run.simulator]
+    assert bool(embedded) == bool(page.footnote)
+    elsewhere = replace_simulator(read_report_runs(nieh_runs)[:1], None)
+    assert build_page(elsewhere, PageRequest(pictures=0)).footnote == ""
 
 
 def test_plans_have_their_steps_and_what_was_seen(make_page, scripted_run, scripted_data):

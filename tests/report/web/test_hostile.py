@@ -113,7 +113,7 @@ def test_the_report_of_hostile_runs_shows_text(
     for reply in REPLIES[:-1]:
         assert " ".join(reply.split()) in " ".join(shown.split())
     assert HOSTILE.split("\u2028")[0] in tab.locator("#runs").inner_text()
-    tab.locator("#sample button.frame").first.click()
+    tab.locator("#sample > .frames button.frame").first.click()
     assert HOSTILE.split("\u2028")[0] in tab.locator("#enlarged").inner_text()
     assert_only_text(opened)
 

@@ -29,9 +29,10 @@ def test_nothing_is_wider_than_the_page_and_every_section_has_its_link(phone, pa
     tab = phone(title="a title of a run with a name that is long " * 3)
     assert tab.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
     links = tab.locator("nav a")
-    assert links.all_inner_texts()[1:-1] == [
-        "Runs",
-        *(section.title for section in page.sections[1:]),
+    assert links.all_inner_texts() == [
+        *(section.title for section in page.sections),
+        "Samples",
+        "Settings of the runs",
     ]
     for at in range(links.count()):
         box = links.nth(at).bounding_box()
@@ -48,10 +49,26 @@ def test_replies_have_the_width_of_the_page_and_numbers_their_names(phone):
     assert name == '"strict "'
 
 
+def test_tables_are_a_block_a_row_with_every_column_on_the_screen(phone, page):
+    wide = Table("", tuple(Column(f"column {number}") for number in range(20)), (Row(("1",) * 20),))
+    tab = phone(sections=[Section("wide", "Wide", tables=(wide,)), *page.sections])
+    cells = tab.locator("#wide td")
+    boxes = [cells.nth(at).bounding_box() for at in range(cells.count())]
+    assert len(boxes) == 20
+    assert all(box["x"] >= 0 and box["x"] + box["width"] <= PHONE["width"] for box in boxes)
+    name = cells.nth(3).evaluate("it => getComputedStyle(it, '::before').content")
+    assert name == '"column 3 "'
+    charts = tab.locator("figure.chart svg")
+    for at in range(charts.count()):
+        box = charts.nth(at).bounding_box()
+        assert box["x"] >= 0 and box["x"] + box["width"] <= PHONE["width"]
+
+
 def test_tables_that_scroll_say_so(phone, page):
     wide = Table("", tuple(Column(f"column {number}") for number in range(20)), (Row(("1",) * 20),))
     narrow = Table("", (Column("column"),), (Row(("1",)),))
     tab = phone(sections=[Section("wide", "Wide", tables=(wide, narrow)), *page.sections])
+    tab.set_viewport_size({"width": 800, "height": 900})
     scrolls = tab.locator("#wide .scroll")
     tab.wait_for_selector("#wide .scroll[data-wide]")
     assert [scrolls.nth(at).get_attribute("data-wide") for at in range(2)] == ["", None]
@@ -72,10 +89,10 @@ def test_parts_of_a_section_have_no_link_and_long_titles_leave_room_for_the_othe
     ).tab
     assert [text[:7] for text in tab.locator("nav a").all_inner_texts()] == [
         "Results",
-        "Runs",
         "a title",
         "Last",
         "Samples",
+        "Setting",
     ]
     box = tab.locator("nav a").last.bounding_box()
     assert box["x"] + box["width"] < tab.locator("#theme").bounding_box()["x"]

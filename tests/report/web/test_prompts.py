@@ -74,10 +74,10 @@ def test_clues_that_a_context_left_out_are_marked(page, open_page):
             page.__class__(**(vars(page) | {"samples": [changed], "prompts": [*page.prompts, cut]}))
         )
         assert (
-            opened.tab.locator("#sample .frames .clue figcaption").inner_text()
+            opened.tab.locator("#sample > .frames .clue figcaption").inner_text()
             == f"{clue.index} {caption}"
         )
-        opened.tab.locator("#sample .frames .clue button").click()
+        opened.tab.locator("#sample > .frames .clue button").click()
         without = opened.tab.locator("#enlarged dd").last.inner_text()
         labels = [run.label for run in page.runs]
         assert without == (", ".join(labels) if caption.endswith("shown") else labels[1])

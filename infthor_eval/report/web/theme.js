@@ -1,0 +1,25 @@
+// Light or dark, and what is read of the page without its samples.
+const toggleTheme = () => {
+  const root = document.documentElement;
+  const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+  root.dataset.theme = dark ? "light" : "dark";
+};
+document.getElementById("theme").addEventListener("click", toggleTheme);
+
+// Tables that are wider than the page say that they scroll, and can be scrolled with keys.
+const markWide = (part = document) => {
+  for (const scroll of part.querySelectorAll(".scroll")) {
+    const isWide = scroll.scrollWidth > scroll.clientWidth;
+    scroll.toggleAttribute("data-wide", isWide);
+    if (isWide) scroll.tabIndex = 0; else scroll.removeAttribute("tabindex");
+  }
+};
+addEventListener("resize", () => markWide());
+
+// A link to a part behind a fold unfolds it.
+const unfold = () => {
+  const target = location.hash && document.getElementById(location.hash.slice(1));
+  if (target?.tagName === "DETAILS") target.open = true;
+};
+addEventListener("hashchange", unfold);
+unfold();
