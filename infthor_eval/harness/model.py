@@ -17,7 +17,7 @@ from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.work.binding import require_capability
-from infthor_eval.runs.work.executor import group_records
+from infthor_eval.runs.work.group_records import group_records
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.suites import baseline_suites, find_request_adapter, find_suite
 from model_adapters import adapter_identity, has_option, identity_of, label, load
