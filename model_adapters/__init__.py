@@ -30,7 +30,12 @@ from model_adapters.protocols import (
     Turn,
     Video,
 )
-from model_adapters.refusals import check_decoding, check_turns, wrap_request_errors
+from model_adapters.refusals import (
+    check_decoding,
+    check_turns,
+    refuse_deferring,
+    wrap_request_errors,
+)
 from model_adapters.registry import (
     adapter_identity,
     check_options,
@@ -90,6 +95,7 @@ __all__ = [
     "name_on_engine",
     "names",
     "options",
+    "refuse_deferring",
     "run_checks",
     "switched_on",
     "switches",

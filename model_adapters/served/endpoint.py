@@ -103,12 +103,12 @@ class Endpoint:
     def ask_unless_done(
         self, call: Call, find: Callable[[], Answer | None]
     ) -> tuple[Answer, tuple[str, ...]]:
-        """Ask as `ask` does, for what must not be done twice: before each attempt, `find` looks
-        whether an earlier one, whose reply was lost, has done it."""
+        """Ask as `ask` does, for what must not be done twice: before each further attempt, `find`
+        looks whether an earlier one, whose reply was lost, has done it."""
         faults: list[str] = []
         n_attempts = 1 if self._is_down.is_set() else 1 + self._options.retries
         while True:
-            done = find()
+            done = find() if faults else None
             if done is not None:
                 return done, tuple(faults)
             self._limiter.wait()

@@ -5,7 +5,7 @@ The form is that of `POST /messages/batches`, `GET /messages/batches`, and `GET
 time, its size, and in the end by the names of its requests.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -96,13 +96,8 @@ class AnthropicBatches:
         """See `BatchService`."""
         return msgspec.json.encode({"custom_id": custom_id, "params": request})
 
-    def submit(self, batch: Batch, path: Path) -> str | None:
+    def submit(self, batch: Batch, path: Path, others: Collection[str]) -> str:
         """See `BatchService`."""
-        found = self._find(batch)
-        if found is not None:
-            return found.id
-        if not path.is_file():
-            return None
         call = Call(
             path="/messages/batches",
             content=b'{"requests":[' + b",".join(path.read_bytes().splitlines()) + b"]}",
@@ -110,8 +105,14 @@ class AnthropicBatches:
             timeout_s=_TRANSFER_S,
         )
         # The reply to an attempt may be lost, though the server has the batch: it is looked for.
-        answer, _ = self._endpoint.ask_unless_done(call, lambda: self._find_answer(batch))
-        return self._read(answer, _Batch, "a batch").id
+        answer, _ = self._endpoint.ask_unless_done(call, lambda: self._find_answer(batch, others))
+        submitted: _Batch = self._read(answer, _Batch, "a batch")
+        return submitted.id
+
+    def find(self, batch: Batch, others: Collection[str]) -> str | None:
+        """See `BatchService`."""
+        found = self._find(batch, others)
+        return None if found is None else found.id
 
     def status(self, batch: Batch) -> BatchStatus:
         """See `BatchService`."""
@@ -144,19 +145,21 @@ class AnthropicBatches:
         for content in answer.content.splitlines():
             yield decode_reply(self._endpoint.where, content, _Line, "the lines of a batch")
 
-    def _find_answer(self, batch: Batch) -> Answer | None:
-        found = self._find(batch)
+    def _find_answer(self, batch: Batch, others: Collection[str]) -> Answer | None:
+        found = self._find(batch, others)
         return None if found is None else Answer(msgspec.json.encode(found), {})
 
-    def _find(self, batch: Batch) -> _Batch | None:
+    def _find(self, batch: Batch, others: Collection[str]) -> _Batch | None:
         """Return a batch that may be ours, or is; None if the server has none.
+
+        If one that may be ours is not, it has none of our requests in the end, and they are asked.
 
         Raises:
             ModelError: there are several that may be ours, as they have not ended.
         """
         candidates = []
         for found in self._since(batch.prepared_at - _CLOCKS_S):
-            if found.request_counts.total != len(batch.ids):
+            if found.id in others or found.request_counts.total != len(batch.ids):
                 continue
             if found.processing_status != "ended":
                 candidates.append(found)

@@ -138,7 +138,7 @@ class BatchQueue:
         self._refused.clear()
         for batch in self._unfinished:
             if batch.server_id is None:  # a command that was stopped may have submitted it, or not
-                self._submit(batch)
+                self._find_or_submit(batch)
         self._is_gathering = True
         try:
             yield
@@ -197,6 +197,11 @@ class BatchQueue:
     @property
     def _unfinished(self) -> list[Batch]:
         return [batch for batch in self._ledger.batches.values() if not batch.ended]
+
+    @property
+    def _known_there(self) -> set[str]:
+        """The server's names of batches of this run."""
+        return {batch.server_id for batch in self._ledger.batches.values() if batch.server_id}
 
     def _is_known(self, request: str) -> bool:
         """Return whether a request needs no asking: it is in hand, or it has its result."""
@@ -291,11 +296,19 @@ class BatchQueue:
         self._draft = None
         self._submit(self._ledger.prepare(draft.name, draft.ids))
 
-    def _submit(self, batch: Batch) -> None:
-        server_id = self._service.submit(batch, self._ledger.requests_file(batch.name))
-        if server_id is None:  # neither there nor here: its requests are asked anew
+    def _find_or_submit(self, batch: Batch) -> None:
+        found = self._service.find(batch, self._known_there)
+        if found is not None:
+            self._ledger.note_submitted(batch, found)
+            self._report(f"batch {found}: {len(batch.ids)} request(s) found at the server")
+        elif self._ledger.requests_file(batch.name).is_file():
+            self._submit(batch)
+        else:  # neither there nor here: its requests are asked anew
             self._end(batch, [])
-            return
+
+    def _submit(self, batch: Batch) -> None:
+        file = self._ledger.requests_file(batch.name)
+        server_id = self._service.submit(batch, file, self._known_there)
         self._ledger.note_submitted(batch, server_id)
         self._report(f"batch {server_id}: {len(batch.ids)} request(s) submitted")
 

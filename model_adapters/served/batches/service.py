@@ -4,7 +4,7 @@ To add batches to a dialect: a class with the members of `BatchService`, and its
 `batch_service` of the dialect.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -94,13 +94,21 @@ class BatchService(Protocol):
     def line(self, custom_id: str, request: dict[str, Any]) -> bytes:
         """Return a request as a line of a batch's file, without the line's end."""
 
-    def submit(self, batch: Batch, path: Path) -> str | None:
-        """Return the server's name of a batch: found there by its own name, or else submitted from
-        its file. None if it is not there and the file is gone.
+    def submit(self, batch: Batch, path: Path, others: Collection[str]) -> str:
+        """Submit a batch from its file, and return the server's name of it; `others` are the names
+        of this run's other batches.
 
         Raises:
             NoAnswerError: the server cannot be reached.
             ModelError: the server refuses it.
+        """
+
+    def find(self, batch: Batch, others: Collection[str]) -> str | None:
+        """Return the server's name of a batch that was perhaps submitted; None if it is not there.
+
+        Raises:
+            NoAnswerError: the server cannot be reached.
+            ModelError: it cannot be told yet.
         """
 
     def status(self, batch: Batch) -> BatchStatus:

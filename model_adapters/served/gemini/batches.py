@@ -4,7 +4,7 @@ The form is that of `POST /upload/.../files` (resumable), `POST /models/M:batchG
 `GET /batches` and `GET /download/.../FILE:download`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlsplit
@@ -93,13 +93,8 @@ class GeminiBatches:
         """See `BatchService`."""
         return msgspec.json.encode({"key": custom_id, "request": request})
 
-    def submit(self, batch: Batch, path: Path) -> str | None:
+    def submit(self, batch: Batch, path: Path, others: Collection[str]) -> str:
         """See `BatchService`."""
-        found = self._find(batch)
-        if found is not None:
-            return found.name
-        if not path.is_file():
-            return None
         file = self._upload(batch, path)
         request = {"displayName": batch.name, "inputConfig": {"fileName": file.name}}
         call = Call(
@@ -109,7 +104,13 @@ class GeminiBatches:
         )
         # The reply to an attempt may be lost, though the server has the batch: it is looked for.
         answer, _ = self._endpoint.ask_unless_done(call, lambda: self._find_answer(batch))
-        return self._read(answer, _Operation, "a batch").name
+        submitted: _Operation = self._read(answer, _Operation, "a batch")
+        return submitted.name
+
+    def find(self, batch: Batch, others: Collection[str]) -> str | None:
+        """See `BatchService`."""
+        found = self._find(batch)
+        return None if found is None else found.name
 
     def status(self, batch: Batch) -> BatchStatus:
         """See `BatchService`."""
@@ -123,7 +124,7 @@ class GeminiBatches:
             return BatchStatus("refused", reason, busy=error.status == 429)
         reason = "" if found.state == "SUCCEEDED" else f"the batch is {found.state.lower()}"
         output = found.metadata.output or _Output()
-        if output.responses_file is None and found.response != b"null":
+        if output.responses_file is None and bytes(found.response) != b"null":
             output = self._read(Answer(bytes(found.response), {}), _Output, "a batch")
         places = (output.responses_file,) if output.responses_file else ()
         return BatchStatus("ended", reason, again=found.state != "CANCELLED", places=places)

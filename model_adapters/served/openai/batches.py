@@ -3,7 +3,7 @@
 The form is that of `POST /files`, `POST /batches`, `GET /batches` and `GET /files/ID/content`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -84,13 +84,8 @@ class OpenAIBatches:
         line = {"custom_id": custom_id, "method": "POST", "url": "/v1/chat/completions"}
         return msgspec.json.encode(line | {"body": request})
 
-    def submit(self, batch: Batch, path: Path) -> str | None:
+    def submit(self, batch: Batch, path: Path, others: Collection[str]) -> str:
         """See `BatchService`."""
-        found = self._find(batch)
-        if found is not None:
-            return found.id
-        if not path.is_file():
-            return None
         file = self._upload(path)
         request = {
             "input_file_id": file.id,
@@ -105,7 +100,13 @@ class OpenAIBatches:
         )
         # The reply to an attempt may be lost, though the server has the batch: it is looked for.
         answer, _ = self._endpoint.ask_unless_done(call, lambda: self._find_answer(batch))
-        return self._read(answer, _Batch, "a batch").id
+        submitted: _Batch = self._read(answer, _Batch, "a batch")
+        return submitted.id
+
+    def find(self, batch: Batch, others: Collection[str]) -> str | None:
+        """See `BatchService`."""
+        found = self._find(batch)
+        return None if found is None else found.id
 
     def status(self, batch: Batch) -> BatchStatus:
         """See `BatchService`."""

@@ -7,10 +7,9 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 from typing import Any
-
-import pytest
 
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
@@ -125,8 +124,7 @@ def test_ctrl_c_leaves_the_batches_to_the_server(make_nieh_set: Any, tmp_path: P
     assert set(server.asked.values()) == {1}
 
 
-@pytest.mark.slow
-def test_whole_sets_are_killed_likewise(tmp_path: Path) -> None:
+def test_a_bundled_set_is_asked_once_however_often_the_run_is_killed(tmp_path: Path) -> None:
     """Not at chosen requests, but after random times, on a bundled set."""
     model_args = "model=m,batch=true,batch_requests=30"
     drawn = random.Random(7)
@@ -135,22 +133,20 @@ def test_whole_sets_are_killed_likewise(tmp_path: Path) -> None:
         words = option_words(model="openai", model_args=given, tasks="nieh_mini_gt")
         command = [sys.executable, "-c", CODE, *words, "--output", str(tmp_path)]
         for _ in range(N_KILLS):
-            n_seen = 0
-            moment = drawn.randrange(1, 24)
-
-            def count(method: str, path: str) -> None:
-                nonlocal n_seen
-                n_seen += 1
-
-            server.before = count
-            process = _start(command)
-            wait_until(lambda m=moment: n_seen >= m or process.poll() is not None)
-            process.kill()
-            process.communicate()
+            _kill_after(server, command, drawn.randrange(1, 24), drawn.random() / 10)
+        server.before = lambda *_: None
         last = _start(command)
         _, err = last.communicate(timeout=PATIENCE_S)
         assert last.returncode == 0, err
-    replies = _replies(tmp_path)
-    n_alike = len(replies) - len({(key.task, key.sample) for key in replies})
-    assert n_alike == 0
-    assert set(server.sizes) and sum(server.asked.values()) == sum(n for n, _ in server.sizes)
+    assert server.n_asked == len(_replies(tmp_path)) == 126
+
+
+def _kill_after(server: BatchServer, command: list[str], n: int, seconds: float) -> None:
+    """Kill a run some time after its request of this number came, if it comes so far."""
+    seen: list[str] = []
+    server.before = lambda _, path: seen.append(path)
+    process = _start(command)
+    wait_until(lambda: len(seen) >= n or process.poll() is not None)
+    time.sleep(seconds)
+    process.kill()
+    process.communicate()

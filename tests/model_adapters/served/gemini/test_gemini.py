@@ -214,9 +214,8 @@ def test_a_batch_whose_name_was_lost_is_found_again(ask: Ask) -> None:
 
         def answer_and_lose(method: str, path: str, headers: Any, body: bytes) -> Any:
             answer = answer_to(method, path, headers, body)
-            return (
-                (0, b"") if path.endswith(":batchGenerateContent") and next(lost, False) else answer
-            )
+            is_lost = path.endswith(":batchGenerateContent") and next(lost, False)
+            return (0, b"") if is_lost else answer
 
         server.answer_to = answer_and_lose  # type: ignore[method-assign]
         code, _, err = ask(server, model="gemini")
