@@ -13,7 +13,7 @@ CANNOT_RUN = {
     r"--models? (qwen2\.5-vl|llava-onevision|openvla|deepseek-vl)[ ,]": "downloads weights",
     r"import-checkpoint PEARLS-Lab/": "downloads weights",
     r" fetch nieh": "downloads the published set",
-    r"--model openai ": "needs a server, and a key",
+    r"--model (openai|anthropic|gemini) ": "needs a server, and a key",
     r"check-parity ": "needs a server",
     r"MyModel|my_task$|=PATH\b": "names files of the reader's",
     r"thumbnails": "needs the example package installed; tests/examples does that",
