@@ -347,3 +347,20 @@ def test_what_cannot_be_asked_together_is_refused_in_one_line(
     )
     ended = run_cli(*task, *data, *options, "--output", tmp_path / "out")
     assert_refused(ended, message, after_notes=True)
+
+
+def test_a_plan_measures_with_single_requests_and_prices_what_is_cached(
+    run_cli: Any, make_nieh_set: Any
+) -> None:
+    prices = "price_per_m_input=1000,price_per_m_cached=100,price_per_m_output=5000"
+    with serve_batches(BatchServer()) as server:
+        given = f"base_url={server.url},model=m,batch=true,{prices}"
+        task = option_words(
+            model="openai", model_args=given, tasks="nieh_gt", data=make_nieh_set(size=56)
+        )
+        code, out, err = run_cli("plan", *task)
+    assert code == 0, err
+    assert server.sizes == []
+    each = (60 * 1000 + 40 * 100 + 10 * 5000) / 1e6
+    assert f"money: {5 * each:.2f} US dollars, by the prices of the model" in out
+    assert " 500 " in out and " 300 " in out  # tokens read, and those not in a cache
