@@ -1,7 +1,7 @@
 """The protocol between a model behind a server and the dialect that the server speaks.
 
-To add a dialect: a folder here with `dialect.py` and `batches.py`; its options in `options.py`, its
-adapter in `adapters.py`, its line in `model_adapters/built_in.py`.
+To add a dialect: a folder here, as `openai`; its options in `options.py`, its adapter in
+`adapters.py`, its line in `model_adapters/built_in.py`.
 """
 
 from collections.abc import Mapping, Sequence
