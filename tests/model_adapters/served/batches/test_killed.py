@@ -1,80 +1,44 @@
 """Runs in batches that are killed again and again: nothing is asked twice, nothing is lost."""
 
 import json
-import multiprocessing
 import os
 import random
 import signal
+import subprocess
 import sys
 import threading
 import time
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-from infthor_eval.cli import main
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
-from model_adapters.served.batches import queue
 
 from ....helpers.command_line import option_words
 from ....helpers.waiting import PATIENCE_S, wait_until
 from ..talking import completion
 from .server import BatchServer, serve_batches
 
+# The pauses between two looks are those of a test, the rest is what a user starts.
+CODE = """
+from model_adapters.served.batches import queue
+queue._FIRST_POLL_S = queue._LONGEST_POLL_S = 0.02
+from infthor_eval.cli import main
+main()
+"""
 N_KILLS = 10
-# A fork has all modules already, which would take most of the time of so many runs.
-_FORK = multiprocessing.get_context("fork")
-
-
-class _Run:
-    """A run in a process of its own, as its user types it."""
-
-    def __init__(self, words: list[str], log: Path) -> None:
-        self._log = log
-        self.process = _FORK.Process(target=_run, args=(words, log))
-        self.process.start()
-
-    def poll(self) -> int | None:
-        return self.process.exitcode
-
-    def kill(self, number: int = signal.SIGKILL) -> None:
-        if self.process.is_alive():
-            os.kill(int(self.process.pid or 0), number)
-
-    def wait(self) -> tuple[int | None, str]:
-        """The exit code, and what was said."""
-        self.process.join(PATIENCE_S)
-        return self.process.exitcode, self._log.read_text()
-
-
-def _run(words: list[str], log: Path) -> None:
-    with log.open("w") as file:
-        sys.stdout = sys.stderr = file
-        code = 0
-        try:
-            main(words)
-        except SystemExit as ended:
-            code = int(ended.code or 0)
-        file.flush()
-        os._exit(code)
-
-
-@pytest.fixture(autouse=True)
-def short_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(queue, "_FIRST_POLL_S", 0.02)
-    monkeypatch.setattr(queue, "_LONGEST_POLL_S", 0.02)
 
 
 def _command(server: BatchServer, data: Path, output: Path) -> list[str]:
     model_args = f"base_url={server.url},model=m,batch=true,batch_requests=2"
     words = option_words(model="openai", model_args=model_args, tasks="nieh_gt", data=data)
-    return [*map(str, words), "--output", str(output)]
+    return [sys.executable, "-c", CODE, *map(str, words), "--output", str(output)]
 
 
-def _start(command: list[str]) -> _Run:
-    return _Run(command, Path(command[-1]).parent / "log")
+def _start(command: list[str]) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ}
+    )
 
 
 def _says(body: dict[str, Any]) -> dict[str, Any]:
@@ -92,8 +56,9 @@ def test_ten_kills_at_any_moment_change_nothing(make_nieh_set: Any, tmp_path: Pa
     data = make_nieh_set(size=56)
     drawn = random.Random(5)
     with serve_batches(BatchServer(answer=_says, looks=1)) as server:
-        code, said = _start(_command(server, data, tmp_path / "whole")).wait()
-        assert code == 0, said
+        whole = _start(_command(server, data, tmp_path / "whole"))
+        _, err = whole.communicate(timeout=PATIENCE_S)
+        assert whole.returncode == 0, err
         expected = _replies(tmp_path / "whole")
         n_requests = sum(server.asked.values())
         server.asked.clear()
@@ -104,8 +69,9 @@ def test_ten_kills_at_any_moment_change_nothing(make_nieh_set: Any, tmp_path: Pa
             # sometimes after it, before its answer is there.
             moment, before = n // 2 + 1, drawn.random() < 0.5
             _kill_at(server, command, moment, before)
-        code, said = _start(command).wait()
-        assert code == 0, said
+        last = _start(command)
+        _, err = last.communicate(timeout=PATIENCE_S)
+        assert last.returncode == 0, err
     assert _replies(tmp_path / "killed") == expected
     assert sum(server.asked.values()) == n_requests == len(expected)
     assert set(server.asked.values()) == {1}
@@ -130,8 +96,8 @@ def _kill_at(server: BatchServer, command: list[str], moment: int, before: bool)
     process = _start(command)
     try:
         wait_until(lambda: reached.is_set() or process.poll() is not None)
-        process.kill()
-        process.wait()
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
     finally:
         killed.set()
         server.before = lambda *_: None
@@ -142,16 +108,17 @@ def test_ctrl_c_leaves_the_batches_to_the_server(make_nieh_set: Any, tmp_path: P
     with serve_batches(BatchServer(answer=_says, looks=10**9)) as server:
         command = _command(server, data, tmp_path / "out")
         stopped = _start(command)
-        wait_until(lambda: len(server.batches) == 3 or stopped.poll() is not None)
-        stopped.kill(signal.SIGINT)
-        code, said = stopped.wait()
-        assert code == 130
-        assert "3 batch(es) with 5 request(s) go on at the server; the same command" in said
-        assert "Traceback" not in said
+        wait_until(lambda: len(server.batches) == 3, stopped)
+        stopped.send_signal(signal.SIGINT)
+        _, err = stopped.communicate(timeout=PATIENCE_S)
+        assert stopped.returncode == 130
+        assert "3 batch(es) with 5 request(s) go on at the server; the same command fetches" in err
+        assert "Traceback" not in err
         for batch in server.batches.values():
             batch["looks"] = 0
-        code, said = _start(command).wait()
-        assert code == 0, said
+        again = _start(command)
+        _, err = again.communicate(timeout=PATIENCE_S)
+        assert again.returncode == 0, err
         assert len(server.batches) == 3
     assert json.loads(next((tmp_path / "out").rglob("usage.json")).read_text())
     assert set(server.asked.values()) == {1}
@@ -164,13 +131,14 @@ def test_a_bundled_set_is_asked_once_however_often_the_run_is_killed(tmp_path: P
     with serve_batches(BatchServer(answer=_says, looks=3)) as server:
         given = f"base_url={server.url},{model_args}"
         words = option_words(model="openai", model_args=given, tasks="nieh_mini_gt")
-        command = [*words, "--output", str(tmp_path / "out")]
+        command = [sys.executable, "-c", CODE, *words, "--output", str(tmp_path)]
         for _ in range(N_KILLS):
             _kill_after(server, command, drawn.randrange(1, 24), drawn.random() / 10)
         server.before = lambda *_: None
-        code, said = _start(command).wait()
-        assert code == 0, said
-    assert server.n_asked == len(_replies(tmp_path / "out")) == 126
+        last = _start(command)
+        _, err = last.communicate(timeout=PATIENCE_S)
+        assert last.returncode == 0, err
+    assert server.n_asked == len(_replies(tmp_path)) == 126
 
 
 def _kill_after(server: BatchServer, command: list[str], n: int, seconds: float) -> None:
@@ -181,4 +149,4 @@ def _kill_after(server: BatchServer, command: list[str], n: int, seconds: float)
     wait_until(lambda: len(seen) >= n or process.poll() is not None)
     time.sleep(seconds)
     process.kill()
-    process.wait()
+    process.communicate()
