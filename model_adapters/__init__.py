@@ -14,9 +14,11 @@ from model_adapters.protocols import (
     Adapter,
     ArmDelta,
     Attended,
+    Batches,
     Capabilities,
     Conversation,
     Decoding,
+    Deferring,
     Mark,
     Model,
     Notice,
@@ -28,7 +30,12 @@ from model_adapters.protocols import (
     Turn,
     Video,
 )
-from model_adapters.refusals import check_decoding, check_turns, wrap_request_errors
+from model_adapters.refusals import (
+    check_decoding,
+    check_turns,
+    refuse_deferring,
+    wrap_request_errors,
+)
 from model_adapters.registry import (
     adapter_identity,
     check_options,
@@ -53,11 +60,13 @@ __all__ = [
     "Attended",
     "Backend",
     "BackendConversation",
+    "Batches",
     "Capabilities",
     "CheckResult",
     "ContractError",
     "Conversation",
     "Decoding",
+    "Deferring",
     "Mark",
     "Model",
     "Notice",
@@ -86,6 +95,7 @@ __all__ = [
     "name_on_engine",
     "names",
     "options",
+    "refuse_deferring",
     "run_checks",
     "switched_on",
     "switches",

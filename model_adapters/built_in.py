@@ -39,12 +39,14 @@ def _locate(adapter: str, options: str, description: str = "") -> BuiltIn:
 
 
 BUILT_IN = {
+    "anthropic": _locate("served.adapters:Anthropic", "served.options:AnthropicOptions"),
     "deepseek-vl": _locate(
         "hf.families.deepseek_vl:DeepseekVL", "options.families:DeepseekVLOptions"
     ),
     "deepseek-vl-tiny": _locate(
         "tiny.deepseek_vl:DeepseekVLTiny", "options.tiny:TinyOptions", _RANDOM
     ),
+    "gemini": _locate("served.adapters:Gemini", "served.options:GeminiOptions"),
     "gemma3": _locate("hf.families.named:Gemma3", "options.named:Gemma3Options"),
     "gemma4": _locate("hf.families.named:Gemma4", "options.named:Gemma4Options"),
     "glm-4.6v": _locate("hf.families.named:Glm46V", "options.named:Glm46VOptions"),
@@ -64,7 +66,7 @@ BUILT_IN = {
     ),
     "mistral-small": _locate("hf.families.named:MistralSmall", "options.named:MistralSmallOptions"),
     "molmo2": _locate("hf.families.named:Molmo2", "options.named:Molmo2Options"),
-    "openai": _locate("openai.adapter:OpenAI", "openai.options:OpenAIOptions"),
+    "openai": _locate("served.adapters:OpenAI", "served.options:OpenAIOptions"),
     "openvla": _locate("policies.openvla.adapter:OpenVLA", "options.policies:OpenVLAOptions"),
     "openvla@vllm": _locate("vllm.openvla:OpenVLAOnVllm", "vllm.options:OpenVLAOnVllmOptions"),
     "openvla-tiny": _locate("tiny.openvla:OpenVLATiny", "options.tiny:OpenVLATinyOptions", _RANDOM),

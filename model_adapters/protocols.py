@@ -5,8 +5,10 @@ see, requests a reply, and rewinds to a mark; each back end decides how it avoid
 parts twice. A policy is simpler: it maps a frame and an instruction to a chunk of arm movements.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
 
 from infthor_eval.errors import UsageError
@@ -18,9 +20,11 @@ __all__ = [
     "Adapter",
     "ArmDelta",
     "Attended",
+    "Batches",
     "Capabilities",
     "Conversation",
     "Decoding",
+    "Deferring",
     "Mark",
     "Model",
     "Notice",
@@ -376,4 +380,47 @@ class Attended(Model, Protocol):
         """Take which unit of the run the next requests belong to, from 1, and of how many.
 
         It is told where one person answers all of the run, which that person may stop.
+        """
+
+
+class Batches(Protocol):
+    """The requests of a run that are answered together, hours later."""
+
+    def gathering(self) -> AbstractContextManager[None]:
+        """Within this context `Conversation.replies` notes its requests and raises `NotAskedError`;
+        after it, it returns the replies that were fetched."""
+
+    def fetch(self) -> bool:
+        """Have the gathered requests answered; return whether to gather once more, as some were not
+        processed.
+
+        Raises:
+            ModelError: the server cannot be asked.
+            DataError: a file cannot be read or written.
+        """
+
+
+@runtime_checkable
+class Deferring(Model, Protocol):
+    """A model that can have requests answered together, by a server's batches.
+
+    Each is asked at once until `open_batches` is called.
+    """
+
+    @property
+    def defers(self) -> bool:
+        """True if that is what the user wants."""
+
+    def open_batches(
+        self, folder: Path, report: Callable[[str], None], should_stop: Callable[[], bool]
+    ) -> Batches:
+        """Return the batches of a run; from then on replies come from them alone.
+
+        Args:
+            folder: where the batches are kept, so that they are found again.
+            report: gets a line when a batch begins or ends.
+            should_stop: returns true when no more is to be waited for.
+
+        Raises:
+            DataError: the folder cannot be read or written.
         """

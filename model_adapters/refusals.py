@@ -3,16 +3,25 @@
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 
-from infthor_eval.errors import AdapterError, ModelError, wrap_user_code
+from infthor_eval.errors import AdapterError, ModelError, UsageError, wrap_user_code
 from infthor_eval.quantities import MOST
 from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
-from model_adapters.protocols import ArmDelta, Capabilities, Decoding, Turn, Video
+from model_adapters.protocols import (
+    ArmDelta,
+    Capabilities,
+    Decoding,
+    Deferring,
+    Subject,
+    Turn,
+    Video,
+)
 
 __all__ = [
     "check_chunk",
     "check_decoding",
     "check_turns",
+    "refuse_deferring",
     "wrap_adapter_errors",
     "wrap_request_errors",
 ]
@@ -51,6 +60,16 @@ def check_turns(name: str, capabilities: Capabilities, turns: Sequence[Turn]) ->
         isinstance(part, Video) for turn in turns for part in turn.parts
     ):
         raise ModelError(f"{name} has no video input; give it the video's frames as images")
+
+
+def refuse_deferring(subject: Subject) -> None:
+    """Refuse batches where replies are needed at once (UsageError)."""
+    if isinstance(subject, Deferring) and subject.defers:
+        subject.close()
+        raise UsageError(
+            f"{subject.name}: batch=true is for `infthor-eval run`, where replies may come hours "
+            "later; leave it out"
+        )
 
 
 def check_chunk(name: str, chunk: Sequence[object]) -> None:

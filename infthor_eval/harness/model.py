@@ -17,10 +17,17 @@ from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.work.binding import require_capability
-from infthor_eval.runs.work.executor import group_records
+from infthor_eval.runs.work.group_records import group_records
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.suites import baseline_suites, find_request_adapter, find_suite
-from model_adapters import adapter_identity, has_option, identity_of, label, load
+from model_adapters import (
+    adapter_identity,
+    has_option,
+    identity_of,
+    label,
+    load,
+    refuse_deferring,
+)
 
 __all__ = ["InfthorLM"]
 
@@ -84,6 +91,7 @@ class InfthorLM(LM):
         }
         say_model_takes_references()
         self._model = load(adapter, option_texts, seed)
+        refuse_deferring(self._model)
         self._seed = seed
         self._name, self._code = label(adapter, option_texts), adapter_identity(adapter)
         self._scratch = ScratchFolder()

@@ -10,7 +10,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.asking.answerers import Answerer, answerer_of
 from infthor_eval.nieh.asking.answering import answer_units
 from infthor_eval.nieh.asking.baselines import Baseline
-from infthor_eval.nieh.asking.recalling import apply_recall
+from infthor_eval.nieh.asking.recalling import apply_recall, asks_model
 from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig
 from infthor_eval.nieh.docs import doc_of, doc_target, prompt_of
 from infthor_eval.nieh.options import NiehOptions
@@ -80,6 +80,7 @@ class NiehEvaluation:
                 tokens,
             ),
             costs=[Cost(name, cost) for name, cost in costs.items() if cost is not None],
+            independent=not any(asks_model(ready.task_samples) for ready in prepared.values()),
         )
         return BoundNieh(workload, prepared, answerer)
 

@@ -126,6 +126,8 @@ class Workload(Generic[SuiteUnit_co]):
         costs: costs of the tasks, where they are known.
         warnings: what people should know before the first unit, such as a checkpoint that was
             trained otherwise.
+        independent: true if no request depends on the reply to another, so that all may be asked
+            together.
     """
 
     groups: Sequence[Group[SuiteUnit_co]]
@@ -133,6 +135,7 @@ class Workload(Generic[SuiteUnit_co]):
     config: RunConfig[Any] = field(default_factory=RunConfig)
     costs: Sequence[Cost] = ()
     warnings: Sequence[str] = ()
+    independent: bool = False
 
     @property
     def n_units(self) -> int:

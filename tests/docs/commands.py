@@ -23,6 +23,7 @@ ELSEWHERE = "needs the example package installed; tests/examples does that"
 # Pages whose commands are parsed and not run.
 PARSED_PAGES = {
     "CONTRIBUTING.md": CLONE,
+    "docs/batches.md": KEY,
     "docs/cost.md": HOURS,
     "docs/engines.md": GPU,
     "docs/figures.md": HOURS,
@@ -53,7 +54,7 @@ CANNOT_RUN = {
     r"--models? (qwen2\.5-vl|llava-onevision|openvla|deepseek-vl)[ ,]": WEIGHTS,
     r"import-checkpoint PEARLS-Lab/": WEIGHTS,
     r"--model hf-multimodal ": WEIGHTS,
-    r"--model openai ": KEY,
+    r"--model (openai|anthropic|gemini) ": KEY,
     r"MyModel|my_task$|=PATH\b|DATA$|import-replies exported|lm-eval run \.\.\.": READERS,
     r"--data (TRAJECTORIES|trajectories) ": READERS,
 }

@@ -7,18 +7,15 @@ from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler
 from typing import Any
 
-import pytest
-
 from infthor_eval.runs import read_run
 from infthor_eval.suites import find_suite
 
-from ..model_adapters.openai.talking import completion, serve_chat
 from ..model_adapters.policies.servers import no_proxy, send
+from ..model_adapters.served.talking import completion, serve_chat
 from .test_worst_values import IN_JSON, fast_disk, read_in_every_way
 
 __all__ = ["fast_disk", "no_proxy"]  # for all tests here
 
-pytest.importorskip("openai", reason="pip install 'infthor-eval[openai]'")
 
 N_UNITS = 126  # of the bundled set
 SPOILED = "@spoiled@"

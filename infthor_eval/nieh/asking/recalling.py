@@ -35,7 +35,7 @@ from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.storage.deadlines import not_counted
 from infthor_eval.storage.digests import fingerprint
 
-__all__ = ["FindRecall", "KeepRecall", "Recaller", "apply_recall", "recall_all"]
+__all__ = ["FindRecall", "KeepRecall", "Recaller", "apply_recall", "asks_model", "recall_all"]
 
 # Looks up what was recalled from the same inputs, by their hash.
 FindRecall = Callable[[str], NiehRecall | None]
@@ -234,6 +234,21 @@ def recall_all(task_samples: TaskSamples) -> list[Sample]:
                 f"{error}; run the task with `infthor-eval run`, or with --model infthor"
             ) from error
     return [recalled[number] for number in range(len(recalled))]
+
+
+def asks_model(task_samples: TaskSamples) -> bool:
+    """Return whether a memory of a task asks the model under test.
+
+    Raises:
+        UsageError: a memory cannot be opened.
+        UserCodeError: it fails.
+    """
+    waiting = [sample.recall for sample in task_samples.samples if sample.awaits_recall]
+    return any(
+        open_memory(settings.memory, settings.options).capabilities.writes
+        for settings in set(waiting)
+        if settings is not None
+    )
 
 
 def _visible(steps: Sequence[Observation], memory: Memory) -> list[Observation]:

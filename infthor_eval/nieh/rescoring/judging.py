@@ -37,6 +37,7 @@ from model_adapters import (
     label,
     load,
     names,
+    refuse_deferring,
     wrap_request_errors,
 )
 
@@ -147,6 +148,7 @@ class Judge:
         check_options(name, options)
         code = adapter_identity(name)
         model = load(name, options, seed)
+        refuse_deferring(model)
         if not isinstance(model, Model):
             model.close()
             raise UsageError(

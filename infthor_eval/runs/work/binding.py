@@ -8,6 +8,7 @@ from infthor_eval.errors import UsageError, UserCodeError, wrap_user_code
 from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import BoundEvaluation, Need, Suite, Workload
+from infthor_eval.runs.work.deferring import require_independent
 from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
 from model_adapters import Model, Policy, Subject, adapter_identity, identity_of, load
@@ -56,6 +57,7 @@ def bind_run(run: PreparedRun[SuiteUnit, Payload]) -> BoundRun[SuiteUnit, Payloa
         stack.callback(subject.close)
         evaluation = run.evaluation.bind(subject)
         stack.callback(evaluation.close)
+        require_independent(subject, evaluation.workload, run.request.worker_settings)
         bound = BoundRun(subject, evaluation, _header(run, subject, evaluation.workload))
         stack.pop_all()
     return bound

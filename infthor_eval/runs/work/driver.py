@@ -34,7 +34,7 @@ class Observer(Protocol):
         """Called for each unit; `resumed` if its record is that of an earlier, stopped run."""
 
     def note(self, text: str) -> None:
-        """Called with a line when a worker is lost or cannot be started."""
+        """Called with a line when a worker is lost, or a batch of requests begins or ends."""
 
 
 class Silent:
@@ -145,7 +145,7 @@ def _start_executor(
     run: PreparedRun[SuiteUnit, Payload], report: Callable[[str], None]
 ) -> Executor[Payload]:
     if run.request.worker_settings.is_local:
-        return LocalExecutor(run)
+        return LocalExecutor(run, report)
     return WorkerPoolExecutor(run, report)
 
 

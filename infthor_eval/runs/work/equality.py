@@ -14,7 +14,8 @@ from infthor_eval.runs.journals.records import Payload, SuiteUnit, UnitKey
 from infthor_eval.runs.request import RunRequest, prepare
 from infthor_eval.runs.suite import Suite
 from infthor_eval.runs.work.binding import BoundRun, bind_run
-from infthor_eval.runs.work.executor import UnrecordedSession, group_records
+from infthor_eval.runs.work.executor import UnrecordedSession
+from infthor_eval.runs.work.group_records import group_records
 from model_adapters import is_known, switched_on, switches
 
 __all__ = ["Equality", "check_equality", "require_switches"]

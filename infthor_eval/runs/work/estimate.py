@@ -27,7 +27,8 @@ from infthor_eval.runs.request import RunRequest, prepare
 from infthor_eval.runs.suite import BoundEvaluation, Group, Suite, Workload
 from infthor_eval.runs.usage import Usage
 from infthor_eval.runs.work.binding import bind_run
-from infthor_eval.runs.work.executor import UnrecordedSession, group_records
+from infthor_eval.runs.work.executor import UnrecordedSession
+from infthor_eval.runs.work.group_records import group_records
 
 __all__ = ["Estimate", "Quantities", "TaskEstimate", "estimate_run", "estimate_tasks"]
 

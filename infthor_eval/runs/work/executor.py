@@ -1,12 +1,11 @@
 """Who does a run's work: this process, or several workers; either way the same records."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, Generic, Protocol
 
-from infthor_eval.errors import STOPS, ModelError
-from infthor_eval.runs.journals.gate import Gate, RefusedRecordError
+from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.records import (
     Artifact,
@@ -14,19 +13,20 @@ from infthor_eval.runs.journals.records import (
     RunHeader,
     SuiteUnit,
     Unit,
-    UnitKey,
     UnitRecord,
     describe_failure,
 )
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.suite import BoundEvaluation, Group, Session, UnitSample, Workload
+from infthor_eval.runs.suite import UnitSample, Workload
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.runs.work.binding import bind_run
+from infthor_eval.runs.work.deferring import fetch_replies
+from infthor_eval.runs.work.group_records import group_records
 from infthor_eval.runs.work.scheduling import run_groups
-from model_adapters import Attended
+from model_adapters import Attended, Deferring
 
-__all__ = ["Executor", "LocalExecutor", "Recorded", "UnrecordedSession", "group_records"]
+__all__ = ["Executor", "LocalExecutor", "Recorded", "UnrecordedSession"]
 
 
 # A record that is on disk; True if an earlier run had put it there.
@@ -59,12 +59,13 @@ class Executor(Protocol[Payload]):
 class LocalExecutor(Generic[SuiteUnit, Payload]):
     """The executor of this process."""
 
-    def __init__(self, run: PreparedRun[SuiteUnit, Payload]) -> None:
-        """Load the subject and find the work.
+    def __init__(self, run: PreparedRun[SuiteUnit, Payload], report: Callable[[str], None]) -> None:
+        """Load the subject and find the work; `report` gets a line on each batch of requests.
 
         Raises:
             InfthorError: see `bind_run`.
         """
+        self._report = report
         self._bound = bind_run(run)
         self._gate = Gate(run.suite.records)
         self.header = self._bound.header
@@ -76,7 +77,12 @@ class LocalExecutor(Generic[SuiteUnit, Payload]):
         """See `Executor`."""
         session = JournalSession(journal)
         evaluation = self._bound.evaluation
-        in_flight = self._bound.subject.capabilities.max_in_flight
+        subject = self._bound.subject
+        if isinstance(subject, Deferring) and subject.defers:
+            given = (evaluation, session, self._gate, folder, self._report, should_stop)
+            if not fetch_replies(subject, *given):
+                return
+        in_flight = subject.capabilities.max_in_flight
         records = run_groups(
             self.workload.groups,
             lambda group: group_records(evaluation, group, session, self._gate),
@@ -128,64 +134,3 @@ class UnrecordedSession:
     def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
         """See `Session`."""
         self._artifacts[fingerprint] = artifact
-
-
-def group_records(
-    evaluation: BoundEvaluation[SuiteUnit, Payload],
-    group: Group[SuiteUnit],
-    session: Session[Payload],
-    gate: Gate[Payload],
-) -> Iterator[UnitRecord[Payload]]:
-    """Yield the records of a group; units without a record when it ends have failed.
-
-    So has a unit whose record the journal cannot hold: that is the fault of who gave what is in it,
-    and of no other unit.
-
-    Raises:
-        MemoryError: the machine has no more memory; the run ends.
-    """
-    units = {unit.key: unit for unit in group.units}
-    waiting = dict(units)
-    records: Iterator[UnitRecord[Payload]] | None = None
-    fault: BaseException
-    # No loop over the records with a `yield` in the `try`: it would catch what ends this generator.
-    while True:
-        try:
-            records = records or iter(evaluation.run(group, session))
-            record = next(records)
-            unit = _unit_of(record, units)
-        except StopIteration:
-            fault = ModelError("the suite gives no record of it; fix the suite")
-            break
-        except (MemoryError, *STOPS):  # the next group would have no more memory than this one
-            raise
-        except BaseException as error:  # noqa: BLE001 - a suite is anybody's code, see STOPS
-            fault = error
-            break
-        waiting.pop(record.key, None)
-        yield _kept(record, unit, session, gate)
-    for unit in waiting.values():
-        yield unit.record_failure(session.describe_failure(unit, fault))
-
-
-def _unit_of(record: UnitRecord[Payload], units: Mapping[UnitKey, Unit[Payload]]) -> Unit[Payload]:
-    unit = units.get(record.key)
-    if unit is None:
-        raise ModelError(
-            f"the suite gives a record of {record.key!r:.200}, no unit of its group; fix the suite"
-        )
-    return unit
-
-
-def _kept(
-    record: UnitRecord[Payload],
-    unit: Unit[Payload],
-    session: Session[Payload],
-    gate: Gate[Payload],
-) -> UnitRecord[Payload]:
-    """Return a record that the journal can hold, or else that of its unit's failure."""
-    try:
-        gate.line_of(record)
-    except RefusedRecordError as error:
-        return unit.record_failure(session.describe_failure(unit, error))
-    return record

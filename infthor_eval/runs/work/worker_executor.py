@@ -26,7 +26,7 @@ from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Group, UnitSample, Workload
 from infthor_eval.runs.work.binding import bind_run
-from infthor_eval.runs.work.executor import group_records
+from infthor_eval.runs.work.group_records import group_records
 from infthor_eval.terminal import print_error
 from infthor_eval.workers import (
     Event,

@@ -13,6 +13,7 @@ import pytest
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Decoding, check_adapter, load
+from model_adapters.served import model as served
 
 from ..asking import up_to
 from .talking import (
@@ -23,10 +24,6 @@ from .talking import (
     open_model,
     serve_chat,
     talkative,
-)
-
-served = pytest.importorskip(
-    "model_adapters.openai.model", reason="the client library is not installed"
 )
 
 KEY = "sk-0123456789abcdef0123456789"
@@ -298,23 +295,9 @@ def test_listing_and_checking_options_does_not_import_the_client() -> None:
     code = (
         "import sys, model_adapters as m; m.options('openai'); m.check_options('openai', {'model': "
         "'m'});"
-        "sys.exit(bool({'openai', 'httpx2'} & set(sys.modules)))"
+        "sys.exit(bool({'httpx2'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-def test_without_the_client_library_one_line_names_the_mend(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    for name in [name for name in sys.modules if name.startswith("model_adapters.openai.")]:
-        if name.rpartition(".")[2] not in ("adapter", "options", "secret"):
-            monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "openai", None)
-    with pytest.raises(
-        ModelError,
-        match=r"openai needs the package openai, 3 or newer \(.*\); pip install 'infthor-e",
-    ):
-        load("openai", {"model": "m", "base_url": "http://127.0.0.1:1"}, 0)
 
 
 @pytest.mark.parametrize("field", ["reasoning_content", "reasoning"])

@@ -4,9 +4,10 @@ from typing import Annotated
 
 import msgspec
 
-from infthor_eval.errors import ModelError, in_one_line
+from infthor_eval.errors import ModelError
+from model_adapters.served.completion import TokenUsage, decode_reply
 
-__all__ = ["Completion", "TokenUsage", "read_completion"]
+__all__ = ["ChatCompletion", "read_completion"]
 
 # By finish_reason. Unknown ones are not quoted, because a server may put any text there.
 _WHY = {
@@ -21,33 +22,10 @@ class _Details(msgspec.Struct, frozen=True):
     cached_tokens: _Count | None = None
 
 
-class TokenUsage(msgspec.Struct, frozen=True):
-    """Tokens of one request and its reply.
-
-    Attributes:
-        prompt_tokens: tokens of the request, frames included.
-        completion_tokens: tokens of the reply, including its reasoning if the server counts that.
-        prompt_tokens_details: tokens of the request that were in the server's cache.
-    """
-
+class _Usage(msgspec.Struct, frozen=True):
     prompt_tokens: _Count
     completion_tokens: _Count
     prompt_tokens_details: _Details | None = None
-
-    @property
-    def n_cached(self) -> int | None:
-        """Tokens of the request in the server's cache, or None if it does not report them."""
-        details = self.prompt_tokens_details
-        return (
-            None
-            if details is None or details.cached_tokens is None
-            else min(details.cached_tokens, self.prompt_tokens)
-        )
-
-    @property
-    def total(self) -> int:
-        """Tokens of request and reply."""
-        return self.prompt_tokens + self.completion_tokens
 
 
 class _Message(msgspec.Struct, frozen=True):
@@ -62,8 +40,8 @@ class _Choice(msgspec.Struct, frozen=True):
     finish_reason: str | None = None
 
 
-class Completion(msgspec.Struct, frozen=True):
-    """A server's reply.
+class ChatCompletion(msgspec.Struct, frozen=True):
+    """A server's reply; see `Completion`.
 
     Attributes:
         choices: alternative replies; the first one is used.
@@ -71,23 +49,30 @@ class Completion(msgspec.Struct, frozen=True):
     """
 
     choices: list[_Choice]
-    usage: TokenUsage | None = None
+    usage: _Usage | None = None
+
+    @property
+    def tokens(self) -> TokenUsage | None:
+        """See `Completion`."""
+        usage = self.usage
+        if usage is None:
+            return None
+        details = usage.prompt_tokens_details
+        cached = None if details is None else details.cached_tokens
+        return TokenUsage(
+            usage.prompt_tokens,
+            usage.completion_tokens,
+            None if cached is None else min(cached, usage.prompt_tokens),
+        )
 
     @property
     def thinking(self) -> str | None:
-        """What the model thought before its reply, if the server tells it apart."""
+        """See `Completion`."""
         message = self.choices[0].message if self.choices else _Message()
         return message.reasoning_content or message.reasoning or None
 
     def text(self, where: str) -> str:
-        """Return the text of the reply; a refusal in words counts as a reply. The message names the
-        server by `where`.
-
-        The text is empty where the model was cut off while it thought.
-
-        Raises:
-            ModelError: the reply has no text.
-        """
+        """See `Completion`."""
         if not self.choices:
             raise ModelError(f"{where} answers without choices; is it a chat model's address?")
         choice = self.choices[0]
@@ -103,16 +88,10 @@ class Completion(msgspec.Struct, frozen=True):
         )
 
 
-def read_completion(where: str, content: bytes) -> Completion:
+def read_completion(where: str, content: bytes) -> ChatCompletion:
     """Parse a server's reply.
 
     Raises:
         ModelError: the body is not a chat completion.
     """
-    try:
-        return msgspec.json.decode(content, type=Completion)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise ModelError(
-            f"{where} does not answer with a chat completion ({in_one_line(error)}); is it a chat "
-            "model's address?"
-        ) from error
+    return decode_reply(where, content, ChatCompletion, "a chat completion")

@@ -11,7 +11,8 @@ from PIL import Image
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Turn
-from model_adapters.openai.messages import EncodedFrames, to_messages
+from model_adapters.served.frames import EncodedFrames
+from model_adapters.served.openai.messages import to_messages
 
 
 def _pixels(address: str) -> np.ndarray:
@@ -82,7 +83,7 @@ def test_a_frame_is_encoded_once_by_its_content(
 
 
 def test_no_more_is_kept_than_there_is_room_for(frames: list[FrameRef], monkeypatch) -> None:
-    sizes = [len(EncodedFrames("png").url(frame)) for frame in frames[:3]]
+    sizes = [len(EncodedFrames("png").base64(frame)) for frame in frames[:3]]
     encoded = EncodedFrames("png", max_bytes=sum(sizes) - 1)
     loaded, load = [], FrameRef.load
     monkeypatch.setattr(FrameRef, "load", lambda frame: loaded.append(frame) or load(frame))

@@ -17,15 +17,11 @@ from hypothesis import strategies as st
 
 from infthor_eval.errors import ModelError
 from model_adapters import Decoding, Reply
-from model_adapters.openai.completions import read_completion
+from model_adapters.served import endpoint, wire
+from model_adapters.served.openai.completions import read_completion
 
 from ..policies.servers import Answer, send
 from .talking import always_say, completion, open_model, talkative
-
-endpoint = pytest.importorskip(
-    "model_adapters.openai.endpoint", reason="the client library is not installed"
-)
-wire = pytest.importorskip("model_adapters.openai.wire")
 
 KEY = "sk-0123456789abcdef0123456789"
 Handler = BaseHTTPRequestHandler

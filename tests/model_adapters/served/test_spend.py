@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_eval.errors import ModelError
-from model_adapters.openai.spend import Caps, Prices, RateLimiter, Spend
+from model_adapters.served.completion import TokenUsage
+from model_adapters.served.spend import Caps, Charge, Prices, RateLimiter, Spend
 
 
 def _took(spend: Spend, tokens: int | None, cost: float = 0.0) -> None:
@@ -19,8 +20,40 @@ def _took(spend: Spend, tokens: int | None, cost: float = 0.0) -> None:
 
 def test_cached_tokens_cost_what_they_cost() -> None:
     prices = Prices(prompt=2.0, cached=0.5, reply=8.0)
-    assert prices.cost(1_000_000, 0, 0) == 2.0
-    assert prices.cost(1_000_000, 400_000, 100_000) == pytest.approx(0.6 * 2 + 0.4 * 0.5 + 0.1 * 8)
+    assert prices.cost(TokenUsage(1_000_000, 0)) == 2.0
+    used = TokenUsage(1_000_000, 100_000, n_cached=400_000)
+    assert prices.cost(used) == pytest.approx(0.6 * 2 + 0.4 * 0.5 + 0.1 * 8)
+
+
+def test_what_is_put_into_the_cache_has_its_own_price() -> None:
+    used = TokenUsage(1_000_000, 0, n_cached=400_000, n_stored=500_000)
+    prices = Prices(prompt=2.0, cached=0.5, reply=8.0, stored=2.5)
+    assert prices.cost(used) == pytest.approx(0.1 * 2 + 0.4 * 0.5 + 0.5 * 2.5)
+    assert Prices(2.0, 0.5, 8.0).cost(used) == pytest.approx(0.6 * 2 + 0.4 * 0.5)
+
+
+@pytest.mark.parametrize(
+    ("caps", "room"),
+    [
+        (Caps(), None),
+        (Caps(tokens=1000), 9),
+        (Caps(cost=1.0), 4),
+        (Caps(tokens=1000, cost=1.0), 4),
+        (Caps(tokens=101), 1),
+    ],
+)
+def test_a_batch_is_as_large_as_the_caps_allow(caps: Caps, room: int | None) -> None:
+    spend = Spend("m", caps)
+    assert spend.room() == (None if room is None else 1)  # the first one tells what one takes
+    spend.add(Charge(tokens=100, cost=0.2, sent=True))
+    assert spend.room() == room
+
+
+def test_there_is_no_room_beyond_the_caps() -> None:
+    spend = Spend("m", Caps(tokens=100))
+    spend.add(Charge(tokens=100, sent=True))
+    with pytest.raises(ModelError, match="not asked: 100 tokens reach max_tokens_total=100"):
+        spend.room()
 
 
 @given(st.lists(st.integers(0, 50), min_size=1, max_size=30), st.integers(1, 200))

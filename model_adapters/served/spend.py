@@ -1,5 +1,6 @@
 """Tokens and cost of requests, caps on both, and rate limits."""
 
+import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,6 +8,8 @@ from dataclasses import dataclass
 from threading import Condition, Lock
 
 from infthor_eval.errors import NotAskedError
+from model_adapters.served.completion import TokenUsage
+from model_adapters.served.options import ServedOptions
 
 __all__ = ["Caps", "Charge", "Prices", "RateLimiter", "Spend"]
 
@@ -21,16 +24,35 @@ class Prices:
         prompt: tokens of requests.
         cached: tokens of requests that were in the server's cache.
         reply: tokens of replies.
+        stored: tokens of requests that were put into the server's cache; as `prompt` where None.
     """
 
     prompt: float
     cached: float
     reply: float
+    stored: float | None = None
 
-    def cost(self, n_prompt: int, n_cached: int, n_reply: int) -> float:
-        """Return the US dollars of one reply; the cached tokens are among those of the prompt."""
+    @classmethod
+    def of(cls, options: ServedOptions) -> "Prices | None":
+        """Return the prices that a user gave, or None."""
+        prompt = options.price_per_m_input
+        reply = options.price_per_m_output
+        if prompt is None or reply is None:
+            return None
+        cached = options.price_per_m_cached
+        cached = prompt if cached is None else cached
+        return cls(prompt, cached, reply, options.price_per_m_cache_write)
+
+    def cost(self, usage: TokenUsage) -> float:
+        """Return the US dollars of one reply."""
+        n_cached = usage.n_cached or 0
+        n_new = usage.prompt_tokens - n_cached - usage.n_stored
+        stored = self.prompt if self.stored is None else self.stored
         return (
-            (n_prompt - n_cached) * self.prompt + n_cached * self.cached + n_reply * self.reply
+            n_new * self.prompt
+            + n_cached * self.cached
+            + usage.n_stored * stored
+            + usage.completion_tokens * self.reply
         ) / _MILLION
 
 
@@ -88,6 +110,32 @@ class Spend:
             yield charge
         finally:
             self._settle(charge)
+
+    def room(self) -> int | None:
+        """Return how many requests may be sent together, if each takes as much as the largest so
+        far; None without caps. The first one is unpredictable, so it goes alone.
+
+        Raises:
+            NotAskedError: as `request`.
+        """
+        with self._changed:
+            reason = self._refusal()
+            if reason is not None:
+                raise NotAskedError(reason)
+            if self._caps == Caps():
+                return None
+            rooms = [1.0] if not self._most_tokens else []
+            if self._caps.tokens is not None and self._most_tokens:
+                rooms.append((self._caps.tokens - self._tokens) / self._most_tokens)
+            if self._caps.cost is not None and self._most_cost:
+                rooms.append((self._caps.cost - self._cost) / self._most_cost)
+            return max(1, math.floor(min(rooms))) if rooms else None
+
+    def add(self, charge: Charge) -> None:
+        """Count a request that was sent without `request`, in a batch."""
+        with self._changed:
+            self._in_flight += 1
+        self._settle(charge)
 
     def _admit(self) -> None:
         with self._changed:

@@ -2,21 +2,26 @@
 
 import email.utils
 import random
+import re
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from threading import Event
-from typing import Any
-
-import openai
 
 from infthor_eval.errors import ModelError, in_one_line
-from model_adapters.openai.options import OpenAIOptions
-from model_adapters.openai.secret import Secret
-from model_adapters.openai.spend import RateLimiter
-from model_adapters.openai.wire import UnreadableError, Wire
+from model_adapters.served.options import ServedOptions
+from model_adapters.served.secret import Secret
+from model_adapters.served.spend import RateLimiter
+from model_adapters.served.wire import (
+    Answer,
+    Call,
+    StatusError,
+    UnreachableError,
+    UnreadableError,
+    Wire,
+)
 
-__all__ = ["Endpoint"]
+__all__ = ["Endpoint", "NoAnswerError", "is_transient"]
 
 _FIRST_WAIT_S = 0.5  # pause before the second attempt; it doubles before each further one
 _LONGEST_WAIT_S = 60.0
@@ -29,15 +34,14 @@ _HINTS = {
     401: "set the environment variable that api_key_env names to a valid key",
     402: "check your account",
     403: "set the environment variable that api_key_env names to a key with access to this model",
-    404: "check base_url (it ends before /chat/completions) and model",
+    404: "check base_url and model",
     413: "use fewer frames, or set image_format=jpeg",
     429: "lower max_in_flight, or set requests_per_minute and tokens_per_minute",
     500: "see the server's log",
 }
-_OTHER_HINT = (
-    "check model and the options of requests (send_seed, send_temperature, send_stop, "
-    "send_repetition_penalty, send_skip_special_tokens, max_tokens_field)"
-)
+_RETRY_DELAY = re.compile(rb'"retryDelay":\s*"(\d{1,9}(?:\.\d{1,9})?)s"')  # Google's, in the body
+# A message of vLLM's.
+_TOO_MANY_FRAMES = b"may be provided in one prompt"
 
 
 class _TransientError(Exception):
@@ -58,92 +62,115 @@ class _TransientError(Exception):
         self.busy = busy
 
 
+class NoAnswerError(ModelError):
+    """All attempts of a request failed, for reasons that may pass."""
+
+
+def is_transient(status: int) -> bool:
+    """Return whether what a status says may pass."""
+    return status in _TRANSIENT or status >= 500
+
+
 class Endpoint:
     """One server, for any number of threads.
 
     After a request has failed in all its attempts, later requests get one attempt each until one
     succeeds: otherwise every sample of a run would wait through all retries of a server that is
-    down. The client's own retries would neither be recorded, nor count in the rate limit, nor be
-    known to the other threads, and they wait for at most 8 s.
+    down.
     """
 
-    def __init__(self, options: OpenAIOptions, secret: Secret) -> None:
+    def __init__(
+        self, options: ServedOptions, secret: Secret, headers: Mapping[str, str], hint: str
+    ) -> None:
+        """Take the options, the key, the headers of every request, and the hint to refusals."""
         self.where = options.url
         self._options = options
         self._secret = secret
-        self._wire = Wire(options, secret)
+        self._hint = hint
+        self._wire = Wire(options, headers)
         self._limiter = RateLimiter(options.requests_per_minute)
         self._is_down = Event()
 
-    def ask(self, request: Mapping[str, Any]) -> tuple[bytes, tuple[str, ...]]:
-        """Return the reply's body to a chat completion request, and a line for each fault that a
-        retry recovered from.
+    def ask(self, call: Call) -> tuple[Answer, tuple[str, ...]]:
+        """Return the reply to a request, and a line for each fault that a retry recovered from.
 
         Raises:
-            ModelError: the server does not answer, or answers with an error.
+            NoAnswerError: all attempts failed.
+            ModelError: the server answers with an error that a retry would not cure.
         """
+        return self.ask_unless_done(call, lambda: None)
+
+    def ask_unless_done(
+        self, call: Call, find: Callable[[], Answer | None]
+    ) -> tuple[Answer, tuple[str, ...]]:
+        """Ask as `ask` does, for what must not be done twice: before each further attempt, `find`
+        looks whether an earlier one, whose reply was lost, has done it."""
         faults: list[str] = []
         n_attempts = 1 if self._is_down.is_set() else 1 + self._options.retries
         while True:
+            done = find() if faults else None
+            if done is not None:
+                return done, tuple(faults)
             self._limiter.wait()
             try:
-                content = self._send_once(request)
+                answer = self._send_once(call)
             except _TransientError as fault:
                 faults.append(f"{self.where} {fault}")
                 if len(faults) == n_attempts:
                     if not fault.busy:
                         self._is_down.set()
-                    raise ModelError(
+                    raise NoAnswerError(
                         f"{self.where} {fault}, in {n_attempts} attempts; {fault.hint}"
                     ) from fault
                 time.sleep(_pause_s(len(faults), fault))
             else:
                 self._is_down.clear()
-                return content, tuple(faults)
+                return answer, tuple(faults)
 
     def close(self) -> None:
         """Close all connections."""
         self._wire.close()
 
-    def _send_once(self, request: Mapping[str, Any]) -> bytes:
+    def _send_once(self, call: Call) -> Answer:
         try:
-            return self._wire.post(request)
+            return self._wire.send(call)
         except TimeoutError as error:
-            timeout_s = self._options.timeout_s
+            timeout_s = self._options.timeout_s if call.timeout_s is None else call.timeout_s
             raise _TransientError(
                 f"does not answer within {timeout_s:g} s", "raise timeout_s if it is slow"
             ) from error
         except UnreadableError as error:
             raise ModelError(f"{self.where} {error}; is it a chat model's address?") from error
-        except openai.APIConnectionError as error:
-            reason = self._secret.redact(in_one_line(error.__cause__ or error))
-            raise _TransientError(f"cannot be reached ({reason})", "is the server up?") from error
-        except openai.APIStatusError as error:
-            raise self._classify(error) from error
-        except openai.OpenAIError as error:
+        except UnreachableError as error:
             reason = self._secret.redact(in_one_line(error))
-            raise ModelError(
-                f"{self.where} cannot be asked ({reason}); check base_url and model"
-            ) from error
+            raise _TransientError(f"cannot be reached ({reason})", "is the server up?") from error
+        except StatusError as error:
+            raise self._classify(error) from error
 
-    def _classify(self, error: openai.APIStatusError) -> _TransientError | ModelError:
-        status = error.status_code
-        body = error.response.content
-        phrase = f" {HTTPStatus(status).phrase}" if status in set(HTTPStatus) else ""
-        problem = f"answers {status}{phrase}: {self._quote(body)}"
-        hint = (
-            _hint_of(body) or _HINTS.get(status) or _HINTS.get(status // 100 * 100) or _OTHER_HINT
-        )
-        is_transient = status in _TRANSIENT or status >= 500
-        if not is_transient or (status == 429 and _QUOTA_EXCEEDED in body):
+    def _classify(self, error: StatusError) -> _TransientError | ModelError:
+        status = error.status
+        problem = self.describe(status, error.content)
+        hint = _hint_of(error.content) or self.hint_to(status)
+        if not is_transient(status) or (status == 429 and _QUOTA_EXCEEDED in error.content):
             return ModelError(f"{self.where} {problem}; {hint}")
-        wait_s = _retry_after_s(error.response.headers)
+        wait_s = _retry_after_s(error.headers)
+        if wait_s is None:
+            wait_s = _retry_delay_s(error.content)
         if wait_s is not None and wait_s > _LONGEST_RETRY_AFTER_S:
             return ModelError(
                 f"{self.where} {problem}, and asks to wait {wait_s:.0f} s; run the same command "
                 "again then: it resumes"
             )
         return _TransientError(problem, hint, wait_s, busy=status == 429)
+
+    def describe(self, status: int, body: bytes) -> str:
+        """Return a status and the words that came with it, in one line without the key."""
+        phrase = f" {HTTPStatus(status).phrase}" if status in set(HTTPStatus) else ""
+        return f"answers {status}{phrase}: {self._quote(body)}"
+
+    def hint_to(self, status: int) -> str:
+        """Return how to fix what a status says."""
+        return _HINTS.get(status) or _HINTS.get(status // 100 * 100) or self._hint
 
     def _quote(self, body: bytes) -> str:
         text = self._secret.redact(body.decode("utf-8", "replace"))
@@ -152,8 +179,8 @@ class Endpoint:
 
 
 def _hint_of(body: bytes) -> str | None:
-    """Return the hint to a refusal that servers have words of their own for; None for others."""
-    if b"may be provided in one prompt" in body:  # vLLM
+    """Return the hint to a refusal that a server has its own words for; None for others."""
+    if _TOO_MANY_FRAMES in body:
         return (
             "start the server with a higher --limit-mm-per-prompt '{\"image\": N}', or use fewer "
             "frames"
@@ -179,3 +206,9 @@ def _retry_after_s(headers: Mapping[str, str]) -> float | None:
         return max(0.0, email.utils.parsedate_to_datetime(value).timestamp() - time.time())
     except (ValueError, OverflowError):
         return None
+
+
+def _retry_delay_s(body: bytes) -> float | None:
+    """Return the pause that the body of an error requests, in seconds, or None."""
+    found = _RETRY_DELAY.search(body)
+    return None if found is None else float(found[1])

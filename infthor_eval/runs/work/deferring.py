@@ -1,0 +1,87 @@
+"""Having all requests of a run answered together, before its units are done one by one."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from infthor_eval.errors import UsageError
+from infthor_eval.runs.journals.gate import Gate
+from infthor_eval.runs.journals.records import Artifact, Unit, UnitRecord, describe_failure
+from infthor_eval.runs.journals.shards import FOLDER
+from infthor_eval.runs.suite import BoundEvaluation, Session, Workload
+from infthor_eval.runs.usage import NOTHING, Usage
+from infthor_eval.runs.work.group_records import group_records
+from infthor_eval.workers import WorkerSettings
+from model_adapters import Deferring, Subject
+
+__all__ = ["fetch_replies", "require_independent"]
+
+_BATCHES = "batches"  # beside the shards of the journal
+
+
+def require_independent(subject: Subject, workload: Workload[Any], workers: WorkerSettings) -> None:
+    """Refuse to ask in batches what is asked reply by reply, or by several workers (UsageError)."""
+    if not (isinstance(subject, Deferring) and subject.defers):
+        return
+    if not workload.independent:
+        tasks = ", ".join(workload.units_by_task)
+        raise UsageError(
+            f"{subject.name}: batch=true asks everything together, but {tasks} asks what depends "
+            "on earlier replies; leave out batch"
+        )
+    if not workers.is_local:
+        raise UsageError(
+            f"{subject.name}: batch=true leaves the work to the server; leave out --workers"
+        )
+
+
+def fetch_replies(
+    subject: Deferring,
+    evaluation: BoundEvaluation[Any, Any],
+    session: Session[Any],
+    gate: Gate[Any],
+    folder: Path,
+    report: Callable[[str], None],
+    should_stop: Callable[[], bool],
+) -> bool:
+    """Have the requests of all units without a result answered; return whether that was done, and
+    not stopped.
+
+    All units are gone through as if they were done, with a subject that notes what it is asked.
+
+    Raises:
+        InfthorError: the requests cannot be sent, or the replies not be fetched.
+    """
+    batches = subject.open_batches(folder / FOLDER / _BATCHES, report, should_stop)
+    while True:
+        with batches.gathering():
+            for group in evaluation.workload.groups:
+                for _ in group_records(evaluation, group, _Gathering(session), gate):
+                    pass  # what is noted is with the subject
+                if should_stop():
+                    break
+        if not batches.fetch():
+            return not should_stop()
+
+
+class _Gathering:
+    """A session in which units are only gone through: what fails is told when they are done."""
+
+    def __init__(self, session: Session[Any]) -> None:
+        self._session = session
+
+    def find_record(self, unit: Unit[Any], fingerprint: str) -> UnitRecord[Any] | None:
+        """See `Session`."""
+        return self._session.find_record(unit, fingerprint)
+
+    def describe_failure(self, unit: Unit[Any], error: BaseException) -> str:
+        """See `Session`; nothing is written."""
+        return describe_failure(error)
+
+    def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
+        """See `Session`."""
+        return self._session.find_artifact(fingerprint, kind)
+
+    def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
+        """See `Session`."""
+        self._session.cache_artifact(fingerprint, artifact, usage)

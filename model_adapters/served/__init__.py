@@ -1,0 +1,2 @@
+"""Models behind a server, in the dialects of OpenAI, Anthropic and Google, one by one or in
+batches."""

@@ -1,0 +1,1 @@
+"""Requests in batches: gathered, submitted once, waited for, fetched, in whatever dialect."""

@@ -1,0 +1,1 @@
+"""Servers of Google's Gemini API."""

@@ -1,0 +1,202 @@
+"""Batches at a server of Google's: a file of requests, a batch, a file of replies.
+
+The form is that of `POST /upload/.../files` (resumable), `POST /models/M:batchGenerateContent`,
+`GET /batches` and `GET /download/.../FILE:download`.
+"""
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, urlsplit
+
+import msgspec
+
+from infthor_eval.errors import ModelError
+from model_adapters.served.batches.service import Batch, BatchReply, BatchStatus
+from model_adapters.served.completion import decode_reply
+from model_adapters.served.endpoint import Endpoint, is_transient
+from model_adapters.served.wire import Answer, Call
+
+__all__ = ["GeminiBatches"]
+
+_TRANSFER_S = 3600.0  # limit for sending or fetching a whole file
+_LARGEST = 2**30  # bytes of the largest accepted file of replies
+_PAGE = 100
+_STATUS = {1: 499, 3: 400, 4: 504, 5: 404, 7: 403, 8: 429, 9: 400, 13: 500, 14: 503, 16: 401}
+
+
+class _Error(msgspec.Struct, frozen=True):
+    code: int = 13
+    message: str = ""
+
+    @property
+    def status(self) -> int:
+        """The status as in HTTP; codes are those of gRPC."""
+        return self.code if self.code >= 100 else _STATUS.get(self.code, 500)
+
+
+class _Output(msgspec.Struct, frozen=True, rename="camel"):
+    responses_file: str | None = None
+
+
+class _Metadata(msgspec.Struct, frozen=True, rename="camel"):
+    display_name: str = ""
+    state: str = ""
+    output: _Output | None = None
+
+
+class _Operation(msgspec.Struct, frozen=True):
+    name: str
+    metadata: _Metadata = _Metadata()
+    error: _Error | None = None
+    response: msgspec.Raw = msgspec.Raw(b"null")
+
+    @property
+    def state(self) -> str:
+        """The state, without its prefix, which is not the same in all versions."""
+        return self.metadata.state.rpartition("STATE_")[2]
+
+
+class _Page(msgspec.Struct, frozen=True, rename="camel"):
+    operations: list[_Operation] = []
+    next_page_token: str = ""
+
+
+class _File(msgspec.Struct, frozen=True):
+    name: str
+
+
+class _Uploaded(msgspec.Struct, frozen=True):
+    file: _File
+
+
+class _Line(msgspec.Struct, frozen=True):
+    key: str
+    response: msgspec.Raw = msgspec.Raw(b"")
+    error: _Error | None = None
+
+
+class GeminiBatches:
+    """See `BatchService`."""
+
+    most_requests = 200_000
+    most_bytes = 2 * 10**9
+
+    def __init__(self, endpoint: Endpoint, model: str) -> None:
+        self._endpoint = endpoint
+        self._model = model
+        parts = urlsplit(endpoint.where)
+        self._host = f"{parts.scheme}://{parts.netloc}"
+        self._version = parts.path
+
+    def line(self, custom_id: str, request: dict[str, Any]) -> bytes:
+        """See `BatchService`."""
+        return msgspec.json.encode({"key": custom_id, "request": request})
+
+    def submit(self, batch: Batch, path: Path, others: Collection[str]) -> str:
+        """See `BatchService`."""
+        file = self._upload(batch, path)
+        request = {"displayName": batch.name, "inputConfig": {"fileName": file.name}}
+        call = Call(
+            path=f"/models/{self._model}:batchGenerateContent",
+            content=msgspec.json.encode({"batch": request}),
+            headers={"Content-Type": "application/json"},
+        )
+        # The reply to an attempt may be lost, though the server has the batch: it is looked for.
+        answer, _ = self._endpoint.ask_unless_done(call, lambda: self._find_answer(batch))
+        submitted: _Operation = self._read(answer, _Operation, "a batch")
+        return submitted.name
+
+    def find(self, batch: Batch, others: Collection[str]) -> str | None:
+        """See `BatchService`."""
+        found = self._find(batch)
+        return None if found is None else found.name
+
+    def status(self, batch: Batch) -> BatchStatus:
+        """See `BatchService`."""
+        call = Call(method="GET", path=f"/{batch.server_id}", largest=_LARGEST)
+        found = self._read(self._endpoint.ask(call)[0], _Operation, "a batch")
+        if found.state in ("PENDING", "RUNNING", "UNSPECIFIED", ""):
+            return BatchStatus("running")
+        error = found.error or _Error()
+        if found.state == "FAILED":
+            reason = error.message or "it gives no reason"
+            return BatchStatus("refused", reason, busy=error.status == 429)
+        reason = "" if found.state == "SUCCEEDED" else f"the batch is {found.state.lower()}"
+        output = found.metadata.output or _Output()
+        if output.responses_file is None and bytes(found.response) != b"null":
+            output = self._read(Answer(bytes(found.response), {}), _Output, "a batch")
+        places = (output.responses_file,) if output.responses_file else ()
+        return BatchStatus("ended", reason, again=found.state != "CANCELLED", places=places)
+
+    def replies(self, batch: Batch, status: BatchStatus) -> Sequence[BatchReply]:
+        """See `BatchService`."""
+        found = []
+        for place in status.places:
+            call = Call(
+                method="GET",
+                path=f"{self._host}/download{self._version}/{place}:download?alt=media",
+                largest=_LARGEST,
+                timeout_s=_TRANSFER_S,
+            )
+            answer, _ = self._endpoint.ask(call)
+            for content in answer.content.splitlines():
+                line = decode_reply(self._endpoint.where, content, _Line, "the lines of a batch")
+                request = batch.request_of(line.key)
+                if request is not None:
+                    found.append(_reply(request, line))
+        return found
+
+    def _upload(self, batch: Batch, path: Path) -> _File:
+        kind = "application/jsonl"
+        begin = Call(
+            path=f"{self._host}/upload{self._version}/files",
+            content=msgspec.json.encode({"file": {"displayName": batch.name}}),
+            headers={
+                "Content-Type": "application/json",
+                "X-Goog-Upload-Protocol": "resumable",
+                "X-Goog-Upload-Command": "start",
+                "X-Goog-Upload-Header-Content-Length": str(path.stat().st_size),
+                "X-Goog-Upload-Header-Content-Type": kind,
+            },
+        )
+        place = self._endpoint.ask(begin)[0].headers.get("x-goog-upload-url", "")
+        if urlsplit(place).netloc != urlsplit(self._host).netloc:
+            raise ModelError(  # it would be sent the key
+                f"{self._endpoint.where} gives no address of its own for an upload; check base_url"
+            )
+        send = Call(
+            path=place,
+            content=path,
+            headers={"X-Goog-Upload-Offset": "0", "X-Goog-Upload-Command": "upload, finalize"},
+            timeout_s=_TRANSFER_S,
+        )
+        uploaded: _Uploaded = self._read(self._endpoint.ask(send)[0], _Uploaded, "a file")
+        return uploaded.file
+
+    def _find_answer(self, batch: Batch) -> Answer | None:
+        found = self._find(batch)
+        return None if found is None else Answer(msgspec.json.encode(found), {})
+
+    def _find(self, batch: Batch) -> _Operation | None:
+        """Return a batch by our name of it; None if the server has none."""
+        after = ""
+        while True:
+            call = Call(method="GET", path=f"/batches?pageSize={_PAGE}{after}", largest=_LARGEST)
+            page = self._read(self._endpoint.ask(call)[0], _Page, "a list of batches")
+            for found in page.operations:
+                if found.metadata.display_name == batch.name:
+                    return found
+            if not page.next_page_token:
+                return None
+            after = f"&pageToken={quote(page.next_page_token, safe='')}"
+
+    def _read(self, answer: Answer, kind: type[Any], what: str) -> Any:
+        return decode_reply(self._endpoint.where, answer.content, kind, what)
+
+
+def _reply(request: str, line: _Line) -> BatchReply:
+    if line.error is None:
+        return BatchReply(request, 200, bytes(line.response).decode() or "null")
+    status = line.error.status
+    return BatchReply(request, status, line.error.message, is_transient(status))

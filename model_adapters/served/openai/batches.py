@@ -1,0 +1,180 @@
+"""Batches at a server of OpenAI's: a file of requests, a batch, files of replies and of errors.
+
+The form is that of `POST /files`, `POST /batches`, `GET /batches` and `GET /files/ID/content`.
+"""
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from model_adapters.served.batches.service import Batch, BatchReply, BatchStatus
+from model_adapters.served.completion import decode_reply
+from model_adapters.served.endpoint import Endpoint, is_transient
+from model_adapters.served.wire import Answer, Call
+
+__all__ = ["OpenAIBatches"]
+
+_TRANSFER_S = 3600.0  # limit for sending or fetching a whole file
+_LARGEST = 2**30  # bytes of the largest accepted file of replies
+_NAME = "infthor_eval_batch"  # key of our metadata
+_PAGE = 100
+_CLOCKS_S = 86_400  # by which the server's clock may be ahead of ours, or behind
+_RUNNING = ("validating", "in_progress", "finalizing", "cancelling")
+_BUSY = "token_limit_exceeded"
+_EXPIRED = "batch_expired"
+_CANCELLED = "batch_cancelled"
+
+
+class _File(msgspec.Struct, frozen=True):
+    id: str
+
+
+class _Error(msgspec.Struct, frozen=True):
+    code: str | None = None
+    message: str | None = None
+
+    @property
+    def words(self) -> str:
+        return " ".join(f"{self.code or ''} {self.message or ''}".split()) or "no reason"
+
+
+class _Errors(msgspec.Struct, frozen=True):
+    data: list[_Error] = []
+
+
+class _Batch(msgspec.Struct, frozen=True):
+    id: str
+    status: str
+    created_at: float = 0.0
+    output_file_id: str | None = None
+    error_file_id: str | None = None
+    errors: _Errors | None = None
+    metadata: dict[str, Any] | None = None
+
+
+class _Page(msgspec.Struct, frozen=True):
+    data: list[_Batch]
+    has_more: bool = False
+
+
+class _Response(msgspec.Struct, frozen=True):
+    status_code: int
+    body: msgspec.Raw = msgspec.Raw(b"null")
+
+
+class _Line(msgspec.Struct, frozen=True):
+    custom_id: str
+    response: _Response | None = None
+    error: _Error | None = None
+
+
+class OpenAIBatches:
+    """See `BatchService`."""
+
+    most_requests = 50_000
+    most_bytes = 200 * 10**6
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        self._endpoint = endpoint
+
+    def line(self, custom_id: str, request: dict[str, Any]) -> bytes:
+        """See `BatchService`."""
+        line = {"custom_id": custom_id, "method": "POST", "url": "/v1/chat/completions"}
+        return msgspec.json.encode(line | {"body": request})
+
+    def submit(self, batch: Batch, path: Path, others: Collection[str]) -> str:
+        """See `BatchService`."""
+        file = self._upload(path)
+        request = {
+            "input_file_id": file.id,
+            "endpoint": "/v1/chat/completions",
+            "completion_window": "24h",
+            "metadata": {_NAME: batch.name},
+        }
+        call = Call(
+            path="/batches",
+            content=msgspec.json.encode(request),
+            headers={"Content-Type": "application/json"},
+        )
+        # The reply to an attempt may be lost, though the server has the batch: it is looked for.
+        answer, _ = self._endpoint.ask_unless_done(call, lambda: self._find_answer(batch))
+        submitted: _Batch = self._read(answer, _Batch, "a batch")
+        return submitted.id
+
+    def find(self, batch: Batch, others: Collection[str]) -> str | None:
+        """See `BatchService`."""
+        found = self._find(batch)
+        return None if found is None else found.id
+
+    def status(self, batch: Batch) -> BatchStatus:
+        """See `BatchService`."""
+        call = Call(method="GET", path=f"/batches/{batch.server_id}")
+        found = self._read(self._endpoint.ask(call)[0], _Batch, "a batch")
+        if found.status in _RUNNING:
+            return BatchStatus("running")
+        errors = found.errors.data if found.errors is not None else []
+        reason = "; ".join(error.words for error in errors[:3])
+        if found.status == "failed":
+            is_busy = any(error.code == _BUSY for error in errors)
+            return BatchStatus("refused", reason or "it gives no reason", busy=is_busy)
+        places = [place for place in (found.output_file_id, found.error_file_id) if place]
+        # Who cancelled it does not want what is left to be asked at once.
+        is_cancelled = found.status == "cancelled"
+        reason = reason or ("" if found.status == "completed" else f"the batch is {found.status}")
+        return BatchStatus("ended", reason, again=not is_cancelled, places=tuple(places))
+
+    def replies(self, batch: Batch, status: BatchStatus) -> Sequence[BatchReply]:
+        """See `BatchService`."""
+        found = []
+        for place in status.places:
+            call = Call(
+                method="GET",
+                path=f"/files/{place}/content",
+                largest=_LARGEST,
+                timeout_s=_TRANSFER_S,
+            )
+            answer, _ = self._endpoint.ask(call)
+            for content in answer.content.splitlines():
+                line = decode_reply(self._endpoint.where, content, _Line, "the lines of a batch")
+                request = batch.request_of(line.custom_id)
+                if request is not None:
+                    found.append(_reply(request, line))
+        return found
+
+    def _upload(self, path: Path) -> _File:
+        call = Call(path="/files", content=path, form={"purpose": "batch"}, timeout_s=_TRANSFER_S)
+        return self._read(self._endpoint.ask(call)[0], _File, "a file")
+
+    def _find_answer(self, batch: Batch) -> Answer | None:
+        found = self._find(batch)
+        return None if found is None else Answer(msgspec.json.encode(found), {})
+
+    def _find(self, batch: Batch) -> _Batch | None:
+        """Return a batch by our name of it, the latest first; None if the server has none."""
+        after = ""
+        while True:
+            call = Call(method="GET", path=f"/batches?limit={_PAGE}{after}", largest=_LARGEST)
+            page = self._read(self._endpoint.ask(call)[0], _Page, "a list of batches")
+            for found in page.data:
+                if (found.metadata or {}).get(_NAME) == batch.name:
+                    return found
+            is_older = bool(page.data) and (
+                page.data[-1].created_at < batch.prepared_at - _CLOCKS_S
+            )
+            if not page.has_more or not page.data or is_older:
+                return None
+            after = f"&after={page.data[-1].id}"
+
+    def _read(self, answer: Answer, kind: type[Any], what: str) -> Any:
+        return decode_reply(self._endpoint.where, answer.content, kind, what)
+
+
+def _reply(request: str, line: _Line) -> BatchReply:
+    response = line.response
+    if response is not None:
+        body = bytes(response.body).decode()
+        return BatchReply(request, response.status_code, body, is_transient(response.status_code))
+    error = line.error or _Error()
+    return BatchReply(request, 0, error.words, error.code != _CANCELLED)
