@@ -42,6 +42,7 @@ PARSED_PAGES = {
     "docs/policies.md": KEY,
     "docs/report.md": READERS,
     "docs/reproduce.md": HOURS,
+    "docs/submit.md": READERS,
     "docs/twins.md": HOURS,
     "docs/vllm.md": GPU,
     "docs/workers.md": HOURS,
@@ -56,7 +57,6 @@ CANNOT_RUN = {
     r"--model hf-multimodal ": WEIGHTS,
     r"--model (openai|anthropic|gemini) ": KEY,
     r"MyModel|my_task$|=PATH\b|DATA$|import-replies exported|lm-eval run \.\.\.": READERS,
-    r"--data (TRAJECTORIES|trajectories) ": READERS,
 }
 PROGRAMS = ("infthor-eval", "make", "lm-eval", "pip", "python", "hf", "torchrun", "export")
 _RUN_HERE = ("infthor-eval", "lm-eval")

@@ -12,6 +12,7 @@ from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
 
 if TYPE_CHECKING:
+    from infthor_eval.report.leaderboard.page import LeaderboardRow
     from infthor_eval.submissions.checking import Verdict
 
 __all__ = ["leaderboard", "submit_check"]
@@ -121,7 +122,7 @@ def leaderboard(
 
     prepare_file(out)
     verdicts = _check(folder, sets, key, allow, include)
-    rows = []
+    rows: list[LeaderboardRow] = []
     n_refused = 0
     for verdict in verdicts:
         n_refused += bool(verdict.refusals)
