@@ -80,8 +80,8 @@ class NiehTaskConfig(TaskConfig, frozen=True, kw_only=True, omit_defaults=True):
             raise TypeError("`config.dataset_kwargs.context` is no name")
         if not isinstance(self.budget, int | None):
             raise TypeError("`config.dataset_kwargs.budget` is no number of tokens")
-        if "max_new_tokens" not in self.decoding:
-            raise TypeError("`decoding.max_new_tokens` is missing")
+        if type(self.decoding.get("max_new_tokens")) is not int:
+            raise TypeError("`decoding.max_new_tokens` is no number of tokens")
         _ = self.memory
 
     @property

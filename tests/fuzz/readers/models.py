@@ -51,9 +51,10 @@ def _make(name: str, document: object, folder: Path) -> Path:
 def _complete(folder: Path) -> None:
     completion = read_completion("http://server", (folder / "reply.json").read_bytes())
     completion.text("http://server")
-    if completion.usage is not None:
-        assert completion.usage.total >= 0
-        assert (completion.usage.n_cached or 0) <= completion.usage.prompt_tokens
+    tokens = completion.tokens
+    if tokens is not None:
+        assert tokens.completion_tokens >= 0
+        assert (tokens.n_cached or 0) <= tokens.prompt_tokens
 
 
 @cache
