@@ -45,6 +45,7 @@ KEPT = (
     "tests/examples/test_sums.py::test_its_results_are_shown_and_exported",
     "tests/runs/work/test_worker_executor.py::test_workers_that_are_killed_lose_nothing_that_was_finished",
     "tests/benchmarks/test_families.py::test_six_families_reply_as_transformers_does",
+    "tests/model_adapters/human/test_page.py::test_ten_questions_by_keyboard_alone",
 )
 _ROOT = Path(__file__).parents[1]
 _LIST = Path(__file__).with_name("slow_tests.txt")
