@@ -80,7 +80,10 @@ class NiehTaskConfig(TaskConfig, frozen=True, kw_only=True, omit_defaults=True):
             raise TypeError("`config.dataset_kwargs.context` is no name")
         if not isinstance(self.budget, int | None):
             raise TypeError("`config.dataset_kwargs.budget` is no number of tokens")
-        if type(self.decoding.get("max_new_tokens")) is not int:
+        if "max_new_tokens" not in self.decoding:
+            raise TypeError("`decoding.max_new_tokens` is missing")
+        # None for imported replies, whose limit nobody wrote down.
+        if not isinstance(self.decoding["max_new_tokens"], int | None):
             raise TypeError("`decoding.max_new_tokens` is no number of tokens")
         _ = self.memory
 
