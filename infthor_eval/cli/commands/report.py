@@ -108,12 +108,13 @@ def command(
     for option, value in {"--panels": panels, "--task": task}.items():
         if value is not None:
             raise UsageError(f"{option}: is for a figure; give --figure too, or leave it out")
-    is_above = any(map(_is_above_runs, runs))
     folders = _runs_among(runs)
     if tables is not None:
         _print_table(folders, tables)
         return
     request = PageRequest(data, scenes, episodes)
+    no_runs = set(runs) - set(folders)
+    is_above = any(not no_runs.isdisjoint(folder.parents) for folder in folders)
     if (is_above and out is None) or (out is not None and not out.suffix):
         _write_index(folders, request, out or _INDEX)
     else:
@@ -164,16 +165,6 @@ def _write_page(folders: Sequence[Path], request: PageRequest, out: Path) -> Non
         f"{len(page.samples):,} samples, {len(page.pictures):,} pictures, {size / 1e6:.1f} MB: "
         f"{path}"
     )
-
-
-def _is_above_runs(path: Path) -> bool:
-    """Whether a path is a folder with runs below it, and no run itself."""
-    from infthor_eval.runs.stored.search import run_folders
-
-    if not path.is_dir():
-        return False
-    first = next(run_folders(path), None)
-    return first is not None and first != path
 
 
 def _runs_among(paths: Sequence[Path]) -> list[Path]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -16,9 +16,6 @@ from infthor_eval.cli.results import print_results, read_run_results
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import is_trajectory_file
 from infthor_eval.terminal import print_line
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["command"]
 

@@ -51,7 +51,8 @@ def results_chart(results: Sequence[TaskResult]) -> Chart | None:
     kept = set(map(id, shown[:_MOST_ROWS]))
     rows = []
     heading = ""
-    by_task = sorted(results, key=lambda one: [each.task for each in results].index(one.task))
+    tasks = list(dict.fromkeys(one.task for one in results))
+    by_task = sorted(results, key=lambda one: tasks.index(one.task))
     for result in by_task:
         if id(result) not in kept:
             continue

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from infthor_eval.distances import DISTANCES, LENGTHS
 from infthor_eval.formats.question import ABSENCE
@@ -24,9 +24,6 @@ from infthor_eval.report.svg.drawing import Series
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.statistics import MeanEstimate
 from infthor_eval.tables import Column, Row, Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["nieh_charts"]
 
@@ -261,7 +258,7 @@ def _heat_map(run: ReportRun) -> Chart | None:
     for depth in depths:
         means.append([_percent(tasks[size].by_variant.get(depth), metric) for size in sizes])
 
-    def draw() -> "Figure":
+    def draw() -> Figure:
         figure = Figure(
             figsize=(2.2 + 0.9 * len(sizes), 1.4 + 0.5 * len(depths)), layout="constrained"
         )

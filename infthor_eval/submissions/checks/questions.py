@@ -50,7 +50,7 @@ class SameTask:
             differing = [
                 name
                 for name in ("dataset_kwargs", "doc_to_text", "doc_to_image", "process_docs")
-                if _setting(theirs.settings, name) != _setting(ours.settings, name)
+                if theirs.settings.get(name) != ours.settings.get(name)
             ]
             if theirs.sources.keys() != ours.sources.keys() or theirs.film != ours.film:
                 differing.append("sources")
@@ -60,10 +60,6 @@ class SameTask:
                     f"{task.name}: has other {', '.join(differing)} than the installed task; run "
                     "the installed one",
                 )
-
-
-def _setting(settings: dict[str, Any], name: str) -> Any:
-    return settings.get(name)
 
 
 class AllThere:
