@@ -14,7 +14,13 @@ from msgspec.structs import replace
 from infthor_eval.errors import InfthorError, ModelError, NotAskedError, wrap_errors
 from infthor_eval.storage.files import writing_hint
 from model_adapters.served.batches.ledger import Ledger
-from model_adapters.served.batches.service import Batch, BatchReply, BatchService, BatchStatus
+from model_adapters.served.batches.service import (
+    Batch,
+    BatchReply,
+    BatchService,
+    BatchStatus,
+    custom_id,
+)
 from model_adapters.served.endpoint import NoAnswerError
 
 __all__ = ["BatchQueue", "BatchRules", "BatchedReply"]
@@ -272,7 +278,7 @@ class BatchQueue:
         return room
 
     def _line(self, draft: _Draft, request: str, body: dict[str, Any]) -> bytes:
-        line = self._service.line(f"{request}-{draft.name}", body) + b"\n"
+        line = self._service.line(custom_id(request, draft.name), body) + b"\n"
         if len(line) > self._most_bytes:
             raise _TooLargeError(
                 f"the request has {len(line) / _MB:.1f} MB, more than a batch may have "

@@ -10,7 +10,7 @@ from typing import Any, Literal, Protocol
 
 import msgspec
 
-__all__ = ["Batch", "BatchReply", "BatchService", "BatchStatus"]
+__all__ = ["Batch", "BatchReply", "BatchService", "BatchStatus", "custom_id"]
 
 
 class Batch(msgspec.Struct, omit_defaults=True):
@@ -31,14 +31,15 @@ class Batch(msgspec.Struct, omit_defaults=True):
     server_id: str | None = None
     ended: bool = False
 
-    def custom_id(self, request: str) -> str:
-        """Return the server's name of a request: that of the request, then that of the batch."""
-        return f"{request}-{self.name}"
-
     def request_of(self, custom_id: str) -> str | None:
-        """Return which request a server's name is of; None if it is of another batch."""
+        """Return which request a `custom_id` is of; None if it is of another batch."""
         request, _, name = custom_id.partition("-")
         return request if name == self.name else None
+
+
+def custom_id(request: str, batch: str) -> str:
+    """Return the server's name of a request: that of the request, then that of the batch."""
+    return f"{request}-{batch}"
 
 
 class BatchReply(msgspec.Struct, frozen=True, omit_defaults=True):
