@@ -27,7 +27,7 @@ from ..asking import up_to
 from ..checkpoints import save
 from ..serving import free_port, wait_for_server
 
-for package in ("fastapi", "uvicorn", "multipart"):
+for package in ("fastapi", "uvicorn", "multipart", "openai"):
     pytest.importorskip(
         package, reason="what `transformers serve` needs is not installed (pip install -e '.[dev]')"
     )
