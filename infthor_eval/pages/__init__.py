@@ -1,1 +1,1 @@
-"""Local pages that a running command serves; what is on them is another package's."""
+"""Local pages, in one file or served by a running command; what is on them is another package's."""

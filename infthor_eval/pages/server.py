@@ -8,10 +8,10 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import resources
 from typing import TYPE_CHECKING
 
 from infthor_eval.errors import UsageError, wrap_errors
+from infthor_eval.pages.one_file import read_part
 
 if TYPE_CHECKING:
     from starlette.routing import BaseRoute, Route
@@ -83,7 +83,7 @@ def file_route(path: str, package: str, name: str) -> Route:
     from starlette.responses import Response
     from starlette.routing import Route
 
-    text = resources.files(package).joinpath(name).read_text(encoding="utf-8")
+    text = read_part(package, name)
     media_type = _MEDIA_TYPES[name.rpartition(".")[2]]
     return Route(path, lambda _request: Response(text, media_type=media_type))
 

@@ -3,19 +3,13 @@
 import base64
 import os
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 from urllib.parse import quote
 
-from jinja2 import Environment
-from markupsafe import Markup
-
-from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.validation.cross_validation import DECISIONS, JudgedQuestion
-from infthor_eval.pages.policy import file_policy
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.pages.one_file import read_part, write_page_file
 
 __all__ = ["write_inspection_page"]
 
@@ -31,26 +25,22 @@ def write_inspection_page(path: Path, items: Sequence[JudgedQuestion], data: Nie
     Raises:
         DataError: it cannot be written.
     """
-    style = _read("inspection.css")
-    script = _read("inspection.js")
-    # Questions and replies come from data files and models: whatever they hold is shown as text.
-    page = Environment(autoescape=True).from_string(_read("inspection.html"))
-    text = page.render(
-        items=[_describe(judged, data, path.parent) for judged in items],
-        choices=DECISIONS,
-        css=Markup(style),
-        js=Markup(script),
-        policy=Markup(file_policy(style=style, script=script, images=_IMAGES)),
+    values = {
+        "items": [_describe(judged, data, path.parent) for judged in items],
+        "choices": DECISIONS,
+    }
+    write_page_file(
+        path,
+        _read("inspection.html"),
+        values,
+        style=[_read("inspection.css")],
+        script=[_read("inspection.js")],
+        images=_IMAGES,
     )
-    with (
-        wrap_errors(f"{path}: cannot be written", "give another --out"),
-        write_atomically(path) as partial,
-    ):
-        partial.write_bytes(text.encode("utf-8", "backslashreplace"))
 
 
 def _read(name: str) -> str:
-    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return read_part(__package__, name)
 
 
 def _describe(judged: JudgedQuestion, data: NiehSet, folder: Path) -> dict[str, object]:

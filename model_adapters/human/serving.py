@@ -63,6 +63,7 @@ def desk_routes(desk: Desk) -> list[BaseRoute]:
     page = _Page(desk)
     return [
         file_route("/", _PACKAGE, "page.html"),
+        file_route("/look.css", "infthor_eval.pages", "look.css"),
         *(file_route(f"/{name}", _PACKAGE, name) for name in ("page.css", "page.js", "strip.js")),
         Route("/state.json", page.state),
         Route("/frames/{number}/{index}", page.frame),

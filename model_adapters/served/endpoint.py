@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from threading import Event
+from typing import TypeVar
 
 from infthor_eval.errors import ModelError, in_one_line
 from model_adapters.served.options import ServedOptions
@@ -22,6 +23,8 @@ from model_adapters.served.wire import (
 )
 
 __all__ = ["Endpoint", "NoAnswerError", "is_transient"]
+
+T = TypeVar("T")
 
 _FIRST_WAIT_S = 0.5  # pause before the second attempt; it doubles before each further one
 _LONGEST_WAIT_S = 60.0
@@ -98,13 +101,15 @@ class Endpoint:
             NoAnswerError: all attempts failed.
             ModelError: the server answers with an error that a retry would not cure.
         """
-        return self.ask_unless_done(call, lambda: None)
+        answer, faults = self.ask_unless_done(call, lambda: None)
+        return answer, faults
 
     def ask_unless_done(
-        self, call: Call, find: Callable[[], Answer | None]
-    ) -> tuple[Answer, tuple[str, ...]]:
+        self, call: Call, find: Callable[[], T | None]
+    ) -> tuple[Answer | T, tuple[str, ...]]:
         """Ask as `ask` does, for what must not be done twice: before each further attempt, `find`
-        looks whether an earlier one, whose reply was lost, has done it."""
+        looks whether an earlier one, whose reply was lost, has done it, and returns what it finds
+        instead of the reply."""
         faults: list[str] = []
         n_attempts = 1 if self._is_down.is_set() else 1 + self._options.retries
         while True:

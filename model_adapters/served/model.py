@@ -147,9 +147,7 @@ class ServedModel:
             usage = self._dialect.read(self._endpoint.where, reply.content.encode()).tokens
         except ModelError:  # told where the reply is used
             usage = None
-        if usage is not None:
-            charge.tokens = usage.total
-            charge.cost = self._cost(usage) or 0.0
+        self._note(usage, charge)
         self._spend.add(charge)
 
     def _send(self, request: dict[str, Any], charge: Charge) -> tuple[Completion, tuple[str, ...]]:
@@ -164,10 +162,9 @@ class ServedModel:
             answer, faults = self._endpoint.ask(call)
             charge.sent = True
             completion = self._dialect.read(self._endpoint.where, answer.content)
-            usage = completion.tokens
-            if usage is not None:
-                self._expected_tokens = used = charge.tokens = usage.total
-                charge.cost = self._cost(usage) or 0.0
+            self._note(completion.tokens, charge)
+            if completion.tokens is not None:
+                self._expected_tokens = used = completion.tokens.total
         finally:
             self._token_limiter.take(used - expected)
         return completion, faults
@@ -186,6 +183,12 @@ class ServedModel:
             n_cached_tokens=usage.n_cached,
             cost=self._cost(usage),
         )
+
+    def _note(self, usage: TokenUsage | None, charge: Charge) -> None:
+        """Put what a reply took into its charge, where the server says it."""
+        if usage is not None:
+            charge.tokens = usage.total
+            charge.cost = self._cost(usage) or 0.0
 
     def _cost(self, usage: TokenUsage) -> float | None:
         return None if self._prices is None else self._prices.cost(usage)

@@ -51,15 +51,6 @@
   for (const id of ["search", "task", "published"]) byId(id).addEventListener("input", filter);
   byId("filters").addEventListener("submit", event => event.preventDefault());
 
-  const toggle = () => {
-    const root = document.documentElement;
-    const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-    root.dataset.theme = dark ? "light" : "dark";
-  };
-  byId("theme").addEventListener("click", toggle);
-  document.addEventListener("keydown", event => {
-    if (event.key === "t" && !event.ctrlKey && !event.metaKey && !/^(INPUT|SELECT)$/.test(event.target.tagName)) toggle();
-  });
   sort();
   filter();
 })();

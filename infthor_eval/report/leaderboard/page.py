@@ -2,16 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 
-from jinja2 import Environment, StrictUndefined
-from markupsafe import Markup
-
-from infthor_eval.errors import wrap_errors
-from infthor_eval.pages.policy import file_policy
+from infthor_eval.pages.one_file import LOOK, THEME, read_part, write_page_file
 from infthor_eval.rates import Rate
-from infthor_eval.storage.files import write_atomically
 
 __all__ = ["LeaderboardRow", "write_leaderboard"]
 
@@ -96,33 +90,25 @@ def write_leaderboard(
     Raises:
         DataError: it cannot be written.
     """
-    style = _read("leaderboard.css")
-    script = _read("leaderboard.js")
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    values = {
+        "rows": sorted(rows, key=lambda row: row.order),
+        "tasks": sorted({row.task for row in rows}),
+        "title": title,
+        "version": version,
+        "refused": refused,
+    }
+    return write_page_file(
+        path,
+        _read("leaderboard.html"),
+        values,
+        style=[LOOK, _read("leaderboard.css")],
+        script=[THEME, _read("leaderboard.js")],
+        filters={"percent": _percent, "interval": _interval, "number": _number},
     )
-    environment.filters |= {"percent": _percent, "interval": _interval, "number": _number}
-    text = environment.from_string(_read("leaderboard.html")).render(
-        rows=sorted(rows, key=lambda row: row.order),
-        tasks=sorted({row.task for row in rows}),
-        title=title,
-        version=version,
-        refused=refused,
-        css=Markup(style),
-        js=Markup(script),
-        policy=Markup(file_policy(style=style, script=script)),
-    )
-    encoded = text.encode("utf-8", "backslashreplace")
-    with (
-        wrap_errors(f"{path}: cannot be written", "give another --out"),
-        write_atomically(path) as partial,
-    ):
-        partial.write_bytes(encoded)
-    return len(encoded)
 
 
 def _read(name: str) -> str:
-    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return read_part(__package__, name)
 
 
 def _percent(rate: Rate | None) -> str:

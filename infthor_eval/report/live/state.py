@@ -274,4 +274,5 @@ def live_routes(run: LiveRun) -> "list[Route]":
     report = "infthor_eval.report.web"
     files = [("/", own, "live.html"), ("/live.js", own, "live.js"), ("/live.css", own, "live.css")]
     files.append(("/report.css", report, "report.css"))
+    files.append(("/look.css", "infthor_eval.pages", "look.css"))
     return [*(file_route(*file) for file in files), Route("/state.json", state)]

@@ -5,27 +5,22 @@ import json
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from importlib import resources
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import msgspec
-from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
 
-from infthor_eval.errors import wrap_errors
-from infthor_eval.pages.policy import file_policy
+from infthor_eval.pages.one_file import LOOK, THEME, read_part, write_page_file
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.web.samples import FrameFacts, Numbered, PageSample, Prompt
 from infthor_eval.report.web.sections import Section
-from infthor_eval.storage.files import write_atomically
 
 __all__ = ["About", "Page", "SuiteLabels", "write_page"]
 
 _SCRIPTS = (
-    "theme.js",
+    "wide.js",
     "tables.js",
     "elements.js",
     "address.js",
@@ -131,37 +126,23 @@ def write_page(page: Page, path: Path) -> int:
     Raises:
         DataError: it cannot be written.
     """
-    style = _read("report.css")
-    script = "".join(map(_read, _SCRIPTS))
-    text = _template().render(
-        page=page,
-        css=Markup(style),
-        js=Markup(script),
-        policy=Markup(file_policy(style=style, script=script)),
-        data=_data(page),
-        svg=Markup,
-        csv=lambda table: export_tables([table], "csv"),
+    values = {
+        "page": page,
+        "data": _data(page),
+        "svg": Markup,
+        "csv": lambda table: export_tables([table], "csv"),
+    }
+    return write_page_file(
+        path,
+        _read("report.html"),
+        values,
+        style=[LOOK, _read("report.css")],
+        script=[THEME, *map(_read, _SCRIPTS)],
     )
-    encoded = text.encode("utf-8", "backslashreplace")
-    with (
-        wrap_errors(f"{path}: cannot be written", "give another --out"),
-        write_atomically(path) as partial,
-    ):
-        partial.write_bytes(encoded)
-    return len(encoded)
-
-
-@cache
-def _template() -> Template:
-    # Questions and replies come from data files and models: whatever they hold is shown as text.
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    return environment.from_string(_read("report.html"))
 
 
 def _read(name: str) -> str:
-    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return read_part(__package__, name)
 
 
 def _data(page: Page) -> Markup:

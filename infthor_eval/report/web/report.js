@@ -2,7 +2,6 @@
 (() => {
   if (!byId("samples")) {
     markWide();
-    addEventListener("keydown", event => { if (event.key === "t") toggleTheme(); });
     return;
   }
 
@@ -161,7 +160,6 @@
       if (chosen > 0) choose(chosen - 1);
     } else if (event.key === "/") byId("search").focus();
     else if (event.key === "b") byId("sample").querySelector(".switch")?.click();
-    else if (event.key === "t") toggleTheme();
     else return;
     event.preventDefault();
   });

@@ -11,6 +11,7 @@ from infthor_eval.report.web.progress import PageProgress, Silent
 __all__ = ["ThumbnailStore"]
 
 _QUALITY = 55  # of WebP: 1 to 3 kB for a frame of 132 pixels, so that thousands fit into a page
+_EFFORT = 2  # of WebP: twice as fast as 4, pictures are 5 % larger
 _LARGE_SIDE = 480  # the published frames, of 300 pixels, keep their size
 _WORK = "frames read"
 _LARGE_QUALITY = 70  # about 5 kB for a frame of the embedded simulator
@@ -106,5 +107,5 @@ def _encode(picture: Image.Image, side: int, quality: int) -> str:
     small = picture.copy()
     small.thumbnail((side, side), Image.Resampling.LANCZOS)
     encoded = io.BytesIO()
-    small.save(encoded, format="webp", quality=quality, method=4)
+    small.save(encoded, format="webp", quality=quality, method=_EFFORT)
     return base64.b64encode(encoded.getvalue()).decode("ascii")

@@ -1,8 +1,9 @@
 """From pieces of a prompt to the inputs that a language model reads."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import torch
 
@@ -37,13 +38,19 @@ class Span:
         return self.positions.shape[-1]
 
 
-class Embed(Protocol):
-    """Prepares spans of prompts for one model."""
+class Embed(ABC):
+    """Prepares spans of prompts for one model, with a cache of features of frames and clips."""
+
+    def __init__(self, model: Any, features: FeatureCache[Any]) -> None:
+        self._features = features
+        self._embeddings = model.get_input_embeddings()
 
     @property
+    @abstractmethod
     def sees_ahead(self) -> bool:
         """True if tokens of a frame attend to later ones of the same frame."""
 
+    @abstractmethod
     def __call__(self, pieces: Sequence[Piece], start: int, before: Sequence[Piece]) -> Span:
         """Prepare pieces that begin at the position `start`, behind the pieces `before` them.
 
@@ -52,23 +59,37 @@ class Embed(Protocol):
             ModelError: processor and model disagree on the number of a frame's tokens.
         """
 
+    @abstractmethod
     def words(self, tokens: Sequence[int], starts: Sequence[int]) -> Span:
         """Prepare tokens of text of different sequences, each at its own position."""
 
+    @abstractmethod
     def join(self, spans: Sequence[Span]) -> Mapping[str, Any]:
         """Return the inputs of several spans as those of one sequence."""
 
     def expect(self, pieces: Sequence[Piece]) -> None:
         """Begin to read the frames of pieces that are going to be prepared, in this order."""
+        self._features.expect(_visuals(pieces))
 
     def hash(self, pieces: Sequence[Piece]) -> str:
         """Return the hash of the pixels of the frames of pieces that were prepared."""
+        return self._features.hash(_visuals(pieces))
 
     def clear(self) -> None:
         """Free the memory of cached features."""
+        self._features.clear()
 
     def close(self) -> None:
         """End the threads that read frames."""
+        self._features.close()
+
+    @property
+    def _device(self) -> torch.device:
+        return self._embeddings.weight.device
+
+
+def _visuals(pieces: Sequence[Piece]) -> list[Frame | Clip]:
+    return [piece for piece in pieces if not isinstance(piece, int)]
 
 
 def piece_starts(
@@ -106,34 +127,22 @@ def word_span(
     return Span(inputs, positions.to(device), tuple(starts), end)
 
 
-class Embedder:
-    """Embeds spans of prompts, with a cache of features of frames and clips.
-
-    Attributes:
-        sees_ahead: False: attention is causal.
-    """
-
-    sees_ahead = False
+class Embedder(Embed):
+    """Embeds spans of prompts: what the language model reads are embeddings."""
 
     def __init__(self, model: Any, family: Family, features: FeatureCache[torch.Tensor]) -> None:
+        super().__init__(model, features)
         self._family = family
-        self._features = features
-        self._embeddings = model.get_input_embeddings()
+
+    @property
+    def sees_ahead(self) -> bool:
+        """False: attention is causal."""
+        return False
 
     @torch.inference_mode()
-    def __call__(
-        self,
-        pieces: Sequence[Piece],
-        start: int,
-        before: Sequence[Piece],
-    ) -> Span:
-        """Embed pieces that begin at the position `start`, behind everything before them.
-
-        Raises:
-            DataError: a frame cannot be read.
-            ModelError: processor and model disagree on the number of a frame's tokens.
-        """
-        visuals = [piece for piece in pieces if not isinstance(piece, int)]
+    def __call__(self, pieces: Sequence[Piece], start: int, before: Sequence[Piece]) -> Span:
+        """See `Embed`."""
+        visuals = _visuals(pieces)
         flat: list[int] = []
         slots: list[int] = []
         for piece in pieces:
@@ -149,43 +158,26 @@ class Embedder:
         # Features first: reading and scaling of frames on the CPU overlaps with the device's
         # previous chunk.
         features = self._slot_features(visuals, len(slots)) if visuals else None
-        device = self._embeddings.weight.device
         # Positions are computed on the CPU, because reading them below would otherwise wait for the
         # device.
         ids = torch.tensor(flat)
         positions = self._family.positions(ids, [piece.shape for piece in visuals], start)
-        embeds = self._embeddings(ids.to(device))
+        embeds = self._embeddings(ids.to(self._device))
         if features is not None:
             embeds[slots] = features.to(embeds)
         starts, end = piece_starts(pieces, positions, start)
-        return Span({"inputs_embeds": embeds[None]}, positions.to(device), starts, end)
+        return Span({"inputs_embeds": embeds[None]}, positions.to(self._device), starts, end)
 
     @torch.inference_mode()
     def words(self, tokens: Sequence[int], starts: Sequence[int]) -> Span:
-        """Embed tokens of text of different sequences, each of which begins at its own position."""
+        """See `Embed`."""
         ids = torch.tensor(tokens)
-        embeds = self._embeddings(ids.to(self._embeddings.weight.device))
+        embeds = self._embeddings(ids.to(self._device))
         return word_span(self._family, {"inputs_embeds": embeds[None]}, ids, starts, embeds.device)
 
     def join(self, spans: Sequence[Span]) -> Mapping[str, Any]:
-        """Return the inputs of several spans as those of one sequence."""
+        """See `Embed`."""
         return {"inputs_embeds": torch.cat([span.inputs["inputs_embeds"] for span in spans], dim=1)}
-
-    def expect(self, pieces: Sequence[Piece]) -> None:
-        """Begin to read the frames of pieces that are going to be embedded, in this order."""
-        self._features.expect([piece for piece in pieces if not isinstance(piece, int)])
-
-    def hash(self, pieces: Sequence[Piece]) -> str:
-        """Return the hash of the pixels of the frames of pieces that were embedded."""
-        return self._features.hash([piece for piece in pieces if not isinstance(piece, int)])
-
-    def clear(self) -> None:
-        """Free the memory of cached features."""
-        self._features.clear()
-
-    def close(self) -> None:
-        """End the threads that read frames."""
-        self._features.close()
 
     def _slot_features(self, visuals: Sequence[Frame | Clip], n_slots: int) -> torch.Tensor:
         features = torch.cat(self._features.get(visuals))

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import torch
 
 from model_adapters.hf.family import Family, Pixels
-from model_adapters.hf.prompting.embedding import Span, piece_starts, word_span
+from model_adapters.hf.prompting.embedding import Embed, Span, piece_starts, word_span
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.prompt import Frame, Piece, token_ids
 
@@ -98,32 +98,23 @@ class MergingFamily(Family, Protocol):
         """Return what the vision encoder makes of each prepared frame."""
 
 
-class NativeEmbedder:
-    """Prepares spans of prompts for one model, with a cache of encoded frames."""
+class NativeEmbedder(Embed):
+    """Prepares spans of prompts as the model's own inputs."""
 
     def __init__(
         self, model: Any, family: MergingFamily, features: FeatureCache[EncodedImage]
     ) -> None:
+        super().__init__(model, features)
         self._family = family
-        self._features = features
-        self._embeddings = model.get_input_embeddings()
-
-    @property
-    def _device(self) -> torch.device:
-        return self._embeddings.weight.device
 
     @property
     def sees_ahead(self) -> bool:
-        """True if tokens of a frame attend to later ones of the same frame."""
+        """See `Embed`: true if the family's masks have types of tokens."""
         return bool(self._family.mask_types)
 
     @torch.inference_mode()
     def __call__(self, pieces: Sequence[Piece], start: int, before: Sequence[Piece]) -> Span:
-        """Prepare pieces that begin at the position `start`, behind the pieces `before` them.
-
-        Raises:
-            DataError: a frame cannot be read.
-        """
+        """See `Embed`."""
         frames = [piece for piece in pieces if isinstance(piece, Frame)]
         ids = torch.tensor([*token_ids(pieces)])
         positions = self._family.positions(ids, [frame.shape for frame in frames], start)
@@ -138,13 +129,13 @@ class NativeEmbedder:
 
     @torch.inference_mode()
     def words(self, tokens: Sequence[int], starts: Sequence[int]) -> Span:
-        """Prepare tokens of text of different sequences, each at its own position."""
+        """See `Embed`."""
         ids = torch.tensor(tokens)
         inputs = {"input_ids": ids[None].to(self._device)}
         return word_span(self._family, inputs, ids, starts, self._device)
 
     def join(self, spans: Sequence[Span]) -> Mapping[str, Any]:
-        """Return the inputs of several spans as those of one sequence; none sees ahead."""
+        """See `Embed`; no span sees ahead."""
         inputs: dict[str, Any] = {
             name: torch.cat([span.inputs[name] for span in spans], dim=-1)
             for name in ("input_ids", *self._family.token_types)
@@ -157,22 +148,6 @@ class NativeEmbedder:
         if encoded:
             inputs[_ENCODED] = {"image": EncodedImage.join(encoded)}
         return inputs
-
-    def expect(self, pieces: Sequence[Piece]) -> None:
-        """Begin to read the frames of pieces that are going to be embedded, in this order."""
-        self._features.expect([piece for piece in pieces if not isinstance(piece, int)])
-
-    def hash(self, pieces: Sequence[Piece]) -> str:
-        """Return the hash of the pixels of the frames of pieces that were embedded."""
-        return self._features.hash([piece for piece in pieces if not isinstance(piece, int)])
-
-    def clear(self) -> None:
-        """Free the memory of cached features."""
-        self._features.clear()
-
-    def close(self) -> None:
-        """End the threads that read frames."""
-        self._features.close()
 
     def _types(
         self, inputs: Mapping[str, Mapping[int, int]], pieces: Sequence[Piece]

@@ -14,14 +14,12 @@ import msgspec
 
 from infthor_eval.errors import ModelError
 from model_adapters.served.batches.service import Batch, BatchReply, BatchStatus
-from model_adapters.served.completion import decode_reply
+from model_adapters.served.batches.transfer import TRANSFER_S, Transfer
 from model_adapters.served.endpoint import Endpoint, is_transient
-from model_adapters.served.wire import Answer, Call
+from model_adapters.served.wire import Call
 
 __all__ = ["AnthropicBatches"]
 
-_TRANSFER_S = 3600.0  # limit for sending or fetching a whole batch
-_LARGEST = 2**30  # bytes of the largest accepted list
 _PAGE = 100
 _CLOCKS_S = 3600  # by which the server's clock may be behind ours
 _STATUS = {  # of errors, by their type; it is that of the same error of a single request
@@ -90,7 +88,7 @@ class AnthropicBatches:
     most_bytes = 256 * 10**6
 
     def __init__(self, endpoint: Endpoint) -> None:
-        self._endpoint = endpoint
+        self._transfer = Transfer(endpoint)
 
     def line(self, custom_id: str, request: dict[str, Any]) -> bytes:
         """See `BatchService`."""
@@ -102,12 +100,9 @@ class AnthropicBatches:
             path="/messages/batches",
             content=b'{"requests":[' + b",".join(path.read_bytes().splitlines()) + b"]}",
             headers={"Content-Type": "application/json"},
-            timeout_s=_TRANSFER_S,
+            timeout_s=TRANSFER_S,
         )
-        # The reply to an attempt may be lost, though the server has the batch: it is looked for.
-        answer, _ = self._endpoint.ask_unless_done(call, lambda: self._find_answer(batch, others))
-        submitted: _Batch = self._read(answer, _Batch, "a batch")
-        return submitted.id
+        return self._transfer.submit(call, _Batch, lambda: self._find(batch, others)).id
 
     def find(self, batch: Batch, others: Collection[str]) -> str | None:
         """See `BatchService`."""
@@ -117,7 +112,7 @@ class AnthropicBatches:
     def status(self, batch: Batch) -> BatchStatus:
         """See `BatchService`."""
         call = Call(method="GET", path=f"/messages/batches/{batch.server_id}")
-        found = self._read(self._endpoint.ask(call)[0], _Batch, "a batch")
+        found = self._transfer.read(call, _Batch, "a batch")
         if found.processing_status != "ended":
             return BatchStatus("running")
         # Who cancelled it does not want what is left to be asked at once.
@@ -135,19 +130,7 @@ class AnthropicBatches:
         return found
 
     def _lines(self, server_id: str) -> Iterator[_Line]:
-        call = Call(
-            method="GET",
-            path=f"/messages/batches/{server_id}/results",
-            largest=_LARGEST,
-            timeout_s=_TRANSFER_S,
-        )
-        answer, _ = self._endpoint.ask(call)
-        for content in answer.content.splitlines():
-            yield decode_reply(self._endpoint.where, content, _Line, "the lines of a batch")
-
-    def _find_answer(self, batch: Batch, others: Collection[str]) -> Answer | None:
-        found = self._find(batch, others)
-        return None if found is None else Answer(msgspec.json.encode(found), {})
+        return self._transfer.lines(f"/messages/batches/{server_id}/results", _Line)
 
     def _find(self, batch: Batch, others: Collection[str]) -> _Batch | None:
         """Return a batch that may be ours, or is; None if the server has none.
@@ -167,7 +150,7 @@ class AnthropicBatches:
                 return found
         if len(candidates) > 1:
             raise ModelError(
-                f"{self._endpoint.where} has {len(candidates)} batches that may be this run's; run "
+                f"{self._transfer.where} has {len(candidates)} batches that may be this run's; run "
                 "the same command again when they have ended"
             )
         return candidates[0] if candidates else None
@@ -176,10 +159,7 @@ class AnthropicBatches:
         """Yield the server's batches, the latest first, back to a time."""
         after = ""
         while True:
-            call = Call(
-                method="GET", path=f"/messages/batches?limit={_PAGE}{after}", largest=_LARGEST
-            )
-            page = self._read(self._endpoint.ask(call)[0], _Page, "a list of batches")
+            page = self._transfer.page(f"/messages/batches?limit={_PAGE}{after}", _Page)
             for found in page.data:
                 if found.created_at.timestamp() < begin:
                     return
@@ -187,9 +167,6 @@ class AnthropicBatches:
             if not page.has_more or not page.last_id:
                 return
             after = f"&after_id={page.last_id}"
-
-    def _read(self, answer: Answer, kind: type[Any], what: str) -> Any:
-        return decode_reply(self._endpoint.where, answer.content, kind, what)
 
 
 def _reply(request: str, result: _Result) -> BatchReply:

@@ -13,14 +13,13 @@ import msgspec
 
 from infthor_eval.errors import ModelError
 from model_adapters.served.batches.service import Batch, BatchReply, BatchStatus
+from model_adapters.served.batches.transfer import LARGEST, TRANSFER_S, Transfer
 from model_adapters.served.completion import decode_reply
 from model_adapters.served.endpoint import Endpoint, is_transient
-from model_adapters.served.wire import Answer, Call
+from model_adapters.served.wire import Call
 
 __all__ = ["GeminiBatches"]
 
-_TRANSFER_S = 3600.0  # limit for sending or fetching a whole file
-_LARGEST = 2**30  # bytes of the largest accepted file of replies
 _PAGE = 100
 _STATUS = {1: 499, 3: 400, 4: 504, 5: 404, 7: 403, 8: 429, 9: 400, 13: 500, 14: 503, 16: 401}
 
@@ -83,7 +82,7 @@ class GeminiBatches:
     most_bytes = 2 * 10**9
 
     def __init__(self, endpoint: Endpoint, model: str) -> None:
-        self._endpoint = endpoint
+        self._transfer = Transfer(endpoint)
         self._model = model
         parts = urlsplit(endpoint.where)
         self._host = f"{parts.scheme}://{parts.netloc}"
@@ -102,10 +101,7 @@ class GeminiBatches:
             content=msgspec.json.encode({"batch": request}),
             headers={"Content-Type": "application/json"},
         )
-        # The reply to an attempt may be lost, though the server has the batch: it is looked for.
-        answer, _ = self._endpoint.ask_unless_done(call, lambda: self._find_answer(batch))
-        submitted: _Operation = self._read(answer, _Operation, "a batch")
-        return submitted.name
+        return self._transfer.submit(call, _Operation, lambda: self._find(batch)).name
 
     def find(self, batch: Batch, others: Collection[str]) -> str | None:
         """See `BatchService`."""
@@ -114,8 +110,8 @@ class GeminiBatches:
 
     def status(self, batch: Batch) -> BatchStatus:
         """See `BatchService`."""
-        call = Call(method="GET", path=f"/{batch.server_id}", largest=_LARGEST)
-        found = self._read(self._endpoint.ask(call)[0], _Operation, "a batch")
+        call = Call(method="GET", path=f"/{batch.server_id}", largest=LARGEST)
+        found = self._transfer.read(call, _Operation, "a batch")
         if found.state in ("PENDING", "RUNNING", "UNSPECIFIED", ""):
             return BatchStatus("running")
         error = found.error or _Error()
@@ -125,7 +121,7 @@ class GeminiBatches:
         reason = "" if found.state == "SUCCEEDED" else f"the batch is {found.state.lower()}"
         output = found.metadata.output or _Output()
         if output.responses_file is None and bytes(found.response) != b"null":
-            output = self._read(Answer(bytes(found.response), {}), _Output, "a batch")
+            output = decode_reply(self._transfer.where, bytes(found.response), _Output, "a batch")
         places = (output.responses_file,) if output.responses_file else ()
         return BatchStatus("ended", reason, again=found.state != "CANCELLED", places=places)
 
@@ -133,15 +129,8 @@ class GeminiBatches:
         """See `BatchService`."""
         found = []
         for place in status.places:
-            call = Call(
-                method="GET",
-                path=f"{self._host}/download{self._version}/{place}:download?alt=media",
-                largest=_LARGEST,
-                timeout_s=_TRANSFER_S,
-            )
-            answer, _ = self._endpoint.ask(call)
-            for content in answer.content.splitlines():
-                line = decode_reply(self._endpoint.where, content, _Line, "the lines of a batch")
+            address = f"{self._host}/download{self._version}/{place}:download?alt=media"
+            for line in self._transfer.lines(address, _Line):
                 request = batch.request_of(line.key)
                 if request is not None:
                     found.append(_reply(request, line))
@@ -160,39 +149,30 @@ class GeminiBatches:
                 "X-Goog-Upload-Header-Content-Type": kind,
             },
         )
-        place = self._endpoint.ask(begin)[0].headers.get("x-goog-upload-url", "")
+        place = self._transfer.send(begin).headers.get("x-goog-upload-url", "")
         if urlsplit(place).netloc != urlsplit(self._host).netloc:
             raise ModelError(  # it would be sent the key
-                f"{self._endpoint.where} gives no address of its own for an upload; check base_url"
+                f"{self._transfer.where} gives no address of its own for an upload; check base_url"
             )
         send = Call(
             path=place,
             content=path,
             headers={"X-Goog-Upload-Offset": "0", "X-Goog-Upload-Command": "upload, finalize"},
-            timeout_s=_TRANSFER_S,
+            timeout_s=TRANSFER_S,
         )
-        uploaded: _Uploaded = self._read(self._endpoint.ask(send)[0], _Uploaded, "a file")
-        return uploaded.file
-
-    def _find_answer(self, batch: Batch) -> Answer | None:
-        found = self._find(batch)
-        return None if found is None else Answer(msgspec.json.encode(found), {})
+        return self._transfer.read(send, _Uploaded, "a file").file
 
     def _find(self, batch: Batch) -> _Operation | None:
         """Return a batch by our name of it; None if the server has none."""
         after = ""
         while True:
-            call = Call(method="GET", path=f"/batches?pageSize={_PAGE}{after}", largest=_LARGEST)
-            page = self._read(self._endpoint.ask(call)[0], _Page, "a list of batches")
+            page = self._transfer.page(f"/batches?pageSize={_PAGE}{after}", _Page)
             for found in page.operations:
                 if found.metadata.display_name == batch.name:
                     return found
             if not page.next_page_token:
                 return None
             after = f"&pageToken={quote(page.next_page_token, safe='')}"
-
-    def _read(self, answer: Answer, kind: type[Any], what: str) -> Any:
-        return decode_reply(self._endpoint.where, answer.content, kind, what)
 
 
 def _reply(request: str, line: _Line) -> BatchReply:

@@ -10,14 +10,12 @@ from typing import Any
 import msgspec
 
 from model_adapters.served.batches.service import Batch, BatchReply, BatchStatus
-from model_adapters.served.completion import decode_reply
+from model_adapters.served.batches.transfer import TRANSFER_S, Transfer
 from model_adapters.served.endpoint import Endpoint, is_transient
-from model_adapters.served.wire import Answer, Call
+from model_adapters.served.wire import Call
 
 __all__ = ["OpenAIBatches"]
 
-_TRANSFER_S = 3600.0  # limit for sending or fetching a whole file
-_LARGEST = 2**30  # bytes of the largest accepted file of replies
 _NAME = "infthor_eval_batch"  # key of our metadata
 _PAGE = 100
 _CLOCKS_S = 86_400  # by which the server's clock may be ahead of ours, or behind
@@ -77,7 +75,7 @@ class OpenAIBatches:
     most_bytes = 200 * 10**6
 
     def __init__(self, endpoint: Endpoint) -> None:
-        self._endpoint = endpoint
+        self._transfer = Transfer(endpoint)
 
     def line(self, custom_id: str, request: dict[str, Any]) -> bytes:
         """See `BatchService`."""
@@ -98,10 +96,7 @@ class OpenAIBatches:
             content=msgspec.json.encode(request),
             headers={"Content-Type": "application/json"},
         )
-        # The reply to an attempt may be lost, though the server has the batch: it is looked for.
-        answer, _ = self._endpoint.ask_unless_done(call, lambda: self._find_answer(batch))
-        submitted: _Batch = self._read(answer, _Batch, "a batch")
-        return submitted.id
+        return self._transfer.submit(call, _Batch, lambda: self._find(batch)).id
 
     def find(self, batch: Batch, others: Collection[str]) -> str | None:
         """See `BatchService`."""
@@ -111,7 +106,7 @@ class OpenAIBatches:
     def status(self, batch: Batch) -> BatchStatus:
         """See `BatchService`."""
         call = Call(method="GET", path=f"/batches/{batch.server_id}")
-        found = self._read(self._endpoint.ask(call)[0], _Batch, "a batch")
+        found = self._transfer.read(call, _Batch, "a batch")
         if found.status in _RUNNING:
             return BatchStatus("running")
         errors = found.errors.data if found.errors is not None else []
@@ -129,34 +124,21 @@ class OpenAIBatches:
         """See `BatchService`."""
         found = []
         for place in status.places:
-            call = Call(
-                method="GET",
-                path=f"/files/{place}/content",
-                largest=_LARGEST,
-                timeout_s=_TRANSFER_S,
-            )
-            answer, _ = self._endpoint.ask(call)
-            for content in answer.content.splitlines():
-                line = decode_reply(self._endpoint.where, content, _Line, "the lines of a batch")
+            for line in self._transfer.lines(f"/files/{place}/content", _Line):
                 request = batch.request_of(line.custom_id)
                 if request is not None:
                     found.append(_reply(request, line))
         return found
 
     def _upload(self, path: Path) -> _File:
-        call = Call(path="/files", content=path, form={"purpose": "batch"}, timeout_s=_TRANSFER_S)
-        return self._read(self._endpoint.ask(call)[0], _File, "a file")
-
-    def _find_answer(self, batch: Batch) -> Answer | None:
-        found = self._find(batch)
-        return None if found is None else Answer(msgspec.json.encode(found), {})
+        call = Call(path="/files", content=path, form={"purpose": "batch"}, timeout_s=TRANSFER_S)
+        return self._transfer.read(call, _File, "a file")
 
     def _find(self, batch: Batch) -> _Batch | None:
         """Return a batch by our name of it, the latest first; None if the server has none."""
         after = ""
         while True:
-            call = Call(method="GET", path=f"/batches?limit={_PAGE}{after}", largest=_LARGEST)
-            page = self._read(self._endpoint.ask(call)[0], _Page, "a list of batches")
+            page = self._transfer.page(f"/batches?limit={_PAGE}{after}", _Page)
             for found in page.data:
                 if (found.metadata or {}).get(_NAME) == batch.name:
                     return found
@@ -166,9 +148,6 @@ class OpenAIBatches:
             if not page.has_more or not page.data or is_older:
                 return None
             after = f"&after={page.data[-1].id}"
-
-    def _read(self, answer: Answer, kind: type[Any], what: str) -> Any:
-        return decode_reply(self._endpoint.where, answer.content, kind, what)
 
 
 def _reply(request: str, line: _Line) -> BatchReply:

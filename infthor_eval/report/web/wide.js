@@ -1,11 +1,3 @@
-// Light or dark, and what is read of the page without its samples.
-const toggleTheme = () => {
-  const root = document.documentElement;
-  const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-  root.dataset.theme = dark ? "light" : "dark";
-};
-document.getElementById("theme").addEventListener("click", toggleTheme);
-
 // Tables that are wider than the page say that they scroll, and can be scrolled with keys.
 const markWide = (part = document) => {
   for (const scroll of part.querySelectorAll(".scroll")) {
