@@ -1,15 +1,17 @@
-"""Tables as text for other programs: CSV, LaTeX (booktabs), Markdown."""
+"""Tables as text for other programs: CSV, LaTeX (booktabs), Markdown; and by columns."""
 
 import csv
 import io
 import re
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain
 
 from infthor_eval.formats.csv_files import shield
 from infthor_eval.tables import Column, Table, TableCell
 from infthor_eval.terminal import printable
 
-__all__ = ["export_tables"]
+__all__ = ["FlatColumn", "export_tables", "flat_columns"]
 
 _LATEX = str.maketrans(
     {
@@ -47,34 +49,46 @@ def _csv(table: Table, *, with_words: bool) -> str:
     text = io.StringIO()
     words = [word for word in (table.title, *table.notes) if word] if with_words else []
     text.writelines(f"# {_in_one_line(word)}\n" for word in words)
-    columns: list[list[str]] = []
-    for column, *cells in zip(table.columns, *_cells(table), strict=True):
-        columns += _csv_columns(column, cells)
-    csv.writer(text, lineterminator="\n").writerows(zip(*columns, strict=True))
+    columns = [[column.heading, *column.cells] for column in flat_columns(table)]
+    rows = ([shield(cell) for cell in row] for row in zip(*columns, strict=True))
+    csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
 
 
-def _csv_columns(column: Column, cells: Sequence[str]) -> Iterator[list[str]]:
-    """Yield a column with its heading, or one for each of the numbers that its cells hold."""
-    names = list(
-        dict.fromkeys(
-            name for cell in cells if isinstance(cell, TableCell) for name in cell.numbers
-        )
-    ) or [""]
-    for number, name in enumerate(names):
-        heading = shield(_in_one_line(f"{column.name} {name}"))
-        yield [heading, *(_csv_cell(cell, name, column, is_first=number == 0) for cell in cells)]
+@dataclass(frozen=True)
+class FlatColumn:
+    """A column of cells that hold one number or one text each.
+
+    Attributes:
+        heading: name of the column, and of the number where a cell of the table held several.
+        is_number: whether its cells are numbers; those that are missing are empty.
+        cells: a cell for each row, in one line.
+    """
+
+    heading: str
+    is_number: bool
+    cells: Sequence[str]
 
 
-def _csv_cell(cell: str, name: str, column: Column, *, is_first: bool) -> str:
+def flat_columns(table: Table) -> Iterator[FlatColumn]:
+    """Yield the columns of a table, a column for each of the numbers that a cell holds."""
+    for column, *cells in zip(table.columns, *_cells(table), strict=True):
+        named = (cell.numbers for cell in cells if isinstance(cell, TableCell))
+        names = list(dict.fromkeys(chain.from_iterable(named))) or [""]
+        for at, name in enumerate(names):
+            flat = [_flat_cell(cell, name, column, is_first=at == 0) for cell in cells]
+            yield FlatColumn(_in_one_line(f"{column.name} {name}"), column.is_number, flat)
+
+
+def _flat_cell(cell: str, name: str, column: Column, *, is_first: bool) -> str:
     if isinstance(cell, TableCell):
         return cell.numbers.get(name, "")
     if not is_first:
         return ""
     text = _in_one_line(cell)
     if not column.is_number:
-        return shield(text)
-    return "" if text == "-" else shield(_THOUSANDS.sub("", text))
+        return text
+    return "" if text == "-" else _THOUSANDS.sub("", text)
 
 
 def _in_one_line(text: str) -> str:

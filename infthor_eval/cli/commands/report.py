@@ -60,6 +60,12 @@ _FOLDER = Path("results/figures")
     help="Print the table of the runs in this form instead, as for a paper.",
 )
 @click.option(
+    "--xlsx",
+    type=PATH,
+    metavar="FILE.xlsx",
+    help="Write the table of the runs as a spreadsheet instead.",
+)
+@click.option(
     "--figure",
     metavar="WHICH",
     help="Draw a figure instead: 6 (reward of arms along trajectories), 7 (reward of plans over "
@@ -82,6 +88,7 @@ def command(
     scenes: Path | None,
     episodes: int,
     tables: str | None,
+    xlsx: Path | None,
     figure: str | None,
     panels: Path | None,
     task: str | None,
@@ -100,8 +107,10 @@ def command(
     from infthor_eval.report.presenter import FigureRequest
     from infthor_eval.report.web.build import PageRequest
 
-    if figure is not None and tables is not None:
-        raise UsageError("--tables: is not for a figure; leave out one of both")
+    forms = {"--tables": tables, "--xlsx": xlsx, "--figure": figure}
+    given = [option for option, value in forms.items() if value is not None]
+    if len(given) > 1:
+        raise UsageError(f"{' and '.join(given)}: are for different things; leave out all but one")
     if figure is not None:
         _draw(runs, figure, FigureRequest(task, panels), out or _FOLDER)
         return
@@ -109,8 +118,8 @@ def command(
         if value is not None:
             raise UsageError(f"{option}: is for a figure; give --figure too, or leave it out")
     folders = _runs_among(runs)
-    if tables is not None:
-        _print_table(folders, tables)
+    if tables is not None or xlsx is not None:
+        _export_table(folders, tables, xlsx)
         return
     request = PageRequest(data, scenes, episodes)
     no_runs = set(runs) - set(folders)
@@ -121,16 +130,23 @@ def command(
         _write_page(folders, request, out or _PAGE)
 
 
-def _print_table(folders: Sequence[Path], form: str) -> None:
+def _export_table(folders: Sequence[Path], form: str | None, spreadsheet: Path | None) -> None:
+    """Print the table of the runs in a form, or write it as a spreadsheet."""
     from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.report.exporting import export_tables
     from infthor_eval.report.headline.results import task_results
     from infthor_eval.report.headline.tables import results_table
     from infthor_eval.report.presented import read_report_runs
+    from infthor_eval.report.spreadsheet import write_spreadsheet
+    from infthor_eval.terminal import print_line
 
     runs = read_report_runs(folders, print_failure)
     table = results_table([result for run in runs for result in task_results(run)])
-    click.echo(export_tables([table], form), nl=False)
+    if form is not None:
+        click.echo(export_tables([table], form), nl=False)
+    if spreadsheet is not None:
+        write_spreadsheet(spreadsheet, [table])
+        print_line(f"{spreadsheet}: {len(table.rows)} rows")
 
 
 def _write_index(folders: Sequence[Path], request: PageRequest, out: Path) -> None:

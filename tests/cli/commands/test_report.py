@@ -181,12 +181,18 @@ def test_a_folder_of_runs_can_be_one_page(folders, tmp_path, run_cli):
     assert "3 runs" in page.read_text() or "m, n" in page.read_text()
 
 
-def test_the_table_of_runs_is_printed_for_a_paper(folders, run_cli):
+def test_the_table_of_runs_is_printed_for_a_paper_and_written_as_a_spreadsheet(
+    folders, tmp_path, run_cli
+):
     code, output, err = run_cli("report", *folders, "--tables", "latex")
     assert (code, err) == (0, "")
     assert output.startswith(r"\begin{tabular}{lllrrrrrrr}")
     assert output.count(r"plans completed") == 3
+    path = tmp_path / "runs.xlsx"
+    code, output, err = run_cli("report", *folders, "--xlsx", path)
+    assert (code, err, output) == (0, "", f"{path}: 3 rows\n")
+    assert path.read_bytes().startswith(b"PK")
     assert_refused(
         run_cli("report", *folders, "--tables", "csv", "--figure", "7"),
-        "--tables: is not for a figure; leave out one of both",
+        "--tables and --figure: are for different things; leave out all but one",
     )
