@@ -218,7 +218,6 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
         "n-samples": {
             task.name: {"original": task.n_samples, "effective": task.n_answered} for task in tasks
         },
-        "infthor_eval_units": msgspec.to_builtins(outcome.summary.units),
         "config": {
             "model": LM_EVAL_MODEL,
             "model_args": {"adapter": request.model, **request.model_options},
@@ -229,12 +228,10 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
             "gen_kwargs": None,
             "random_seed": request.tasks.seed,
         },
-        # A key of our own: of what these scores are.
+        # A key of our own: what these scores are of.
         "infthor_eval": {
             "version": outcome.summary.header.config.infthor_eval,
-            "n_missing": outcome.n_missing,
-            "n_failed": sum(record.failure is not None for record in outcome.records),
-            "n_excluded": sum(record.excluded is not None for record in outcome.records),
+            "units": msgspec.to_builtins(outcome.summary.units),
         },
         "date": time.time(),
         "lm_eval_version": version("lm_eval"),

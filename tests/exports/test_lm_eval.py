@@ -92,7 +92,7 @@ def test_a_failed_sample_is_exported_without_a_score(make_nieh_set, tmp_path, ru
     results = json.loads(path.read_text())
     assert results["n-samples"]["nieh_gt"] == {"original": 5, "effective": 3}
     assert results["results"]["nieh_gt"]["sample_len"] == 3
-    assert results["infthor_eval_units"]["nieh_gt"] == {
+    assert results["infthor_eval"]["units"]["nieh_gt"] == {
         "answered": 3,
         "failed": 2,
         "not_asked": 0,
@@ -105,8 +105,8 @@ def test_others_get_the_files_that_the_run_wrote(questions_run, export):
     written = sorted(path.name for path in (questions_run / "lm_eval" / "random").iterdir())
     assert sorted(path.name for path in (out / "random").iterdir()) == written
     (results,) = out.rglob("results_*.json")
-    about = json.loads(results.read_text())["infthor_eval"]
-    assert (about["n_missing"], about["n_failed"], about["n_excluded"]) == (0, 0, 0)
+    (units,) = json.loads(results.read_text())["infthor_eval"]["units"].values()
+    assert (units["failed"], units["not_asked"], units["excluded"]) == (0, 0, 0)
 
 
 def test_files_older_than_the_journal_are_refused(questions_run, tmp_path, run_cli):

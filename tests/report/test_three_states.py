@@ -158,7 +158,7 @@ def exported(records: list[Any]) -> Any:
 def test_the_folder_for_lm_eval() -> None:
     run = exported(PLANTED)
     assert run.results["n-samples"] == {"nieh_gt": {"original": 8, "effective": 4}}
-    assert run.results["infthor_eval_units"] == {"nieh_gt": UNITS}
+    assert run.results["infthor_eval"]["units"] == {"nieh_gt": UNITS}
     means = run.results["results"]["nieh_gt"]
     assert (means["strict,none"], means["sample_len"]) == (0.75, 4)
     rows = run.samples["nieh_gt"]
