@@ -18,8 +18,8 @@ from model_adapters.served.batches.service import (
     Batch,
     BatchReply,
     BatchService,
-    BatchStatus,
     custom_id,
+    one_each,
 )
 from model_adapters.served.endpoint import NoAnswerError
 
@@ -28,8 +28,8 @@ __all__ = ["BatchQueue", "BatchRules", "BatchedReply"]
 _FIRST_POLL_S = 2.0  # pause between two looks at a server; it grows by half
 _LONGEST_POLL_S = 120.0
 _NAP_S = 0.1  # a pause ends so soon after the run is stopped
+_LISTED_WITHIN_S = 30.0  # by then a batch that the server has is in its list
 _MB = 10**6
-_MISSING = "the batch has ended without a line for it"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -304,6 +304,11 @@ class BatchQueue:
 
     def _find_or_submit(self, batch: Batch) -> None:
         found = self._service.find(batch, self._known_there)
+        if found is None:
+            self._rest(_LISTED_WITHIN_S)  # the command before may have been stopped a moment ago
+            if self._should_stop():
+                return
+            found = self._service.find(batch, self._known_there)
         if found is not None:
             self._ledger.note_submitted(batch, found)
             self._report(f"batch {found}: {len(batch.ids)} request(s) found at the server")
@@ -357,7 +362,7 @@ class BatchQueue:
             return True
         replies = [
             replace(reply, content=self._rules.redact(reply.content))
-            for reply in _one_each(batch, self._service.replies(batch, status), status)
+            for reply in one_each(batch, self._service.replies(batch, status), status)
         ]
         self._end(batch, replies)
         for reply in replies:
@@ -394,13 +399,3 @@ class BatchQueue:
         hint = writing_hint(" and run the same command again, which resumes it")
         with wrap_errors("the requests of a batch cannot be written", hint):
             yield
-
-
-def _one_each(batch: Batch, replies: Sequence[BatchReply], status: BatchStatus) -> list[BatchReply]:
-    """Return one reply for each request of a batch; requests of others are left out."""
-    found: dict[str, BatchReply] = {}
-    for reply in replies:
-        if reply.id not in found or reply.is_answered:
-            found[reply.id] = reply
-    missing = BatchReply("", 0, status.reason or _MISSING, status.again)
-    return [found.get(each) or replace(missing, id=each) for each in batch.ids]

@@ -9,8 +9,11 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 import msgspec
+from msgspec.structs import replace
 
-__all__ = ["Batch", "BatchReply", "BatchService", "BatchStatus", "custom_id"]
+__all__ = ["Batch", "BatchReply", "BatchService", "BatchStatus", "custom_id", "one_each"]
+
+_MISSING = "the batch has ended without a line for it"
 
 
 class Batch(msgspec.Struct, omit_defaults=True):
@@ -79,6 +82,16 @@ class BatchStatus(msgspec.Struct, frozen=True):
     again: bool = True
     busy: bool = False
     places: tuple[str, ...] = ()
+
+
+def one_each(batch: Batch, replies: Sequence[BatchReply], status: BatchStatus) -> list[BatchReply]:
+    """Return one reply for each request of a batch; requests of others are left out."""
+    found: dict[str, BatchReply] = {}
+    for reply in replies:
+        if reply.id not in found or reply.is_answered:
+            found[reply.id] = reply
+    missing = BatchReply("", 0, status.reason or _MISSING, status.again)
+    return [found.get(each) or replace(missing, id=each) for each in batch.ids]
 
 
 class BatchService(Protocol):

@@ -20,6 +20,7 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(endpoint, "_FIRST_WAIT_S", 0.001)
     monkeypatch.setattr(queue, "_FIRST_POLL_S", 0.001)
     monkeypatch.setattr(queue, "_LONGEST_POLL_S", 0.01)
+    monkeypatch.setattr(queue, "_LISTED_WITHIN_S", 0.05)
     for name in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GEMINI_API_KEY"):
         monkeypatch.delenv(name, raising=False)
 

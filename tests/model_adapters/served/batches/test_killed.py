@@ -22,7 +22,7 @@ from .server import BatchServer, serve_batches
 # The pauses between two looks are those of a test, the rest is what a user starts.
 CODE = """
 from model_adapters.served.batches import queue
-queue._FIRST_POLL_S = queue._LONGEST_POLL_S = 0.02
+queue._FIRST_POLL_S = queue._LONGEST_POLL_S = queue._LISTED_WITHIN_S = 0.02
 from infthor_eval.cli import main
 main()
 """

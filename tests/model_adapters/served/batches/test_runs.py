@@ -267,6 +267,37 @@ def test_a_batch_whose_name_was_lost_is_found_again(ask: Ask) -> None:
     assert len(server.sizes) == 6
 
 
+def test_a_batch_that_the_server_lists_a_moment_later_is_not_submitted_again(ask: Ask) -> None:
+    with serve_batches(BatchServer()) as server:
+
+        def lose(method: str, path: str) -> tuple[int, bytes] | None:
+            if (method, path) == ("POST", "/v1/batches"):
+                newest = list(server.files)[-1]
+                server.add_batch(
+                    {
+                        "input_file_id": newest,
+                        "endpoint": "/v1/chat/completions",
+                        "completion_window": "24h",
+                        "metadata": {"infthor_eval_batch": _name_in(server.files[newest])},
+                    }
+                )
+                server.before = hide
+                return 0, b""
+            return None
+
+        def hide(method: str, path: str) -> tuple[int, bytes] | None:
+            if method == "GET" and path.startswith("/v1/batches?"):
+                server.before = lambda *_: None
+                return 200, b'{"data": [], "has_more": false}'
+            return None
+
+        server.before = lose
+        assert ask(server, retries=0)[0] != 0
+        code, _, err = ask(server)
+    assert code == 0, err
+    assert (server.n_asked, len(server.sizes)) == (5, 1)
+
+
 def _name_in(content: bytes) -> str:
     name = json.loads(content.splitlines()[0])["custom_id"].partition("-")[2]
     return str(name)
