@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 
 __all__ = ["LIMIT_S", "read_slow_tests"]
@@ -64,8 +65,19 @@ def read_slow_tests() -> set[str]:
 
 
 def _processor_seconds() -> float:
+    """Return what this process has used, with children that have ended and those that have not: a
+    simulator lives as long as its fixture."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(usage.ru_utime + usage.ru_stime for usage in used)
+    ended = sum(usage.ru_utime + usage.ru_stime for usage in used)
+    return ended + sum(map(_seconds_of, psutil.Process().children(recursive=True)))
+
+
+def _seconds_of(process: psutil.Process) -> float:
+    try:
+        times = process.cpu_times()
+    except psutil.NoSuchProcess:
+        return 0.0
+    return float(times.user + times.system + times.children_user + times.children_system)
 
 
 @pytest.hookimpl(hookwrapper=True)

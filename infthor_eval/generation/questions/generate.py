@@ -6,7 +6,7 @@ of their own.
 
 import random
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -135,15 +135,25 @@ def generate_questions(
     advance = begin("questions checked", len(check_jobs))
     soundness = _share_out(check_jobs, worker_settings, say, advance, result)
     for job in check_jobs:
-        name = job.path.name
-        chosen = chosen_by_path[job.path]
         # Checked in our words, which the checker reads.
-        for candidate, is_sound in zip(chosen, soundness.get(job.path, ()), strict=False):
-            question = candidate.question(name)
-            if published_words:
-                question = in_published_words(candidate, name)
-            (result.questions if is_sound else result.unconfirmed).append(question)
+        checked = zip(chosen_by_path[job.path], soundness.get(job.path, ()), strict=False)
+        _sort_out(result, job.path.name, checked, published_words=published_words)
     return result
+
+
+def _sort_out(
+    result: GeneratedQuestions,
+    traj_id: str,
+    checked: Iterable[tuple[Candidate, bool]],
+    *,
+    published_words: bool,
+) -> None:
+    """Add candidates on a trajectory to a result, by whether their answers were confirmed."""
+    for candidate, is_sound in checked:
+        question = candidate.question(traj_id)
+        if published_words:
+            question = in_published_words(candidate, traj_id)
+        (result.questions if is_sound else result.unconfirmed).append(question)
 
 
 def _object_types(
