@@ -19,9 +19,9 @@ To add or change a metric of NIEH: here for all tasks; for one alone, `process_r
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from difflib import SequenceMatcher
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from typing import Literal
 
@@ -58,6 +58,7 @@ __all__ = [
 STRICT_RULES = "2"
 Scorer = Literal["reference", "strict"]
 SCORERS: tuple[Scorer, ...] = ("reference", "strict")
+_KEPT = 2**13  # comparisons that are remembered: answers are few, and replies repeat them
 
 NEAR = 80  # similarity in percent from which two normalised strings count as equal
 _YES_NO = ("yes", "no")
@@ -187,6 +188,7 @@ def is_number(text: str) -> bool:
     return re.fullmatch(r"-?\d+(\.\d+)?", text) is not None
 
 
+@lru_cache(_KEPT, typed=True)
 def normal_form(text: Answer) -> str:
     """Return the published normal form: a number in digits if there is one, else plain words."""
     if not isinstance(text, str):
@@ -207,6 +209,7 @@ def _near(answer: str, wanted: str) -> bool:
     return similarity(answer, wanted) >= NEAR
 
 
+@lru_cache(_KEPT)
 def similarity(one: str, other: str) -> int:
     """Return how alike two texts are, in percent."""
     return round(100 * SequenceMatcher(None, one, other).ratio())
@@ -218,12 +221,16 @@ def are_synonyms(answer: str, wanted: str) -> bool:
         (answer == word and wanted in phrases)
         or (wanted == word and answer in phrases)
         or (answer in phrases and wanted in phrases)
-        for word, phrases in _synonyms().items()
+        for word, phrases in _rows_with().get(answer, ())
     )
 
 
 @cache
-def _synonyms() -> dict[str, list[str]]:
+def _rows_with() -> Mapping[str, Sequence[tuple[str, list[str]]]]:
+    """Return the published rows, a word and its synonyms each, by every text in them."""
     table = resources.files(__package__).joinpath("synonyms.yaml").read_text(encoding="utf-8")
-    rows: dict[str, list[str]] = yaml.safe_load(table)
+    rows: dict[str, list[tuple[str, list[str]]]] = {}
+    for word, phrases in yaml.safe_load(table).items():
+        for text in {word, *phrases}:
+            rows.setdefault(text, []).append((word, phrases))
     return rows

@@ -1,11 +1,12 @@
 """Pages that are one file: their style, script and policy are in it, and nothing is fetched."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
 
 from infthor_eval.errors import wrap_errors
@@ -51,11 +52,7 @@ def write_page_file(
         DataError: it cannot be written.
     """
     css, js = "".join(style), "".join(script)
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters |= filters or {}
-    text = environment.from_string(template).render(
+    text = _compiled(template, tuple((filters or {}).items())).render(
         values,
         css=Markup(css),
         js=Markup(js),
@@ -68,3 +65,13 @@ def write_page_file(
     ):
         partial.write_bytes(encoded)
     return len(encoded)
+
+
+@cache
+def _compiled(template: str, filters: tuple[tuple[str, Callable[..., Any]], ...]) -> Template:
+    """Compile a template once: an index has hundreds of pages."""
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= dict(filters)
+    return environment.from_string(template)
