@@ -125,7 +125,7 @@ $(PEERS): $(DEVELOPED)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt --no-deps --upgrade --target $@ torchvision
 	touch $@
 
-$(INSPECT): $(DEVELOPED)
+$(INSPECT):
 	$(PYTHON) -m venv $@
 	$@/bin/pip install --quiet --disable-pip-version-check 'inspect_ai==0.3.285'
 	touch $@

@@ -36,6 +36,8 @@ class _SequenceTrainer(transformers.Trainer):
     `linear_share`.
     """
 
+    lr_scheduler: Any
+
     def get_decay_parameter_names(self, model: torch.nn.Module) -> list[str]:
         return [name for name, _ in model.named_parameters()]
 

@@ -121,6 +121,9 @@ class BufferedLayer(DynamicLayer):
     Buffers have the shape (batch, heads, capacity, head size).
     """
 
+    keys: torch.Tensor
+    values: torch.Tensor
+
     def __init__(self, allocation: _Allocation) -> None:
         super().__init__()
         self._allocation = allocation

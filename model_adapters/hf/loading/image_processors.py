@@ -141,9 +141,7 @@ def _is_frame(image: Any) -> bool:
 class _QuickRescale(PilBackend):
     """What comes behind an image processor's own methods, in place of transformers' arithmetic."""
 
-    def rescale(  # type: ignore[override]
-        self, image: Any, scale: float, **kwargs: Any
-    ) -> Any:
+    def rescale(self, image: Any, scale: float, **kwargs: Any) -> Any:
         """Return the image times a factor, in float32, (channels, height, width)."""
         if not _is_frame(image):
             return super().rescale(image, scale, **kwargs)
@@ -152,9 +150,7 @@ class _QuickRescale(PilBackend):
         _look_up(image, super().rescale(levels, scale, **kwargs).reshape(-1), rescaled)
         return rescaled
 
-    def normalize(  # type: ignore[override]
-        self, image: Any, mean: Any, std: Any, **kwargs: Any
-    ) -> Any:
+    def normalize(self, image: Any, mean: Any, std: Any, **kwargs: Any) -> Any:
         """Return the image less the means, divided by the deviations, (channels, height, width)."""
         if image.ndim != 3 or image.dtype != np.float32 or not _is_each(image, mean, std):
             return super().normalize(image, mean, std, **kwargs)
