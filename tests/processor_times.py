@@ -3,16 +3,17 @@
     make test-times        # all tests, with this plugin, then `python -m tests.processor_times`
 
 A pytest plugin (`-p tests.processor_times`) writes the processor seconds of each test, with its
-fixtures and child processes, into build/processor_times/. The command lists those above `LIMIT_S`
-in tests/slow_tests.txt, which `make test` leaves out and `make test-all` runs. Processor time
-changes little with other work on the machine.
+child processes and its share of fixtures that others use, too, into build/processor_times/. The
+command lists those above `LIMIT_S` in tests/slow_tests.txt, but the quickest of each file; `make
+test` leaves them out, and `make test-all` runs them. Processor time changes little with other work
+on the machine.
 """
 
 import json
 import os
 import resource
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import psutil
@@ -20,7 +21,8 @@ import pytest
 
 __all__ = ["LIMIT_S", "read_slow_tests"]
 
-LIMIT_S = 1.0
+LIMIT_S = 0.5
+_QUICKEST_S = 2.0  # the quickest test of a file that takes no more is never slow
 # Slow ones that `make test` runs all the same: no other test goes the same whole way, or later ones
 # need their results.
 KEPT = (
@@ -47,6 +49,17 @@ KEPT = (
     "tests/runs/work/test_worker_executor.py::test_workers_that_are_killed_lose_nothing_that_was_finished",
     "tests/benchmarks/test_families.py::test_six_families_reply_as_transformers_does",
     "tests/model_adapters/human/test_page.py::test_ten_questions_by_keyboard_alone",
+    "tests/cli/commands/test_explain.py::"
+    "test_a_planted_cause_is_named[first0-second0-the size of images-longest_edge]",
+    "tests/nieh/rescoring/test_rebuilt_requests.py::"
+    "test_every_context_comes_out_as_it_was_sent[nieh_mini_full-options3]",
+    "tests/infthor_sim/test_snapshots.py::"
+    "test_nothing_saved_and_a_saved_state_of_another_scene_are_refused",
+    "tests/plans/twins/test_suite.py::test_who_does_not_remember_has_no_pair[history]",
+    "tests/submissions/test_honest.py::test_the_bundled_model_passes",
+    "tests/report/leaderboard/test_page.py::test_it_is_as_wide_as_the_page_and_readable[light-1400]",
+    "tests/report/web/test_pairs.py::"
+    "test_both_replies_stand_beside_each_other_and_filters_are_of_pairs",
 )
 _ROOT = Path(__file__).parents[1]
 _LIST = Path(__file__).with_name("slow_tests.txt")
@@ -80,29 +93,82 @@ def _seconds_of(process: psutil.Process) -> float:
     return float(times.user + times.system + times.children_user + times.children_system)
 
 
-@pytest.hookimpl(hookwrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
-    """Write what a test takes."""
+_shared: dict[str, float] = {}  # what was spent on each fixture that several tests may use
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_fixture_setup(
+    fixturedef: pytest.FixtureDef[object], request: pytest.FixtureRequest
+) -> Iterator[None]:
+    """Measure what a fixture takes, unless it is of one test alone."""
     before = _processor_seconds()
-    yield
+    try:
+        return (yield)
+    finally:
+        if fixturedef.scope != "function":
+            key = _key(fixturedef, request.param if hasattr(request, "param") else None)
+            _shared[key] = _shared.get(key, 0.0) + _processor_seconds() - before
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Write what a test takes itself, and which shared fixtures it uses."""
+    before, before_shared = _processor_seconds(), sum(_shared.values())
+    result = yield
+    own = _processor_seconds() - before - (sum(_shared.values()) - before_shared)
+    used = {key: _shared[key] for key in _keys_of(item) if key in _shared}
     _MEASURED.mkdir(parents=True, exist_ok=True)
     with (_MEASURED / f"{os.getpid()}.jsonl").open("a") as file:
-        file.write(json.dumps([item.nodeid, round(_processor_seconds() - before, 3)]) + "\n")
+        file.write(json.dumps([item.nodeid, round(own, 3), used]) + "\n")
+    return result
+
+
+def _key(fixture: pytest.FixtureDef[object], param: object) -> str:
+    return f"{fixture.baseid}::{fixture.argname}[{param!r}]"
+
+
+def _keys_of(item: pytest.Item) -> Iterator[str]:
+    """Yield the names of the fixtures that a test uses, of whatever scope."""
+    params = item.callspec.params if hasattr(item, "callspec") else {}
+    for name in getattr(item, "fixturenames", ()):
+        for fixture in item._fixtureinfo.name2fixturedefs.get(name, ())[-1:]:
+            yield _key(fixture, params.get(name))
+
+
+def _read_measured() -> Counter[str]:
+    """Return the seconds of each test that was measured: its own, and its share of what it uses
+    together with others."""
+    seconds: Counter[str] = Counter()
+    for path in _MEASURED.glob("*.jsonl"):
+        lines = [json.loads(line) for line in path.read_text().splitlines()]
+        users = Counter(key for _, _, used in lines for key in used)
+        for test, own, used in lines:
+            shares = sum(taken / users[key] for key, taken in used.items())
+            seconds[test] = max(seconds[test], own + shares)
+    return seconds
+
+
+def _quickest_of_files(seconds: Mapping[str, float]) -> Iterator[str]:
+    """Yield the quickest test of each file, so that `make test` leaves out few files wholly."""
+    by_file: dict[str, list[str]] = {}
+    for test in seconds:
+        by_file.setdefault(test.partition("::")[0], []).append(test)
+    for tests in by_file.values():
+        quickest = min(tests, key=lambda test: (seconds[test], test))
+        if seconds[quickest] <= _QUICKEST_S:
+            yield quickest
 
 
 def main() -> None:
     """Write the list of slow tests from what was measured; tests that were not measured stay as
     they are listed."""
-    seconds: Counter[str] = Counter()
-    for path in _MEASURED.glob("*.jsonl"):
-        for line in path.read_text().splitlines():
-            test, taken = json.loads(line)
-            seconds[test] = max(seconds[test], taken)
+    seconds = _read_measured()
     for line in _LIST.read_text().splitlines():
         if line and not line.startswith("#"):
             taken, test = line.split(maxsplit=1)
             seconds.setdefault(test, float(taken))
-    slow = sorted(test for test, taken in seconds.items() if taken > LIMIT_S and test not in KEPT)
+    kept = {*KEPT, *_quickest_of_files(seconds)}
+    slow = sorted(test for test, taken in seconds.items() if taken > LIMIT_S and test not in kept)
     lines = [f"{seconds[test]:7.1f} {test}" for test in slow]
     _LIST.write_text(_HEAD.format(limit=LIMIT_S) + "\n".join(lines) + "\n")
     of_slow = sum(seconds[test] for test in slow)
