@@ -32,7 +32,7 @@ from infthor_eval.formats.twins import TwinPair
 from infthor_eval.generation.twins.drafting import TwinDraft, is_flipped
 
 # Kinds of which one world is the episode's own.
-KINDS = ("swap", "swap-task", "swap-sliced", "move", "replace")
+KINDS = ("swap-task", "swap-sliced", "move", "replace")
 _STRENGTH = 1.0  # of the prior on each weight, of features of unit size
 _STEPS = 50  # of Newton's method, at most
 _Place = tuple[str, str]  # a type and that of what it is in or on

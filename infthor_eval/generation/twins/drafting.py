@@ -203,7 +203,7 @@ class _Maker:
             AskedWorld(first.steps, worlds.changed, seed),
             AskedWorld(second.steps, worlds.changed_in_second, seed),
         )
-        if worlds.ids:  # of an exchange; of most other kinds neither world is the episode's own
+        if worlds.has_own:
             check_sightings(*asked)
         questions = pair_questions(asked, worlds.types, self._score)
         names = name_worlds(self._draft.rooms, pair_id)

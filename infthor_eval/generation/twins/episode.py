@@ -1,6 +1,5 @@
 """An episode that twins are made of: a trajectory, its restored start, and what happened in it."""
 
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +12,6 @@ from infthor_eval.generation.questions import open_state
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
 from infthor_eval.generation.replay import replay
 from infthor_eval.generation.twins.rewriting import whole_of
-from infthor_eval.generation.twins.task_shares import task_shares
 from infthor_eval.household.containment import logged_parent
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.storage.scratch import ScratchFolder
@@ -53,11 +51,6 @@ class Episode:
             for key, obj in sorted(self.start.objects.items())
             if obj.pickupable and key not in holders and self.holder(key) is not None
         )
-
-    @cached_property
-    def task_shares(self) -> Counter[str]:
-        """How often a task that is drawn at the start names each type of object."""
-        return task_shares(self.start, self.trajectory.scene.floor_plan)
 
     @cached_property
     def put_targets(self) -> frozenset[str]:

@@ -1,12 +1,12 @@
-"""Kinds in which two objects exchange places at the start, and roles in the episode."""
+"""Kinds in which objects exchange places at the start, and roles in the episode."""
 
 import random
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
-from infthor_eval.formats.trajectory import Scene
+from infthor_eval.formats.trajectory import Scene, Trajectory
 from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.generation.twins.kinds import EditRefused, Worlds
 from infthor_eval.generation.twins.placing import may_fit, scenes_of_both
@@ -22,46 +22,62 @@ __all__ = ["Exchange", "ExchangeKind", "Move", "Swap", "SwapSliced", "SwapTask",
 _CARRYING = {"PickupObject", "PutObject"}
 _SLICING = {"SliceObject"}
 _Pair = tuple[ThorObject, ThorObject]
+_Group = TypeVar("_Group", bound=tuple[ThorObject, ...])
 
 
 @dataclass(frozen=True)
 class Exchange:
-    """Two objects that exchange places; what the agent did with one it does with the other.
+    """Objects exchange places; what the agent did with one it does with the one at its place.
 
     Attributes:
-        one: an object at the start.
-        other: another object, of another type.
+        pairs: the two that exchange places in either world; None in the one that is the episode's
+            own.
     """
 
-    one: ThorObject
-    other: ThorObject
+    pairs: tuple[_Pair | None, _Pair]
+
+    @property
+    def objects(self) -> tuple[ThorObject, ...]:
+        """All that exchange places in one of the worlds."""
+        known = {obj.object_id: obj for pair in self.pairs if pair is not None for obj in pair}
+        return tuple(known.values())
+
+    def partner(self, world: int, obj: ThorObject) -> ThorObject:
+        """Return the object at whose place another is in a world, and which is at its place."""
+        pair = self.pairs[world]
+        if pair is None or obj.object_id not in {one.object_id for one in pair}:
+            return obj
+        return pair[pair[0].object_id == obj.object_id]
 
     def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
-        """See `Proposal`: the first world is as the episode, the second with places exchanged."""
-        both = self.one, self.other
-        exchanged = self.other, self.one
-        scenes = scenes_of_both(episode.trajectory.scene, simulator, [both, exchanged])
-        ids = [restored_ids(simulator, scene, both) for scene in scenes]
-        types = {self.one.object_type: self.other.object_type}
-        types |= {new: old for old, new in types.items()}
-        is_handled = any(episode.actions_on(obj.object_id) for obj in both)
-        roles = (
-            {obj.object_id: ids[0][obj.name] for obj in both},
-            {
-                obj.object_id: ids[1][other.name]
-                for obj, other in zip(both, both[::-1], strict=True)
-            },
-        )
-        words: tuple[dict[str, str], dict[str, str]] = ({}, types if is_handled else {})
+        """See `Proposal`."""
+        objects = self.objects
+        places = [(obj, (self.partner(0, obj), self.partner(1, obj))) for obj in objects]
+        scenes = scenes_of_both(episode.trajectory.scene, simulator, places)
+        ids = [restored_ids(simulator, scene, objects) for scene in scenes]
         first, second = (
-            in_world(episode.trajectory, scene, exchange_ids(role), renamed)
-            for scene, role, renamed in zip(scenes, roles, words, strict=True)
+            self._world(episode, number, scene, ids[number]) for number, scene in enumerate(scenes)
         )
         return Worlds(
             pair=(first, second),
             changed=frozenset(ids[0].values()),
-            types=frozenset(types),
-            ids={ids[0][obj.name]: ids[1][obj.name] for obj in both},
+            types=frozenset(obj.object_type for obj in objects),
+            ids={ids[0][obj.name]: ids[1][obj.name] for obj in objects},
+            has_own=self.pairs[0] is None,
+        )
+
+    def _world(
+        self, episode: Episode, number: int, scene: Scene, ids: Mapping[str, str]
+    ) -> Trajectory:
+        """Return the episode in a world, by the ids that objects have in its scene."""
+        partners = [(obj, self.partner(number, obj)) for obj in self.objects]
+        is_handled = any(episode.actions_on(obj.object_id) for obj in self.objects)
+        types = {obj.object_type: other.object_type for obj, other in partners if obj != other}
+        return in_world(
+            episode.trajectory,
+            scene,
+            exchange_ids({obj.object_id: ids[other.name] for obj, other in partners}),
+            types if is_handled else {},
         )
 
 
@@ -94,9 +110,8 @@ class ExchangeKind:
 
     def propose(self, episode: Episode, rng: random.Random) -> Iterator[Exchange]:
         """See `EditKind`."""
-        for one, other in self.pairs(episode, rng):
-            if rng.random() < self.chance(episode, one, other):
-                yield Exchange(one, other)
+        for pair in self.pairs(episode, rng):
+            yield Exchange((None, pair))
 
     def pairs(self, episode: Episode, rng: random.Random) -> list[_Pair]:
         """Return the pairs of objects that may exchange places, the likeliest first."""
@@ -107,17 +122,7 @@ class ExchangeKind:
             if self.allows(*(set(episode.actions_on(obj.object_id)) for obj in (one, other)))
             and self._may_exchange(episode, one, other)
         ]
-        rng.shuffle(pairs)
-        pairs.sort(key=lambda pair: _n_unseen(episode, pair))
-        return _spread(pairs)
-
-    def chance(self, episode: Episode, one: ThorObject, other: ThorObject) -> float:
-        """Return with what probability an exchange is proposed: 1 if its world is as likely.
-
-        If a world that is half as likely as the episode is proposed half as often, neither of two
-        worlds is the likelier original (the rule of Metropolis).
-        """
-        return 1.0
+        return _in_order(episode, rng, pairs)
 
     def allows(self, first: set[str], second: set[str]) -> bool:
         """Return True for two objects with these names of actions on them."""
@@ -150,20 +155,25 @@ class ExchangeKind:
         )
 
 
-def _n_unseen(episode: Episode, pair: _Pair) -> int:
-    return sum(obj.object_id not in episode.history.seen for obj in pair)
+def _in_order(episode: Episode, rng: random.Random, groups: list[_Group]) -> list[_Group]:
+    """Return groups of objects by chance, those that frames show first.
 
-
-def _spread(pairs: Iterable[_Pair]) -> list[_Pair]:
-    """Return pairs with those first of which no object is in an earlier one, so that facts vary."""
-    first: list[_Pair] = []
-    later: list[_Pair] = []
+    Among these are first those of which no object is in an earlier one, so that facts vary.
+    """
+    rng.shuffle(groups)
+    groups.sort(key=lambda group: sum(_is_unseen(episode, obj) for obj in group))
+    first: list[_Group] = []
+    later: list[_Group] = []
     used: set[str] = set()
-    for pair in pairs:
-        keys = {obj.object_id for obj in pair}
-        (later if keys & used else first).append(pair)
+    for group in groups:
+        keys = {obj.object_id for obj in group}
+        (later if keys & used else first).append(group)
         used |= keys
     return [*first, *later]
+
+
+def _is_unseen(episode: Episode, obj: ThorObject) -> bool:
+    return obj.object_id not in episode.history.seen
 
 
 def _is_alone(episode: Episode, obj: ThorObject) -> bool:
@@ -173,26 +183,31 @@ def _is_alone(episode: Episode, obj: ThorObject) -> bool:
 
 
 class Swap(ExchangeKind):
-    """One that is carried exchanges places with one that is not touched."""
+    """One of two that are not touched is at the place of one that is carried, and carried for it.
+
+    Neither world is the episode's own: what a room's tasks name most often would tell it.
+    """
 
     name: ClassVar[str] = "swap"
+
+    def propose(self, episode: Episode, rng: random.Random) -> Iterator[Exchange]:
+        """See `EditKind`."""
+        partners: dict[str, list[_Pair]] = {}
+        for one, other in self.pairs(episode, rng):
+            pair = (one, other) if episode.actions_on(one.object_id) else (other, one)
+            partners.setdefault(pair[0].object_id, []).append(pair)
+        groups = [
+            (carried, one, other)
+            for pairs in partners.values()
+            for (carried, one), (_, other) in combinations(pairs, 2)
+            if canonical_type(one.object_type) != canonical_type(other.object_type)
+        ]
+        for carried, one, other in _in_order(episode, rng, groups):
+            yield Exchange(((carried, one), (carried, other)))
 
     def allows(self, first: set[str], second: set[str]) -> bool:
         """See the base."""
         return bool(first) != bool(second) and first | second <= _CARRYING
-
-    def _may_exchange(self, episode: Episode, one: ThorObject, other: ThorObject) -> bool:
-        """Return True if each could as well be where the other is, and be what is carried."""
-        if not super()._may_exchange(episode, one, other):
-            return False
-        low, high = sorted(episode.task_shares[obj.object_type] for obj in (one, other))
-        return low >= high / 2 > 0
-
-    def chance(self, episode: Episode, one: ThorObject, other: ThorObject) -> float:
-        """See the base: how often tasks name what is carried."""
-        carried, left = (one, other) if episode.actions_on(one.object_id) else (other, one)
-        shares = episode.task_shares
-        return shares[left.object_type] / shares[carried.object_type]
 
 
 class SwapTask(ExchangeKind):
@@ -213,7 +228,7 @@ class SwapSliced(ExchangeKind):
     def propose(self, episode: Episode, rng: random.Random) -> Iterator[Exchange]:
         """See `EditKind`."""
         for exchange in super().propose(episode, rng):
-            if {exchange.one.object_type, exchange.other.object_type} <= SLICEABLE:
+            if {obj.object_type for obj in exchange.objects} <= SLICEABLE:
                 yield exchange
 
     def allows(self, first: set[str], second: set[str]) -> bool:

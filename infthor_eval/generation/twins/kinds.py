@@ -6,7 +6,7 @@ another package, an entry point of the group `infthor_eval.twins`.
 
 import random
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Protocol
 
 from infthor_eval.formats.trajectory import Trajectory
@@ -50,6 +50,7 @@ class Worlds:
         changed: ids in the first world of the objects that may differ, with their slices.
         types: object types that the changed fact is about; only questions on them are paired.
         inserted: indices of the actions that the episode does not have, in each world.
+        has_own: true if one of the worlds is the episode's own.
     """
 
     pair: tuple[Trajectory, Trajectory]
@@ -57,6 +58,7 @@ class Worlds:
     types: frozenset[str]
     ids: dict[str, str] = field(default_factory=dict)
     inserted: range = range(0)
+    has_own: bool = False
 
     @property
     def changed_in_second(self) -> frozenset[str]:
@@ -67,7 +69,7 @@ class Worlds:
         """Return the same worlds in the other order."""
         first, second = self.pair
         back = {new: old for old, new in self.ids.items()}
-        return Worlds((second, first), self.changed_in_second, self.types, back, self.inserted)
+        return replace(self, pair=(second, first), changed=self.changed_in_second, ids=back)
 
 
 class Proposal(Protocol):

@@ -27,18 +27,20 @@ _FAR = 50.0  # metres above the room, where objects wait for their new places
 
 
 def scenes_of_both(
-    scene: Scene, simulator: Simulator, places: Sequence[tuple[ThorObject, ThorObject]]
+    scene: Scene,
+    simulator: Simulator,
+    places: Sequence[tuple[ThorObject, tuple[ThorObject, ThorObject]]],
 ) -> tuple[Scene, Scene]:
     """Stand one of two objects at each of some places, the other one in a second world.
 
     Both stand at the same point, so that no distance tells which of them a room was generated with:
-    where only the one of the episode has room, both are moved aside. What a world has no place for
+    where only one of them has room, both are moved aside. What a world has no place for
     is above the room, at the same height in both.
 
     Args:
         scene: the scene, which is restored first.
         simulator: a simulator.
-        places: for each place the object of the episode, and that of the second world.
+        places: for each place the object that is there in the scene, and that of either world.
 
     Returns:
         The two scenes, as trajectories have them.
@@ -47,12 +49,14 @@ def scenes_of_both(
         EditRefused: there is no room, or a third object moved or is elsewhere.
         SimulatorError: the simulator fails.
     """
-    mover = _Mover(scene, simulator, {obj.object_id: obj for place in places for obj in place})
-    offsets = [mover.offset_for_both(*place) for place in places]
+    items = {obj.object_id: obj for where, both in places for obj in (where, *both)}
+    mover = _Mover(scene, simulator, items)
+    offsets = [mover.offset_for_both(where, both) for where, both in places]
     worlds = []
     for side in (0, 1):
         standing = [
-            (place[side], place[0], offset) for place, offset in zip(places, offsets, strict=True)
+            (both[side], where, offset)
+            for (where, both), offset in zip(places, offsets, strict=True)
         ]
         worlds.append(mover.scene(standing))
     return worlds[0], worlds[1]
@@ -85,14 +89,14 @@ class _Mover:
         """Take an object out of the way, in the rotation that it has."""
         _lift(self._simulator, item, self._waiting[item.object_id])
 
-    def offset_for_both(self, where: ThorObject, other: ThorObject) -> _Offset:
-        """Return how far from a place, at least, both the object there and another have room.
+    def offset_for_both(self, where: ThorObject, both: tuple[ThorObject, ThorObject]) -> _Offset:
+        """Return how far from an object's place, at least, both of two objects have room.
 
         Raises:
             EditRefused: there is no such point.
         """
         for offset in _OFFSETS:
-            if all(self._stands(item, where, offset) for item in (other, where)):
+            if all(self._stands(item, where, offset) for item in reversed(both)):
                 return offset
         raise EditRefused("no room at the other's place")
 

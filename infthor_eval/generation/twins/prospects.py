@@ -57,14 +57,16 @@ class Prospects:
     def may_be_needed(self, proposal: Proposal) -> bool:
         """Return whether an edit may give a final task; of other edits than exchanges, True.
 
-        After an exchange either object is where the other is in the episode.
+        After an exchange an object is where its partner is in the episode.
         """
         if not isinstance(proposal, Exchange):
             return True
-        keys = proposal.one.object_id, proposal.other.object_id
         history = self._episode.history
-        is_clear = any(history.is_only_one(0, key) for key in keys)
-        return is_clear and any(self._fits(history, end, keys) for end in self.seen)
+        return any(
+            self._fits(history, end, [proposal.partner(world, obj).object_id for world in (0, 1)])
+            for obj, end in product(proposal.objects, self.seen)
+            if history.is_only_one(0, obj.object_id)
+        )
 
     def hides(self, end: int, keys: Sequence[str]) -> bool:
         """Return True if an agent at the end of a history sees none of these by turning around."""

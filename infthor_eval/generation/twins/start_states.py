@@ -124,7 +124,7 @@ class _Replacement:
         What is not there is put aside in both, as its pose is written, too.
         """
         both = self.one, self.other
-        scenes = scenes_of_both(episode.trajectory.scene, simulator, [both])
+        scenes = scenes_of_both(episode.trajectory.scene, simulator, [(self.one, both)])
         ids = [restored_ids(simulator, scene, both) for scene in scenes]
         worlds = [
             _with_states(
@@ -137,6 +137,7 @@ class _Replacement:
             changed=frozenset(ids[0].values()),
             types=frozenset({self.one.object_type, self.other.object_type}),
             ids={ids[0][obj.name]: ids[1][obj.name] for obj in both},
+            has_own=True,
         )
 
 
@@ -160,7 +161,9 @@ class Replace:
         ]
         for pair in sorted(pairs, key=lambda pair: -sum(_can_be_missed(episode, pair))):
             one, other = rng.sample(pair, 2)
-            # What has few places is the likelier at each: see `ExchangeKind.chance`.
+            # What has few places is the likelier at each. If a world that is half as likely as the
+            # episode is proposed half as often, neither is the likelier original (the rule of
+            # Metropolis).
             if rng.random() < _n_places(episode, one) / _n_places(episode, other):
                 yield _Replacement(one, other)
 

@@ -1,21 +1,12 @@
 """Which objects may exchange places."""
 
 import random
-from collections import Counter
-from dataclasses import replace
 
 import pytest
 
-from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.generation.twins.exchanges import Move, Swap, Untouched
-from infthor_eval.generation.twins.task_shares import task_shares
 from infthor_eval.household.affordances import goes_into
-from infthor_eval.thor.restore import restore
-
-
-@pytest.fixture(scope="module")
-def trajectory(file):
-    return next(iter_trajectories(file))
+from infthor_eval.household.wording import canonical_type
 
 
 @pytest.fixture(scope="module")
@@ -23,51 +14,26 @@ def episode(living_room):
     return living_room
 
 
-def test_tasks_name_what_more_can_be_done_with_more_often(trajectory, simulator):
-    restore(simulator, trajectory.scene)
-    shares = task_shares(simulator.view, trajectory.scene.floor_plan)
-    # A kitchen heats, cools, cleans and stacks mugs; shakers it only puts somewhere.
-    assert shares["Mug"] > 3 * shares["SaltShaker"]
-    assert shares == task_shares(simulator.view, trajectory.scene.floor_plan)
+def test_of_a_swap_neither_world_is_the_episode(episode):
+    edits = [*Swap().propose(episode, random.Random(0))]
+    assert edits
+    for edit in edits:
+        (carried, one), (again, other) = edit.pairs
+        assert carried == again
+        assert episode.actions_on(carried.object_id)
+        assert not any(episode.actions_on(obj.object_id) for obj in (one, other))
+        assert len({canonical_type(obj.object_type) for obj in edit.objects}) == 3
+        # At the place of each is another thing in one world than in the other.
+        for obj in edit.objects:
+            assert edit.partner(0, obj) != edit.partner(1, obj)
 
 
-def test_what_tasks_name_more_often_is_not_carried_in_one_world_alone(episode):
-    pairs = Swap().pairs(episode, random.Random(0))
-    assert pairs
-    for one, other in pairs:
-        low, high = sorted(episode.task_shares[obj.object_type] for obj in (one, other))
-        assert low >= high / 2 > 0
-
-
-def test_what_no_task_names_is_exchanged_with_nothing(episode):
-    bare = replace(episode)
-    vars(bare)["task_shares"] = Counter()
-    assert not Swap().pairs(bare, random.Random(0))
-
-
-def test_a_world_half_as_likely_is_proposed_half_as_often(episode):
-    one, other = Swap().pairs(episode, random.Random(0))[0]
-    carried, left = (one, other) if episode.actions_on(one.object_id) else (other, one)
-    unequal = replace(episode)
-    shares = Counter({carried.object_type: 60, left.object_type: 30})
-    vars(unequal)["task_shares"] = shares
-    rng = random.Random(0)
-    edits = [edit for _ in range(400) for edit in Swap().propose(unequal, rng)]
-    both = {one.object_id, other.object_id}
-
-    def count(edits):
-        return sum({edit.one.object_id, edit.other.object_id} == both for edit in edits)
-
-    n_same = count(edits)
-    assert 160 < n_same < 240
-    shares[carried.object_type] = 20
-    again = [edit for _ in range(20) for edit in Swap().propose(unequal, rng)]
-    assert count(again) == 20
-
-
-def test_only_swaps_are_drawn_by_how_likely_they_are(episode):
-    one, other = episode.loose[:2]
-    assert Move().chance(episode, one, other) == 1.0
+def test_of_a_move_one_world_is_the_episode(episode):
+    for edit in Move().propose(episode, random.Random(0)):
+        own, pair = edit.pairs
+        assert own is None
+        assert [edit.partner(0, obj) for obj in pair] == [*pair]
+        assert [edit.partner(1, obj) for obj in pair] == [*pair[::-1]]
 
 
 def test_the_reverse_of_each_exchange_could_be_proposed_as_well(episode):
