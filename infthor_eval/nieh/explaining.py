@@ -23,6 +23,7 @@ from infthor_eval.nieh.scoring import (
 __all__ = ["explain"]
 
 _YES_NO = ("yes", "no")
+_LONGEST = 60  # characters of a quoted text
 
 
 def explain(reply: str, answers: Sequence[Answer], scorers: Sequence[Scorer]) -> list[str]:
@@ -30,13 +31,18 @@ def explain(reply: str, answers: Sequence[Answer], scorers: Sequence[Scorer]) ->
     response = last_line(reply)
     lines = []
     if response != reply.strip():
-        lines.append(f"the last line counts: {response!r}")
+        lines.append(f"the last line counts: {_quote(response)}")
     for scorer in scorers:
         lines.append(f"{scorer}: {score(response, answers, scorer):g}{_rule(answers, scorer)}")
         lines += [
             f"  {_find(gold, _pieces(response, answers, scorer), scorer)}" for gold in answers
         ]
     return lines
+
+
+def _quote(text: str) -> str:
+    """Return a text in quotes, and a long one with its beginning alone: the reply stands beside."""
+    return repr(text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…")
 
 
 def _rule(answers: Sequence[Answer], scorer: Scorer) -> str:
@@ -61,12 +67,12 @@ def _find(gold: Answer, pieces: Sequence[str], scorer: Scorer) -> str:
     matches = matches_reference if scorer == "reference" else matches_strict
     found = [piece for piece in pieces if matches(piece, gold)]
     if found:
-        return f"{str(gold)!r} is said by {found[0]!r}: {_why(found[0], gold, scorer)}"
+        return f"{str(gold)!r} is said by {_quote(found[0])}: {_why(found[0], gold, scorer)}"
     if not pieces:
         return f"{str(gold)!r} is not said: the reply is empty"
     wanted = _wanted(gold, scorer)
     nearest = max(pieces, key=lambda piece: similarity(_said(piece, scorer), wanted))
-    return f"{str(gold)!r} is not said by {nearest!r}: {_why_not(nearest, gold, scorer)}"
+    return f"{str(gold)!r} is not said by {_quote(nearest)}: {_why_not(nearest, gold, scorer)}"
 
 
 def _said(piece: str, scorer: Scorer) -> str:
@@ -89,12 +95,12 @@ def _why(piece: str, gold: Answer, scorer: Scorer) -> str:
     said = _said(piece, scorer)
     wanted = _wanted(gold, scorer)
     if said == wanted:
-        return f"equal as {said!r}"
+        return f"equal as {_quote(said)}"
     alike = similarity(said, wanted)
     if said and wanted and alike >= NEAR:
-        return f"{said!r} and {wanted!r} are {alike} % alike, {NEAR} % are enough"
+        return f"{_quote(said)} and {wanted!r} are {alike} % alike, {NEAR} % are enough"
     if are_synonyms(said, wanted):
-        return f"{said!r} and {wanted!r} are in one row of synonyms"
+        return f"{_quote(said)} and {wanted!r} are in one row of synonyms"
     return f"it begins with {wanted}"  # within the first letters, to the published scorer
 
 
@@ -106,7 +112,8 @@ def _why_not(piece: str, gold: Answer, scorer: Scorer) -> str:
         return f"the number must be {wanted}"
     said = _said(piece, scorer)
     wanted = _wanted(gold, scorer)
+    alike = similarity(said, wanted)
     return (
-        f"{said!r} and {wanted!r} are {similarity(said, wanted)} % alike, {NEAR} % are needed, and "
-        "no row of synonyms has both"
+        f"{_quote(said)} and {wanted!r} are {alike} % alike, {NEAR} % are needed, and no row of "
+        "synonyms has both"
     )
