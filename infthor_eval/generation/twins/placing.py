@@ -34,8 +34,8 @@ def scenes_of_both(
     """Stand one of two objects at each of some places, the other one in a second world.
 
     Both stand at the same point, so that no distance tells which of them a room was generated with:
-    where only one of them has room, both are moved aside. What a world has no place for
-    is above the room, at the same height in both.
+    where only one of them has room, both are moved aside. What a world has no place for is above
+    the room, at the same height in both.
 
     Args:
         scene: the scene, which is restored first.
