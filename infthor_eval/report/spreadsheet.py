@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["write_spreadsheet"]
 
 _WIDEST = 60  # characters of a column; longer texts are cut by the program, not in the file
+_DIGITS = ".16G"  # as XlsxWriter writes numbers; the greatest floats become infinite by rounding
 
 
 def write_spreadsheet(path: Path, tables: Sequence[Table]) -> None:
@@ -63,4 +64,4 @@ def _number(cell: str) -> float | None:
         value = float(cell)
     except ValueError:
         return None
-    return value if isfinite(value) else None
+    return value if isfinite(float(format(value, _DIGITS))) else None

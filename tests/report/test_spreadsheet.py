@@ -4,7 +4,7 @@ import sys
 
 import openpyxl
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from infthor_eval.errors import DataError, UsageError
@@ -53,6 +53,8 @@ def test_no_text_is_a_formula_or_a_link(tmp_path, text):
 
 
 @settings(max_examples=30)
+@example(sys.float_info.max)
+@example(-sys.float_info.max)
 @given(st.floats(allow_nan=True, allow_infinity=True))
 def test_whatever_a_number_is_the_file_can_be_opened(tmp_path_factory, value):
     path = tmp_path_factory.mktemp("sheet") / "a.xlsx"
