@@ -1,36 +1,47 @@
 """Tables as a spreadsheet (Office Open XML, .xlsx), which any office program opens."""
 
 from collections.abc import Sequence
+from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from infthor_eval.errors import UsageError, wrap_errors
 from infthor_eval.report.exporting import FlatColumn, flat_columns
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import prepare_file, write_atomically
 from infthor_eval.tables import Table
 
 if TYPE_CHECKING:
     from xlsxwriter.worksheet import Worksheet
 
-__all__ = ["write_spreadsheet"]
+__all__ = ["prepare_spreadsheet", "write_spreadsheet"]
 
 _WIDEST = 60  # characters of a column; longer texts are cut by the program, not in the file
 _DIGITS = ".16G"  # as XlsxWriter writes numbers; the greatest floats become infinite by rounding
 
 
+def prepare_spreadsheet(path: Path) -> Path:
+    """Check, before the work starts, that a spreadsheet can be written; create its folder.
+
+    Raises:
+        DataError: the path cannot be written to.
+        UsageError: the extra `xlsx` is not installed.
+    """
+    if find_spec("xlsxwriter") is None:
+        raise UsageError("a spreadsheet needs XlsxWriter; pip install 'infthor-eval[xlsx]'")
+    return prepare_file(path, "--xlsx")
+
+
 def write_spreadsheet(path: Path, tables: Sequence[Table]) -> None:
-    """Write tables into a file, a sheet each.
+    """Write tables into a prepared file, a sheet each.
 
     Numbers are numbers there, and no text is taken for a formula or a link. Notes stand below.
 
     Raises:
         DataError: it cannot be written.
-        UsageError: the extra `xlsx` is not installed.
     """
-    problem, hint = "a spreadsheet needs XlsxWriter", "pip install 'infthor-eval[xlsx]'"
-    with wrap_errors(problem, hint, catch=ImportError, raise_as=UsageError):
-        from xlsxwriter import Workbook
+    from xlsxwriter import Workbook
+
     with (
         wrap_errors(f"{path}: cannot be written", "give another --xlsx"),
         write_atomically(path) as partial,

@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.report.spreadsheet import write_spreadsheet
+from infthor_eval.report.spreadsheet import prepare_spreadsheet, write_spreadsheet
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
 
@@ -70,10 +70,16 @@ def test_tables_are_sheets(tmp_path):
     assert len(read(tmp_path / "a.xlsx")) == 2
 
 
-def test_what_cannot_be_written_is_one_line(tmp_path, monkeypatch):
+def test_what_cannot_be_written_is_one_line(tmp_path):
     table = Table("", (Column("a", False),), ())
     with pytest.raises(DataError, match=r"cannot be written.*give another --xlsx"):
         write_spreadsheet(tmp_path / "none" / "a.xlsx", [table])
+
+
+def test_what_a_spreadsheet_needs_is_looked_for_first(tmp_path, monkeypatch):
+    (tmp_path / "a.xlsx").mkdir()
+    with pytest.raises(DataError, match=r"not a file; give another place with --xlsx"):
+        prepare_spreadsheet(tmp_path / "a.xlsx")
     monkeypatch.setitem(sys.modules, "xlsxwriter", None)
     with pytest.raises(UsageError, match=r"pip install 'infthor-eval\[xlsx\]'"):
-        write_spreadsheet(tmp_path / "a.xlsx", [table])
+        prepare_spreadsheet(tmp_path / "b.xlsx")

@@ -137,9 +137,11 @@ def _export_table(folders: Sequence[Path], form: str | None, spreadsheet: Path |
     from infthor_eval.report.headline.results import task_results
     from infthor_eval.report.headline.tables import results_table
     from infthor_eval.report.presented import read_report_runs
-    from infthor_eval.report.spreadsheet import write_spreadsheet
+    from infthor_eval.report.spreadsheet import prepare_spreadsheet, write_spreadsheet
     from infthor_eval.terminal import print_line
 
+    if spreadsheet is not None:
+        prepare_spreadsheet(spreadsheet)
     runs = read_report_runs(folders, print_failure)
     table = results_table([result for run in runs for result in task_results(run)])
     if form is not None:
