@@ -10,9 +10,6 @@ DEVELOPED := $(VENV)/.developed
 PEERS := $(VENV)/test-peers
 # inspect_ai reads the logs that `export` writes; eighty other packages come with it, so it has an environment of its own.
 INSPECT := $(VENV)/inspect-ai
-# The renderer is compiled once; otherwise each process that finds it missing would compile it.
-COMPILE := $(BIN)/python -m pytest -q tests/infthor_sim/test_questions.py tests/infthor_sim/test_pictures.py -m "not slow" \
-	-k "test_questions or test_ids_frame_names or numba"
 
 # Real vLLM, on a GPU or a CPU, has an environment of its own.
 VLLM := .venv-vllm
@@ -26,7 +23,7 @@ BY_HARDWARE := torch triton cuda-bindings cuda-pathfinder cuda-toolkit $(addpref
 COMPILE_LOCK = $(TOOLS)/bin/uv --no-config pip compile --quiet --upgrade --universal --python-version 3.11 \
 	--generate-hashes --no-annotate --custom-compile-command 'make lock'
 
-.PHONY: demo shell test test-all test-times test-vllm fuzz vitals lint docs lock audit release clean
+.PHONY: demo shell compiled test test-all test-times test-vllm fuzz vitals lint docs lock audit release clean
 
 # A trajectory in a procedural kitchen, its frames and questions; then the bundled sets, by the bounds and a small model,
 # which is also asked behind memories.
@@ -44,17 +41,20 @@ demo: $(INSTALLED)
 shell: $(INSTALLED)
 	@. $(BIN)/activate && exec "$${SHELL:-/bin/sh}"
 
-test: $(DEVELOPED) $(PEERS) $(INSPECT)
-	$(COMPILE)
+# The renderer is compiled once; otherwise each process that finds it missing would compile it.
+compiled: $(DEVELOPED)
+	$(BIN)/python -m pytest -q tests/infthor_sim/test_questions.py tests/infthor_sim/test_pictures.py -m "not slow" \
+		-k "test_questions or test_ids_frame_names or numba"
+
+test: compiled $(PEERS) $(INSPECT)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 # The slow ones too; half an hour on two cores.
-test-all: $(DEVELOPED) $(PEERS) $(INSPECT)
+test-all: compiled $(PEERS) $(INSPECT)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile
 
 # Measures all tests, and lists those that are slow in tests/slow_tests.txt.
-test-times: $(DEVELOPED) $(PEERS) $(INSPECT)
-	$(COMPILE)
+test-times: compiled $(PEERS) $(INSPECT)
 	rm -rf build/processor_times
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -p tests.processor_times
 	$(BIN)/python -m tests.processor_times
