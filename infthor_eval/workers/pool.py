@@ -3,6 +3,7 @@
 import contextlib
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from queue import Empty, SimpleQueue
@@ -193,10 +194,14 @@ class Pool:
     def close(self) -> None:
         """End all workers, whatever they are doing."""
         self._jobs.close()
-        for number, link in self._links.items():
-            link.close()
-            self._threads[number - 1].join(_EXIT_WAIT_S)
-            link.close()  # again: the thread may have opened it in between
+        with ThreadPoolExecutor(len(self._links)) as closers:
+            list(closers.map(self._close, self._links.values(), self._threads))
+
+    @staticmethod
+    def _close(link: Link, thread: Thread) -> None:
+        link.close()
+        thread.join(_EXIT_WAIT_S)
+        link.close()  # again: the thread may have opened it in between
 
     def _next_event(self) -> Event | _JobEnded | None:
         try:

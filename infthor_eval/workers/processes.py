@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -19,6 +20,7 @@ __all__ = ["ProcessLink", "processes"]
 _STOP = "stop"
 _TERMINATED = 143  # exit status
 _EXIT_WAIT_S = 10.0  # for a process to end
+_STOP_WAIT_S = 0.7  # for one that is stopped in the middle of something: Ctrl-C waits for nobody
 # Spawned, not forked: a fork of a process with threads, a GPU or a simulator does not work.
 _SPAWN = get_context("spawn")
 _VISIBLE = "CUDA_VISIBLE_DEVICES"
@@ -42,23 +44,26 @@ class ProcessLink:
         # Of multiprocessing's spawn context, whose class has no public name.
         self._process: Any = None
         self._connection: Connection[Any, Any] | None = None
+        self._is_busy = False
 
     def open(self) -> Any:
         """See `Link`."""
         self.close()
         with self._changing:
             self._start()
-        self._send(self._open_worker)
-        return self._receive()[1]
+        with self._busy():
+            self._send(self._open_worker)
+            return self._receive()[1]
 
     def do(self, job: Any) -> Iterator[Any]:
         """See `Link`."""
-        self._send(job)
-        while True:
-            more, value = self._receive()
-            if not more:
-                return
-            yield value
+        with self._busy():
+            self._send(job)
+            while True:
+                more, value = self._receive()
+                if not more:
+                    return
+                yield value
 
     def stop(self) -> None:
         """See `Link`."""
@@ -71,10 +76,18 @@ class ProcessLink:
             if self._process is None:
                 return
             self._process.terminate()
-            self._process.join(_EXIT_WAIT_S)
+            self._process.join(_STOP_WAIT_S if self._is_busy else _EXIT_WAIT_S)
             if self._process.is_alive():
                 self._process.kill()
                 self._process.join()
+
+    @contextmanager
+    def _busy(self) -> Iterator[None]:
+        self._is_busy = True
+        try:
+            yield
+        finally:
+            self._is_busy = False
 
     def _start(self) -> None:
         self._connection, theirs = _SPAWN.Pipe()

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -147,6 +148,20 @@ def test_once_it_is_to_stop_the_results_in_hand_are_the_last_and_further_jobs_ca
     assert {event.job for event in events} == {0}
     assert len(events) < 20
     assert counts(list(shared.run(1, lambda _: Job(3))), 0) == [0, 1, 2]
+
+
+def test_workers_that_hear_no_signal_are_killed_together_and_soon():
+    shared = Pool(WorkerSettings(3).connect(OpenCounter()), 3)
+    shared.open()
+    begun = {}
+    for event in shared.run(3, lambda _: Job(2, stuck=1)):
+        begun[event.worker] = event.result[0]
+        if len(begun) == 3:
+            break
+    start = time.monotonic()
+    shared.close()
+    assert time.monotonic() - start < 10  # of one that is asked to end, and not stopped
+    assert not any(map(is_running, begun.values()))
 
 
 def test_processes_share_the_processors_of_the_machine(monkeypatch):

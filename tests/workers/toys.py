@@ -20,6 +20,7 @@ class Job:
         number: to count to.
         dies: after how many results the worker dies.
         once: a file that says that a worker has died of it already; None dies every time.
+        stuck: after how many results it hangs, as in native code, in which no signal is heard.
         raises: what is raised in the end.
         slow: seconds before each result.
         meets: an empty folder in which each worker leaves its name before its first result, and
@@ -29,6 +30,7 @@ class Job:
     number: int
     dies: int | None = None
     once: Path | None = None
+    stuck: int | None = None
     raises: Exception | None = None
     slow: float = 0.0
     meets: Path | None = None
@@ -71,6 +73,9 @@ class Counter:
             wait_until(lambda: len(list(job.meets.iterdir())) > 1)
         for count in range(job.number):
             time.sleep(job.slow)
+            if count == job.stuck:
+                signal.signal(signal.SIGTERM, signal.SIG_IGN)
+                time.sleep(600)
             if count == job.dies and not (job.once and job.once.exists()):
                 if job.once:
                     job.once.touch()
