@@ -47,16 +47,16 @@ compiled: $(DEVELOPED)
 		-k "test_questions or test_ids_frame_names or numba"
 
 test: compiled $(PEERS) $(INSPECT)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 # The slow ones too; half an hour on two cores.
 test-all: compiled $(PEERS) $(INSPECT)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder
 
 # Measures all tests, and lists those that are slow in tests/slow_tests.txt.
 test-times: compiled $(PEERS) $(INSPECT)
 	rm -rf build/processor_times
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -p tests.processor_times
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -p tests.processor_times
 	$(BIN)/python -m tests.processor_times
 
 # Models in real vLLM against the same ones in transformers.
