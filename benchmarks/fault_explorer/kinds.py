@@ -100,6 +100,14 @@ def _report(place: Place) -> Words:
     return ("report", *runs, "--out", place.out / "report.html")
 
 
+def _exported(form: str) -> Kind:
+    def words(place: Place) -> Words:
+        runs = sorted((place.inputs / "oracle").iterdir())
+        return ("export", *runs, "--format", form, "--out", place.out / "exported")
+
+    return Kind(f"export {form}", words, _asked)
+
+
 def _train(place: Place) -> Words:
     command = ("train", "--recipe", "questions", "--model", "qwen2.5-vl-tiny", "--data")
     steps = ("--set", "max_steps=2", "--set", "save_every=1")
@@ -109,7 +117,7 @@ def _train(place: Place) -> Words:
 KINDS = (
     Kind("questions", lambda place: _run(place, "oracle", "nieh_mini_gt", "--limit", "2")),
     Kind(
-        "questions, model",
+        "questions by a model",
         lambda place: _run(place, "qwen2.5-vl-tiny", "nieh_mini_gt", "--limit", "2"),
     ),
     Kind(
@@ -156,6 +164,7 @@ KINDS = (
         ),
         _asked,
     ),
+    *map(_exported, ("every-eval-ever", "inspect", "lm-eval")),
     Kind(
         "bundle",
         lambda place: ("bundle", place.inputs / "manifest.json", "--out", place.out / "bundle"),

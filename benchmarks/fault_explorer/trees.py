@@ -3,8 +3,10 @@
 import json
 import re
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 __all__ = ["difference", "read_tree"]
 
@@ -14,6 +16,8 @@ Tree = dict[str, Any]
 _STAMP = re.compile(r"_\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d\.\d+(?=\.jsonl?$)")
 # Of a unit's record: its time, how often it was tried, what it survived, what was cached.
 _OF_A_TRY = ("seconds", "attempt", "faults", "cached")
+# Of an export for others: its time, a name that is made of it, hashes of files that have either.
+_OF_AN_EXPORT = ("date", "evaluation_id", "retrieved_timestamp", "checksum")
 
 
 def read_tree(folder: Path) -> Tree:
@@ -73,9 +77,26 @@ def _without_times(*names: str) -> Callable[[bytes], Any]:
     return lambda content: _without(json.loads(content), names)
 
 
+def _lines(content: bytes) -> Any:
+    """Lines of JSON, without the export that they belong to."""
+    return [_without(json.loads(line), _OF_AN_EXPORT) for line in content.splitlines()]
+
+
+def _archive(content: bytes) -> Any:
+    """What is in a zip file, without when it was put there."""
+    with ZipFile(BytesIO(content)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
 _READERS: tuple[tuple[Callable[[Path], bool], Callable[[bytes], Any]], ...] = (
     (lambda path: path.parent.name == "journal" and path.suffix == ".jsonl", _journal),
     (lambda path: path.name == "usage.json", _without_times("seconds", "cached", "hit_rate")),
     (lambda path: path.name == "replay.json", _without_times("seconds")),
     (lambda path: path.parent.parent.name == "lm_eval", _without_times("date")),
+    (
+        lambda path: "exported" in path.parts and path.suffix == ".json",
+        _without_times(*_OF_AN_EXPORT),
+    ),
+    (lambda path: "exported" in path.parts and path.suffix == ".jsonl", _lines),
+    (lambda path: path.suffix == ".eval", _archive),
 )
