@@ -49,7 +49,7 @@ compiled: $(DEVELOPED)
 test: compiled $(PEERS) $(INSPECT)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
-# The slow ones too; half an hour on two cores.
+# The slow ones too; 2.3 hours of one core, so more than an hour on two.
 test-all: compiled $(PEERS) $(INSPECT)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder
 
