@@ -10,7 +10,18 @@ from typing import Annotated, Any
 
 from msgspec import Meta
 
-__all__ = ["MOST", "Amount", "Count", "Number", "Share", "Total", "Whole", "require_number"]
+__all__ = [
+    "MOST",
+    "Amount",
+    "AmountSum",
+    "Count",
+    "CountSum",
+    "Number",
+    "Share",
+    "Total",
+    "Whole",
+    "require_number",
+]
 
 MOST = 2**53  # beyond it a float skips integers
 
@@ -20,6 +31,9 @@ Whole = Annotated[int, Meta(ge=-MOST, le=MOST)]
 Number = Annotated[float, Meta(ge=-MOST, le=MOST)]
 Amount = Annotated[float, Meta(ge=0, le=MOST)]  # of seconds, metres, dollars
 Share = Annotated[float, Meta(ge=0, le=1)]
+# Sums over many records: each is within the limits, and all together need not be.
+CountSum = Annotated[int, Meta(ge=0)]
+AmountSum = Annotated[float, Meta(ge=0)]
 
 
 def require_number(name: str, value: Any) -> float:

@@ -9,6 +9,7 @@ import msgspec
 
 from infthor_eval.errors import DataError, InfthorError, wrap_errors
 from infthor_eval.formats.reading import NOT_JSON, read_bytes
+from infthor_eval.quantities import AmountSum, CountSum
 from infthor_eval.rates import Rate
 from infthor_eval.runs.completeness import count_missing
 from infthor_eval.runs.journals.records import RunHeader
@@ -53,12 +54,22 @@ class BrokenRun:
     reason: str
 
 
+class _UsageOfAll(Usage, frozen=True, omit_defaults=True):
+    """Usage of all units together, which may be beyond what one unit's may be."""
+
+    requests: CountSum = 0
+    context: CountSum = 0
+    cached: CountSum = 0
+    reply: CountSum = 0
+    cost: AmountSum | None = None
+
+
 class Results(msgspec.Struct, frozen=True):
     """The fields of `results.json` that need no suite."""
 
     n_missing: int
     primary_metrics: dict[str, Rate] = {}
-    usage: Usage = NOTHING
+    usage: _UsageOfAll = _UsageOfAll()
 
 
 def find_runs(folder: Path, tell: Tell | None = None) -> Iterator[StoredRun | BrokenRun]:
