@@ -10,6 +10,8 @@ DEVELOPED := $(VENV)/.developed
 PEERS := $(VENV)/test-peers
 # inspect_ai reads the logs that `export` writes; eighty other packages come with it, so it has an environment of its own.
 INSPECT := $(VENV)/inspect-ai
+# The renderer is compiled once; otherwise each process that finds it missing would compile it.
+COMPILED := $(VENV)/.compiled
 
 # Real vLLM, on a GPU or a CPU, has an environment of its own.
 VLLM := .venv-vllm
@@ -23,7 +25,7 @@ BY_HARDWARE := torch triton cuda-bindings cuda-pathfinder cuda-toolkit $(addpref
 COMPILE_LOCK = $(TOOLS)/bin/uv --no-config pip compile --quiet --upgrade --universal --python-version 3.11 \
 	--generate-hashes --no-annotate --custom-compile-command 'make lock'
 
-.PHONY: demo shell compiled test test-all test-times test-vllm fuzz vitals lint docs lock audit release clean
+.PHONY: demo shell test test-all test-times test-vllm fuzz vitals lint docs lock audit release clean
 
 # A trajectory in a procedural kitchen, its frames and questions; then the bundled sets, by the bounds and a small model,
 # which is also asked behind memories.
@@ -41,20 +43,20 @@ demo: $(INSTALLED)
 shell: $(INSTALLED)
 	@. $(BIN)/activate && exec "$${SHELL:-/bin/sh}"
 
-# The renderer is compiled once; otherwise each process that finds it missing would compile it.
-compiled: $(DEVELOPED)
+$(COMPILED): $(DEVELOPED) $(wildcard infthor_sim/render/*.py)
 	$(BIN)/python -m pytest -q tests/infthor_sim/test_questions.py tests/infthor_sim/test_pictures.py -m "not slow" \
 		-k "test_questions or test_ids_frame_names or numba"
+	touch $@
 
-test: compiled $(PEERS) $(INSPECT)
+test: $(COMPILED) $(PEERS) $(INSPECT)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 # The slow ones too; 2.3 hours of one core, so more than an hour on two.
-test-all: compiled $(PEERS) $(INSPECT)
+test-all: $(COMPILED) $(PEERS) $(INSPECT)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder
 
 # Measures all tests, and lists those that are slow in tests/slow_tests.txt.
-test-times: compiled $(PEERS) $(INSPECT)
+test-times: $(COMPILED) $(PEERS) $(INSPECT)
 	rm -rf build/processor_times
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -p tests.processor_times
 	$(BIN)/python -m tests.processor_times
