@@ -73,8 +73,15 @@ test-all` runs them.
 
 def read_slow_tests() -> set[str]:
     """Return the ids of the slow tests."""
-    lines = _LIST.read_text().splitlines()
-    return {line.split(maxsplit=1)[1] for line in lines if line and not line.startswith("#")}
+    return {test for test, _ in _read_listed()}
+
+
+def _read_listed() -> Iterator[tuple[str, float]]:
+    """Yield the slow tests with their seconds, which the list rounds."""
+    for line in _LIST.read_text().splitlines():
+        if line and not line.startswith("#"):
+            taken, test = line.split(maxsplit=1)
+            yield test, float(taken)
 
 
 def _processor_seconds() -> float:
@@ -162,19 +169,17 @@ def _quickest_of_files(seconds: Mapping[str, float]) -> Iterator[str]:
 def main() -> None:
     """Write the list of slow tests from what was measured; tests that were not measured stay as
     they are listed."""
-    seconds = _read_measured()
-    for line in _LIST.read_text().splitlines():
-        if line and not line.startswith("#"):
-            taken, test = line.split(maxsplit=1)
-            seconds.setdefault(test, float(taken))
-    kept = {*KEPT, *_quickest_of_files(seconds)}
-    slow = sorted(test for test, taken in seconds.items() if taken > LIMIT_S and test not in kept)
+    measured = _read_measured()
+    listed = {test: taken for test, taken in _read_listed() if test not in measured}
+    seconds = listed | measured
+    above = {test for test, taken in measured.items() if taken > LIMIT_S}
+    slow = sorted({*listed, *above}.difference(KEPT, _quickest_of_files(measured)))
     lines = [f"{seconds[test]:7.1f} {test}" for test in slow]
     _LIST.write_text(_HEAD.format(limit=LIMIT_S) + "\n".join(lines) + "\n")
     of_slow = sum(seconds[test] for test in slow)
     print(
         f"{len(slow)} slow tests: {of_slow:.0f} s of processor time; others: "
-        f"{seconds.total() - of_slow:.0f} s"
+        f"{sum(seconds.values()) - of_slow:.0f} s"
     )
 
 
