@@ -22,14 +22,14 @@ def evaluate(options: Mapping[str, Any]) -> DataFrame:
     from infthor_eval.cli.progress.runs import execute_runs
     from infthor_eval.exports.lm_eval import export
     from infthor_eval.report.run_table import load_runs
-    from infthor_eval.runs import prepare
+    from infthor_eval.runs import prepare_all
 
     try:
         context = command.make_context("evaluate", list(_words(options)))
         requests = RunOptions.from_click(context.params).requests()
     except click.ClickException as error:
         raise UsageError(error.format_message()) from error
-    runs = [prepare(request, suite) for request, suite in requests]
+    runs = prepare_all(requests)
     outcomes, is_stopped = execute_runs(runs, finish=export)
     if is_stopped:
         raise KeyboardInterrupt

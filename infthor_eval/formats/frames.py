@@ -86,7 +86,7 @@ class FrameRef:
         layers = [f"{patch.path.name}@{patch.left},{patch.top}" for patch in self.patches]
         return f"{digest(' '.join([self.path.name, *layers]))}.png"
 
-    @property
+    @cached_property
     def n_bytes(self) -> int | None:
         """Size of its files, or None if one is missing."""
         try:
@@ -116,8 +116,9 @@ class FrameRef:
         with _open(self.path) as image:
             return image.size
 
+    @cached_property
     def problem(self) -> str | None:
-        """Return why this cannot be a frame, by the first bytes of its files, or None."""
+        """Why this cannot be a frame, by the first bytes of its files, or None."""
         return next(filter(None, map(_problem_of, self._paths)), None)
 
     def load(self) -> Image.Image:

@@ -95,6 +95,7 @@ class NiehSet:
         self.trajectories = trajectories
         self.simulator = simulator_of(self.directory)
         self.files = {file.stem: self._read_file(file) for file in self.question_files}
+        self._shared_frames: dict[str, FrameRef] = {}
         self._frames: dict[str, dict[int, FrameRef] | DataError] = {}
         # One tuple per trajectory, shared by all its questions: a copy each would be thousands of
         # references.
@@ -311,14 +312,16 @@ class NiehSet:
             return (
                 f"clue {outside[0]} is outside trajectory {question.traj_id} ({len(frames)} frames)"
             )
-        return next(filter(None, (frames[index].problem() for index in question.clues)), None)
+        return next(filter(None, (frames[index].problem for index in question.clues)), None)
 
     def _trajectory(self, traj_id: str) -> dict[int, FrameRef]:
         if not self.has_frames:
             raise DataError(f"{self.root}: {_NO_FRAMES}")
         if Path(traj_id).name != traj_id or traj_id in {"", ".", ".."}:
             raise DataError(f"trajectory {traj_id!r} is not a plain folder name")
-        return _read_once(self._frames, traj_id, lambda: _read_frames(self.folder(traj_id)))
+        return _read_once(
+            self._frames, traj_id, lambda: _read_frames(self.folder(traj_id), self._shared_frames)
+        )
 
 
 def _read_once(cache: dict[K, T | DataError], key: K, read: Callable[[], T]) -> T:
@@ -335,13 +338,16 @@ def _read_once(cache: dict[K, T | DataError], key: K, read: Callable[[], T]) -> 
     return result
 
 
-def _read_frames(folder: Path) -> dict[int, FrameRef]:
-    """Return the frames by their number (`img_idx`), in time order."""
+def _read_frames(folder: Path, shared_frames: dict[str, FrameRef]) -> dict[int, FrameRef]:
+    """Return the frames by their number (`img_idx`), in time order.
+
+    Pictures that several trajectories share are kept in `shared_frames`, by their line.
+    """
     with wrap_errors(f"trajectory {folder.name[:_LONGEST]}: its folder cannot be read", _HINT):
         if not folder.is_dir():
             raise DataError(f"trajectory {folder.name} is not in metadata/")
     steps = sorted(read_steps(folder), key=lambda step: step.img_idx)
-    shared = read_shared_frames(folder, [step.img_idx for step in steps])
+    shared = read_shared_frames(folder, [step.img_idx for step in steps], shared_frames)
     if shared is not None:
         return shared
     home = next((folder / name for name in _IMAGE_FOLDERS if (folder / name).is_dir()), folder)

@@ -73,8 +73,16 @@ def write_frame_names(folder: Path, names: Sequence[str], *, packed: bool = Fals
         (folder / _NAMES).write_bytes(content)
 
 
-def read_shared_frames(folder: Path, numbers: Sequence[int]) -> dict[int, FrameRef] | None:
+def read_shared_frames(
+    folder: Path, numbers: Sequence[int], known: dict[str, FrameRef]
+) -> dict[int, FrameRef] | None:
     """Return the frames of a trajectory's folder by their numbers, or None if it has its own.
+
+    Args:
+        folder: folder of the trajectory.
+        numbers: numbers of its frames, in time order.
+        known: frames of other trajectories of the set by their line, which are returned where they
+            are the same; those of this one are added.
 
     Raises:
         DataError: a name is none of ours, or there is not one for each number.
@@ -83,7 +91,11 @@ def read_shared_frames(folder: Path, numbers: Sequence[int]) -> dict[int, FrameR
     if not path.is_file():
         return None
     root = folder.parent.parent
-    frames = [_frame(root, path, line) for line in read_text(path, _HINT).splitlines()]
+    lines = read_text(path, _HINT).splitlines()
+    for line in lines:
+        if line not in known:
+            known[line] = _frame(root, path, line)
+    frames = [known[line] for line in lines]
     if len(frames) != len(numbers):
         raise DataError(
             f"{path}: {len(frames)} names but {len(numbers)} entries in metadata.json; {_HINT}"

@@ -16,7 +16,7 @@ from infthor_eval.nieh.docs import doc_of, doc_target, prompt_of
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.prompts import PUBLISHED_MAIN
 from infthor_eval.nieh.records import NiehAnswer
-from infthor_eval.nieh.samples import TaskSamples, open_set
+from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.task import NiehTask, PreparedTask
 from infthor_eval.nieh.units import NiehUnit
 from infthor_eval.runs import (
@@ -46,7 +46,6 @@ class NiehEvaluation:
                 cannot be loaded, or an option that has no effect on any of the tasks.
             DataError: a task file or a set is not valid.
         """
-        open_set.cache_clear()  # its files may have changed since an earlier run of this process
         self._options = request.options
         self._tasks = [NiehTask(file, request) for file in request.tasks]
         _refuse_empty([task.task_samples for task in self._tasks], self._tasks)

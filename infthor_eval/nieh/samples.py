@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,6 +26,7 @@ from infthor_eval.nieh.prompts import PUBLISHED_MAIN
 from infthor_eval.nieh.published.hub_data import default_folder
 from infthor_eval.runs.limiting import spread
 from infthor_eval.storage.folders import packaged_folder
+from infthor_eval.storage.once import once_a_command
 
 __all__ = ["TaskSamples", "find_samples", "find_set", "open_set"]
 
@@ -104,9 +105,9 @@ class TaskSamples:
         return self.frame_ablation.apply(parts, self.data, self.context, sample), text
 
 
-@lru_cache(maxsize=8)
+@once_a_command
 def open_set(root: str, trajectories: str | None = None) -> NiehSet:
-    """Open a folder's set, once per process; `open_set.cache_clear()` makes it be read again."""
+    """Open a folder's set, once for all runs of a command."""
     return NiehSet(Path(root), Path(trajectories) if trajectories else None)
 
 
@@ -182,10 +183,9 @@ def _by_question(
 
     A limit takes whole pairs of twins, so it may take one question more.
     """
-    problems: dict[FrameRef, str | None] = {}
 
     def skip_unreadable(sample: Sample) -> Sample | SkippedQuestion:
-        problem = _find_problem(context.select_frames(data, sample), problems)
+        problem = _find_problem(context.select_frames(data, sample))
         return SkippedQuestion(sample.question, problem, sample.variant) if problem else sample
 
     by_position: dict[int, _Items] = {}
@@ -235,11 +235,6 @@ def _samples(
         return [SkippedQuestion(question, str(error))]
 
 
-def _find_problem(frames: list[FrameRef], known: dict[FrameRef, str | None]) -> str | None:
-    """Return why a frame cannot be shown, or None. `known` caches the check of each file."""
-    for frame in frames:
-        if frame not in known:
-            known[frame] = frame.problem()
-        if known[frame]:
-            return known[frame]
-    return None
+def _find_problem(frames: list[FrameRef]) -> str | None:
+    """Return why a frame cannot be shown, or None."""
+    return next(filter(None, (frame.problem for frame in frames)), None)

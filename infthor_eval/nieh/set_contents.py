@@ -101,7 +101,7 @@ def _read_trajectory(data: NiehSet, traj_id: str, contents: SetContents) -> None
     contents.layouts[layout.value] += 1
     if frames:
         contents.image_folders[frames[0].path.parent.name] += 1
-        if frames[0].problem() is None:
+        if frames[0].problem is None:
             contents.image_sizes[frames[0].size] += 1
 
 

@@ -13,7 +13,7 @@ from infthor_eval.runs.journals.records import (
     UnitRecord,
 )
 from infthor_eval.runs.journals.shards import read_header, read_run
-from infthor_eval.runs.request import PreparedRun, RunRequest, prepare
+from infthor_eval.runs.request import PreparedRun, RunRequest, prepare, prepare_all
 from infthor_eval.runs.stored.command import StoredCommand, read_stored_command
 from infthor_eval.runs.suite import (
     BoundEvaluation,
@@ -74,6 +74,7 @@ __all__ = [
     "execute",
     "mark_incomplete",
     "prepare",
+    "prepare_all",
     "read_header",
     "read_run",
     "read_stored_command",

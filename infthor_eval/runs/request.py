@@ -1,6 +1,6 @@
 """The request for a run, checked before anything expensive is loaded."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic
@@ -9,10 +9,11 @@ from infthor_eval.errors import UsageError, unknown_name
 from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit
 from infthor_eval.runs.suite import Evaluation, Suite, TaskRequest
 from infthor_eval.storage.files import file_name, plain_name, require_writable
+from infthor_eval.storage.once import forget_files
 from infthor_eval.workers import WorkerSettings
 from model_adapters import check_options, is_known, label, names
 
-__all__ = ["PreparedRun", "RunRequest", "prepare", "run_folder"]
+__all__ = ["PreparedRun", "RunRequest", "prepare", "prepare_all", "run_folder"]
 
 _LONGEST_TASKS = 80  # characters of their names in a folder's
 
@@ -79,24 +80,41 @@ class PreparedRun(Generic[SuiteUnit, Payload]):
 def prepare(
     request: RunRequest, suite: Suite[SuiteUnit, Payload]
 ) -> PreparedRun[SuiteUnit, Payload]:
-    """Check a request before anything expensive is loaded.
+    """Check the only request of a command; see `prepare_all`."""
+    (run,) = prepare_all([(request, suite)])
+    return run
+
+
+def prepare_all(
+    requests: Sequence[tuple[RunRequest, Suite[SuiteUnit, Payload]]],
+) -> list[PreparedRun[SuiteUnit, Payload]]:
+    """Check the requests of a command before anything expensive is loaded.
+
+    Data that several of them need are read once.
 
     Raises:
         UsageError: the model or an option is unknown, or the suite refuses the request.
         DataError: the suite's data do not match their format, or the results folder cannot be
             written.
     """
+    for request, suite in requests:
+        _check_model(request, suite)  # before the data are read, which may take minutes
+    forget_files()
+    return [
+        PreparedRun(request, suite, suite.prepare(request.tasks)) for request, suite in requests
+    ]
+
+
+def _check_model(request: RunRequest, suite: Suite[SuiteUnit, Payload]) -> None:
     if request.model not in suite.baselines and not is_known(request.model):
         raise _unknown_model(request.model, [*suite.baselines, *names()])
     if request.model not in suite.baselines:
-        # Before the data are read, which may take minutes.
         check_options(request.model, request.model_options)
     elif request.model_options:
         raise UsageError(
             f"{request.model} has no option {next(iter(request.model_options))}, nor any other"
         )
     require_writable(request.output / file_name(request.label), "--output")
-    return PreparedRun(request, suite, suite.prepare(request.tasks))
 
 
 def _unknown_model(name: str, known: Iterable[str]) -> UsageError:

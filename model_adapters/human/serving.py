@@ -147,7 +147,7 @@ def _take(desk: Desk, form: _AnswerForm) -> Response:
 
 def _picture(frame: FrameRef) -> Response:
     """Return a frame, named as the image that it is, whatever the name of its file."""
-    problem = frame.problem()
+    problem = frame.problem
     if problem is not None:
         return _problem(problem, 404)
     content = frame.png() if frame.patches else frame.path.read_bytes()

@@ -259,7 +259,7 @@ def test_an_image_that_is_no_frame(tmp_path, name):
 )
 def test_the_header_tells_before_a_model_is_asked(tmp_path, name, expected):
     (tmp_path / "a.png").write_bytes(IMAGES[name][0])
-    problem = FrameRef(tmp_path / "a.png").problem()
+    problem = FrameRef(tmp_path / "a.png").problem
     assert problem is not None
     assert expected in problem
 

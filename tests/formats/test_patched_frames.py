@@ -35,7 +35,7 @@ def test_a_patch_covers_where_it_is_not_transparent(patched):
     assert blue == [(x, y) for y in (8, 9) for x in (17, 18, 19)]
     assert frame.getpixel((16, 8)) == RED
     assert patched.size == frame.size == (20, 10)
-    assert patched.problem() is None
+    assert patched.problem is None
 
 
 def test_its_png_has_the_same_pixels(patched, tmp_path):
@@ -88,7 +88,7 @@ def test_a_patch_that_reaches_beyond_the_picture_is_refused(patched, place):
 
 def test_a_missing_file_is_a_problem_and_has_no_size(patched):
     patched.patches[0].path.unlink()
-    assert "patch.png: cannot be read" in str(patched.problem())
+    assert "patch.png: cannot be read" in str(patched.problem)
     assert patched.n_bytes is None
     with pytest.raises(DataError, match=r"patch\.png"):
         _ = patched.digest
@@ -109,7 +109,7 @@ def test_names_of_patched_frames_are_read_as_they_were_written(patched, tmp_path
     folder.mkdir(parents=True)
     names = [_stored(tmp_path, FrameRef(patched.path)), _stored(tmp_path, patched)]
     write_frame_names(folder, names, packed=packed)
-    frames = read_shared_frames(folder, [3, 5])
+    frames = read_shared_frames(folder, [3, 5], {})
     assert list(frames) == [3, 5]
     assert frames[3] == FrameRef(tmp_path / "frames" / f"{names[0]}.png")
     assert frames[5].load().tobytes() == patched.load().tobytes()
@@ -135,7 +135,7 @@ NAME = "0" * 32
 def test_a_wrong_line_is_refused(line, tmp_path):
     write_frame_names(tmp_path, [line])
     with pytest.raises(DataError, match=re.escape(f"{line!r} is not the name of a picture")):
-        read_shared_frames(tmp_path, [0])
+        read_shared_frames(tmp_path, [0], {})
 
 
 @pytest.mark.parametrize("content", [b"x", b""])
@@ -144,4 +144,4 @@ def test_a_damaged_packed_list_is_refused(tmp_path, content):
     path = tmp_path / "frames.txt.xz"
     path.write_bytes(content or path.read_bytes()[:-10])
     with pytest.raises(DataError, match=r"frames\.txt\.xz: cannot be unpacked"):
-        read_shared_frames(tmp_path, [0])
+        read_shared_frames(tmp_path, [0], {})

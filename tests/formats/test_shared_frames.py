@@ -46,6 +46,17 @@ def test_a_picture_is_stored_once(shared, tmp_path):
     assert set((root / "frames").iterdir()) == stored
 
 
+def test_trajectories_with_the_same_picture_have_the_same_frame(tmp_path):
+    known = {}
+    for name, pictures in (("a", ["1" * 32, "2" * 32]), ("b", ["2" * 32, "3" * 32])):
+        folder = tmp_path / "metadata" / name
+        folder.mkdir(parents=True)
+        write_frame_names(folder, pictures)
+    a, b = (read_shared_frames(tmp_path / "metadata" / name, [4, 7], known) for name in ("a", "b"))
+    assert a[7] is b[4]
+    assert [frame.path.stem[0] for frame in (a[4], a[7], b[7])] == ["1", "2", "3"]
+
+
 @pytest.mark.parametrize(
     ("names", "words"),
     [
@@ -56,8 +67,8 @@ def test_a_picture_is_stored_once(shared, tmp_path):
 def test_wrong_names_are_refused(names, words, tmp_path):
     write_frame_names(tmp_path, names)
     with pytest.raises(DataError, match=words):
-        read_shared_frames(tmp_path, range(6))
+        read_shared_frames(tmp_path, range(6), {})
 
 
 def test_a_trajectory_with_its_own_pictures_has_no_shared_ones(tmp_path):
-    assert read_shared_frames(tmp_path, range(6)) is None
+    assert read_shared_frames(tmp_path, range(6), {}) is None

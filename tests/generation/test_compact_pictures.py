@@ -34,7 +34,7 @@ def _stored(root: Path, pictures: list[np.ndarray], colors: int) -> tuple[list[F
     folder.mkdir(parents=True)
     store = PictureStore(out, frames, colors)
     write_frame_names(folder, [store.name(frame) for frame in frames])
-    return list((read_shared_frames(folder, range(len(frames))) or {}).values()), out
+    return list((read_shared_frames(folder, range(len(frames)), {}) or {}).values()), out
 
 
 @given(st.lists(RECTANGLES, min_size=1, max_size=12))

@@ -4,12 +4,16 @@ from collections import Counter
 
 import pytest
 
+from infthor_eval.cli.options.run import RunOptions
+from infthor_eval.cli.options.values import ModelSpec
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.exports.lm_eval import export
+from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
+from infthor_eval.nieh import samples
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.nieh.samples import find_samples
-from infthor_eval.runs import execute, read_run
+from infthor_eval.runs import execute, prepare_all, read_run
 from model_adapters import Capabilities, Reply
 
 from ..helpers.questions import make_question
@@ -41,6 +45,16 @@ def test_oracle_is_right_everywhere_and_lm_eval_agrees(prepare_run):
         "nieh_full": 1.0,
     }
     assert len(list(outcome.folder.glob("lm_eval/*/samples_nieh_*.jsonl"))) == 2
+
+
+def test_runs_of_one_command_read_a_set_once_and_the_next_command_anew(data, tmp_path, monkeypatch):
+    opened = []
+    monkeypatch.setattr(samples, "NiehSet", lambda *where: opened.append(where) or NiehSet(*where))
+    models = (ModelSpec("oracle", {}), ModelSpec("blind", {}))
+    for n_opened in (1, 2):
+        options = RunOptions(models, tasks=("nieh",), data=data, output=tmp_path)
+        assert len(prepare_all(options.requests())) == 2
+        assert len(opened) == n_opened
 
 
 def test_the_same_command_goes_on_and_another_starts_anew(prepare_run):

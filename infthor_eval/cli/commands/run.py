@@ -33,7 +33,7 @@ from infthor_eval.runs import (
     RunRequest,
     Suite,
     check_equality,
-    prepare,
+    prepare_all,
     require_switches,
 )
 from model_adapters import model_note
@@ -131,7 +131,7 @@ def evaluate(
     with quiet_notes(show.quiet):
         # Retrieval embeds every frame, which takes minutes.
         with NOTES.status("reading the tasks and their data"), prints_as_notes():
-            runs = [prepare(request, suite) for request, suite in requests]
+            runs = prepare_all(requests)
         for model in dict.fromkeys(request.model for request, _ in requests):
             if note := model_note(model):
                 print_note(f"{model}: {note}", "yellow")

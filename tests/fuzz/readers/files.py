@@ -38,7 +38,7 @@ def _make_frame(name: str, folder: Path) -> Path:
 
 def _read_frame(name: str, folder: Path) -> None:
     frame = FrameRef(folder / name)
-    problem = frame.problem()
+    problem = frame.problem
     assert problem is None or "\n" not in problem
     image = frame.load()
     assert image.size == (32, 24) or image.width * image.height < 10**8

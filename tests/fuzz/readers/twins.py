@@ -46,7 +46,7 @@ def _ask(folder: Path) -> None:
             try:
                 for part in found.request(sample)[0]:
                     if hasattr(part, "problem"):
-                        assert part.problem() is not None or part.load().size == (160, 160)
+                        assert part.problem is not None or part.load().size == (160, 160)
             except InfthorError:
                 assert not is_sound, f"{context}: a sound question is refused"
 

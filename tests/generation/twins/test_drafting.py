@@ -184,7 +184,7 @@ def test_frames_are_stored_once(made):
     assert {path.stem for path in (out / "frames").iterdir()} == names
     frames = NiehSet(out, needs_questions=False).frames(drafted.pairs[0].traj_ids[0])
     assert len(frames) == len(drafted.pairs[0].frames)
-    assert all(frame.problem() is None for frame in frames)
+    assert all(frame.problem is None for frame in frames)
 
 
 def test_no_file_of_a_world_names_the_episode(made):

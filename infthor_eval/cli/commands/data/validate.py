@@ -27,7 +27,7 @@ from infthor_eval.nieh.validation.cross_validation import (
 from infthor_eval.nieh.validation.validated_set import check_output, write_validated_set
 from infthor_eval.report.inspection import write_inspection_page
 from infthor_eval.report.terminal import print_table, table_console
-from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare
+from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare_all
 from infthor_eval.runs.stored.labels import label_runs
 
 __all__ = ["command", "validate"]
@@ -114,7 +114,7 @@ def validate(
     check_decisions(decisions, data.questions)
     check_output(out, data)
     with prints_as_notes():
-        runs = [prepare(request, suite) for request, suite in requests]
+        runs = prepare_all(requests)
     outcomes, is_stopped = execute_runs(runs)
     if is_stopped:
         return 130
