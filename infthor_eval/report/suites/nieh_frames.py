@@ -5,6 +5,7 @@ Of twins: the clues, and frames that differ between both worlds; the same ones o
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 
 import msgspec
@@ -52,21 +53,13 @@ def find_timelines(
         # The question was skipped or failed for it, and its record has the reason.
         except DataError:
             continue
-    thumbnails.expect(
-        len(
-            {
-                choice.frames[at]
-                for choice in chosen.values()
-                for at in choice.shown | choice.recalled
-            }
-        )
+    choices = chosen.values()
+    wanted = chain(
+        (choice.frames[at] for choice in choices for at in sorted(choice.clues)),
+        (choice.frames[at] for choice in choices for at in sorted(choice.others)),
+        (choice.frames[at] for choice in choices for at in sorted(choice.recalled)),
     )
-    for choice in chosen.values():
-        for index in sorted(choice.clues):
-            _picture(choice.frames[index], thumbnails)
-    for choice in chosen.values():
-        for index in sorted(choice.others):
-            _picture(choice.frames[index], thumbnails)
+    thumbnails.add_all({_picture_key(frame): frame.load for frame in wanted})
     notes = [f"{task}: no frames are shown: {problem}" for task, problem in sets.problems.items()]
     facts = Numbered[FrameFacts]()
     timelines = {key: _timeline(choice, thumbnails, facts) for key, choice in chosen.items()}
@@ -158,7 +151,7 @@ def _timeline(
         known = msgspec.structs.replace(choice.facts[index], changed=choice.changed.get(index, ()))
         return TimelineFrame(
             index,
-            _picture(choice.frames[index], thumbnails),
+            thumbnails.number(_picture_key(choice.frames[index])),
             index in choice.clues,
             index in choice.changed,
             facts.number(known),
@@ -174,11 +167,8 @@ def _timeline(
     return Timeline(len(choice.frames), frames, note, recalled)
 
 
-def _picture(frame: FrameRef, thumbnails: ThumbnailStore) -> int | None:
-    try:
-        return thumbnails.add(str(frame.path.with_name(frame.name)), frame.load)
-    except DataError:  # an unreadable frame has its place on the timeline, without a picture
-        return None
+def _picture_key(frame: FrameRef) -> str:
+    return str(frame.path.with_name(frame.name))
 
 
 def _read_frame_facts(folder: Path) -> Sequence[FrameFacts]:

@@ -3,10 +3,12 @@
 import base64
 import io
 import random
+from functools import partial
 
 import pytest
 from PIL import Image
 
+from infthor_eval.errors import DataError
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 
 
@@ -52,3 +54,34 @@ def test_thumbnails_take_the_room_of_enlarged_pictures_and_the_first_ones_keep_t
     assert store.large == {}
     assert store.n_left_out == more.count(None)
     assert sum(map(len, store.encoded)) <= budget
+
+
+@pytest.mark.parametrize("budget", [3_000, 40_000, 200_000, 10_000_000])
+def test_pictures_added_together_are_those_added_one_by_one(budget):
+    loads = {str(seed): partial(noise, seed, side) for seed, side in enumerate([300, 100, 768] * 9)}
+    together, single = ThumbnailStore(budget), ThumbnailStore(budget)
+    together.add_all(loads)
+    assert [together.number(key) for key in loads] == [
+        single.add(key, load) for key, load in loads.items()
+    ]
+    assert together.encoded == single.encoded
+    assert together.large == single.large
+    assert together.n_left_out == single.n_left_out
+
+
+def test_a_picture_that_cannot_be_read_has_no_number_and_the_others_have():
+    def refuse():
+        raise DataError("x.png: cannot be read")
+
+    store = ThumbnailStore(10_000_000)
+    store.add_all({"a": lambda: noise(0), "b": refuse, "c": lambda: noise(1)})
+    assert [store.number(key) for key in "abc"] == [0, None, 1]
+    assert store.n_left_out == 0
+
+
+def test_pictures_beyond_the_room_are_not_loaded():
+    loaded = []
+    store = ThumbnailStore(1)
+    store.add_all({str(at): lambda at=at: loaded.append(at) or noise(at) for at in range(500)})
+    assert len(loaded) < 100
+    assert store.n_left_out == 500
