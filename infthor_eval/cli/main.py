@@ -15,6 +15,7 @@ import click
 import infthor_eval
 from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.repeated import refuse_repeated_options
+from infthor_eval.cli.progress.patience import answer_ctrl_c
 from infthor_eval.cli.progress.stopping import handle_signal
 from infthor_eval.errors import (
     InfthorError,
@@ -26,7 +27,7 @@ from infthor_eval.errors import (
 )
 from infthor_eval.plugins import import_target
 from infthor_eval.storage.scratch import remove_abandoned
-from infthor_eval.terminal import print_error
+from infthor_eval.terminal import error_console, print_error
 
 __all__ = ["main"]
 
@@ -97,6 +98,7 @@ _SHARED_MODULES = {
 _NAMES = tuple(name for group in _COMMANDS.values() for name in group)
 _DEFAULT = "run"
 _INTERRUPTED, _TERMINATED = 130, 143  # exit codes
+_STOPPED = "stopped; run the same command to continue"
 _COLLECT_AFTER = 50_000  # new objects between two collections of garbage
 
 
@@ -169,7 +171,12 @@ def main(args: list[str] | None = None) -> None:
             stream.reconfigure(errors="backslashreplace")
     output = sys.stdout
     try:
-        with handle_signal(signal.SIGTERM, _raise_terminated), _collecting_seldom():
+        with (
+            handle_signal(signal.SIGTERM, _raise_terminated),
+            handle_signal(signal.SIGINT, _raise_interrupted),
+            answer_ctrl_c(_tell_patience, _end),
+            _collecting_seldom(),
+        ):
             remove_abandoned()
             code = _infthor_eval.main(args, prog_name="infthor-eval", standalone_mode=False)
         # Here and not at Python's exit, so that a full disk is an error like any other.
@@ -189,7 +196,7 @@ def main(args: list[str] | None = None) -> None:
         _exit(str(error), error.exit_code)
     except (click.Abort, KeyboardInterrupt, Terminated) as error:
         code = _TERMINATED if isinstance(error, Terminated) else _INTERRUPTED
-        _exit("stopped; run the same command to continue", code)
+        _exit(_STOPPED, code)
     except OSError as error:  # that no command expects: a full disk, a file removed during the work
         _discard_output()
         path = error.filename if error.filename is not None else "standard output or a file"
@@ -224,6 +231,22 @@ def _collecting_seldom() -> Iterator[None]:
 def _raise_terminated(_number: int, _frame: FrameType | None) -> None:
     """Handle SIGTERM."""
     raise Terminated(_TERMINATED)
+
+
+def _raise_interrupted(_number: int, _frame: FrameType | None) -> None:
+    """Handle SIGINT."""
+    raise KeyboardInterrupt
+
+
+def _tell_patience() -> None:
+    print_error("a calculation has to end first; press Ctrl-C again to end the program now")
+
+
+def _end() -> None:
+    """End the process as a kill would; what is finished is on disk."""
+    error_console().show_cursor()  # which a progress bar has hidden
+    print_error(_STOPPED)
+    os._exit(_INTERRUPTED)
 
 
 def _discard_output() -> None:

@@ -7,7 +7,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import FrameType
 
-__all__ = ["Stop", "handle_signal", "stop_on_sigint"]
+__all__ = ["Stop", "handle_signal", "n_handled", "stop_on_sigint"]
+
+
+class _Handled:
+    """How often Ctrl-C was handled: signals are the process's, so there is one of these."""
+
+    n = 0
 
 
 @dataclass
@@ -33,11 +39,21 @@ def handle_signal(number: int, handler: Callable[[int, FrameType | None], None])
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(number, handler)
+
+    def handle(received: int, frame: FrameType | None) -> None:
+        _Handled.n += received == signal.SIGINT
+        handler(received, frame)
+
+    before = signal.signal(number, handle)
     try:
         yield
     finally:
         signal.signal(number, before)
+
+
+def n_handled() -> int:
+    """Return how often Ctrl-C was handled in this process."""
+    return _Handled.n
 
 
 @contextlib.contextmanager
