@@ -128,7 +128,7 @@ $(PEERS): $(DEVELOPED)
 
 $(INSPECT):
 	$(PYTHON) -m venv $@
-	$@/bin/pip install --quiet --disable-pip-version-check 'inspect_ai==0.3.285'
+	$@/bin/pip install --quiet --disable-pip-version-check --no-compile 'inspect_ai==0.3.285'
 	touch $@
 
 clean:

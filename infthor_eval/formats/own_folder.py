@@ -5,10 +5,12 @@ for each trajectory. Numbers in their names count as numbers: `2.png` comes befo
 
 Columns: `question`, `answer`, `clue_frames` (optional: names or numbers of frames, with commas
 between them) and, with several trajectories, `trajectory`. A question without clue frames has all
-frames of its trajectory as such. Other columns are ignored.
+frames of its trajectory as such. Other columns are ignored, unless they look like one of these
+misspelt.
 """
 
-from collections.abc import Mapping
+import difflib
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +22,7 @@ from infthor_eval.formats.question import Question, SkippedQuestion
 __all__ = ["OwnFolder", "find_own_folder"]
 
 _COLUMNS = ("question", "answer")
+_OPTIONAL = ("clue_frames", "trajectory")
 _HINT = f"it is a UTF-8 CSV file with the columns {', '.join(_COLUMNS)} and clue_frames"
 _ONLY = "frames"  # name of the only trajectory; not the folder's own, which may be moved
 
@@ -40,10 +43,13 @@ class OwnFolder:
         """Read the CSV file; a row that cannot be used is a `SkippedQuestion` that names its line.
 
         Raises:
-            DataError: the file or a folder cannot be read, or no row of it is a question.
+            DataError: the file or a folder cannot be read, a column is misspelt, or no row of it is
+                a question.
         """
+        rows = list(read_rows(self.file, _COLUMNS, _HINT))
+        self._refuse_misspelt(rows[0].cells.keys() if rows else ())
         images = {name: find_images(folder) for name, folder in self.folders.items()}
-        entries = [self._entry(row, images) for row in read_rows(self.file, _COLUMNS, _HINT)]
+        entries = [self._entry(row, images) for row in rows]
         if not any(isinstance(entry, Question) for entry in entries):
             reasons = [entry.reason for entry in entries if isinstance(entry, SkippedQuestion)]
             raise DataError(
@@ -51,6 +57,16 @@ class OwnFolder:
                 f"{_HINT}"
             )
         return entries
+
+    def _refuse_misspelt(self, names: Collection[str]) -> None:
+        """Refuse a column that is one of the optional ones misspelt: its cells would be ignored."""
+        for name in names:
+            near = difflib.get_close_matches(name.lower(), _OPTIONAL, n=1)
+            if near and near[0] not in names:
+                raise DataError(
+                    f"{self.file}: the column {name!r} is not known; did you mean {near[0]}? "
+                    "Rename or remove it"
+                )
 
     def _entry(
         self, row: CsvRow, images: Mapping[str, Mapping[str, Path]]

@@ -177,6 +177,12 @@ def check_task_file(file: TaskFile) -> None:
     file.require("dataset_kwargs")
     location = f"{file.path}: dataset_kwargs"
     raw = file.settings["dataset_kwargs"]
+    known = (*_OF_SETS, *(setting.name for setting in fields(ContextSettings)))
+    for key in raw if isinstance(raw, Mapping) else ():
+        if key not in known:
+            near = difflib.get_close_matches(str(key), known, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(sorted(known))}"
+            raise DataError(f"{location}: {key} is not known; {hint}")
     if not isinstance(raw, Mapping) or not (
         isinstance(raw.get("context"), str) or _leaves_context_open(raw)
     ):
@@ -184,12 +190,6 @@ def check_task_file(file: TaskFile) -> None:
             f"{location} must be a mapping with the name of a context (context: NAME, or "
             "leaves_open: context)"
         )
-    known = (*_OF_SETS, *(setting.name for setting in fields(ContextSettings)))
-    for key in raw:
-        if key not in known:
-            near = difflib.get_close_matches(str(key), known, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(sorted(known))}"
-            raise DataError(f"{location}: {key} is not known; {hint}")
     for key in _OF_SETS:
         if not isinstance(raw.get(key, ""), str):
             raise DataError(f"{location}: {key} is {raw[key]!r:.60}; it is a name")

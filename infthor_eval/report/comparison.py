@@ -248,15 +248,17 @@ def _drawing(samples: Sequence[Sequence[float]], n_units: int) -> float | None:
     return _NORMAL_95 * spread / n_units
 
 
+_DRAWING_NOTE = "drawing: what the difference moves by if both are asked the same again (95 %)."
+
+
 def comparison_table(comparisons: Sequence[Comparison], first: str, second: str) -> Table:
     """Return a table by task and metric, in its own unit; `first` and `second` name the runs."""
     repeated = any(comparison.drawing is not None for comparison in comparisons)
     numbers = ["first", "second", "difference", "95 % interval", "p", "samples", "not in both"]
     numbers += ["drawing"] if repeated else []
     notes = (
-        ("drawing: what the difference moves by if both are asked the same again (95 %).",)
-        if repeated
-        else ()
+        f"first: {first}; second: {second}; difference: the second minus the first.",
+        *((_DRAWING_NOTE,) if repeated else ()),
     )
     columns = (
         Column("task", False),

@@ -17,6 +17,7 @@ BOMB = "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
 FILES = [
     (CLUES + ", depthz: [0.2]}", "depthz is not known; did you mean depths?"),
     (CLUES + ", top-k: 3}", "top-k is not known; did you mean top_k?"),
+    (HEAD + "dataset_kwargs: {contxt: clues}", "contxt is not known; did you mean context?"),
     (CLUES + ", 5: 3}", "not"),
     (
         CLUES + ", ctx_size: two}",

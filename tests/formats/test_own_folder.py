@@ -76,6 +76,12 @@ def test_the_fingerprint_is_that_of_questions_and_frames(make_folder):
     [
         (["1.png"], ["question,reply", "q,a"], "no column answer"),
         (["1.png"], ["question,answer"], "no row is a question \\(it has none\\)"),
+        (
+            ["1.png"],
+            ["question,answer,clues", "q,a,1"],
+            "'clues' is not known; did you mean",
+        ),
+        (["1.png"], ["question,answer,Trajectory", "q,a,1"], "did you mean trajectory?"),
         (["1.png"], ["question,answer,clue_frames", "q,a,7"], "an entry that is no frame"),
         (["1.png", "1.jpg"], ["question,answer", "q,a"], "two frames have the name 1"),
         (["1.png", "a/1.png"], ["question,answer", "q,a"], "frames in itself and in a/"),
@@ -87,6 +93,12 @@ def test_a_folder_that_cannot_be_used_is_refused_in_one_line(make_folder, names,
     with pytest.raises(DataError, match=message) as error:
         NiehSet(root)
     assert "\n" not in str(error.value)
+
+
+def test_columns_of_ones_own_are_ignored(make_folder):
+    columns = "question,answer,clue_frames,frames,note,difficulty"
+    root = make_folder(["1.png", "2.png"], columns, "q,a,2,many,mine,hard")
+    assert clue_names(NiehSet(root)) == [["2.png"]]
 
 
 def test_several_csv_files_are_refused(make_folder):

@@ -47,6 +47,16 @@ def test_oracle_is_right_everywhere_and_lm_eval_agrees(prepare_run):
     assert len(list(outcome.folder.glob("lm_eval/*/samples_nieh_*.jsonl"))) == 2
 
 
+@pytest.mark.parametrize("model", ["blind", "blind-count"])
+def test_a_guesser_with_one_trajectory_is_said_to_be_no_measure(model, make_nieh_set, prepare_run):
+    alone = make_nieh_set(
+        [make_question(text="Is there a mug?"), make_question(text="Is there a pan?")], name="alone"
+    )
+    watcher = Watcher()
+    execute(prepare_run(model=model, data=alone, tasks=("nieh_gt",)), watcher)
+    assert [cost.description.partition(":")[0] for cost in watcher.work.costs] == ["one trajectory"]
+
+
 def test_runs_of_one_command_read_a_set_once_and_the_next_command_anew(data, tmp_path, monkeypatch):
     opened = []
     monkeypatch.setattr(samples, "NiehSet", lambda *where: opened.append(where) or NiehSet(*where))

@@ -6,7 +6,7 @@ from typing import Protocol
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.asking.answering import OpenAnswerer, OpenBaseline, OpenModel
-from infthor_eval.nieh.asking.baselines import Baseline, Predict
+from infthor_eval.nieh.asking.baselines import Baseline, Blind, Predict
 from infthor_eval.nieh.asking.budget import budget_of
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.records import NiehAnswer
@@ -94,7 +94,14 @@ class _BaselineAnswerer:
         return _BASELINE_TOKENS_PER_FRAME
 
     def cost(self, prepared: PreparedTask) -> str | None:
-        return None
+        questions = prepared.task_samples.data.questions  # all that it learns from
+        n_trajectories = len({question.cluster for question in questions})
+        if n_trajectories > 1 or not isinstance(self._baseline, Blind):
+            return None
+        return (
+            f"one trajectory: {self._baseline.name} learns from its other questions alone, and may "
+            "be worse than a guess"
+        )
 
     def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
         # Each task on its own: the questions of one task must be no clue to another.

@@ -25,8 +25,9 @@ _NOTES = (
     "answers anew for each world has 25 at most.",
     "by fact: mean over changed facts, which several pairs may be about. flipped: the reply to the "
     "twin is another one; right then: both right, of these. one right: of both, and how often it "
-    "is the commoner answer of its form (prior knowledge). wrong twin: single replies that are "
-    "right in the other world. bases: trajectories that the worlds were made of.",
+    "is the commoner answer of its form (prior knowledge). single: answers with full marks, while "
+    "the task's accuracy counts lists that are right in part, too. wrong twin: single replies that "
+    "are right in the other world. bases: trajectories that the worlds were made of.",
 )
 
 

@@ -19,7 +19,7 @@ from infthor_eval.nieh.results.summary import (
 )
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.memory_chart import memory_charts
-from infthor_eval.report.svg.dots import Dot, DotRow, DotsChart, dot_of, dots_chart
+from infthor_eval.report.svg.dots import Dot, DotRow, DotsChart, class_row, dot_of, dots_chart
 from infthor_eval.report.svg.drawing import Series
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.statistics import MeanEstimate
@@ -122,13 +122,12 @@ def _by_evidence(task: str, lines: Sequence[_Line]) -> Iterator[Chart]:
 
 
 def _by_class(classes: _Classes, lines: Sequence[_Line]) -> Chart:
-    """Draw a row per class with the dots of all lines, and the counts of the first."""
+    """Draw a row per class with the dots of all lines."""
     cells = [classes.cells_of(line) for line in lines]
     rows = []
     for name in classes.names:
         dots = [_dot(of_line.get(name), line) for of_line, line in zip(cells, lines, strict=True)]
-        n = next((of_line[name].n for of_line in cells if name in of_line), 0)
-        rows.append(DotRow(f"{name.removeprefix(_DEPTH)} ({n:,})", dots))
+        rows.append(class_row(name.removeprefix(_DEPTH), dots))
     return dots_chart(
         DotsChart(
             title=f"{classes.task}: accuracy by {classes.by}",
@@ -164,7 +163,7 @@ def _by_form(task: str, lines: Sequence[_Line]) -> Chart:
         known = [of_line.get(name) for of_line in forms]
         first = next(form for form in known if form is not None)
         dots = [None if form is None else Dot(100 * form.score, n=form.n) for form in known]
-        rows.append(DotRow(f"{name} ({first.n:,})", dots, 100 * first.guess))
+        rows.append(class_row(name, dots, 100 * first.guess))
     return dots_chart(
         DotsChart(
             title=f"{task}: accuracy by form, beside guessing",

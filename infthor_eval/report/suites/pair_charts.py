@@ -19,7 +19,7 @@ from infthor_eval.report.figures.style import (
 )
 from infthor_eval.report.presenter import FigureRequest, FigureResult
 from infthor_eval.report.runs import ReportRun
-from infthor_eval.report.svg.dots import DotRow, DotsChart, dot_of, dots_chart
+from infthor_eval.report.svg.dots import DotsChart, class_row, dot_of, dots_chart, number_range
 from infthor_eval.report.svg.drawing import Series
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.tables import Column, Row, Table
@@ -113,9 +113,8 @@ def _chart(task: str, curve: PairCurve, names: Sequence[str], lines: Sequence[_L
     rows = []
     for name in names:
         known = [of_line.get(name) for of_line in rates]
-        n = next(rate.n for rate in known if rate is not None)
         dots = [None if rate is None else dot_of(rate, rate.n) for rate in known]
-        rows.append(DotRow(f"{name} ({n:,})", dots))
+        rows.append(class_row(name, dots))
     return dots_chart(
         DotsChart(
             title=f"{task}: pairs of twins right, by {curve.title}",
@@ -133,12 +132,12 @@ def _chart(task: str, curve: PairCurve, names: Sequence[str], lines: Sequence[_L
 
 
 def _draw(axes: Axes, curve: PairCurve, names: Sequence[str], lines: Sequence[_Line]) -> None:
-    """Draw a curve of each run over the classes, with intervals, and the first run's counts."""
+    """Draw a curve of each run over the classes, with intervals, and the counts of pairs."""
     for number, line in enumerate(lines):
         offset = _SPREAD * (number / max(len(lines) - 1, 1) - 0.5) if len(lines) > 1 else 0.0
         _draw_line(axes, curve.rates(line.pairs), names, line.look, offset)
-    first = curve.rates(lines[0].pairs)
-    counts = [first[name].n if name in first else 0 for name in names]
+    rates = [curve.rates(line.pairs) for line in lines]
+    counts = [number_range([of[name].n for of in rates if name in of]) for name in names]
     axes.set_xticks(
         range(len(names)), [f"{name}\n({n})" for name, n in zip(names, counts, strict=True)]
     )

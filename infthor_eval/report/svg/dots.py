@@ -20,7 +20,7 @@ from infthor_eval.report.svg.drawing import (
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
-__all__ = ["Dot", "DotRow", "DotsChart", "dot_of", "dots_chart"]
+__all__ = ["Dot", "DotRow", "DotsChart", "class_row", "dot_of", "dots_chart", "number_range"]
 
 _DOT = 13  # pixels between the dots of several runs in a row
 _NARROW = 6  # the same where there are so many that none has its number beside it
@@ -70,6 +70,18 @@ class DotRow(NamedTuple):
     dots: Sequence[Dot | None]
     chance: float | None = None
     heading: str = ""
+
+
+def class_row(name: str, dots: Sequence[Dot | None], chance: float | None = None) -> DotRow:
+    """Return the row of a class of samples, with their number in parentheses."""
+    counts = [dot.n for dot in dots if dot is not None and dot.n is not None]
+    return DotRow(f"{name} ({number_range(counts)})", dots, chance)
+
+
+def number_range(counts: Sequence[int]) -> str:
+    """Return a number that all have, or the least and the most: runs may have different ones."""
+    least, most = min(counts, default=0), max(counts, default=0)
+    return f"{least:,}" if least == most else f"{least:,} to {most:,}"
 
 
 @dataclass(frozen=True)

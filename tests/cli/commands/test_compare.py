@@ -119,6 +119,7 @@ def test_runs_of_one_name_are_told_apart_by_the_options_that_differ(
     code, out, _ = run_cli("compare", *folders)
     assert code == 0
     assert "random (seed=1) against random (seed=0)" in " ".join(out.split())
+    assert "first: random (seed=0); second: random (seed=1)" in " ".join(out.split())
 
 
 def test_blank_frames_are_part_of_the_name(make_nieh_set, tmp_path, run_cli):

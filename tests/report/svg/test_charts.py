@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from infthor_eval.report.svg.dots import Dot, DotRow, DotsChart, dots_chart
+from infthor_eval.report.svg.dots import Dot, DotRow, DotsChart, class_row, dots_chart
 from infthor_eval.report.svg.drawing import LETTER, WIDTH, Series, ticks_between
 from infthor_eval.report.svg.points import Point, PointsChart, points_chart
 
@@ -26,6 +26,20 @@ def dots(rows, n_series=1, **changes):
     series = [Series(f"{LONG} {number}", number) for number in range(n_series)]
     fields = {"title": "t", "caption": "c", "axis": "%", "label": "class"}
     return dots_chart(DotsChart(**fields, series=series, rows=rows, **changes))
+
+
+@pytest.mark.parametrize(
+    ("counts", "label"),
+    [
+        ([126, 126], "no clue (126)"),
+        ([3, 126], "no clue (3 to 126)"),
+        ([1000, None, 4], "no clue (4 to 1,000)"),
+        ([None], "no clue (0)"),
+    ],
+)
+def test_a_class_has_the_numbers_of_all_runs_beside_its_name(counts, label):
+    row = class_row("no clue", [n and Dot(50, n=n) for n in counts])
+    assert row.label == label
 
 
 @pytest.mark.parametrize("n_series", [1, 3, 12])
