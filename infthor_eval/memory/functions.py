@@ -79,10 +79,12 @@ class FunctionMemory:
         return whole
 
     def _problem(self, numbers: Any, n_images: int) -> UserCodeError:
-        return UserCodeError(
-            f"{self._function.name} returned {numbers!r:.60}; return the numbers of images, from 0 "
-            f"to {n_images - 1}: `return [0, 5]`"
+        allowed = (
+            f"the numbers of images, from 0 to {n_images - 1}: `return [0, 5]`"
+            if n_images
+            else "nothing where there are no images yet: `return []`"
         )
+        return UserCodeError(f"{self._function.name} returned {numbers!r:.60}; return {allowed}")
 
 
 class _Images(Sequence[Image.Image]):

@@ -31,9 +31,9 @@ def asked(tmp_path, observed):
     file = tmp_path / "mine.py"
     file.write_text(SOURCE)
 
-    def ask(name, budget=None, tokens_per_frame=10, **options):
+    def ask(name, budget=None, tokens_per_frame=10, n_frames=5, **options):
         memory = open_memory(f"{file}:{name}", tuple(sorted(options.items())))
-        recall = observed(memory, 5, tokens_per_frame, name=str(tmp_path))
+        recall = observed(memory, n_frames, tokens_per_frame, name=str(tmp_path))
         return [step.number for step in recall(budget=budget)]
 
     for number in range(5):
@@ -56,6 +56,11 @@ def test_the_most_important_fit_the_budget(asked):
 def test_what_is_no_number_of_an_image_is_an_error(asked, name):
     with pytest.raises(UserCodeError, match=r"return the numbers of images, from 0 to 4"):
         asked(name)
+
+
+def test_a_question_before_the_first_image_is_answered_by_nothing(asked):
+    with pytest.raises(UserCodeError, match=r"returned \[0\]; return nothing .* `return \[\]`"):
+        asked("beyond", n_frames=0)
 
 
 def test_other_functions_and_options_are_refused(asked):
