@@ -173,7 +173,7 @@ def main(args: list[str] | None = None) -> None:
     try:
         with (
             handle_signal(signal.SIGTERM, _raise_terminated),
-            handle_signal(signal.SIGINT, _raise_interrupted),
+            handle_signal(signal.SIGINT, signal.default_int_handler),
             answer_ctrl_c(_tell_patience, _end),
             _collecting_seldom(),
         ):
@@ -231,11 +231,6 @@ def _collecting_seldom() -> Iterator[None]:
 def _raise_terminated(_number: int, _frame: FrameType | None) -> None:
     """Handle SIGTERM."""
     raise Terminated(_TERMINATED)
-
-
-def _raise_interrupted(_number: int, _frame: FrameType | None) -> None:
-    """Handle SIGINT."""
-    raise KeyboardInterrupt
 
 
 def _tell_patience() -> None:

@@ -98,14 +98,14 @@ def prepare_all(
             written.
     """
     for request, suite in requests:
-        _check_model(request, suite)  # before the data are read, which may take minutes
+        _check(request, suite)  # before the data are read, which may take minutes
     forget_files()
     return [
         PreparedRun(request, suite, suite.prepare(request.tasks)) for request, suite in requests
     ]
 
 
-def _check_model(request: RunRequest, suite: Suite[SuiteUnit, Payload]) -> None:
+def _check(request: RunRequest, suite: Suite[SuiteUnit, Payload]) -> None:
     if request.model not in suite.baselines and not is_known(request.model):
         raise _unknown_model(request.model, [*suite.baselines, *names()])
     if request.model not in suite.baselines:

@@ -94,9 +94,10 @@ class _BaselineAnswerer:
         return _BASELINE_TOKENS_PER_FRAME
 
     def cost(self, prepared: PreparedTask) -> str | None:
+        if not isinstance(self._baseline, Blind):
+            return None
         questions = prepared.task_samples.data.questions  # all that it learns from
-        n_trajectories = len({question.cluster for question in questions})
-        if n_trajectories > 1 or not isinstance(self._baseline, Blind):
+        if len({question.cluster for question in questions}) > 1:
             return None
         return (
             f"one trajectory: {self._baseline.name} learns from its other questions alone, and may "

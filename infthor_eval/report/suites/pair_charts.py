@@ -133,10 +133,10 @@ def _chart(task: str, curve: PairCurve, names: Sequence[str], lines: Sequence[_L
 
 def _draw(axes: Axes, curve: PairCurve, names: Sequence[str], lines: Sequence[_Line]) -> None:
     """Draw a curve of each run over the classes, with intervals, and the counts of pairs."""
-    for number, line in enumerate(lines):
-        offset = _SPREAD * (number / max(len(lines) - 1, 1) - 0.5) if len(lines) > 1 else 0.0
-        _draw_line(axes, curve.rates(line.pairs), names, line.look, offset)
     rates = [curve.rates(line.pairs) for line in lines]
+    for number, (line, of_line) in enumerate(zip(lines, rates, strict=True)):
+        offset = _SPREAD * (number / max(len(lines) - 1, 1) - 0.5) if len(lines) > 1 else 0.0
+        _draw_line(axes, of_line, names, line.look, offset)
     counts = [number_range([of[name].n for of in rates if name in of]) for name in names]
     axes.set_xticks(
         range(len(names)), [f"{name}\n({n})" for name, n in zip(names, counts, strict=True)]

@@ -1,6 +1,5 @@
 """An index of runs: a page with all of them, and a page for each, made by several processes."""
 
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ from infthor_eval.report.presented import read_report_run
 from infthor_eval.report.runs import distinct_names
 from infthor_eval.report.web.build import PageRequest, build_page, results_section
 from infthor_eval.report.web.page import Page, write_page
+from infthor_eval.report.web.processors import n_processors
 from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.sections import Section
 from infthor_eval.runs import RunHeader, read_header
@@ -131,8 +131,7 @@ def _plan(folders: Sequence[Path], pages: Path) -> tuple[list[_Job], list[tuple[
 @contextmanager
 def _executor(n_jobs: int) -> Iterator[Executor | None]:
     """Open processes for so many pages; None where one process is enough."""
-    n_processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-    n_workers = min(n_processors or os.cpu_count() or 1, n_jobs)
+    n_workers = min(n_processors(), n_jobs)
     if n_workers < 2 or n_jobs <= _FEW:
         yield None
         return

@@ -2,7 +2,6 @@
 
 import base64
 import io
-import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -13,6 +12,7 @@ from typing import NamedTuple, TypeVar
 from PIL import Image
 
 from infthor_eval.errors import DataError
+from infthor_eval.report.web.processors import n_processors
 from infthor_eval.report.web.progress import PageProgress, Silent
 
 __all__ = ["ThumbnailStore"]
@@ -97,7 +97,7 @@ class ThumbnailStore:
         if not new:
             return
         self._progress.begin(_WORK, len(new))
-        n_threads = min(os.cpu_count() or 1, _MOST_THREADS)
+        n_threads = min(n_processors(), _MOST_THREADS)
         with ThreadPoolExecutor(n_threads, "thumbnails") as threads:
             begin = partial(self._begin, threads)
             n_ahead = n_threads * _N_AHEAD
