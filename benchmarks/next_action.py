@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.cli.options.values import parse_model_args
-from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
+from infthor_eval.formats.pictures.blank import blank_like
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.sequence_text import ACT
 from infthor_eval.plans.actors.habits import Habits

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.video import Video
+from infthor_eval.formats.pictures.video import Video
 
 __all__ = [
     "ROLES",

@@ -23,13 +23,13 @@ from infthor_eval.formats.action_log import logged_action_frames, read_action_lo
 from infthor_eval.formats.frames import FrameRef, find_images
 from infthor_eval.formats.outline import Outline, find_outline, read_outline, read_states
 from infthor_eval.formats.own_folder import OwnFolder, find_own_folder
+from infthor_eval.formats.pictures.video import Video, read_video
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.shared_frames import read_shared_frames
 from infthor_eval.formats.step_log import log_file, read_steps
 from infthor_eval.formats.twins import TwinPair, read_pairs
-from infthor_eval.formats.video import Video, read_video
 
 __all__ = ["NiehSet"]
 

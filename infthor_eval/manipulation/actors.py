@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, runtime_checkable
 
-from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.pictures.blank import blank_like
 from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment
 from infthor_eval.manipulation.kinds import ManipulationKind

@@ -10,8 +10,8 @@ from dataclasses import asdict
 from typing import Any
 
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.pictures.video import Video
 from infthor_eval.formats.question import PublishedColumns, Question
-from infthor_eval.formats.video import Video
 from infthor_eval.nieh.contexts import ContextPart, Sample, context_named
 from infthor_eval.nieh.contexts.base import RecallSettings
 from infthor_eval.nieh.contexts.video import as_images

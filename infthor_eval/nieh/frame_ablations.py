@@ -8,11 +8,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.pictures.blank import blank_like
+from infthor_eval.formats.pictures.video import Video
 from infthor_eval.formats.question import Question
-from infthor_eval.formats.video import Video
 from infthor_eval.nieh.contexts import Context, ContextPart, Sample
 from infthor_eval.nieh.options import BLANK, NO_CLUE, OTHER, SHOWN, check_frames
 from infthor_eval.nieh.other_homes import count_homes, draw_other_home

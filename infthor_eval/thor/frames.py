@@ -5,7 +5,7 @@ from typing import Protocol
 
 from infthor_eval.errors import SimulatorError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.png import write_png
+from infthor_eval.formats.pictures.png import write_png
 from infthor_eval.storage.files import writing_hint
 from infthor_eval.thor.view import SimulatorView
 

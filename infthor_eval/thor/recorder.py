@@ -4,7 +4,7 @@ from pathlib import Path
 
 from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.object_ids import object_type_of
-from infthor_eval.formats.png import write_png
+from infthor_eval.formats.pictures.png import write_png
 from infthor_eval.formats.step_log import LoggedPose, ObjectInFrame, ObjectLog, ObjectState, Step
 from infthor_eval.thor.view import SimulatorView, ThorObject
 

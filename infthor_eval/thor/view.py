@@ -10,6 +10,7 @@ from msgspec.structs import asdict
 from numpy.typing import NDArray
 
 from infthor_eval.errors import SimulatorError, in_one_line
+from infthor_eval.thor.segmentation import Instance, Segmentation, segmentation_of
 
 __all__ = [
     "AgentPose",
@@ -17,11 +18,9 @@ __all__ = [
     "ArmState",
     "AxisAngle",
     "Box",
-    "Instance",
     "SimulatorView",
     "ThorObject",
     "Vector",
-    "instances_of",
     "teleport_call",
     "view_of",
 ]
@@ -154,14 +153,6 @@ class ArmState(msgspec.Struct, frozen=True):
 
 
 @dataclass(frozen=True)
-class Instance:
-    """The pixels that show an object: number, and [xmin, ymin, xmax, ymax], ends inclusive."""
-
-    pixels: int
-    box: tuple[int, int, int, int]
-
-
-@dataclass(frozen=True)
 class SimulatorView:
     """State of the simulator after one action.
 
@@ -175,6 +166,7 @@ class SimulatorView:
         error_code: the simulator's code of this error.
         result: `actionReturn`.
         instances: objects in the frame by id; None if instance segmentation is not rendered.
+        segmentation: which object each pixel shows; None likewise.
         arm: arm of the agent; None if it has none.
     """
 
@@ -189,6 +181,7 @@ class SimulatorView:
     result: Any
     scene: str
     instances: dict[str, Instance] | None
+    segmentation: Segmentation | None = None
     arm: ArmState | None = None
 
 
@@ -225,6 +218,7 @@ def view_of(event: Any) -> SimulatorView:
             f"metadata of {metadata.get('lastAction')!r:.40}: {in_one_line(error)}; use AI2-THOR "
             "5.x"
         ) from error
+    segmentation = segmentation_of(event)
     return SimulatorView(
         frame=None if event.frame is None else np.ascontiguousarray(event.frame),
         depth=None if event.depth_frame is None else np.ascontiguousarray(event.depth_frame),
@@ -236,33 +230,10 @@ def view_of(event: Any) -> SimulatorView:
         error_code=str(outcome.code or ""),
         result=outcome.result,
         scene=outcome.scene,
-        instances=_instances(event),
+        instances=None if segmentation is None else segmentation.instances(),
+        segmentation=segmentation,
         arm=arm,
     )
-
-
-def instances_of(codes: NDArray[np.uint32]) -> dict[int, Instance]:
-    """Return each code's number of pixels and box, given a code per pixel [height, width]."""
-    width = codes.shape[1]
-    # This works on runs of equal pixels within a row, of which there are a few thousand instead of
-    # 90,000 pixels.
-    starts = np.empty(codes.shape, dtype=bool)
-    starts[:, 0] = True
-    np.not_equal(codes[:, 1:], codes[:, :-1], out=starts[:, 1:])
-    first = np.flatnonzero(starts)
-    length = np.diff(first, append=codes.size)
-    values, index = np.unique(codes.ravel()[first], return_inverse=True)
-    row, left = np.divmod(first, width)
-    pixels = np.bincount(index, weights=length).astype(int)
-    low = np.full((len(values), 2), codes.size)
-    high = np.zeros((len(values), 2), dtype=int)
-    np.minimum.at(low, index, np.stack([left, row], axis=1))
-    np.maximum.at(high, index, np.stack([left + length - 1, row], axis=1))
-    boxes = np.concatenate([low, high], axis=1).tolist()
-    return {
-        int(code): Instance(int(count), (box[0], box[1], box[2], box[3]))
-        for code, count, box in zip(values, pixels, boxes, strict=True)
-    }
 
 
 def _pose(agent: dict[str, Any]) -> AgentPose:
@@ -272,25 +243,6 @@ def _pose(agent: dict[str, Any]) -> AgentPose:
         float(agent["cameraHorizon"]),
         agent.get("isStanding"),
     )
-
-
-def _instances(event: Any) -> dict[str, Instance] | None:
-    frame = event.instance_segmentation_frame
-    if frame is None:
-        return None
-    # In place, channel by channel: copies of the whole frame take four times as long.
-    codes = frame[..., 0].astype(np.uint32)
-    for channel in (1, 2):
-        codes <<= 8
-        codes |= frame[..., channel]
-    instances = instances_of(codes)
-    names = {r << 16 | g << 8 | b: name for (r, g, b), name in event.color_to_object_id.items()}
-    # A name without "|" is a class of the structure (walls, floor), not an object.
-    return {
-        names[code]: instance
-        for code, instance in instances.items()
-        if code in names and "|" in names[code]
-    }
 
 
 def teleport_call(pose: AgentPose, *, force: bool = True) -> dict[str, Any]:

@@ -16,11 +16,11 @@ from PIL import Image
 from infthor_eval.formats.archive import unpack_tar
 from infthor_eval.formats.floor_plans import floor_plan_names
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.pictures.video import read_video
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
-from infthor_eval.formats.video import read_video
 from infthor_eval.generation.bundle import read_manifest
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.nieh.validation.cross_validation import read_decisions

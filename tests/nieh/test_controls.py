@@ -8,8 +8,8 @@ import pytest
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.outline import read_outline
+from infthor_eval.formats.pictures.video import Video
 from infthor_eval.formats.question import Question
-from infthor_eval.formats.video import Video
 from infthor_eval.nieh.asking.recalling import recall_all
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.other_homes import draw_other_home

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from infthor_eval.formats.video import Video
+from infthor_eval.formats.pictures.video import Video
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.runs import Catalog
 from infthor_eval.storage.digests import digest

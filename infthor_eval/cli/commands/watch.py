@@ -84,7 +84,7 @@ def command(
     """
     from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.errors import UsageError
-    from infthor_eval.formats.animations import require_animation_name
+    from infthor_eval.formats.pictures.animations import require_animation_name
     from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.presenter import EpisodeSelection
     from infthor_eval.storage.files import prepare_file
@@ -151,7 +151,7 @@ def _write(
 ) -> None:
     """Replay recorded episodes and write a film of them, or a sheet if `fps` is None."""
     from infthor_eval.cli.progress.bar import PacedBar
-    from infthor_eval.formats.animations import write_animation
+    from infthor_eval.formats.pictures.animations import write_animation
     from infthor_eval.terminal import error_console, print_line, progress_bar
 
     replay = _require_replay(run)

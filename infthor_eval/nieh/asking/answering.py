@@ -15,8 +15,8 @@ from msgspec.structs import replace as replace_fields
 
 from infthor_eval.errors import DataError, ModelError, NotAskedError, UserCodeError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.pictures.video import Video
 from infthor_eval.formats.question import Answer
-from infthor_eval.formats.video import Video
 from infthor_eval.memory import Write
 from infthor_eval.nieh.asking.baselines import Predict
 from infthor_eval.nieh.asking.notebook import Notebook

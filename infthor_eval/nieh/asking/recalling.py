@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from infthor_eval.errors import InfthorError, ModelError, UsageError
-from infthor_eval.formats.blank import blank_like
+from infthor_eval.formats.pictures.blank import blank_like
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.memory import (

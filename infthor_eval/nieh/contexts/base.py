@@ -9,8 +9,8 @@ import msgspec
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.pictures.video import FILM_FPS, Video
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.formats.video import FILM_FPS, Video
 from infthor_eval.memory import MemoryOptions
 from infthor_eval.nieh.options import FRAMES
 from infthor_eval.nieh.prompts import PROMPTS, PUBLISHED_MAIN, question_text

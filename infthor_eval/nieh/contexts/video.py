@@ -7,8 +7,8 @@ from typing import Any
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.pictures.video import FILM_FPS, Video, sample_positions
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.formats.video import FILM_FPS, Video, sample_positions
 from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
 __all__ = ["as_images", "video", "video_frames", "video_identity", "video_parts", "video_positions"]

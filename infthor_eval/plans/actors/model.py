@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.object_ids import Words
+from infthor_eval.formats.pictures.blank import blank_like
 from infthor_eval.household.sequence_text import ACT, action_part
 from infthor_eval.plans.actors.protocols import Act, PlanSituation
 from infthor_eval.plans.environment import StepOutcome

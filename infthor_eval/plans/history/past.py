@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.pictures.blank import blank_like
 from infthor_eval.formats.step_log import ObjectLog
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.memory import Observation

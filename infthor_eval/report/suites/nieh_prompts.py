@@ -7,7 +7,7 @@ from pathlib import Path
 from infthor_eval.errors import DataError, InfthorError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.video import Video
+from infthor_eval.formats.pictures.video import Video
 from infthor_eval.nieh.contexts import ContextPart
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.options import SHOWN

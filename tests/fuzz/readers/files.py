@@ -14,11 +14,11 @@ import numpy as np
 from PIL import Image
 
 from infthor_eval.formats.archive import unpack_tar
-from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.pictures.blank import blank_like
+from infthor_eval.formats.pictures.video import read_video
 from infthor_eval.formats.plan_logs import is_plan_log, read_plan_log
-from infthor_eval.formats.video import read_video
 from infthor_eval.generation.bundle import read_manifest
 from infthor_eval.nieh.published.imported_replies import import_logs
 from infthor_eval.plans.published.imported_counts import import_counts

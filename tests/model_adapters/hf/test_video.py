@@ -12,7 +12,7 @@ import torch
 
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.video import FILM_FPS, sample_positions
+from infthor_eval.formats.pictures.video import FILM_FPS, sample_positions
 from model_adapters import Video, load
 from model_adapters.hf.family import ClipShape
 

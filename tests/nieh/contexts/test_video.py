@@ -4,8 +4,8 @@ import pytest
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.pictures.video import Video
 from infthor_eval.formats.question import Question
-from infthor_eval.formats.video import Video
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 from infthor_eval.nieh.docs import doc_of, doc_parts, doc_prompt, sample_of
 from infthor_eval.nieh.samples import find_samples, open_set

@@ -3,7 +3,7 @@ import pytest
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.video import Video, read_video, sample_positions
+from infthor_eval.formats.pictures.video import Video, read_video, sample_positions
 from infthor_eval.storage.folders import user_cache
 
 

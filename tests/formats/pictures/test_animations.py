@@ -6,7 +6,7 @@ import pytest
 from PIL import Image
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.formats.animations import require_animation_name, write_animation
+from infthor_eval.formats.pictures.animations import require_animation_name, write_animation
 
 SHADES = (0, 60, 60, 120, 180, 240)
 

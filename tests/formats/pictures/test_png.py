@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from infthor_eval.formats.png import write_png
+from infthor_eval.formats.pictures.png import write_png
 
 
 @pytest.mark.parametrize("shape", [(300, 300, 3), (1, 7, 3), (5, 1, 3)])

@@ -1,0 +1,96 @@
+"""Which object each pixel of a frame shows."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Instance", "Segmentation", "instances_of", "segmentation_of"]
+
+
+@dataclass(frozen=True)
+class Instance:
+    """The pixels that show an object: number, and [xmin, ymin, xmax, ymax], ends inclusive."""
+
+    pixels: int
+    box: tuple[int, int, int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Segmentation:
+    """Which object each pixel of a frame shows.
+
+    Attributes:
+        codes: a code for each pixel, [height, width].
+        names: objects by code; codes of walls and floors have none.
+    """
+
+    codes: NDArray[np.uint32]
+    names: Mapping[int, str]
+
+    def instances(self) -> dict[str, Instance]:
+        """Return the objects in the frame by id."""
+        return {
+            self.names[code]: instance
+            for code, instance in instances_of(self.codes).items()
+            if code in self.names
+        }
+
+    def cell_pixels(self, grid: int) -> dict[str, NDArray[np.int64]]:
+        """Return how many pixels of each cell of the frame show an object, by its id.
+
+        Args:
+            grid: cells along each side of the frame; numbers of pixels are [grid, grid], the top
+                row first.
+        """
+        rows, columns = (np.arange(extent) * grid // extent for extent in self.codes.shape)
+        codes, index = np.unique(self.codes, return_inverse=True)
+        places = index.reshape(self.codes.shape) * grid**2 + rows[:, None] * grid + columns
+        pixels = np.bincount(places.ravel(), minlength=len(codes) * grid**2)
+        by_code = dict(zip(codes.tolist(), pixels.reshape(-1, grid, grid), strict=True))
+        return {self.names[code]: cells for code, cells in by_code.items() if code in self.names}
+
+
+def segmentation_of(event: Any) -> Segmentation | None:
+    """Return the segmentation of an `ai2thor.server.Event`, None if it was not rendered."""
+    frame = event.instance_segmentation_frame
+    if frame is None:
+        return None
+    # In place, channel by channel: copies of the whole frame take four times as long.
+    codes = frame[..., 0].astype(np.uint32)
+    for channel in (1, 2):
+        codes <<= 8
+        codes |= frame[..., channel]
+    # A name without "|" is a class of the structure (walls, floor), not an object.
+    names = {
+        r << 16 | g << 8 | b: name
+        for (r, g, b), name in event.color_to_object_id.items()
+        if "|" in name
+    }
+    return Segmentation(codes, names)
+
+
+def instances_of(codes: NDArray[np.uint32]) -> dict[int, Instance]:
+    """Return each code's number of pixels and box, given a code per pixel [height, width]."""
+    width = codes.shape[1]
+    # This works on runs of equal pixels within a row, of which there are a few thousand instead of
+    # 90,000 pixels.
+    starts = np.empty(codes.shape, dtype=bool)
+    starts[:, 0] = True
+    np.not_equal(codes[:, 1:], codes[:, :-1], out=starts[:, 1:])
+    first = np.flatnonzero(starts)
+    length = np.diff(first, append=codes.size)
+    values, index = np.unique(codes.ravel()[first], return_inverse=True)
+    row, left = np.divmod(first, width)
+    pixels = np.bincount(index, weights=length).astype(int)
+    low = np.full((len(values), 2), codes.size)
+    high = np.zeros((len(values), 2), dtype=int)
+    np.minimum.at(low, index, np.stack([left, row], axis=1))
+    np.maximum.at(high, index, np.stack([left + length - 1, row], axis=1))
+    boxes = np.concatenate([low, high], axis=1).tolist()
+    return {
+        int(code): Instance(int(count), (box[0], box[1], box[2], box[3]))
+        for code, count, box in zip(values, pixels, boxes, strict=True)
+    }
