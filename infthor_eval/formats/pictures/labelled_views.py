@@ -7,7 +7,7 @@
 | `view` | int32, [things], the view that shows a thing |
 | `type` | int16, [things], index of its type in `names` |
 | `receptacle` | int16, [things], index of the type of the innermost receptacle it is in, or -1 |
-| `held`, `opened` | bool, [things], whether the agent holds it, and whether it is open |
+| `loose`, `held`, `opened` | bool, [things], whether it can be picked up, whether the agent holds it, whether it is open |
 | `pixels` | uint16, [things, grid, grid], its pixels in each cell of the frame as it was rendered |
 
 A thing is an object in one view. Types have AI2-THOR's names.
@@ -38,6 +38,7 @@ class ThingInView(NamedTuple):
         view: index of the view.
         type: object type.
         receptacle: type of the innermost receptacle that it is in or on; None for none.
+        loose: True if it can be picked up.
         held: True if the agent holds it.
         opened: True if it is open.
         pixels: its pixels in each cell of the frame, [grid, grid].
@@ -46,6 +47,7 @@ class ThingInView(NamedTuple):
     view: int
     type: str
     receptacle: str | None
+    loose: bool
     held: bool
     opened: bool
     pixels: NDArray[np.int64]
@@ -60,6 +62,7 @@ class LabelledViews:
     view: NDArray[np.int32]
     type: NDArray[np.int16]
     receptacle: NDArray[np.int16]
+    loose: NDArray[np.bool_]
     held: NDArray[np.bool_]
     opened: NDArray[np.bool_]
     pixels: NDArray[np.uint16]
@@ -77,6 +80,7 @@ def views_of(frames: Sequence[NDArray[np.uint8]], things: Sequence[ThingInView])
         view=np.array([thing.view for thing in things], np.int32),
         type=np.array([index[thing.type] for thing in things], np.int16),
         receptacle=np.array([index[thing.receptacle] for thing in things], np.int16),
+        loose=np.array([thing.loose for thing in things], np.bool_),
         held=np.array([thing.held for thing in things], np.bool_),
         opened=np.array([thing.opened for thing in things], np.bool_),
         pixels=np.stack([thing.pixels for thing in things]).astype(np.uint16),
@@ -119,7 +123,10 @@ def read_views(path: Path) -> LabelledViews:
 def _problem(views: LabelledViews) -> str | None:
     """Return what is wrong with views, None for nothing."""
     n_things = len(views.view)
-    columns = (views.type, views.receptacle, views.held, views.opened, views.pixels)
+    columns = (
+        *(views.type, views.receptacle, views.loose),
+        *(views.held, views.opened, views.pixels),
+    )
     if any(len(column) != n_things for column in columns):
         return "its columns have different lengths"
     n_names, n_views = len(views.names), len(views.frames)

@@ -185,6 +185,7 @@ def _things(view: SimulatorView, number: int, grid: int) -> list[ThingInView]:
                 number,
                 thing.object_type,
                 parents[0] if parents else None,
+                thing.pickupable is True,
                 thing.is_picked_up,
                 thing.is_open is True,
                 pixels,

@@ -1,4 +1,4 @@
-"""The vision tower on many frames of one size at once, for training.
+"""The vision tower on many pictures of one size at once, for training.
 
 transformers computes the attention of each frame by itself, and embeds both time steps of a patch,
 which are the same picture. One call for all frames takes two thirds of the time.
@@ -14,36 +14,59 @@ from transformers.models.qwen2_5_vl.modeling_qwen2_5_vl import (
     get_vision_position_ids,
 )
 
-__all__ = ["tower_features"]
+__all__ = ["patch_states", "tower_features", "unit_logits"]
 
 
 def tower_features(tower: Any, patches: Tensor) -> Tensor:
     """Return the features of frames, (frames, tokens, hidden), as the tower gives them.
 
     Args:
-        tower: a Qwen2.5-VL vision tower whose windows are whole frames.
-        patches: pixels of the patches of square frames, in one of the two time steps, (frames,
+        tower: see `patch_states`.
+        patches: see `patch_states`.
+    """
+    merged: Tensor = tower.merger(patch_states(tower, patches).flatten(0, 1))
+    return merged.reshape(len(patches), -1, merged.shape[-1])
+
+
+def patch_states(tower: Any, patches: Tensor) -> Tensor:
+    """Return the states of patches after the tower's last layer, (pictures, patches, width).
+
+    Args:
+        tower: a Qwen2.5-VL vision tower whose windows are whole pictures.
+        patches: pixels of the patches of square pictures, in one of the two time steps, (pictures,
             patches, values).
     """
-    n_frames, n_patches, _ = patches.shape
-    kernel = tower.patch_embed.proj.weight  # (hidden, colours, time, height, width)
-    hidden = linear(patches, kernel.sum(2).flatten(1))
-    side = int(n_patches**0.5)
+    kernel = tower.patch_embed.proj.weight  # (width, colours, time, height, width)
+    states = linear(patches, kernel.sum(2).flatten(1))
+    side = int(patches.shape[1] ** 0.5)
     ids = get_vision_position_ids(torch.tensor([[1, side, side]]), tower.spatial_merge_size)
-    rotation = tower.rotary_pos_emb(hidden[0], ids)
+    rotation = tower.rotary_pos_emb(states[0], ids)
     for block in tower.blocks:
-        hidden = hidden + _attention(block.attn, block.norm1(hidden), rotation)
-        hidden = hidden + block.mlp(block.norm2(hidden))
-    merged: Tensor = tower.merger(hidden.flatten(0, 1))
-    return merged.reshape(n_frames, -1, merged.shape[-1])
+        states = states + _attention(block.attn, block.norm1(states), rotation)
+        states = states + block.mlp(block.norm2(states))
+    return states
 
 
-def _attention(attention: Any, hidden: Tensor, rotation: tuple[Tensor, Tensor]) -> Tensor:
-    n_frames, n_patches, width = hidden.shape
-    states = attention.qkv(hidden).reshape(n_frames, n_patches, 3, attention.num_heads, -1)
-    query, key, value = states.unbind(2)
+def unit_logits(tower: Any, states: Tensor, n_units: int) -> Tensor:
+    """Return the first units of the merger before their nonlinearity, (pictures, tokens, units).
+
+    Args:
+        tower: the tower.
+        states: states of the patches, (pictures, patches, width).
+        n_units: number of units.
+    """
+    merger = tower.merger
+    merged = merger.ln_q(states).reshape(len(states), -1, merger.hidden_size)
+    layer = merger.mlp[0]
+    return linear(merged, layer.weight[:n_units], layer.bias[:n_units])
+
+
+def _attention(attention: Any, states: Tensor, rotation: tuple[Tensor, Tensor]) -> Tensor:
+    n_pictures, n_patches, width = states.shape
+    parts = attention.qkv(states).reshape(n_pictures, n_patches, 3, attention.num_heads, -1)
+    query, key, value = parts.unbind(2)
     query, key = apply_rotary_pos_emb_vision(query, key, *rotation)
     query, key, value = (one.transpose(1, 2) for one in (query, key, value))
     mixed = scaled_dot_product_attention(query, key, value).transpose(1, 2)
-    output: Tensor = attention.proj(mixed.reshape(n_frames, n_patches, width))
+    output: Tensor = attention.proj(mixed.reshape(n_pictures, n_patches, width))
     return output

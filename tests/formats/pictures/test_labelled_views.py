@@ -16,9 +16,9 @@ def some_views():
     frames = [np.full((4, 4, 3), grey, np.uint8) for grey in (10, 20)]
     cells = np.arange(9).reshape(3, 3)
     things = [
-        ThingInView(0, "Mug", "CounterTop", False, False, cells),
-        ThingInView(1, "Mug", None, True, False, cells[::-1]),
-        ThingInView(1, "Fridge", None, False, True, cells.T),
+        ThingInView(0, "Mug", "CounterTop", True, False, False, cells),
+        ThingInView(1, "Mug", None, True, True, False, cells[::-1]),
+        ThingInView(1, "Fridge", None, False, False, True, cells.T),
     ]
     return views_of(frames, things)
 
@@ -31,6 +31,7 @@ def test_written_views_are_read_as_they_were(tmp_path):
     assert [views.names[at] for at in views.type] == ["Mug", "Mug", "Fridge"]
     assert [at < 0 or views.names[at] for at in views.receptacle] == ["CounterTop", True, True]
     assert views.view.tolist() == [0, 1, 1]
+    assert views.loose.tolist() == [True, True, False]
     assert (views.held.tolist(), views.opened.tolist()) == (
         [False, True, False],
         [False, False, True],

@@ -1,0 +1,1 @@
+"""Learning to see: labelled views, what they show, and the tower that names it."""
