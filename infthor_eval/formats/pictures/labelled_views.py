@@ -7,7 +7,8 @@
 | `view` | int32, [things], the view that shows a thing |
 | `type` | int16, [things], index of its type in `names` |
 | `receptacle` | int16, [things], index of the type of the innermost receptacle it is in, or -1 |
-| `loose`, `held`, `opened` | bool, [things], whether it can be picked up, whether the agent holds it, whether it is open |
+| `loose` | bool, [things], whether it can be picked up |
+| `held`, `opened` | bool, [things], whether the agent holds it, and whether it is open |
 | `pixels` | uint16, [things, grid, grid], its pixels in each cell of the frame as it was rendered |
 
 A thing is an object in one view. Types have AI2-THOR's names.

@@ -17,7 +17,7 @@ from PIL import Image
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.shared_frames import patched_name, store_encoded
 
-__all__ = ["PictureStore"]
+__all__ = ["PictureStore", "palette_of"]
 
 _Pixels = NDArray[np.uint8]  # [height, width], indices of colours
 
@@ -51,7 +51,7 @@ class PictureStore:
     def __init__(self, root: Path, frames: Iterable[FrameRef], colors: int) -> None:
         self._root = root
         pictures = {frame: frame.load() for frame in dict.fromkeys(frames)}
-        palette = _palette_of(pictures.values(), colors)
+        palette = palette_of(pictures.values(), colors)
         self._colors = np.array(palette.getpalette(), dtype=np.uint8).reshape(-1, 3)
         self._pixels = {
             frame: np.asarray(picture.quantize(palette=palette, dither=Image.Dither.NONE))
@@ -133,7 +133,7 @@ def _stretch(differs: NDArray[np.bool_]) -> slice:
     return slice(start, max(int(indices[-1]) + 1, min(start + _NARROWEST, len(differs))))
 
 
-def _palette_of(pictures: Iterable[Image.Image], colors: int) -> Image.Image:
+def palette_of(pictures: Iterable[Image.Image], colors: int) -> Image.Image:
     """Return an image whose palette suits all pictures, also their small parts."""
     counts = np.zeros(2**15, dtype=np.int64)
     sums = np.zeros((2**15, 3))

@@ -7,13 +7,22 @@ A tower that is to name things needs thousands of views of each.
 import math
 import random
 from collections.abc import Sequence
+from typing import Any
 
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector
 
 __all__ = ["arrange", "choose_pose"]
 
-_OPEN_SHARE = 0.3  # of what can be opened
+# State changes, what they need, and the share of the things that could be changed and are.
+_CHANGES: tuple[tuple[str, str, float, dict[str, str]], ...] = (
+    ("SliceObject", "sliceable", 0.3, {}),
+    ("OpenObject", "openable", 0.3, {}),
+    ("ToggleObjectOn", "toggleable", 0.3, {}),
+    ("CookObject", "cookable", 0.2, {}),
+    ("DirtyObject", "dirtyable", 0.2, {}),
+    ("FillObjectWithLiquid", "can_fill_with_liquid", 0.2, {"fillLiquid": "water"}),
+)
 _HOLD_SHARE = 0.5  # of the arrangements, in which the agent holds something
 _SEEDS = 2**31
 _QUIET = {"renderImage": False, "renderInstanceSegmentation": False}
@@ -31,24 +40,26 @@ _EYES_M = 1.575  # height of the camera
 
 
 def arrange(simulator: Simulator, rng: random.Random) -> int:
-    """Put the loose things of the scene about, open some, and let the agent hold one, or none.
+    """Put the loose things of the scene about, change the states of some, and let the agent hold
+    one, or none.
 
     Returns:
         How many of the actions were refused; the others count all the same.
     """
-    view = simulator.step("InitialRandomSpawn", randomSeed=rng.randrange(_SEEDS), **_QUIET)
-    n_refused = int(not view.success)
-    for thing in list(view.objects.values()):
-        if thing.openable is True and not thing.is_open and rng.random() < _OPEN_SHARE:
-            opened = simulator.step(
-                "OpenObject", objectId=thing.object_id, forceAction=True, **_QUIET
-            )
-            n_refused += not opened.success
+    n_refused = 0
+
+    def act(action: str, **arguments: Any) -> None:
+        nonlocal n_refused
+        n_refused += not simulator.step(action, **arguments, **_QUIET).success
+
+    act("InitialRandomSpawn", randomSeed=rng.randrange(_SEEDS))
+    for action, ability, share, arguments in _CHANGES:
+        for thing in [*simulator.view.objects.values()]:
+            if getattr(thing, ability) is True and rng.random() < share:
+                act(action, objectId=thing.object_id, forceAction=True, **arguments)
     loose = _loose(simulator.view)
     if loose and rng.random() < _HOLD_SHARE:
-        chosen = rng.choice(loose).object_id
-        held = simulator.step("PickupObject", objectId=chosen, forceAction=True, **_QUIET)
-        n_refused += not held.success
+        act("PickupObject", objectId=rng.choice(loose).object_id, forceAction=True)
     return n_refused
 
 

@@ -18,6 +18,7 @@ from infthor_eval.formats.pictures.labelled_views import (
     views_of,
     write_views,
 )
+from infthor_eval.generation.compact.pictures import palette_of
 from infthor_eval.generation.simulator_jobs import (
     SimulatorWorker,
     collect_outcomes,
@@ -33,6 +34,9 @@ from infthor_eval.workers import WorkerSettings, run_jobs
 __all__ = ["ViewJob", "ViewSet", "generate_views"]
 
 _LEAST_PIXELS = 8  # of an object that is labelled
+# Bundled sets have pictures of few colours, and so have half of the arrangements.
+_FEW_COLORS_SHARE = 0.5
+_N_COLORS = (64, 128)
 _TRIES = 4  # poses for each view; where the agent would stand in something, it is refused
 
 
@@ -147,10 +151,13 @@ def _look_about(
     for _ in range(job.arrangements):
         simulator.rewind(empty, exactly=True)
         n_refused += arrange(simulator, rng)
-        for view in _views(job.per_arrangement, simulator, rng):
-            things += _things(view, len(frames), job.grid)
-            assert view.frame is not None
-            frames.append(_resized(view.frame, job.side))
+        views = _views(job.per_arrangement, simulator, rng)
+        for number, view in enumerate(views):
+            things += _things(view, len(frames) + number, job.grid)
+        pictures = [Image.fromarray(view.frame) for view in views if view.frame is not None]
+        if pictures and rng.random() < _FEW_COLORS_SHARE:
+            pictures = _in_few_colors(pictures, rng.choice(_N_COLORS))
+        frames += (_resized(picture, job.side) for picture in pictures)
     return frames, things, n_refused
 
 
@@ -194,6 +201,14 @@ def _things(view: SimulatorView, number: int, grid: int) -> list[ThingInView]:
     return things
 
 
-def _resized(frame: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
-    """Resize a frame as the image processor does."""
-    return np.asarray(Image.fromarray(frame).resize((side, side), Image.Resampling.BICUBIC))
+def _in_few_colors(pictures: Sequence[Image.Image], n_colors: int) -> list[Image.Image]:
+    palette = palette_of(pictures, n_colors)
+    return [
+        picture.quantize(palette=palette, dither=Image.Dither.NONE).convert("RGB")
+        for picture in pictures
+    ]
+
+
+def _resized(picture: Image.Image, side: int) -> NDArray[np.uint8]:
+    """Resize a picture as the image processor does."""
+    return np.asarray(picture.resize((side, side), Image.Resampling.BICUBIC))
