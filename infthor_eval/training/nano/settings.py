@@ -6,7 +6,7 @@ import msgspec
 
 from infthor_eval.formats.object_ids import Words
 
-__all__ = ["NanoRecipe", "QuestionSettings", "SceneSettings", "VisionSettings"]
+__all__ = ["NanoRecipe", "QuestionSettings", "ReadingSettings", "SceneSettings", "VisionSettings"]
 
 _COUNTS = (
     "text_steps",
@@ -154,6 +154,48 @@ class QuestionSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
         counts = ("per_step", "together", "synthetic_frames", "recalled_frames", "per_trajectory")
         _require_counts(self, counts)
         _require_shares(self, ("synthetic", "paired", "recalled", "whole", "ramp"))
+
+
+class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Questions in the steps in which the decoder learns to read.
+
+    Attributes:
+        tokens_per_step: fewest tokens of the questions of a step, with their frames.
+        together: most questions on the same frames.
+        renamed: share of the homes in which each type of thing is taken for another.
+        single: share of the steps, the first ones, in which all questions are on single frames.
+        ramp: share of the steps, from there on, in which the numbers of frames grow.
+        synthetic: share of the frames with synthetic questions, by rules from what they show.
+        synthetic_frames: most frames of these.
+        filled: most synthetic questions that are added to recorded ones.
+        recalled: share of the others that are asked as behind a memory: the clue frames among
+            frames that do not matter, and the last view.
+        recalled_frames: most frames among those that do not matter.
+        whole: share of the others that are asked on the whole trajectory.
+    """
+
+    tokens_per_step: int = 1500
+    together: int = 12
+    renamed: float = 0.7
+    single: float = 0.15
+    ramp: float = 0.3
+    synthetic: float = 0.4
+    synthetic_frames: int = 6
+    filled: int = 4
+    recalled: float = 0.5
+    recalled_frames: int = 8
+    whole: float = 0.03
+
+    def __post_init__(self) -> None:
+        """Check the ranges of all settings.
+
+        Raises:
+            ValueError: a value is out of its range; the message names the setting.
+        """
+        _require_counts(self, ("tokens_per_step", "together", "synthetic_frames"))
+        _require_shares(self, ("renamed", "single", "synthetic", "recalled", "whole"))
+        if not 0 < self.ramp <= 1:
+            raise ValueError(f"ramp is {self.ramp}; use a number above 0 and at most 1")
 
 
 class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

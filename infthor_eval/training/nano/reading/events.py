@@ -12,6 +12,7 @@ from pathlib import Path
 
 from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.step_log import iter_object_states, read_steps
+from infthor_eval.household.wording import canonical_type
 
 __all__ = ["Event", "Happening", "events_in", "read_events"]
 
@@ -36,7 +37,7 @@ class Happening:
     Attributes:
         place: place of the first frame after it, from 0.
         event: what happened.
-        type: the type of thing it happened to, or that it happened in.
+        type: the type of thing it happened to, or that it happened in, as people name it.
     """
 
     place: int
@@ -60,7 +61,7 @@ def read_events(folder: Path) -> list[Happening]:
         action = (step.action or "").partition(" ")[0]
         if step.success and step.target:
             happenings += [
-                Happening(place, event, object_type_of(key))
+                Happening(place, event, canonical_type(object_type_of(key)))
                 for event, key in _changes(action, step.target, step.receptacle, parents)
                 if key
             ]

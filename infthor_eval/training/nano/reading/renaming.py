@@ -104,6 +104,10 @@ class Vocabulary:
         name = self._by_compact_name.get(answer)
         return answer if name is None else compact_name(renaming(name))
 
+    def form(self, text: str) -> str:
+        """Return a question without the types that it names, the same for all that ask so."""
+        return "".join(part if isinstance(part, str) else "_" for part in self._template(text))
+
     def phrases(self, text: str) -> list[str]:
         """Return the parts of a question that name no type, as they follow what is before them."""
         parts = (part.rstrip() for part in self._template(text) if isinstance(part, str))

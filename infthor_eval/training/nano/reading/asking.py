@@ -1,0 +1,95 @@
+"""Questions on frames as training sequences, of a home as it was recorded or renamed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts import CONTEXTS
+from infthor_eval.nieh.prompts import question_text
+from infthor_eval.training.encoding import Encoder, TrainingSequence
+from infthor_eval.training.nano.reading.frame_units import RenamedFrame
+from infthor_eval.training.nano.reading.network import FrameEvents
+from model_adapters.hf.prompting.prompt import Frame, Piece
+
+__all__ = ["Asker", "ReadingSequence", "question_intro"]
+
+_N_TAILS = 50_000  # encoded questions that are kept
+
+
+@dataclass(frozen=True)
+class ReadingSequence:
+    """Questions on some frames, as branches of one sequence.
+
+    Attributes:
+        tokens: the sequence.
+        events: what happened before each of its frames.
+    """
+
+    tokens: TrainingSequence
+    events: FrameEvents
+
+
+def question_intro() -> str:
+    """Return the text that precedes every question, on clue frames as behind a memory."""
+    return _prompt("").rstrip()
+
+
+def _prompt(text: str) -> str:
+    return question_text(CONTEXTS["clues"].intro, Question("", text, (), ()))
+
+
+class Asker:
+    """Encodes questions and answers, each of them once for all frames.
+
+    Args:
+        encoder: builds sequences.
+        any_frame: a frame; what follows the last one does not depend on it.
+    """
+
+    def __init__(self, encoder: Encoder, any_frame: FrameRef) -> None:
+        self._encoder = encoder
+        self._any_frame = any_frame
+        self._tail = lru_cache(_N_TAILS)(self._encode_tail)
+
+    def ask(
+        self,
+        frames: Sequence[FrameRef],
+        order: tuple[int, ...] | None,
+        asked: Sequence[tuple[str, str]],
+        events: FrameEvents,
+    ) -> ReadingSequence:
+        """Return questions on frames.
+
+        Args:
+            frames: the frames, in order.
+            order: order of the types in a renamed home (`RenamedFrame`); None as recorded.
+            asked: texts and answers, at least one.
+            events: what happened before each of the frames.
+        """
+        head = self._encoder.pieces([*frames, ""])
+        head = head[: _n_with_frames(head)]
+        if order is not None:
+            head = [
+                RenamedFrame(one.digest, one.size, one.ids, one.ref, order)
+                if isinstance(one, Frame)
+                else one
+                for one in head
+            ]
+        tails = [self._tail(text, answer) for text, answer in asked]
+        pieces = (*head, *(piece for tail in tails for piece in tail.pieces))
+        has_loss = (False,) * len(head) + tuple(flag for tail in tails for flag in tail.has_loss)
+        branches = tuple(len(tail.pieces) for tail in tails)
+        return ReadingSequence(TrainingSequence("questions", pieces, has_loss, branches), events)
+
+    def _encode_tail(self, text: str, answer: str) -> TrainingSequence:
+        """Return what follows the last frame."""
+        whole = self._encoder.answer("question", [self._any_frame, _prompt(text)], answer)
+        n = _n_with_frames(whole.pieces)
+        return TrainingSequence("question", whole.pieces[n:], whole.has_loss[n:])
+
+
+def _n_with_frames(pieces: Sequence[Piece]) -> int:
+    """Return the number of pieces up to the last frame."""
+    return max(at for at, piece in enumerate(pieces) if isinstance(piece, Frame)) + 1

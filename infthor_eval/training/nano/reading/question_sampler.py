@@ -1,0 +1,197 @@
+"""Random questions to learn reading from: on single frames, on clue frames, behind memories, whole.
+
+Most are about renamed homes, so that only the frames can answer. Both questions of a pair of twins
+are in one step, with the same frames by number and the same names: what differs between the two
+worlds is then all that there is to learn from them.
+"""
+
+import random
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.question import Question
+from infthor_eval.training.nano.reading.asking import Asker, ReadingSequence
+from infthor_eval.training.nano.reading.episodes import Episode, RecordedQuestion, World
+from infthor_eval.training.nano.reading.events import events_in
+from infthor_eval.training.nano.reading.frame_units import type_order
+from infthor_eval.training.nano.reading.renaming import Renaming, Vocabulary
+from infthor_eval.training.nano.seeing.units import Units
+from infthor_eval.training.nano.seen_objects import SeenFrame
+from infthor_eval.training.nano.settings import ReadingSettings
+from infthor_eval.training.nano.synthetic_questions import AskedText, SyntheticQuestions
+
+__all__ = ["QuestionSampler"]
+
+_AS_RECORDED = Renaming({})
+_MOST_TOKENS = 2500  # of a sequence
+_MOST_FILLED_FRAMES = 12  # on which synthetic questions are added to recorded ones
+_SLICED = "slice"  # slices are no types of their own, so that they cannot be renamed
+_IN_ANY_ORDER = ("objects", "things that")  # marks of questions whose answers have no order
+
+
+class _Names(NamedTuple):
+    """The names in a sequence: how types are renamed, and their order in the units."""
+
+    renaming: Renaming
+    order: tuple[int, ...] | None
+
+
+class QuestionSampler:
+    """Draws questions.
+
+    Args:
+        asker: encodes them.
+        episodes: recorded episodes, at least one.
+        seen: what their frames show.
+        vocabulary: types that are renamed.
+        units: units of the frames.
+        settings: which questions a step has.
+    """
+
+    def __init__(
+        self,
+        asker: Asker,
+        episodes: Sequence[Episode],
+        seen: Iterable[SeenFrame],
+        vocabulary: Vocabulary,
+        units: Units,
+        settings: ReadingSettings,
+    ) -> None:
+        self._asker = asker
+        self._episodes = episodes
+        self._vocabulary = vocabulary
+        self._units = units
+        self._settings = settings
+        frames = [*seen]
+        self._seen = {one.frame.digest: one for one in frames}
+        self._synthetic_questions = SyntheticQuestions(frames)
+        self._by_form: dict[str, list[tuple[Episode, RecordedQuestion]]] = defaultdict(list)
+        for episode in episodes:
+            for question in episode.questions:
+                form = vocabulary.form(question.asked[0].text)
+                self._by_form[form].append((episode, question))
+        self._forms = sorted(self._by_form)
+        # Rare forms are as hard as frequent ones.
+        self._weights = [len(self._by_form[form]) ** 0.5 for form in self._forms]
+
+    def draw(self, rng: random.Random, progress: float) -> list[ReadingSequence]:
+        """Return the questions of a step, with their answers.
+
+        Args:
+            rng: source of all random choices.
+            progress: share of the steps that is done.
+        """
+        settings = self._settings
+        is_single = progress < settings.single
+        grown = min(1.0, max(0.0, progress - settings.single) / settings.ramp)
+        drawn: list[ReadingSequence] = []
+        while sum(one.tokens.n_tokens for one in drawn) < settings.tokens_per_step:
+            names = self._draw_names(rng)
+            is_synthetic = is_single or rng.random() < settings.synthetic
+            found = (self._synthetic if is_synthetic else self._recorded)(rng, grown, names)
+            drawn += (one for one in found if one.tokens.n_tokens <= _MOST_TOKENS)
+        return drawn
+
+    def _draw_names(self, rng: random.Random) -> _Names:
+        if rng.random() >= self._settings.renamed:
+            return _Names(_AS_RECORDED, None)
+        renaming = self._vocabulary.draw(rng)
+        return _Names(renaming, type_order(self._units, renaming))
+
+    def _synthetic(self, rng: random.Random, grown: float, names: _Names) -> list[ReadingSequence]:
+        """Return synthetic questions on some frames of an episode; few frames are the most likely.
+
+        There are none if the frames show nothing to ask for.
+        """
+        settings = self._settings
+        world = rng.choice(rng.choice(self._episodes).worlds)
+        n_frames = len(world.frames)
+        n = min(1 + round(rng.random() ** 2 * (settings.synthetic_frames - 1) * grown), n_frames)
+        first = rng.randrange(n_frames - n + 1)
+        in_a_row = [*range(first, first + n)]
+        places = in_a_row if rng.random() < 0.5 else sorted(rng.sample(range(n_frames), n))
+        asked = self._ask_by_rules(world, places, settings.together, names, rng)
+        return [self._sequence(world, places, asked, names)] if asked else []
+
+    def _recorded(self, rng: random.Random, grown: float, names: _Names) -> list[ReadingSequence]:
+        """Return a question and others that its frames answer; of twins, in both worlds."""
+        settings = self._settings
+        (form,) = rng.choices(self._forms, self._weights)
+        episode, first = rng.choice(self._by_form[form])
+        shown = self._shown(rng, grown, episode, first)
+        others = [one for one in episode.answerable(shown) if one is not first and one.clues]
+        chosen = [first, *rng.sample(others, min(len(others), settings.together - 1))]
+        if names.order is not None:
+            chosen = [one for one in chosen if not _is_about_slices(one)]
+        places = sorted(shown)
+        n_more = min(settings.filled, settings.together - len(chosen))
+        sequences = []
+        for number, world in enumerate(episode.worlds if chosen else ()):
+            asked = [self._in_words(one.asked[number], names) for one in chosen]
+            if len(places) <= _MOST_FILLED_FRAMES:
+                asked += self._ask_by_rules(world, places, n_more, names, rng)
+            sequences.append(self._sequence(world, places, asked, names))
+        return sequences
+
+    def _shown(
+        self, rng: random.Random, grown: float, episode: Episode, question: RecordedQuestion
+    ) -> set[int]:
+        """Return the places of the frames to show: all, those behind a memory, or the clues."""
+        settings = self._settings
+        share = rng.random()
+        if share < settings.whole * grown:
+            return {*range(episode.n_frames)}
+        shown = {*question.shown}
+        if share < settings.recalled:
+            n_others = rng.randint(0, round(settings.recalled_frames * grown))
+            shown |= {*rng.sample(range(episode.n_frames), min(n_others, episode.n_frames))}
+            shown.add(episode.n_frames - 1)
+        return shown
+
+    def _ask_by_rules(
+        self, world: World, places: Sequence[int], n: int, names: _Names, rng: random.Random
+    ) -> list[AskedText]:
+        seen = [self._seen[world.frames[at].digest] for at in places]
+        asked = self._synthetic_questions.ask(seen, n, rng)
+        if names.order is not None:
+            asked = [(text, answer) for text, answer in asked if _SLICED not in text + answer]
+        return [
+            self._renamed(text, answer.split(", "), names, in_any_order=True)
+            for text, answer in asked
+        ]
+
+    def _in_words(self, question: Question, names: _Names) -> AskedText:
+        in_any_order = any(mark in question.text for mark in _IN_ANY_ORDER)
+        answers = [*map(str, question.answers)]
+        return self._renamed(question.text, answers, names, in_any_order=in_any_order)
+
+    def _renamed(
+        self, text: str, answers: Sequence[str], names: _Names, *, in_any_order: bool
+    ) -> AskedText:
+        renaming = names.renaming
+        new = [self._vocabulary.rename_answer(answer, renaming) for answer in answers]
+        return self._vocabulary.rename(text, renaming), ", ".join(
+            sorted(new) if in_any_order else new
+        )
+
+    def _sequence(
+        self, world: World, places: Sequence[int], asked: Sequence[AskedText], names: _Names
+    ) -> ReadingSequence:
+        frames: list[FrameRef] = [world.frames[at] for at in places]
+        events = [
+            None
+            if of_frame is None
+            else [(event, names.renaming(name)) for event, name in of_frame]
+            for of_frame in events_in(world.happenings, places)
+        ]
+        return self._asker.ask(frames, names.order, asked, events)
+
+
+def _is_about_slices(question: RecordedQuestion) -> bool:
+    return any(
+        _SLICED in text
+        for asked in question.asked
+        for text in (asked.text, *map(str, asked.answers))
+    )
