@@ -1,4 +1,4 @@
-"""The data that the small model is trained on: trajectories, frames, questions, twins."""
+"""The data that the small model is trained on: views, trajectories, frames, questions, twins."""
 
 from functools import partial
 from pathlib import Path
@@ -14,14 +14,16 @@ from infthor_eval.generation.replay_set import replay_with_workers, select
 from infthor_eval.generation.twins.drafting import TwinSettings
 from infthor_eval.generation.twins.kinds import KINDS
 from infthor_eval.generation.twins.twin_set import make_twins
+from infthor_eval.generation.views.generate import ViewJob, generate_views
 from infthor_eval.nieh.scoring import score
 from infthor_eval.storage.files import prepare_folder
 from infthor_eval.terminal import progress_bar
 from infthor_eval.thor.launch import embedded_launch
-from infthor_eval.training.nano.settings import SceneSettings
+from infthor_eval.training.nano.architecture import PATCH_SIDE, PATCHES
+from infthor_eval.training.nano.settings import SceneSettings, ViewSettings
 from infthor_eval.workers import WorkerSettings
 
-__all__ = ["generate_training_data"]
+__all__ = ["generate_training_data", "generate_training_views"]
 
 _EVERY = 500  # more than there are questions on a trajectory
 
@@ -58,6 +60,37 @@ def generate_training_data(
         sets.append(prepare_folder(out / "twins"))
         _make_twins(scenes, seed, trajectories, sets[1], worker_settings)
     return sets
+
+
+def generate_training_views(
+    views: ViewSettings, seed: int, out: Path, worker_settings: WorkerSettings
+) -> list[Path]:
+    """Generate labelled views of rooms; those in the folder already are not generated again.
+
+    Returns:
+        A file for each room.
+
+    Raises:
+        DataError: a room has none.
+    """
+    prepare_folder(out)
+    side = PATCHES * PATCH_SIDE
+    jobs = [
+        ViewJob(name, seed, views.arrangements, views.per_arrangement, side, PATCHES)
+        for name in views.names
+    ]
+    with progress_bar(NOTES) as progress:
+        generated = generate_views(
+            jobs,
+            embedded_launch(),
+            out,
+            worker_settings,
+            PacedBar(progress, "views", len(jobs)).advance,
+            print_note,
+        )
+    _require_whole(out, generated.failures)
+    print_note(f"{generated.views:,} views of {len(jobs)} rooms: {out}")
+    return generated.paths
 
 
 def _generate(

@@ -23,7 +23,7 @@ _HINT = "restore it, or remove the folder to restart"
 
 @dataclass(frozen=True)
 class Checkpoints:
-    """The last state of a run, in `step-NUMBER`: weights, optimizer's moments, and settings.
+    """The last state of a run, in `step-NUMBER`: weights, optimizers' moments, and settings.
 
     Nothing else is stored: order of sequences, learning rate and random numbers follow from
     settings and step.
@@ -36,7 +36,7 @@ class Checkpoints:
     folder: Path
     about: Mapping[str, Any]
 
-    def save(self, step: int, model: torch.nn.Module, optimizer: torch.optim.Optimizer) -> None:
+    def save(self, step: int, model: torch.nn.Module, *optimizers: torch.optim.Optimizer) -> None:
         """Write the state after some finished steps, then remove the previous one.
 
         Raises:
@@ -51,24 +51,24 @@ class Checkpoints:
         ):
             folder.mkdir()
             save_model(model, str(folder / _WEIGHTS))
-            torch.save(optimizer.state_dict(), folder / _OPTIMIZER)
+            torch.save([one.state_dict() for one in optimizers], folder / _OPTIMIZER)
             state = {"step": step, "about": self.about}
             (folder / _STATE).write_text(json.dumps(state, indent=2) + "\n", encoding="utf-8")
         for older in self._places():
             if older != path:
                 shutil.rmtree(older)
 
-    def restore(self, model: torch.nn.Module, optimizer: torch.optim.Optimizer) -> int:
+    def restore(self, model: torch.nn.Module, *optimizers: torch.optim.Optimizer) -> int:
         """Load the last state, if there is one, and return the number of finished steps.
 
         Raises:
             DataError: the state is damaged.
             UsageError: the state is of another run.
         """
-        states = self._places()
-        if not states:
+        places = self._places()
+        if not places:
             return 0
-        last = states[-1]
+        last = places[-1]
         with wrap_errors(f"{last}: cannot be read", _HINT, catch=Exception):
             state = json.loads((last / _STATE).read_text(encoding="utf-8"))
             step = int(state["step"])
@@ -77,9 +77,9 @@ class Checkpoints:
         with wrap_errors(f"{last}: cannot be read", _HINT, catch=Exception):
             load_model(model, last / _WEIGHTS)
             device = next(model.parameters()).device
-            optimizer.load_state_dict(
-                torch.load(last / _OPTIMIZER, map_location=device, weights_only=True)
-            )
+            states = torch.load(last / _OPTIMIZER, map_location=device, weights_only=True)
+            for optimizer, of_optimizer in zip(optimizers, states, strict=True):
+                optimizer.load_state_dict(of_optimizer)
         return step
 
     def _places(self) -> list[Path]:

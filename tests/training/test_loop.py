@@ -107,7 +107,7 @@ def test_a_run_that_was_killed_goes_on_to_the_same_weights(
     for one, other in zip(model.parameters(), again.parameters(), strict=True):
         assert torch.equal(one, other)
     moments = [
-        torch.load(tmp_path / name / "step-000005/optimizer.pt", weights_only=True)["state"]
+        torch.load(tmp_path / name / "step-000005/optimizer.pt", weights_only=True)[0]["state"]
         for name in ("whole", "killed")
     ]
     for number, one in moments[0].items():

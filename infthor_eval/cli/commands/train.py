@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from infthor_eval.training.fine_tuning import TrainingRun
     from infthor_eval.training.loop import Progress
     from infthor_eval.training.nano.settings import NanoRecipe
-    from infthor_eval.training.nano.stages import NanoProgress
+    from infthor_eval.training.nano.steps import NanoProgress
     from infthor_eval.training.recipe import Recipe
     from infthor_eval.workers import WorkerSettings
 
@@ -29,11 +29,7 @@ __all__ = ["command"]
 
 _GPUS = 8
 _TFLOPS = 400.0
-_STAGES = {
-    "vision": "recognising objects",
-    "text": "reading plans",
-    "joint": "answering and acting",
-}
+_STAGES = {"vision": "recognising objects", "reading": "answering and acting"}
 
 
 @click.command(
@@ -216,15 +212,21 @@ def _print_estimate(run: TrainingRun, n_gpus: int, tflops: float) -> None:
 def _train_small_model(
     recipe: NanoRecipe, folders: Sequence[Path], out: Path, worker_settings: WorkerSettings
 ) -> None:
-    """Train the small model on replayed sets with questions; without any, generate one in `out`."""
-    from infthor_eval.cli.training_data import generate_training_data
+    """Train the small model on replayed sets with questions; without any, generate one in `out`.
+
+    The views that it learns to see from are generated in any case.
+    """
+    from infthor_eval.cli.training_data import generate_training_data, generate_training_views
     from infthor_eval.storage.files import hold_folder
     from infthor_eval.training.export import export
-    from infthor_eval.training.nano.stages import train_small_model
+    from infthor_eval.training.nano.stages import TrainingData, train_small_model
 
     with hold_folder(out):
         sets = list(folders) or generate_training_data(
             recipe.scenes, recipe.seed, out / "data", worker_settings
+        )
+        views = generate_training_views(
+            recipe.views, recipe.seed, out / "data" / "views", worker_settings
         )
         with progress_bar(NOTES) as progress:
             bars = StepBars(progress)
@@ -232,6 +234,7 @@ def _train_small_model(
             def observe(step: NanoProgress) -> None:
                 bars.advance(_STAGES[step.stage], step.step, step.n_steps, f"loss {step.loss:.3f}")
 
-            loaded = train_small_model(recipe, sets, out / "states", observe, print_note)
+            data = TrainingData(sets, views)
+            loaded = train_small_model(recipe, data, out / "states", observe, print_note)
         export(loaded, out / "checkpoint", title=recipe.title, words=recipe.words)
         console().print(f"{out / 'checkpoint'}")

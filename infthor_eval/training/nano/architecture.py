@@ -1,8 +1,7 @@
 """The untrained small model: Qwen2.5-VL with random weights, and a tokenizer for household words.
 
-A frame is 112 x 112 pixels, which are eight by eight patches. Words are single tokens. So is the
-introduction of every question of the published evaluation, which would otherwise be three quarters
-of a question's tokens.
+A frame is 168 x 168 pixels: twelve by twelve patches, and three by three tokens. Words are single
+tokens, and so are some texts of several words.
 """
 
 from collections.abc import Iterable
@@ -13,6 +12,7 @@ from transformers import Qwen2_5_VLConfig
 from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLImageProcessorPil
 
 from infthor_eval.household.sequence_text import MARKS
+from infthor_eval.training.nano.reading.first_weights import Part, part_width
 from infthor_eval.training.nano.settings import NanoRecipe
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
 from model_adapters.hf.loading.checkpoint import assemble
@@ -22,23 +22,23 @@ from model_adapters.tiny.qwen2_5_vl import SPECIAL
 from model_adapters.tiny.tokenizer import train_tokenizer
 from model_adapters.tiny.twin import draw_model, token_ids
 
-__all__ = ["PATCHES", "build_untrained", "image_processor"]
+__all__ = ["BLOCK", "GRID", "PATCHES", "PATCH_SIDE", "build_untrained", "image_processor"]
 
-_PATCH_GRID = 8  # patches along each side of a frame
-PATCHES = _PATCH_GRID**2
-_SIDE = 14  # pixels of a patch
-_HEADS = 4
-# The processor rounds this to 112 x 112 pixels; with a limit of exactly 112 * 112 it would round
-# down to 84 x 84.
-_PIXELS = 12_600
+PATCHES = 12  # along each side of a frame
+BLOCK = 4  # along each side of a token's part of it
+GRID = PATCHES // BLOCK  # tokens along each side
+PATCH_SIDE = 14  # pixels
+_VISION_HEADS = 4
+_THETA = 1e8  # the slowest positions turn by less than a radian in the longest trajectory
+# The processor rounds this to 168 x 168 pixels; with a limit of exactly 168 * 168 it would round
+# down to 112 x 112.
+_PIXELS = 28_400
 _N_MERGED = 3000  # more than the number of words, so that every word is a token
 
 
-def image_processor(grid: int) -> Any:
-    """Return the image processor, for frames of as many tokens along each side."""
-    return Qwen2VLImageProcessorPil(
-        min_pixels=_PIXELS, max_pixels=_PIXELS, merge_size=_PATCH_GRID // grid
-    )
+def image_processor() -> Any:
+    """Return the image processor."""
+    return Qwen2VLImageProcessorPil(min_pixels=_PIXELS, max_pixels=_PIXELS, merge_size=BLOCK)
 
 
 def build_untrained(
@@ -64,7 +64,7 @@ def build_untrained(
     model = draw_model(
         _config(recipe, ids, len(tokenizer)), recipe.seed, ids["<|im_end|>"], ids["<|endoftext|>"]
     )
-    processor = image_processor(recipe.vision.grid)
+    processor = image_processor()
     family = Qwen25VLFamily(model, processor, tokenizer)
     family.video = None  # it is trained on no film
     return assemble(
@@ -89,10 +89,10 @@ def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
         text_config={
             "vocab_size": vocab_size,
             "hidden_size": width,
-            "intermediate_size": 3 * width,
+            "intermediate_size": width,
             "num_hidden_layers": recipe.layers,
-            "num_attention_heads": _HEADS,
-            "num_key_value_heads": _HEADS,
+            "num_attention_heads": len(Part),
+            "num_key_value_heads": len(Part),
             "max_position_embeddings": 32_768,
             "bos_token_id": None,
             "eos_token_id": ids["<|im_end|>"],
@@ -100,19 +100,19 @@ def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
             "tie_word_embeddings": True,
             "rope_parameters": {
                 "rope_type": "default",
-                "rope_theta": 1e4,
-                "mrope_section": _rope_sections(width // _HEADS),
+                "rope_theta": _THETA,
+                "mrope_section": _rope_sections(part_width(width)),
             },
         },
         vision_config={
             "depth": vision.layers,
             "hidden_size": vision.hidden,
             "intermediate_size": 2 * vision.hidden,
-            "num_heads": _HEADS,
+            "num_heads": _VISION_HEADS,
             "out_hidden_size": width,
-            "patch_size": _SIDE,
-            "spatial_merge_size": _PATCH_GRID // vision.grid,
-            "window_size": _PATCH_GRID * _SIDE,  # the whole frame
+            "patch_size": PATCH_SIDE,
+            "spatial_merge_size": BLOCK,
+            "window_size": PATCHES * PATCH_SIDE,  # the whole frame
             "fullatt_block_indexes": list(range(vision.layers)),
         },
     )

@@ -6,19 +6,14 @@ import msgspec
 
 from infthor_eval.formats.object_ids import Words
 
-__all__ = ["NanoRecipe", "QuestionSettings", "ReadingSettings", "SceneSettings", "VisionSettings"]
-
-_COUNTS = (
-    "text_steps",
-    "joint_steps",
-    "text_plans_per_step",
-    "windows_per_step",
-    "plans_per_step",
-    "joint_text_plans_per_step",
-)
-
-
-_GRIDS = (2, 4)
+__all__ = [
+    "ActingSettings",
+    "NanoRecipe",
+    "ReadingSettings",
+    "SceneSettings",
+    "ViewSettings",
+    "VisionSettings",
+]
 
 
 def _require_counts(settings: msgspec.Struct, names: Iterable[str]) -> None:
@@ -33,9 +28,9 @@ def _require_shares(settings: msgspec.Struct, names: Iterable[str]) -> None:
             raise ValueError(f"{name} is {getattr(settings, name)}; use a number between 0 and 1")
 
 
-def _require_width(settings: "NanoRecipe | VisionSettings") -> None:
-    if settings.hidden < 1 or settings.hidden % 32:
-        raise ValueError(f"hidden is {settings.hidden}; use a multiple of 32")
+def _require_width(settings: "NanoRecipe | VisionSettings", factor: int) -> None:
+    if settings.hidden < 1 or settings.hidden % factor:
+        raise ValueError(f"hidden is {settings.hidden}; use a multiple of {factor}")
 
 
 class SceneSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -83,27 +78,60 @@ class SceneSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         return tuple(f"{kind}-{self.first + at}" for kind in self.kinds for at in range(n))
 
 
+class ViewSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Views to learn seeing from, of rooms whose things are put about at random.
+
+    Attributes:
+        kinds: kinds of rooms.
+        first: number of the first room of each kind; trajectories are in others.
+        count: rooms of each kind.
+        arrangements: how often the things of a room are put about.
+        per_arrangement: views of each arrangement.
+    """
+
+    kinds: tuple[str, ...] = ("kitchen", "living-room", "bedroom", "bathroom")
+    first: int = 1001
+    count: int = 30
+    arrangements: int = 4
+    per_arrangement: int = 17
+
+    def __post_init__(self) -> None:
+        """Check the ranges of all settings.
+
+        Raises:
+            ValueError: a value is out of its range; the message names the setting.
+        """
+        _require_counts(self, ("count", "arrangements", "per_arrangement"))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all rooms."""
+        numbers = range(self.first, self.first + self.count)
+        return tuple(f"{kind}-{number}" for number in numbers for kind in self.kinds)
+
+
 class VisionSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The vision tower and the first stage, in which it learns which objects frames show where.
+    """The vision tower and the first stage, in which it learns which objects views show where.
 
     Attributes:
         hidden: width of the tower.
         layers: layers of the tower.
-        grid: tokens along each side of a frame, 2 or 4: a token merges four by four or two by two
-            patches.
         steps: steps of the first stage.
-        frames_per_step: frames in each of these.
+        patches_per_step: patches in each of these.
+        crops: share of the steps, the first ones, with crops around things instead of frames.
+        mixed: share of the later steps with crops.
         lr: highest learning rate in these.
-        weight: weight of the loss of naming objects in the other stages.
+        matrix_lr: that of the layers' matrices, whose steps are made orthogonal (Muon).
     """
 
-    hidden: int = 128
+    hidden: int = 96
     layers: int = 4
-    grid: int = 4
-    steps: int = 600
-    frames_per_step: int = 64
-    lr: float = 1.5e-3
-    weight: float = 0.1
+    steps: int = 1000
+    patches_per_step: int = 4608
+    crops: float = 0.4
+    mixed: float = 0.25
+    lr: float = 3e-3
+    matrix_lr: float = 1.5e-2
 
     def __post_init__(self) -> None:
         """Check the ranges of all settings.
@@ -111,49 +139,9 @@ class VisionSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
         Raises:
             ValueError: a value is out of its range; the message names the setting.
         """
-        _require_counts(self, ("layers", "steps", "frames_per_step"))
-        _require_width(self)
-        if self.grid not in _GRIDS:
-            raise ValueError(f"grid is {self.grid}; use one of {', '.join(map(str, _GRIDS))}")
-
-
-class QuestionSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Questions in the steps of the third stage.
-
-    Attributes:
-        per_step: fewest questions in a step.
-        together: most questions on the same frames.
-        synthetic: share of the frames with synthetic questions, by rules from what they show.
-        synthetic_frames: most frames of these.
-        paired: share of the others that are asked in both worlds of twins, if there are any.
-        recalled: share of all but the synthetic ones that are asked as behind a memory: the clue
-            frames among frames that do not matter, and the last view.
-        recalled_frames: most frames among those that do not matter.
-        whole: share of the steps with questions on one whole trajectory, of twins on both, instead.
-        per_trajectory: most questions in such a step.
-        ramp: share of the stage in which the numbers of frames and `whole` grow from nothing.
-    """
-
-    per_step: int = 100
-    together: int = 12
-    synthetic: float = 0.4
-    synthetic_frames: int = 1
-    paired: float = 0.0
-    recalled: float = 0.5
-    recalled_frames: int = 12
-    whole: float = 0.0
-    per_trajectory: int = 40
-    ramp: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the ranges of all settings.
-
-        Raises:
-            ValueError: a value is out of its range; the message names the setting.
-        """
-        counts = ("per_step", "together", "synthetic_frames", "recalled_frames", "per_trajectory")
-        _require_counts(self, counts)
-        _require_shares(self, ("synthetic", "paired", "recalled", "whole", "ramp"))
+        _require_counts(self, ("layers", "steps", "patches_per_step"))
+        _require_shares(self, ("crops", "mixed"))
+        _require_width(self, 32)
 
 
 class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -198,31 +186,54 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
             raise ValueError(f"ramp is {self.ramp}; use a number above 0 and at most 1")
 
 
+class ActingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Histories and plans in the steps in which the decoder learns to act.
+
+    Attributes:
+        windows_per_step: windows of histories in a step.
+        window_tokens: most tokens of a window.
+        single_plan_share: share of the steps with single plans of histories instead of windows.
+        plans_per_step: single plans in such a step.
+        text_plans_per_step: synthetic plans without frames in each step.
+        text_plans_weight: weight of the loss on these.
+    """
+
+    windows_per_step: int = 1
+    window_tokens: int = 2048
+    single_plan_share: float = 0.7
+    plans_per_step: int = 8
+    text_plans_per_step: int = 16
+    text_plans_weight: float = 0.5
+
+    def __post_init__(self) -> None:
+        """Check the ranges of all settings.
+
+        Raises:
+            ValueError: a value is out of its range; the message names the setting.
+        """
+        counts = ("windows_per_step", "window_tokens", "plans_per_step", "text_plans_per_step")
+        _require_counts(self, counts)
+        _require_shares(self, ("single_plan_share",))
+
+
 class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Training of the small model in three stages: vision, then text, then both together.
+    """Training of the small model in two stages: the tower, and then the decoder.
 
     Attributes:
         architecture: marks the recipe as one of the small model.
         title: description in one line.
-        scenes: scenes to generate data in if no data are given.
+        scenes: scenes to generate trajectories in if no data are given.
+        views: rooms to generate views of.
         vision: the vision tower and the first stage, in which it learns to see.
         hidden: width of the decoder.
         layers: layers of the decoder.
-        text_steps: steps of the second stage, in which the decoder learns to act by the words of
-            synthetic plans without frames. The tower is frozen from here on.
-        joint_steps: steps of the third stage, in which the decoder learns to answer questions and
-            to act.
-        text_plans_per_step: synthetic plans in each step of the second stage.
-        questions: questions in each step of the third stage.
-        windows_per_step: windows of histories in a step of the third stage.
-        window_tokens: most tokens of a window.
-        single_plan_share: share of the steps of the third stage with single plans of histories
-            instead of windows.
-        plans_per_step: single plans in such a step.
-        joint_text_plans_per_step: synthetic plans in each step of the third stage.
-        text_plans_weight: weight of the loss on these.
-        lr: highest learning rate of the second and third stage.
-        weight_decay: weight decay of AdamW.
+        steps: steps of the second stage, in which the decoder learns to read and to act. The tower
+            is frozen in it.
+        reading: questions in each of its steps.
+        acting: histories and plans in each of its steps.
+        event_weight: weight of the loss of what happened between frames.
+        lr: highest learning rate of the second stage.
+        weight_decay: weight decay of both.
         words: words of plans and actions.
         threads: torch threads; another number rounds differently.
         seed: seed of everything that is random.
@@ -231,20 +242,15 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     architecture: str = "nano"
     title: str
     scenes: SceneSettings = SceneSettings()
+    views: ViewSettings = ViewSettings()
     vision: VisionSettings = VisionSettings()
-    hidden: int = 128
+    hidden: int = 320
     layers: int = 4
-    text_steps: int = 200
-    joint_steps: int = 800
-    text_plans_per_step: int = 96
-    questions: QuestionSettings = QuestionSettings()
-    windows_per_step: int = 1
-    window_tokens: int = 2048
-    single_plan_share: float = 0.5
-    plans_per_step: int = 12
-    joint_text_plans_per_step: int = 24
-    text_plans_weight: float = 0.5
-    lr: float = 1.5e-3
+    steps: int = 600
+    reading: ReadingSettings = ReadingSettings()
+    acting: ActingSettings = ActingSettings()
+    event_weight: float = 0.3
+    lr: float = 1e-3
     weight_decay: float = 0.05
     words: Words = Words.PUBLISHED
     threads: int = 2
@@ -256,6 +262,5 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         Raises:
             ValueError: a value is out of its range; the message names the setting.
         """
-        _require_counts(self, _COUNTS)
-        _require_width(self)
-        _require_shares(self, ("single_plan_share",))
+        _require_counts(self, ("layers", "steps"))
+        _require_width(self, 40)

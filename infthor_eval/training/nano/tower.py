@@ -14,18 +14,7 @@ from transformers.models.qwen2_5_vl.modeling_qwen2_5_vl import (
     get_vision_position_ids,
 )
 
-__all__ = ["patch_states", "tower_features", "unit_logits"]
-
-
-def tower_features(tower: Any, patches: Tensor) -> Tensor:
-    """Return the features of frames, (frames, tokens, hidden), as the tower gives them.
-
-    Args:
-        tower: see `patch_states`.
-        patches: see `patch_states`.
-    """
-    merged: Tensor = tower.merger(patch_states(tower, patches).flatten(0, 1))
-    return merged.reshape(len(patches), -1, merged.shape[-1])
+__all__ = ["patch_states", "unit_logits"]
 
 
 def patch_states(tower: Any, patches: Tensor) -> Tensor:

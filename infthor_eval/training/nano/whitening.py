@@ -11,7 +11,6 @@ from torch import Tensor
 
 __all__ = ["whiten_patches"]
 
-_N_FRAMES = 1500
 _SMOOTHING = 1e-3  # of the mean variance, added to each; components of less are noise
 _SCALE = 0.5  # standard deviation of the filters' outputs
 
@@ -24,11 +23,10 @@ def whiten_patches(tower: Any, pixels: Tensor, seed: int) -> None:
     Args:
         tower: a Qwen2.5-VL vision tower.
         pixels: patches of frames, (frames, patches, values).
-        seed: seed of the choice of frames and of the rotation.
+        seed: seed of the rotation.
     """
     generator = torch.Generator().manual_seed(seed)
-    chosen = torch.randperm(len(pixels), generator=generator)[:_N_FRAMES]
-    patches = pixels[chosen].flatten(0, 1).float()
+    patches = pixels.flatten(0, 1)
     variances, components = torch.linalg.eigh(patches.T @ patches / len(patches))
     kernel = tower.patch_embed.proj.weight  # (hidden, colours, time, height, width)
     width, colours, n_times, *side = kernel.shape

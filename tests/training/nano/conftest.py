@@ -1,4 +1,4 @@
-"""A small set to train on."""
+"""A small set to train on, and a few views."""
 
 import shutil
 
@@ -6,6 +6,10 @@ import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
+from infthor_eval.generation.views.generate import ViewJob, generate_views
+from infthor_eval.thor.launch import embedded_launch
+from infthor_eval.training.nano.architecture import PATCH_SIDE, PATCHES
+from infthor_eval.workers import WorkerSettings
 
 from ...helpers.bundled import bundled_name
 
@@ -22,3 +26,14 @@ def small_set(bundled_set, tmp_path_factory):
     questions = [item for item in NiehSet(bundled_set).questions if item.traj_id in names]
     write_questions(root / "qa_set_small.csv", questions)
     return root
+
+
+@pytest.fixture(scope="session")
+def small_views(tmp_path_factory):
+    """Views of two rooms."""
+    side = PATCHES * PATCH_SIDE
+    jobs = [ViewJob(scene, 0, 1, 12, side, PATCHES) for scene in ("bedroom-301", "kitchen-302")]
+    folder = tmp_path_factory.mktemp("views")
+    generated = generate_views(jobs, embedded_launch(), folder, WorkerSettings())
+    assert not generated.failures
+    return generated.paths

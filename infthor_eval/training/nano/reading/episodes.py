@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
@@ -78,7 +79,7 @@ def read_episodes(folders: Sequence[Path]) -> tuple[list[Episode], list[SkippedS
         The episodes, and the questions that cannot be used.
 
     Raises:
-        DataError: a set cannot be read.
+        DataError: a set cannot be read, or none has a question.
     """
     episodes: dict[tuple[str, ...], Episode] = {}
     skipped: list[SkippedSequence] = []
@@ -91,6 +92,9 @@ def read_episodes(folders: Sequence[Path]) -> tuple[list[Episode], list[SkippedS
         for worlds in by_pair.values():
             if len(worlds) == (_N_WORLDS if worlds[0].question.pair else 1):
                 _add(episodes, samples.data, worlds)
+    if not episodes:
+        where = ", ".join(map(str, folders))
+        raise DataError(f"{where}: no question to learn from; give another set")
     return [*episodes.values()], skipped
 
 

@@ -18,8 +18,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from infthor_eval.training.nano.network import spellings
 from infthor_eval.training.nano.seeing.units import Role, Units
+from infthor_eval.training.nano.spelling import spellings
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
 __all__ = ["Part", "part_width", "set_first_weights"]
@@ -255,13 +255,14 @@ class _Setter:
 
     def _look_back(self, attention: Any, rows: slice, head: _Head) -> None:
         """Look so many positions back by the fast frequencies, which turn keys against queries."""
-        angle = self._frequencies()[:_N_FAST] * head.back
-        strength = _LOOK * (1.0 if head.query is None else _LOOK_AND_MATCH)
         half = self._width // 2
+        n = min(_N_FAST, half)
+        angle = self._frequencies()[:n] * head.back
+        strength = _LOOK * (1.0 if head.query is None else _LOOK_AND_MATCH)
         query, key = (one.bias[rows] for one in (attention.q_proj, attention.k_proj))
-        query[:_N_FAST] += strength
-        key[:_N_FAST] += strength * torch.cos(angle)
-        key[half : half + _N_FAST] += strength * torch.sin(angle)
+        query[:n] += strength
+        key[:n] += strength * torch.cos(angle)
+        key[half : half + n] += strength * torch.sin(angle)
 
 
 def set_first_weights(

@@ -5,6 +5,7 @@ from typing import Any
 
 import torch
 from torch import Tensor
+from torch.nn import Parameter
 from torch.nn.functional import binary_cross_entropy_with_logits, gelu
 
 from infthor_eval.training.batches import Batch
@@ -60,6 +61,13 @@ class ReadingNetwork(SequenceModel):
     @property
     def _merger_layer(self) -> Any:
         return self.model.model.visual.merger.mlp[2]
+
+    def trained_parameters(self) -> list[Parameter]:
+        """Return the parameters of all but the tower; its merger's last layer is among them."""
+        frozen = {*map(id, self.model.model.visual.parameters())} - {
+            *map(id, self._merger_layer.parameters())
+        }
+        return [parameter for parameter in self.parameters() if id(parameter) not in frozen]
 
     def losses(self, batch: Batch, events: Sequence[FrameEvents]) -> tuple[Tensor, Tensor]:
         """Return the sums of the losses of all tokens with a label, and of what happened.

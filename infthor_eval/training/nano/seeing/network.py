@@ -26,19 +26,15 @@ class SeeingNetwork(torch.nn.Module):
     Args:
         tower: a Qwen2.5-VL vision tower; its merger's first layer gets the units.
         views: the views to learn from.
-        cell_pixels: pixels of a patch in the frames as they were rendered.
-        mean: mean of the colours as the image processor subtracts it, [3], from 0 to 1.
-        deviation: what it divides by.
+        image_processor: makes the inputs of the tower from frames.
     """
 
-    def __init__(
-        self, tower: Any, views: ViewDataset, cell_pixels: int, mean: Tensor, deviation: Tensor
-    ) -> None:
+    def __init__(self, tower: Any, views: ViewDataset, image_processor: Any) -> None:
         super().__init__()
         self.tower = tower
         self._views = views
-        self._cell_pixels = cell_pixels
-        self._mean, self._deviation = mean, deviation
+        self._mean = torch.tensor(image_processor.image_mean)
+        self._deviation = torch.tensor(image_processor.image_std)
         width = tower.patch_embed.proj.out_channels
         self.norm = torch.nn.RMSNorm(width)
         self.names = torch.nn.Linear(width, len(views.units.types) + 1)
@@ -64,7 +60,7 @@ class SeeingNetwork(torch.nn.Module):
     def _unit_loss(self, states: Tensor, batch: ViewBatch) -> Tensor:
         """Return the loss of the units, summed over them, averaged over tokens."""
         units, block = self._views.units, self.tower.spatial_merge_size
-        labels, unclear = token_labels(batch, block, self._cell_pixels, len(units.types))
+        labels, unclear = token_labels(batch, block, self._views.cell_pixels, len(units.types))
         logits = unit_logits(self.tower, states, len(units)).reshape(labels.shape)
         losses = binary_cross_entropy_with_logits(
             logits, torch.from_numpy(labels).float(), reduction="none"
@@ -77,7 +73,7 @@ class SeeingNetwork(torch.nn.Module):
     def _name_loss(self, states: Tensor, batch: ViewBatch) -> Tensor:
         """Return the cross entropy of the patches' names, averaged over patches."""
         n_types = len(self._views.units.types)
-        shares = torch.from_numpy(cell_shares(batch, self._cell_pixels, n_types))
+        shares = torch.from_numpy(cell_shares(batch, self._views.cell_pixels, n_types))
         losses = -(shares * log_softmax(self.names(self.norm(states)), -1)).sum(-1)
         loose = shares[..., :-1] @ torch.from_numpy(self._views.loose).float()
         weights = 1 + _LOOSE_WEIGHT * loose

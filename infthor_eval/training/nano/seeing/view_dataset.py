@@ -20,7 +20,9 @@ from infthor_eval.training.nano.seeing.units import Units
 __all__ = ["ViewBatch", "ViewDataset", "in_merge_order"]
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
+_RENDERED_SIDE = 300  # pixels of the frames that labels are of
 _LEAST_PIXELS = 80  # of something that a crop is taken around
+_FLOOR = "Floor"  # what lies there is in no receptacle that anybody would name
 _FIXTURE_SHARE = 0.04  # weight of a crop around a fixture, of the mean weight around loose things
 _SMALL_PIXELS = 200  # what has less is taken half as often
 _SMALL_SHARE = 0.5
@@ -72,21 +74,22 @@ class ViewDataset:
     Attributes:
         units: units of the types in the views.
         loose: [types], True for the types of things that can be picked up.
+        fixtures: [types], True for the types of all others that hold something or can be opened.
 
     Raises:
         DataError: there are no files, one cannot be read, or their sizes differ.
     """
 
     def __init__(self, paths: Sequence[Path], block: int) -> None:
-        rooms = [read_views(path) for path in paths]
+        rooms = [read_views(path) for path in paths]  # as large as the data: their frames go below
         if not rooms:
             raise DataError("no labelled views to learn from; generate some")
         self._block = block
         self._grid = _common_grid(rooms, paths)
         self._digest = digest_of_files(paths)
         self.units = Units(name for room in rooms for name in room.names.tolist())
-        starts = np.cumsum([0, *(len(room.frames) for room in rooms)])
-        self._patches = np.concatenate([self._cut(room.frames) for room in rooms])
+        self._starts = starts = np.cumsum([0, *(len(room.frames) for room in rooms)])
+        self._frames = [room.frames for room in rooms]
         self._view = np.concatenate(
             [room.view + start for room, start in zip(rooms, starts[:-1], strict=True)]
         )
@@ -98,25 +101,44 @@ class ViewDataset:
             np.concatenate([getattr(room, name) for room in rooms])[order]
             for name in ("loose", "held", "opened", "pixels")
         )
-        self._first = np.searchsorted(self._view, np.arange(len(self._patches) + 1))
+        self._first = np.searchsorted(self._view, np.arange(starts[-1] + 1))
         self._n_pixels = self._pixels.sum((1, 2), dtype=np.int64)
         self.loose = np.zeros(len(self.units.types), bool)
         self.loose[self._type[self._loose]] = True
+        self.fixtures = self._find_fixtures()
         self._centres, self._chances = self._crop_centres()
 
     def __len__(self) -> int:
         """Return the number of views."""
-        return len(self._patches)
+        return int(self._starts[-1])
+
+    @property
+    def cell_pixels(self) -> int:
+        """Pixels of a cell of a frame as it was rendered."""
+        return (_RENDERED_SIDE // self._grid) ** 2
+
+    @property
+    def crop_patches(self) -> int:
+        """Patches of a crop."""
+        return self._block**2
+
+    @property
+    def frame_patches(self) -> int:
+        """Patches of a frame."""
+        return self._grid**2
 
     def identity(self) -> str:
         """Return a hash of all views and labels."""
         return self._digest
 
-    def _cut(self, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return frames as patches, [frames, grid, grid, values]."""
-        n, side = len(frames), frames.shape[1] // self._grid
-        cut = frames.reshape(n, self._grid, side, self._grid, side, 3).swapaxes(2, 3)
-        return cut.reshape(n, self._grid, self._grid, -1)
+    def _find_fixtures(self) -> NDArray[np.bool_]:
+        is_fixture = np.zeros(len(self.units.types), bool)
+        is_fixture[self._receptacle[self._receptacle >= 0]] = True
+        is_fixture[self._type[self._opened]] = True
+        floor = self.units.index(_FLOOR)
+        if floor >= 0:
+            is_fixture[floor] = False
+        return is_fixture & ~self.loose
 
     def _indices(self, rooms: Iterable[LabelledViews], column: str) -> NDArray[np.int64]:
         parts = []
@@ -164,6 +186,14 @@ class ViewDataset:
         """Return random whole frames, half of them mirrored."""
         return self.frames(rng.integers(0, len(self), n), rng.random(n) < 0.5)
 
+    def _patches(self, view: int) -> NDArray[np.uint8]:
+        """Return the patches of a frame, [grid, grid, values]."""
+        room = int(np.searchsorted(self._starts, view, side="right")) - 1
+        frame = self._frames[room][view - self._starts[room]]
+        side = len(frame) // self._grid
+        cut = frame.reshape(self._grid, side, self._grid, side, 3).swapaxes(1, 2)
+        return cut.reshape(self._grid, self._grid, -1)
+
     def _batch(
         self,
         views: NDArray[np.int64],
@@ -175,7 +205,12 @@ class ViewDataset:
         rows = top[:, None] + np.arange(side)
         columns = left[:, None] + np.arange(side)
         columns[mirrored] = columns[mirrored, ::-1]
-        patches = self._patches[views[:, None, None], rows[:, :, None], columns[:, None, :]]
+        patches = np.stack(
+            [
+                self._patches(view)[own_rows[:, None], own_columns]
+                for view, own_rows, own_columns in zip(views, rows, columns, strict=True)
+            ]
+        )
         patches[mirrored] = _mirrored(patches[mirrored])
         things = [np.arange(*self._first[view : view + 2]) for view in views]
         picture = np.repeat(np.arange(len(views)), [len(one) for one in things])

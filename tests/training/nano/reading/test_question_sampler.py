@@ -11,11 +11,11 @@ from infthor_eval.household.wording import canonical_type, object_type
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.training.encoding import Encoder
 from infthor_eval.training.nano.architecture import build_untrained
+from infthor_eval.training.nano.corpus import corpus_texts
 from infthor_eval.training.nano.reading.asking import Asker, question_intro
 from infthor_eval.training.nano.reading.episodes import read_episodes
 from infthor_eval.training.nano.reading.question_sampler import QuestionSampler
 from infthor_eval.training.nano.reading.renaming import Vocabulary
-from infthor_eval.training.nano.sampler import corpus_texts
 from infthor_eval.training.nano.seeing.units import Units
 from infthor_eval.training.nano.seen_objects import SeenFrame, read_seen_frames
 from infthor_eval.training.nano.settings import NanoRecipe, ReadingSettings
@@ -23,7 +23,7 @@ from infthor_eval.training.question_sequences import question_sequences
 
 from ....helpers.twin_sets import CLUES, write_twin_set
 
-RECIPE = NanoRecipe(title="small", hidden=32, layers=1, threads=1)
+RECIPE = NanoRecipe(title="small", hidden=40, layers=1, threads=1)
 
 
 @pytest.fixture(scope="module")

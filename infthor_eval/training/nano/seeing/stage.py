@@ -1,0 +1,61 @@
+"""The first stage of the small model's training: the tower learns to see."""
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from infthor_eval.training.muon import Muon
+from infthor_eval.training.nano.seeing.network import SeeingNetwork
+from infthor_eval.training.nano.seeing.units import Units
+from infthor_eval.training.nano.seeing.view_dataset import ViewBatch, ViewDataset
+from infthor_eval.training.nano.settings import NanoRecipe
+from infthor_eval.training.nano.steps import Stage
+from infthor_eval.training.nano.whitening import whiten_patches
+from infthor_eval.training.network import decay_groups
+
+__all__ = ["lower_thresholds", "seeing_stage"]
+
+_BETAS = (0.9, 0.98)
+_WHITENED_FRAMES = 600
+_SHIFT = 2.0  # logits by which units are raised when the tower is trained
+
+
+def seeing_stage(recipe: NanoRecipe, network: SeeingNetwork, views: ViewDataset) -> Stage:
+    """Return the stage, with the tower's first layer set to the views' principal components."""
+    vision = recipe.vision
+    rng = np.random.default_rng(recipe.seed)
+    first = views.random_frames(min(_WHITENED_FRAMES, len(views)), rng)
+    whiten_patches(network.tower, network.inputs(first), recipe.seed)
+    matrices = [parameter for parameter in network.tower.blocks.parameters() if parameter.ndim == 2]
+    chosen = {*map(id, matrices), *map(id, network.tower.merger.mlp[2].parameters())}
+    others = [parameter for parameter in network.parameters() if id(parameter) not in chosen]
+    optimizers = (
+        Muon(matrices, lr=vision.matrix_lr, weight_decay=recipe.weight_decay),
+        torch.optim.AdamW(decay_groups(others, recipe.weight_decay), lr=vision.lr, betas=_BETAS),
+    )
+
+    def compute(number: int) -> Tensor:
+        loss = network.loss(_draw(recipe, views, number))
+        loss.backward()
+        return loss.detach()
+
+    return Stage("vision", vision.steps, network, optimizers, compute)
+
+
+def _draw(recipe: NanoRecipe, views: ViewDataset, number: int) -> ViewBatch:
+    """Return the pictures of a step: crops alone at first, then also frames."""
+    vision = recipe.vision
+    rng = np.random.default_rng([recipe.seed, number])
+    is_crops = number < vision.crops * vision.steps or rng.random() < vision.mixed
+    if is_crops:
+        return views.crops(max(1, vision.patches_per_step // views.crop_patches), rng)
+    return views.random_frames(max(1, vision.patches_per_step // views.frame_patches), rng)
+
+
+def lower_thresholds(tower: Any, units: Units) -> None:
+    """Let units hand on what they are half sure of: a unit is on from above a half at first, and
+    rare things seldom get there."""
+    with torch.no_grad():
+        tower.merger.mlp[0].bias[: len(units)] += _SHIFT

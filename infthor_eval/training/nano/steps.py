@@ -1,0 +1,87 @@
+"""The steps of a stage of the small model's training."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from infthor_eval.training.checkpoints import Checkpoints
+
+__all__ = ["NanoProgress", "Stage", "run_stage"]
+
+_WARM_UP = 50  # steps
+_LOWEST = 0.03  # final learning rate as a share of the highest
+_CLIP = 1.0
+_STEPS_PER_STATE = 100  # a state is written, from which a stopped training continues
+
+
+@dataclass(frozen=True)
+class NanoProgress:
+    """A finished step.
+
+    Attributes:
+        stage: "vision" or "reading".
+        step: number of the step in the stage, from 1.
+        n_steps: steps of the stage.
+        loss: loss in nats: in the first stage of units and names of patches, in the second the sum
+            of the losses per token of answers, of actions, and of weighted synthetic plans.
+    """
+
+    stage: str
+    step: int
+    n_steps: int
+    loss: float
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of the training.
+
+    Attributes:
+        name: name of the stage.
+        n_steps: number of its steps.
+        network: what is trained.
+        optimizers: optimizers, with the highest learning rate in each of their groups.
+        compute: adds the gradients of a step, given its number, and returns its loss.
+    """
+
+    name: str
+    n_steps: int
+    network: torch.nn.Module
+    optimizers: Sequence[torch.optim.Optimizer]
+    compute: Callable[[int], Tensor]
+
+
+def run_stage(
+    stage: Stage, checkpoints: Checkpoints, on_step: Callable[[NanoProgress], None]
+) -> None:
+    """Run the steps of a stage that its last state has not, with a linear warm-up and a cosine
+    decay of the learning rates.
+
+    Raises:
+        DataError: a state is damaged or cannot be written.
+        UsageError: the states are of another recipe or other data.
+    """
+    groups: list[tuple[dict[str, Any], float]] = [
+        (group, group["lr"]) for one in stage.optimizers for group in one.param_groups
+    ]
+    trained = [parameter for group, _ in groups for parameter in group["params"]]
+    stage.network.train()
+    for number in range(checkpoints.restore(stage.network, *stage.optimizers), stage.n_steps):
+        warm_up = min(1.0, (number + 1) / _WARM_UP)
+        decay = 0.5 * (1 + math.cos(math.pi * number / stage.n_steps))
+        for group, highest in groups:
+            group["lr"] = highest * warm_up * (_LOWEST + (1 - _LOWEST) * decay)
+        stage.network.zero_grad()
+        loss = stage.compute(number)
+        torch.nn.utils.clip_grad_norm_(trained, _CLIP)
+        for optimizer in stage.optimizers:
+            optimizer.step()
+        n_done = number + 1
+        if n_done % _STEPS_PER_STATE == 0 or n_done == stage.n_steps:
+            checkpoints.save(n_done, stage.network, *stage.optimizers)
+        on_step(NanoProgress(stage.name, n_done, stage.n_steps, loss.item()))
+    stage.network.eval()
