@@ -30,15 +30,17 @@ GRID = PATCHES // BLOCK  # tokens along each side
 PATCH_SIDE = 14  # pixels
 _VISION_HEADS = 4
 _THETA = 1e8  # the slowest positions turn by less than a radian in the longest trajectory
-# The processor rounds this to 168 x 168 pixels; with a limit of exactly 168 * 168 it would round
-# down to 112 x 112.
-_PIXELS = 28_400
+# The processor rounds frames down to fewer pixels than the one, and up to more than the other; so
+# frames of any size become 168 x 168, which is between them.
+_MIN_PIXELS, _MAX_PIXELS = 28_000, 28_400
 _N_MERGED = 3000  # more than the number of words, so that every word is a token
 
 
 def image_processor() -> Any:
     """Return the image processor."""
-    return Qwen2VLImageProcessorPil(min_pixels=_PIXELS, max_pixels=_PIXELS, merge_size=BLOCK)
+    return Qwen2VLImageProcessorPil(
+        min_pixels=_MIN_PIXELS, max_pixels=_MAX_PIXELS, merge_size=BLOCK
+    )
 
 
 def build_untrained(

@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 from safetensors.torch import load_file
 
 from infthor_eval.errors import DataError, UsageError
@@ -16,7 +17,7 @@ from infthor_eval.training.encoding import Encoder
 from infthor_eval.training.export import export
 from infthor_eval.training.nano import steps
 from infthor_eval.training.nano.action_sampler import ActionSampler, SyntheticPlans
-from infthor_eval.training.nano.architecture import BLOCK, build_untrained, image_processor
+from infthor_eval.training.nano.architecture import BLOCK, PATCHES, build_untrained, image_processor
 from infthor_eval.training.nano.corpus import corpus_texts, single_tokens
 from infthor_eval.training.nano.reading.asking import question_intro
 from infthor_eval.training.nano.reading.frame_units import read_frame_units
@@ -107,6 +108,13 @@ def test_types_are_those_of_parts_and_slices():
         "Apple|+1|+2|+3|AppleSliced_2",
     )
     assert [object_type_of(key) for key in ids] == ["Mug", "SinkBasin", "AppleSliced"]
+
+
+@pytest.mark.parametrize("side", [84, 100, 168, 224, 300, 640])
+def test_frames_of_any_size_have_as_many_patches(side):
+    picture = Image.new("RGB", (side, side))
+    patches = image_processor()(images=[picture], return_tensors="pt")["pixel_values"]
+    assert len(patches) == PATCHES**2
 
 
 def test_words_and_some_texts_of_several_are_tokens(loaded, views):

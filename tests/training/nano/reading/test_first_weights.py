@@ -1,0 +1,81 @@
+"""What the decoder's heads do before any training."""
+
+import pytest
+import torch
+from torch.nn.functional import gelu
+
+from infthor_eval.training.nano.architecture import GRID, build_untrained
+from infthor_eval.training.nano.reading.first_weights import set_first_weights
+from infthor_eval.training.nano.seeing.units import Role, Units
+from infthor_eval.training.nano.settings import NanoRecipe
+from infthor_eval.training.nano.spelling import spellings
+
+LOOSE = ("Apple", "Book", "Knife", "Mug", "Plate")
+FIXTURES = ("CounterTop", "Fridge", "Sink")
+UNITS = Units([*LOOSE, *FIXTURES])
+PLACE = 4  # the token in the middle of a frame
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    recipe = NanoRecipe(title="small", layers=2, threads=1)
+    texts = [text for name in UNITS.types for text in spellings(name)]
+    loaded = build_untrained(recipe, texts, [])
+    kinds = ([name in group for name in UNITS.types] for group in (LOOSE, FIXTURES))
+    set_first_weights(loaded, UNITS, *kinds, GRID, seed=0)
+    loaded.model.set_attn_implementation("eager")
+    return loaded.model.eval(), loaded.tokenizer, loaded.family
+
+
+def looks(loaded, shown, word, layer, head):
+    """Where a head looks from a word after a frame: at the token before it, its nine, its end.
+
+    Args:
+        shown: type and role of what the middle of the frame shows.
+    """
+    model, tokenizer, family = loaded
+    values = torch.full((1, GRID**2, len(Role), len(UNITS.types)), -9.0)
+    for name, role in shown:
+        values[0, PLACE, role, UNITS.index(name)] = 4.0
+    merger = model.model.visual.merger.mlp[2]
+    with torch.no_grad():
+        weight = merger.weight[:, : len(UNITS)]
+        features = torch.nn.functional.linear(gelu(values.flatten(2)), weight)[0]
+    names = ("vision_start", "image_pad", "vision_end")
+    start, pad, end = (tokenizer.convert_tokens_to_ids(f"<|{name}|>") for name in names)
+    (token,) = tokenizer(word, add_special_tokens=False)["input_ids"]
+    ids = torch.tensor([start, *[pad] * GRID**2, end, token])
+    embeds = model.get_input_embeddings()(ids).detach()
+    embeds[1 : 1 + GRID**2] = features
+    positions = family.positions(ids, [(168, 168)], 0)
+    with torch.no_grad():
+        output = model.get_decoder()(
+            inputs_embeds=embeds[None], position_ids=positions, output_attentions=True
+        )
+    return output.attentions[layer][0, head, -1]
+
+
+def test_a_name_finds_the_part_of_the_frame_that_shows_the_thing(loaded):
+    """Apart from itself, which is alike, too."""
+    shown = [("Mug", Role.SHOWN), ("Sink", Role.AROUND)]
+    weights = looks(loaded, shown, " mug", layer=0, head=0)[:-1]
+    assert weights[1 + PLACE] > 0.9 * weights.sum()
+    other = looks(loaded, shown, " knife", layer=0, head=0)[:-1]
+    assert other[1 + PLACE] < 0.01 * weights[1 + PLACE]
+
+
+def test_a_fixture_finds_what_is_in_it(loaded):
+    shown = [("Mug", Role.SHOWN), ("Sink", Role.AROUND)]
+    assert looks(loaded, shown, " sink", layer=0, head=1)[1 + PLACE] > 0.9
+    assert looks(loaded, shown, " fridge", layer=0, head=1)[1 + PLACE] < 0.5
+
+
+def test_names_of_one_thing_are_alike_in_all_spellings(loaded):
+    model, tokenizer, _ = loaded
+    words = model.get_input_embeddings().weight
+    spelled = [tokenizer(text, add_special_tokens=False)["input_ids"] for text in spellings("Mug")]
+    mugs = torch.stack([words[ids[0]] for ids in spelled if len(ids) == 1])
+    (knife,) = tokenizer(" knife", add_special_tokens=False)["input_ids"]
+    alike = torch.cosine_similarity(mugs[:1], mugs[1:])
+    assert len(alike) > 1
+    assert alike.min() > torch.cosine_similarity(mugs[:1], words[knife][None]).item() + 0.3
