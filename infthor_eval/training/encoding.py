@@ -17,7 +17,14 @@ from model_adapters import Part, Turn
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.prompt import Frame, Piece, Prompter, n_common, n_tokens
 
-__all__ = ["Encoder", "SkippedSequence", "TrainingSequence", "join_branches", "within"]
+__all__ = [
+    "Encoder",
+    "SkippedSequence",
+    "TrainingSequence",
+    "join_branches",
+    "with_branches",
+    "within",
+]
 
 
 @dataclass(frozen=True)
@@ -36,6 +43,10 @@ class TrainingSequence:
     pieces: tuple[Piece, ...]
     has_loss: tuple[bool, ...]
     branches: tuple[int, ...] = ()
+
+    def part(self, places: slice) -> "TrainingSequence":
+        """Return some pieces of a sequence without branches."""
+        return TrainingSequence(self.name, self.pieces[places], self.has_loss[places])
 
     @property
     def spans(self) -> list[slice]:
@@ -85,13 +96,26 @@ def join_branches(name: str, sequences: Sequence[TrainingSequence]) -> TrainingS
     # The piece before the first with loss is part of the branch: the loss is computed there.
     firsts = [sequence.has_loss.index(True) - 1 for sequence in sequences]
     n = min(n_common([sequence.pieces for sequence in sequences]), *firsts)
-    tails = [(sequence.pieces[n:], sequence.has_loss[n:]) for sequence in sequences]
-    first = sequences[0]
+    return with_branches(
+        name, sequences[0].part(slice(n)), [one.part(slice(n, None)) for one in sequences]
+    )
+
+
+def with_branches(
+    name: str, head: TrainingSequence, tails: Sequence[TrainingSequence]
+) -> TrainingSequence:
+    """Return a sequence that goes on in several ways, given what is before them and each of them.
+
+    Args:
+        name: source of the sequence.
+        head: what all of them follow; without branches, as the others are.
+        tails: the branches.
+    """
     return TrainingSequence(
         name,
-        (*first.pieces[:n], *(piece for pieces, _ in tails for piece in pieces)),
-        (*first.has_loss[:n], *(flag for _, flags in tails for flag in flags)),
-        tuple(len(pieces) for pieces, _ in tails),
+        (*head.pieces, *(piece for tail in tails for piece in tail.pieces)),
+        (*head.has_loss, *(flag for tail in tails for flag in tail.has_loss)),
+        tuple(len(tail.pieces) for tail in tails),
     )
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from infthor_eval.errors import InfthorError, SimulatorError
+from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.pictures.labelled_views import (
     ThingInView,
     read_views,
@@ -182,16 +183,12 @@ def _things(view: SimulatorView, number: int, grid: int) -> list[ThingInView]:
         if key not in view.objects or pixels.sum() < _LEAST_PIXELS:
             continue
         thing = view.objects[key]
-        parents = [
-            view.objects[name].object_type
-            for name in thing.parent_receptacles or ()
-            if name in view.objects
-        ]
+        parents = thing.parent_receptacles
         things.append(
             ThingInView(
                 number,
                 thing.object_type,
-                parents[0] if parents else None,
+                object_type_of(parents[0]) if parents else None,
                 thing.pickupable is True,
                 thing.is_picked_up,
                 thing.is_open is True,

@@ -7,15 +7,23 @@ from typing import Any
 
 import torch
 from torch import Tensor
+from torch.nn import Parameter
 
 from infthor_eval.training.checkpoints import Checkpoints
+from infthor_eval.training.network import decay_groups
 
-__all__ = ["NanoProgress", "Stage", "run_stage"]
+__all__ = ["NanoProgress", "Stage", "adamw", "run_stage"]
 
 _WARM_UP = 50  # steps
 _LOWEST = 0.03  # final learning rate as a share of the highest
 _CLIP = 1.0
+_BETAS = (0.9, 0.98)
 _STEPS_PER_STATE = 100  # a state is written, from which a stopped training continues
+
+
+def adamw(parameters: Sequence[Parameter], lr: float, weight_decay: float) -> torch.optim.AdamW:
+    """Return the optimizer of what Muon does not train."""
+    return torch.optim.AdamW(decay_groups(parameters, weight_decay), lr=lr, betas=_BETAS)
 
 
 @dataclass(frozen=True)

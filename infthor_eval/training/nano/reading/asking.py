@@ -8,7 +8,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import CONTEXTS
 from infthor_eval.nieh.prompts import question_text
-from infthor_eval.training.encoding import Encoder, TrainingSequence
+from infthor_eval.training.encoding import Encoder, TrainingSequence, with_branches
 from infthor_eval.training.nano.reading.frame_units import RenamedFrame
 from infthor_eval.training.nano.reading.network import FrameEvents
 from model_adapters.hf.prompting.prompt import Frame, Piece
@@ -77,17 +77,14 @@ class Asker:
                 else one
                 for one in head
             ]
+        shown = TrainingSequence("frames", tuple(head), (False,) * len(head))
         tails = [self._tail(text, answer) for text, answer in asked]
-        pieces = (*head, *(piece for tail in tails for piece in tail.pieces))
-        has_loss = (False,) * len(head) + tuple(flag for tail in tails for flag in tail.has_loss)
-        branches = tuple(len(tail.pieces) for tail in tails)
-        return ReadingSequence(TrainingSequence("questions", pieces, has_loss, branches), events)
+        return ReadingSequence(with_branches("questions", shown, tails), events)
 
     def _encode_tail(self, text: str, answer: str) -> TrainingSequence:
         """Return what follows the last frame."""
         whole = self._encoder.answer("question", [self._any_frame, _prompt(text)], answer)
-        n = _n_with_frames(whole.pieces)
-        return TrainingSequence("question", whole.pieces[n:], whole.has_loss[n:])
+        return whole.part(slice(_n_with_frames(whole.pieces), None))
 
 
 def _n_with_frames(pieces: Sequence[Piece]) -> int:

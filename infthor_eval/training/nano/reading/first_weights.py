@@ -55,7 +55,8 @@ class _Head:
 
 
 def _heads(grid: int) -> tuple[tuple[_Head, ...], ...]:
-    """Return the heads of each layer, for frames of as many tokens along each side.
+    """Return the heads of each layer, for frames of as many tokens along each side; further layers
+    are like the last.
 
     A frame takes `grid` positions and one before and after; its end comes `grid` after its tokens.
     """
@@ -86,7 +87,6 @@ def _heads(grid: int) -> tuple[tuple[_Head, ...], ...]:
             held_before,
             contents,
         ),
-        answers,
         answers,
     )
 

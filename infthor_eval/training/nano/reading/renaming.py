@@ -113,10 +113,6 @@ class Vocabulary:
         parts = (part.rstrip() for part in self._template(text) if isinstance(part, str))
         return [part if part.startswith(" ") else f" {part}" for part in parts if part]
 
-    def types_in(self, text: str) -> list[str]:
-        """Return the types that a question names, in order."""
-        return [part.type for part in self._template(text) if isinstance(part, _Slot)]
-
     def _find_slots(self, text: str) -> Sequence[str | _Slot]:
         parts: list[str | _Slot] = []
         done = 0

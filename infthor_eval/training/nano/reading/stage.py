@@ -15,12 +15,10 @@ from infthor_eval.training.nano.reading.asking import ReadingSequence
 from infthor_eval.training.nano.reading.network import ReadingNetwork
 from infthor_eval.training.nano.reading.question_sampler import QuestionSampler
 from infthor_eval.training.nano.settings import NanoRecipe
-from infthor_eval.training.nano.steps import Stage
-from infthor_eval.training.network import decay_groups
+from infthor_eval.training.nano.steps import Stage, adamw
 
 __all__ = ["reading_stage"]
 
-_BETAS = (0.9, 0.98)
 _BATCHES = 4  # that the sequences of a step are computed in
 _Sequence = TypeVar("_Sequence", ReadingSequence, TrainingSequence)
 
@@ -32,9 +30,7 @@ def reading_stage(
     actions: ActionSampler,
 ) -> Stage:
     """Return the stage, in which the tower is frozen but for the merger's last layer."""
-    optimizer = torch.optim.AdamW(
-        decay_groups(network.trained_parameters(), recipe.weight_decay), lr=recipe.lr, betas=_BETAS
-    )
+    optimizer = adamw(network.trained_parameters(), recipe.lr, recipe.weight_decay)
 
     def compute(number: int) -> Tensor:
         rng = random.Random(f"{recipe.seed}/{number}")

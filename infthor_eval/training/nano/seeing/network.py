@@ -65,10 +65,10 @@ class SeeingNetwork(torch.nn.Module):
         losses = binary_cross_entropy_with_logits(
             logits, torch.from_numpy(labels).float(), reduction="none"
         )
-        losses = losses * torch.tensor([_ROLE_WEIGHTS[role] for role in Role])[:, None]
-        shown = losses[:, :, Role.SHOWN].masked_fill(torch.from_numpy(unclear), 0.0)
-        others = losses.sum((2, 3)) - losses[:, :, Role.SHOWN].sum(2)
-        return (shown.sum(2) + others).mean()
+        weights = torch.tensor([_ROLE_WEIGHTS[role] for role in Role])[:, None]
+        is_ignored = torch.zeros(labels.shape, dtype=torch.bool)
+        is_ignored[:, :, Role.SHOWN] = torch.from_numpy(unclear)
+        return (losses * weights).masked_fill(is_ignored, 0.0).sum((2, 3)).mean()
 
     def _name_loss(self, states: Tensor, batch: ViewBatch) -> Tensor:
         """Return the cross entropy of the patches' names, averaged over patches."""

@@ -11,13 +11,11 @@ from infthor_eval.training.nano.seeing.network import SeeingNetwork
 from infthor_eval.training.nano.seeing.units import Units
 from infthor_eval.training.nano.seeing.view_dataset import ViewBatch, ViewDataset
 from infthor_eval.training.nano.settings import NanoRecipe
-from infthor_eval.training.nano.steps import Stage
+from infthor_eval.training.nano.steps import Stage, adamw
 from infthor_eval.training.nano.whitening import whiten_patches
-from infthor_eval.training.network import decay_groups
 
 __all__ = ["lower_thresholds", "seeing_stage"]
 
-_BETAS = (0.9, 0.98)
 _WHITENED_FRAMES = 600
 _SHIFT = 2.0  # logits by which units are raised when the tower is trained
 
@@ -33,7 +31,7 @@ def seeing_stage(recipe: NanoRecipe, network: SeeingNetwork, views: ViewDataset)
     others = [parameter for parameter in network.parameters() if id(parameter) not in chosen]
     optimizers = (
         Muon(matrices, lr=vision.matrix_lr, weight_decay=recipe.weight_decay),
-        torch.optim.AdamW(decay_groups(others, recipe.weight_decay), lr=vision.lr, betas=_BETAS),
+        adamw(others, vision.lr, recipe.weight_decay),
     )
 
     def compute(number: int) -> Tensor:

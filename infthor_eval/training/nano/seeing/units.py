@@ -40,6 +40,6 @@ class Units:
         """Return the number of units."""
         return len(Role) * len(self.types)
 
-    def index(self, object_type: str | None) -> int:
+    def index(self, object_type: str) -> int:
         """Return a type's index in `types`, or -1 if it has no units."""
-        return -1 if object_type is None else self._index.get(canonical_type(object_type), -1)
+        return self._index.get(canonical_type(object_type), -1)

@@ -81,12 +81,12 @@ class ViewDataset:
     """
 
     def __init__(self, paths: Sequence[Path], block: int) -> None:
-        rooms = [read_views(path) for path in paths]  # as large as the data: their frames go below
+        rooms = [read_views(path) for path in paths]
         if not rooms:
             raise DataError("no labelled views to learn from; generate some")
         self._block = block
         self._grid = _common_grid(rooms, paths)
-        self._digest = digest_of_files(paths)
+        self._paths = paths
         self.units = Units(name for room in rooms for name in room.names.tolist())
         self._starts = starts = np.cumsum([0, *(len(room.frames) for room in rooms)])
         self._frames = [room.frames for room in rooms]
@@ -129,7 +129,7 @@ class ViewDataset:
 
     def identity(self) -> str:
         """Return a hash of all views and labels."""
-        return self._digest
+        return digest_of_files(self._paths)
 
     def _find_fixtures(self) -> NDArray[np.bool_]:
         is_fixture = np.zeros(len(self.units.types), bool)

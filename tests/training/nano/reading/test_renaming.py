@@ -61,4 +61,4 @@ def test_slices_and_parts_are_no_types_of_their_own():
 def test_phrases_are_what_is_said_around_the_types():
     text = "Where did you move the apple from the fridge?"
     assert VOCABULARY.phrases(text) == [" Where did you move the", " from the", " ?"]
-    assert VOCABULARY.types_in(text) == ["Apple", "Fridge"]
+    assert VOCABULARY.form(text) == "Where did you move the _ from the _?"
