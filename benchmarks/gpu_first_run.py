@@ -44,6 +44,7 @@ def main(words: Sequence[str] | None = None) -> int:
         data=options.data,
         download=options.download,
         old_libraries=options.old_libraries,
+        frames=options.frames,
     )
     try:
         prepare_folder(options.out)
@@ -71,6 +72,12 @@ def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
         "--old-libraries",
         metavar="FOLDER:...",
         help="folders of the libraries of the policies' publication (reference_policies.py)",
+    )
+    parser.add_argument(
+        "--frames",
+        type=int,
+        default=1040,
+        help="frames of the long trajectory that speeds are measured on; default 1040, 128K tokens",
     )
     parser.add_argument(
         "--minutes", type=float, default=60, help="no step begins after; default 60"

@@ -12,6 +12,7 @@ from infthor_eval.nieh.published.hub_data import default_folder
 
 __all__ = ["CHECKPOINT", "Machine", "find_machine"]
 
+_TINY_FRAMES = 24
 CHECKPOINT = "Qwen/Qwen2.5-VL-7B-Instruct"
 
 
@@ -32,6 +33,7 @@ class Machine:
         old_libraries: folders of the libraries of the policies' publication, with colons between
             them; None without.
         flash: whether flash-attn is installed.
+        frames: frames of the long trajectory that speeds are measured on.
     """
 
     device: str
@@ -44,6 +46,7 @@ class Machine:
     download: bool
     old_libraries: str | None
     flash: bool
+    frames: int
 
     @property
     def kernels(self) -> tuple[str, ...]:
@@ -67,8 +70,10 @@ def find_machine(
     data: Path | None,
     download: bool,
     old_libraries: str | None,
+    frames: int,
 ) -> Machine:
-    """Look at the machine; `checkpoint` and `data` are folders, looked for where None."""
+    """Look at the machine; `checkpoint` and `data` are folders, looked for where None, and `frames`
+    those of the long trajectory."""
     on_gpu = device == "cuda"
     properties = torch.cuda.get_device_properties(0) if on_gpu else None
     weights = str(checkpoint) if checkpoint else _cached(download)
@@ -84,6 +89,7 @@ def find_machine(
         download=download,
         old_libraries=old_libraries,
         flash=on_gpu and importlib.util.find_spec("flash_attn") is not None,
+        frames=_TINY_FRAMES if tiny else frames,
     )
 
 

@@ -40,6 +40,7 @@ def machine(script):
         download=False,
         old_libraries=None,
         flash=False,
+        frames=1040,
     )
 
 

@@ -150,6 +150,8 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     Attributes:
         tokens_per_step: fewest tokens of the questions of a step, with their frames.
         together: most questions on the same frames.
+        labelled: share of the steps, the first ones, in which frames are known by what they show,
+            and not by what the tower tells of them.
         renamed: share of the homes in which each type of thing is taken for another.
         single: share of the steps, the first ones, in which all questions are on single frames.
         ramp: share of the steps, from there on, in which the numbers of frames grow.
@@ -164,6 +166,7 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
 
     tokens_per_step: int = 1500
     together: int = 12
+    labelled: float = 0.5
     renamed: float = 0.7
     single: float = 0.15
     ramp: float = 0.3
@@ -181,7 +184,7 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
             ValueError: a value is out of its range; the message names the setting.
         """
         _require_counts(self, ("tokens_per_step", "together", "synthetic_frames"))
-        _require_shares(self, ("renamed", "single", "synthetic", "recalled", "whole"))
+        _require_shares(self, ("labelled", "renamed", "single", "synthetic", "recalled", "whole"))
         if not 0 < self.ramp <= 1:
             raise ValueError(f"ramp is {self.ramp}; use a number above 0 and at most 1")
 

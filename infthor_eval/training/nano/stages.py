@@ -18,6 +18,7 @@ from infthor_eval.training.nano.reading.asking import Asker
 from infthor_eval.training.nano.reading.episodes import read_episodes
 from infthor_eval.training.nano.reading.first_weights import set_first_weights
 from infthor_eval.training.nano.reading.frame_units import read_frame_units
+from infthor_eval.training.nano.reading.label_units import label_units
 from infthor_eval.training.nano.reading.network import ReadingNetwork
 from infthor_eval.training.nano.reading.question_sampler import QuestionSampler
 from infthor_eval.training.nano.reading.renaming import Vocabulary
@@ -110,7 +111,8 @@ def train_small_model(
     network = ReadingNetwork(
         loaded, read_frame_units(frames, image_processor(), tower, units), units
     )
-    stage = reading_stage(recipe, network, questions, actions)
+    labelled = label_units(seen, units, views.loose, GRID, recipe.seed)
+    stage = reading_stage(recipe, network, labelled, questions, actions)
     run_stage(stage, Checkpoints(states / stage.name, about), on_step)
     # Halves the file; no answer of the bundled model depends on the rounding.
     loaded.model.to(torch.bfloat16)

@@ -34,13 +34,14 @@ class ReadingNetwork(SequenceModel):
         units: their names.
 
     Attributes:
+        frames: units that frames are known by from now on.
         norm: normalises states for the next layer.
         events: reads off what happened between frames; it is not part of the model.
     """
 
     def __init__(self, loaded: LoadedCheckpoint, frames: FrameUnits, units: Units) -> None:
         super().__init__(loaded)
-        self._frames = frames
+        self.frames = frames
         self._units = units
         self._frame_end: int = loaded.model.config.vision_end_token_id
         hidden = loaded.model.config.text_config.hidden_size
@@ -52,7 +53,7 @@ class ReadingNetwork(SequenceModel):
         """Return the features of each frame, (slots, hidden)."""
         if not frames:
             return []
-        values = torch.stack([self._frames.of(frame) for frame in frames])
+        values = torch.stack([self.frames.of(frame) for frame in frames])
         layer = self._merger_layer
         on = gelu(values.flatten(2))
         features = torch.nn.functional.linear(on, layer.weight[:, : len(self._units)], layer.bias)

@@ -12,6 +12,7 @@ from infthor_eval.training.batches import collate
 from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.nano.action_sampler import ActionSampler
 from infthor_eval.training.nano.reading.asking import ReadingSequence
+from infthor_eval.training.nano.reading.frame_units import FrameUnits
 from infthor_eval.training.nano.reading.network import ReadingNetwork
 from infthor_eval.training.nano.reading.question_sampler import QuestionSampler
 from infthor_eval.training.nano.settings import NanoRecipe
@@ -26,14 +27,25 @@ _Sequence = TypeVar("_Sequence", ReadingSequence, TrainingSequence)
 def reading_stage(
     recipe: NanoRecipe,
     network: ReadingNetwork,
+    labelled: FrameUnits,
     questions: QuestionSampler,
     actions: ActionSampler,
 ) -> Stage:
-    """Return the stage, in which the tower is frozen but for the merger's last layer."""
+    """Return the stage, in which the tower is frozen but for the merger's last layer.
+
+    Args:
+        recipe: recipe of the training.
+        network: the decoder with what the tower tells of all frames.
+        labelled: what the frames show, which comes first.
+        questions: draws questions.
+        actions: draws histories and plans.
+    """
     optimizer = adamw(network.trained_parameters(), recipe.lr, recipe.weight_decay)
+    told = network.frames
 
     def compute(number: int) -> Tensor:
         rng = random.Random(f"{recipe.seed}/{number}")
+        network.frames = labelled if number < recipe.reading.labelled * recipe.steps else told
         drawn = questions.draw(rng, number / recipe.steps)
         loss = _learn_to_read(network, drawn, recipe.event_weight)
         loss += _learn_to_act(network, actions.histories(rng), 1.0)
