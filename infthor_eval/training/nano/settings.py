@@ -157,11 +157,13 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
         ramp: share of the steps, from there on, in which the numbers of frames grow.
         synthetic: share of the frames with synthetic questions, by rules from what they show.
         synthetic_frames: most frames of these.
+        events: share of the frames with synthetic questions on a few events in a row.
+        events_in_a_row: most events of these.
         filled: most synthetic questions that are added to recorded ones.
-        recalled: share of the others that are asked as behind a memory: the clue frames among
-            frames that do not matter, and the last view.
+        recalled: share of the recorded ones that are asked as behind a memory: the clue frames
+            among frames that do not matter, and the last view.
         recalled_frames: most frames among those that do not matter.
-        whole: share of the others that are asked on the whole trajectory.
+        whole: share of the recorded ones that are asked on the whole trajectory.
     """
 
     tokens_per_step: int = 1500
@@ -170,8 +172,10 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     renamed: float = 0.7
     single: float = 0.15
     ramp: float = 0.3
-    synthetic: float = 0.4
+    synthetic: float = 0.25
     synthetic_frames: int = 6
+    events: float = 0.3
+    events_in_a_row: int = 6
     filled: int = 4
     recalled: float = 0.5
     recalled_frames: int = 8
@@ -183,8 +187,11 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
         Raises:
             ValueError: a value is out of its range; the message names the setting.
         """
-        _require_counts(self, ("tokens_per_step", "together", "synthetic_frames"))
-        _require_shares(self, ("labelled", "renamed", "single", "synthetic", "recalled", "whole"))
+        _require_counts(
+            self, ("tokens_per_step", "together", "synthetic_frames", "events_in_a_row")
+        )
+        shares = ("labelled", "renamed", "single", "synthetic", "events", "recalled", "whole")
+        _require_shares(self, shares)
         if not 0 < self.ramp <= 1:
             raise ValueError(f"ramp is {self.ramp}; use a number above 0 and at most 1")
 

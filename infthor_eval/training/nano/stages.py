@@ -33,6 +33,9 @@ from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
 __all__ = ["TrainingData", "train_small_model"]
 
+# What the first stage depends on: with other settings of the second one its tower is still good.
+_SEEING = ("hidden", "layers", "seed", "threads", "vision", "weight_decay")
+
 
 @dataclass(frozen=True)
 class TrainingData:
@@ -88,14 +91,13 @@ def train_small_model(
     loaded = build_untrained(recipe, corpus_texts(data.sets, types), tokens)
     frames = [one.frame for one in seen]
     about = {
-        "recipe": fingerprint(msgspec.to_builtins(recipe)),
         "views": views.identity(),
         "frames": fingerprint({"frames": [frame.digest for frame in frames]}),
     }
     tower = loaded.model.model.visual
     seeing = SeeingNetwork(tower, views, image_processor())
     stage = seeing_stage(recipe, seeing, views)
-    run_stage(stage, Checkpoints(states / stage.name, about), on_step)
+    run_stage(stage, Checkpoints(states / stage.name, about | _settings(recipe, _SEEING)), on_step)
     lower_thresholds(tower, units)
 
     encoder = Encoder(loaded)
@@ -113,7 +115,14 @@ def train_small_model(
     )
     labelled = label_units(seen, units, views.loose, GRID, recipe.seed)
     stage = reading_stage(recipe, network, labelled, questions, actions)
-    run_stage(stage, Checkpoints(states / stage.name, about), on_step)
+    run_stage(stage, Checkpoints(states / stage.name, about | _settings(recipe)), on_step)
     # Halves the file; no answer of the bundled model depends on the rounding.
     loaded.model.to(torch.bfloat16)
     return loaded
+
+
+def _settings(recipe: NanoRecipe, names: Sequence[str] | None = None) -> dict[str, str]:
+    """Return a hash of a recipe's settings, or of some of them."""
+    settings = msgspec.to_builtins(recipe)
+    chosen = {name: settings[name] for name in names or settings}
+    return {"recipe": fingerprint(chosen)}

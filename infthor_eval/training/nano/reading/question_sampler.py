@@ -7,13 +7,14 @@ worlds is then all that there is to learn from them.
 
 import random
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
 from infthor_eval.training.nano.reading.asking import Asker, ReadingSequence
 from infthor_eval.training.nano.reading.episodes import Episode, RecordedQuestion, World
+from infthor_eval.training.nano.reading.event_questions import EventQuestions
 from infthor_eval.training.nano.reading.events import events_in
 from infthor_eval.training.nano.reading.frame_units import type_order
 from infthor_eval.training.nano.reading.renaming import Renaming, Vocabulary
@@ -67,6 +68,7 @@ class QuestionSampler:
         frames = [*seen]
         self._seen = {one.frame.digest: one for one in frames}
         self._synthetic_questions = SyntheticQuestions(frames)
+        self._event_questions = EventQuestions(self._seen)
         self._by_form: dict[str, list[tuple[Episode, RecordedQuestion]]] = defaultdict(list)
         for episode in episodes:
             for question in episode.questions:
@@ -89,10 +91,18 @@ class QuestionSampler:
         drawn: list[ReadingSequence] = []
         while sum(one.tokens.n_tokens for one in drawn) < settings.tokens_per_step:
             names = self._draw_names(rng)
-            is_synthetic = is_single or rng.random() < settings.synthetic
-            found = (self._synthetic if is_synthetic else self._recorded)(rng, grown, names)
+            found = self._kind(is_single, rng)(rng, grown, names)
             drawn += (one for one in found if one.tokens.n_tokens <= _MOST_TOKENS)
         return drawn
+
+    def _kind(
+        self, is_single: bool, rng: random.Random
+    ) -> Callable[[random.Random, float, _Names], list[ReadingSequence]]:
+        settings = self._settings
+        share = rng.random()
+        if is_single or share < settings.synthetic:
+            return self._synthetic
+        return self._events if share < settings.synthetic + settings.events else self._recorded
 
     def _draw_names(self, rng: random.Random) -> _Names:
         if rng.random() >= self._settings.renamed:
@@ -113,6 +123,22 @@ class QuestionSampler:
         in_a_row = [*range(first, first + n)]
         places = in_a_row if rng.random() < 0.5 else sorted(rng.sample(range(n_frames), n))
         asked = self._ask_by_rules(world, places, settings.together, names, rng)
+        return [self._sequence(world, places, asked, names)] if asked else []
+
+    def _events(self, rng: random.Random, grown: float, names: _Names) -> list[ReadingSequence]:
+        """Return questions on a few events in a row; few events are the most likely.
+
+        There are none if the frames do not show them.
+        """
+        settings = self._settings
+        world = rng.choice(rng.choice(self._episodes).worlds)
+        n = 1 + round(rng.random() * (settings.events_in_a_row - 1) * grown)
+        places = self._event_questions.draw_places(world, n, rng)
+        asked = [
+            self._renamed(text, answer.split(", "), names, in_any_order=False)
+            for text, answer in self._event_questions.ask(world, places, settings.together, rng)
+            if names.order is None or _SLICED not in text + answer
+        ]
         return [self._sequence(world, places, asked, names)] if asked else []
 
     def _recorded(self, rng: random.Random, grown: float, names: _Names) -> list[ReadingSequence]:

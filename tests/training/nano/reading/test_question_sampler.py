@@ -23,6 +23,7 @@ from infthor_eval.training.question_sequences import question_sequences
 
 from ....helpers.twin_sets import CLUES, write_twin_set
 
+RECORDED = {"synthetic": 0.0, "events": 0.0, "single": 0.0}  # no others
 RECIPE = NanoRecipe(title="small", hidden=40, layers=1, threads=1)
 
 
@@ -81,7 +82,12 @@ def texts(loaded):
 
 
 def test_a_question_as_recorded_has_the_prompt_of_evaluation(small_set, make, loaded):
-    settings = {"synthetic": 0.0, "single": 0.0, "recalled": 0.0, "whole": 0.0, "renamed": 0.0}
+    settings = {
+        **RECORDED,
+        "recalled": 0.0,
+        "whole": 0.0,
+        "renamed": 0.0,
+    }
     sampler = make(small_set, **settings, together=1, filled=0)
     task = find_samples({"data": str(small_set), "context": "clues"})
     evaluated = {
@@ -131,7 +137,12 @@ def test_both_worlds_of_twins_are_asked_on_the_same_frames_by_number(tmp_path, m
     data = NiehSet(twin_set)
     views = [data.frames(name) for name in {question.traj_id for question in data.questions}]
     frames = [SeenFrame(frame, ()) for view in views for frame in view]
-    settings = {"synthetic": 0.0, "single": 0.0, "recalled": 0.0, "whole": 0.0, "filled": 0}
+    settings = {
+        **RECORDED,
+        "recalled": 0.0,
+        "whole": 0.0,
+        "filled": 0,
+    }
     sampler = make(twin_set, frames=frames, **settings, renamed=0.5, tokens_per_step=3000)
     drawn = sampler.draw(random.Random(0), 1.0)
     for first, second in zip(drawn[::2], drawn[1::2], strict=True):
@@ -148,7 +159,7 @@ def test_both_worlds_of_twins_are_asked_on_the_same_frames_by_number(tmp_path, m
 
 
 def test_whole_trajectories_have_all_frames_and_what_happened(small_set, make):
-    sampler = make(small_set, synthetic=0.0, single=0.0, whole=1.0, tokens_per_step=1)
+    sampler = make(small_set, **RECORDED, whole=1.0, tokens_per_step=1)
     (one,) = sampler.draw(random.Random(0), 1.0)
     assert len(one.events) == len(one.tokens.frames) > 40
     assert one.events[0] is None
