@@ -12,6 +12,8 @@ import gzip
 import json
 import lzma
 import stat
+import struct
+import zipfile
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,6 +27,7 @@ from infthor_eval.storage.limits import FILE_MB, LINE_MB
 
 __all__ = [
     "DAMAGED",
+    "DAMAGED_ZIP",
     "NOT_JSON",
     "file_problem",
     "find_packed",
@@ -43,6 +46,9 @@ T = TypeVar("T")
 
 # What the decoders of gzip, xz and zip raise on damaged content, beside OSError.
 DAMAGED = (EOFError, zlib.error, lzma.LZMAError)
+# What a damaged zip archive raises when it is opened, and when a member is read. RuntimeError: of a
+# member that is encrypted, or packed in a way that is not known.
+DAMAGED_ZIP = (zipfile.BadZipFile, OSError, RuntimeError, struct.error, *DAMAGED)
 # What `msgspec` raises on what is not JSON of its type.
 NOT_JSON = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 _MB = 2**20

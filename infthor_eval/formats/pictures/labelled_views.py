@@ -18,18 +18,31 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.formats.reading import DAMAGED_ZIP
 from infthor_eval.storage.files import write_atomically, writing_hint
 
 __all__ = ["LabelledViews", "ThingInView", "read_views", "views_of", "write_views"]
 
 _NONE = -1
-_MALFORMED = (OSError, ValueError, TypeError, BadZipFile)
+_COLOURS = 3
+_MALFORMED = (*DAMAGED_ZIP, ValueError, TypeError, MemoryError)
+# Kinds of numpy's types, and dimensions; those of things have one row a thing.
+_FORMS = {
+    "frames": ("u", 4),
+    "names": ("U", 1),
+    "view": ("i", 1),
+    "type": ("i", 1),
+    "receptacle": ("i", 1),
+    "loose": ("b", 1),
+    "held": ("b", 1),
+    "opened": ("b", 1),
+    "pixels": ("u", 3),
+}
 
 
 class ThingInView(NamedTuple):
@@ -123,6 +136,12 @@ def read_views(path: Path) -> LabelledViews:
 
 def _problem(views: LabelledViews) -> str | None:
     """Return what is wrong with views, None for nothing."""
+    for name, form in _FORMS.items():
+        array = getattr(views, name)
+        if (array.dtype.kind, array.ndim) != form:
+            return f"its {name} are {array.dtype} of {array.ndim} dimensions"
+    if views.frames.shape[3] != _COLOURS:
+        return f"its frames have {views.frames.shape[3]} colours"
     n_things = len(views.view)
     columns = (
         *(views.type, views.receptacle, views.loose),

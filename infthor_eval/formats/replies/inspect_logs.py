@@ -6,7 +6,6 @@ The package writes them packed with zstandard, which Python's own zip reader doe
 
 import struct
 import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError, in_one_line
-from infthor_eval.formats.reading import json_value, require_file
+from infthor_eval.formats.reading import DAMAGED_ZIP, json_value, require_file
 from infthor_eval.formats.replies.exported_samples import told_of
 from infthor_eval.formats.replies.logged import LoggedReply
 from infthor_eval.quantities import Amount, Count
@@ -30,8 +29,6 @@ _HINT = "give a log as inspect_ai writes it"
 _ZSTANDARD = 93
 _LOCAL = struct.Struct("<26xHH")  # up to the lengths of a member's name and extra field
 _MB = 1_000_000
-# RuntimeError: of a member that is encrypted, or packed in a way that is not known.
-_DAMAGED = (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, struct.error)
 
 
 class _Spec(msgspec.Struct, frozen=True):
@@ -109,7 +106,7 @@ def _samples(path: Path) -> Iterator[tuple[_Spec, Any]]:
             for name, member in members.items():
                 if name.startswith(_SAMPLES):
                     yield spec, _document(archive, member)
-    except (*_DAMAGED, ValueError) as error:  # msgspec's errors are ValueErrors
+    except (*DAMAGED_ZIP, ValueError) as error:  # msgspec's errors are ValueErrors
         raise DataError(f"{path}: not a log of inspect_ai ({in_one_line(error)}); {_HINT}") from (
             error
         )

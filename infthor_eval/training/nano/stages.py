@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import torch
@@ -26,9 +27,9 @@ from infthor_eval.training.nano.reading.stage import reading_stage
 from infthor_eval.training.nano.seeing.network import SeeingNetwork
 from infthor_eval.training.nano.seeing.stage import lower_thresholds, seeing_stage
 from infthor_eval.training.nano.seeing.view_dataset import ViewDataset
-from infthor_eval.training.nano.seen_objects import read_seen_frames
+from infthor_eval.training.nano.seen_objects import SeenFrame, read_seen_frames
 from infthor_eval.training.nano.settings import NanoRecipe
-from infthor_eval.training.nano.steps import NanoProgress, run_stage
+from infthor_eval.training.nano.steps import NanoProgress, Stage, run_stage
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
 __all__ = ["TrainingData", "train_small_model"]
@@ -78,6 +79,47 @@ def train_small_model(
     """
     torch.set_num_threads(recipe.threads)
     torch.manual_seed(recipe.seed)
+    training = _prepare(recipe, data)
+
+    def run(stage: Stage, settings: dict[str, str]) -> None:
+        run_stage(stage, Checkpoints(states / stage.name, training.about | settings), on_step)
+
+    run(_seeing(training), _settings(recipe, _SEEING))
+    run(_reading(training, print_note), _settings(recipe))
+    # Halves the file; no answer of the bundled model depends on the rounding.
+    training.loaded.model.to(torch.bfloat16)
+    return training.loaded
+
+
+@dataclass(frozen=True)
+class _Training:
+    """What both stages have in common.
+
+    Attributes:
+        recipe: recipe of the training.
+        sets: folders of replayed sets.
+        views: the views to learn seeing from.
+        seen: the frames of the sets, and what they show.
+        vocabulary: the types that questions and answers may name.
+        loaded: the model.
+        about: what states depend on beside the recipe.
+    """
+
+    recipe: NanoRecipe
+    sets: Sequence[Path]
+    views: ViewDataset
+    seen: Sequence[SeenFrame]
+    vocabulary: Vocabulary
+    loaded: LoadedCheckpoint
+    about: dict[str, str]
+
+    @property
+    def tower(self) -> Any:
+        """The vision tower."""
+        return self.loaded.model.model.visual
+
+
+def _prepare(recipe: NanoRecipe, data: TrainingData) -> _Training:
     views = ViewDataset(data.views, BLOCK)
     units = views.units
     seen = read_seen_frames(data.sets)
@@ -88,37 +130,38 @@ def train_small_model(
     )
     types = sorted({*units.types, *(one.type for _, objects in seen for one in objects)})
     tokens = single_tokens(data.sets, vocabulary, types)
-    loaded = build_untrained(recipe, corpus_texts(data.sets, types), tokens)
-    frames = [one.frame for one in seen]
     about = {
         "views": views.identity(),
-        "frames": fingerprint({"frames": [frame.digest for frame in frames]}),
+        "frames": fingerprint({"frames": [frame.digest for frame, _ in seen]}),
     }
-    tower = loaded.model.model.visual
-    seeing = SeeingNetwork(tower, views, image_processor())
-    stage = seeing_stage(recipe, seeing, views)
-    run_stage(stage, Checkpoints(states / stage.name, about | _settings(recipe, _SEEING)), on_step)
-    lower_thresholds(tower, units)
+    loaded = build_untrained(recipe, corpus_texts(data.sets, types), tokens)
+    return _Training(recipe, data.sets, views, seen, vocabulary, loaded, about)
 
+
+def _seeing(training: _Training) -> Stage:
+    network = SeeingNetwork(training.tower, training.views, image_processor())
+    return seeing_stage(training.recipe, network, training.views)
+
+
+def _reading(training: _Training, print_note: Callable[[str], None]) -> Stage:
+    recipe, loaded, seen = training.recipe, training.loaded, training.seen
+    views, units, tower = training.views, training.views.units, training.tower
+    lower_thresholds(tower, units)
     encoder = Encoder(loaded)
-    episodes, skipped = read_episodes(data.sets)
-    actions = ActionSampler(encoder, data.sets, recipe.acting, recipe.words)
+    episodes, skipped = read_episodes(training.sets)
+    actions = ActionSampler(encoder, training.sets, recipe.acting, recipe.words)
     for _, reason, n in count_reasons(("", one.reason) for one in (*skipped, *actions.skipped)):
         print_note(f"{n} skipped: {reason}")
+    frames = [frame for frame, _ in seen]
     asker = Asker(encoder, frames[0])
-    questions = QuestionSampler(asker, episodes, seen, vocabulary, units, recipe.reading)
+    questions = QuestionSampler(asker, episodes, seen, training.vocabulary, units, recipe.reading)
     set_first_weights(
         loaded, units, views.loose.tolist(), views.fixtures.tolist(), GRID, recipe.seed
     )
-    network = ReadingNetwork(
-        loaded, read_frame_units(frames, image_processor(), tower, units), units
-    )
+    told = read_frame_units(frames, image_processor(), tower, units)
     labelled = label_units(seen, units, views.loose, GRID, recipe.seed)
-    stage = reading_stage(recipe, network, labelled, questions, actions)
-    run_stage(stage, Checkpoints(states / stage.name, about | _settings(recipe)), on_step)
-    # Halves the file; no answer of the bundled model depends on the rounding.
-    loaded.model.to(torch.bfloat16)
-    return loaded
+    network = ReadingNetwork(loaded, told, units)
+    return reading_stage(recipe, network, labelled, questions, actions)
 
 
 def _settings(recipe: NanoRecipe, names: Sequence[str] | None = None) -> dict[str, str]:

@@ -45,6 +45,9 @@ def test_written_views_are_read_as_they_were(tmp_path):
         ("view", np.array([0, 1, 2], np.int32), "it names a view or a type that it does not have"),
         ("type", np.array([0, 1, 9], np.int16), "it names a view or a type that it does not have"),
         ("held", np.array([True]), "its columns have different lengths"),
+        ("held", np.array([1.0, 0.0, 1.0]), "its held are float64 of 1 dimensions"),
+        ("pixels", np.zeros(3, np.uint16), "its pixels are uint16 of 1 dimensions"),
+        ("frames", np.zeros((2, 4, 4, 4), np.uint8), "its frames have 4 colours"),
     ],
 )
 def test_arrays_that_do_not_belong_together_are_refused(tmp_path, array, value, problem):
