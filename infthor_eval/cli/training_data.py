@@ -65,7 +65,9 @@ def generate_training_data(
 def generate_training_views(
     views: ViewSettings, seed: int, out: Path, worker_settings: WorkerSettings
 ) -> list[Path]:
-    """Generate labelled views of rooms; those in the folder already are not generated again.
+    """Generate labelled views of rooms; those that are there already are not generated again.
+
+    Views of other settings are kept beside them, in a folder of their own.
 
     Returns:
         A file for each room.
@@ -73,8 +75,9 @@ def generate_training_views(
     Raises:
         DataError: a room has none.
     """
-    prepare_folder(out)
     side = PATCHES * PATCH_SIDE
+    settings = f"seed{seed}-{views.arrangements}x{views.per_arrangement}-{side}px-{PATCHES}"
+    folder = prepare_folder(out / settings)
     jobs = [
         ViewJob(name, seed, views.arrangements, views.per_arrangement, side, PATCHES)
         for name in views.names
@@ -83,13 +86,13 @@ def generate_training_views(
         generated = generate_views(
             jobs,
             embedded_launch(),
-            out,
+            folder,
             worker_settings,
             PacedBar(progress, "views", len(jobs)).advance,
             print_note,
         )
-    _require_whole(out, generated.failures)
-    print_note(f"{generated.views:,} views of {len(jobs)} rooms: {out}")
+    _require_whole(folder, generated.failures)
+    print_note(f"{generated.views:,} views of {len(jobs)} rooms: {folder}")
     return generated.paths
 
 
