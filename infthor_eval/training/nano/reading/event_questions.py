@@ -20,6 +20,7 @@ from infthor_eval.household.wording import (
 from infthor_eval.training.nano.reading.episodes import World
 from infthor_eval.training.nano.reading.events import Event
 from infthor_eval.training.nano.seen_objects import SeenFrame
+from infthor_eval.training.nano.synthetic_questions import AskedText
 
 __all__ = ["EventQuestions"]
 
@@ -69,7 +70,7 @@ class EventQuestions:
 
     def ask(
         self, world: World, places: Sequence[int], n: int, rng: random.Random
-    ) -> list[tuple[str, str]]:
+    ) -> list[AskedText]:
         """Return up to `n` distinct questions on what frames show to happen, in random order.
 
         Args:
@@ -113,7 +114,7 @@ def _listed(types: Sequence[str]) -> str:
     return ", ".join(dict.fromkeys(map(answer_of, types)))
 
 
-def _puts(changes: Sequence[_Change], _: random.Random) -> Iterator[tuple[str, str]]:
+def _puts(changes: Sequence[_Change], _: random.Random) -> Iterator[AskedText]:
     puts = [one for one in _of(changes, Event.PUT) if one.where is not None]
     for place in dict.fromkeys(one.where for one in puts if one.where):
         things = [one.type for one in puts if one.where == place]
@@ -129,7 +130,7 @@ def _puts(changes: Sequence[_Change], _: random.Random) -> Iterator[tuple[str, s
         yield "Where did you put things?", _listed([one.where for one in puts if one.where])
 
 
-def _pickups(changes: Sequence[_Change], rng: random.Random) -> Iterator[tuple[str, str]]:
+def _pickups(changes: Sequence[_Change], rng: random.Random) -> Iterator[AskedText]:
     pickups = _of(changes, Event.PICKED_UP)
     things = [*dict.fromkeys(one.type for one in pickups)]
     if things:
@@ -145,7 +146,7 @@ def _pickups(changes: Sequence[_Change], rng: random.Random) -> Iterator[tuple[s
         yield text, "yes" if first < second else "no"
 
 
-def _openings(changes: Sequence[_Change], rng: random.Random) -> Iterator[tuple[str, str]]:
+def _openings(changes: Sequence[_Change], rng: random.Random) -> Iterator[AskedText]:
     opened = [one.type for one in _of(changes, Event.OPENED)]
     for name in dict.fromkeys(opened):
         named = rng.choice((with_the(name), with_article(noun(name))))

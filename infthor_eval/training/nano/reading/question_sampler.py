@@ -126,7 +126,7 @@ class QuestionSampler:
         return [self._sequence(world, places, asked, names)] if asked else []
 
     def _events(self, rng: random.Random, grown: float, names: _Names) -> list[ReadingSequence]:
-        """Return questions on a few events in a row; few events are the most likely.
+        """Return questions on a few events in a row.
 
         There are none if the frames do not show them.
         """
@@ -134,11 +134,8 @@ class QuestionSampler:
         world = rng.choice(rng.choice(self._episodes).worlds)
         n = 1 + round(rng.random() * (settings.events_in_a_row - 1) * grown)
         places = self._event_questions.draw_places(world, n, rng)
-        asked = [
-            self._renamed(text, answer.split(", "), names, in_any_order=False)
-            for text, answer in self._event_questions.ask(world, places, settings.together, rng)
-            if names.order is None or _SLICED not in text + answer
-        ]
+        found = self._event_questions.ask(world, places, settings.together, rng)
+        asked = self._all_renamed(found, names, in_any_order=False)
         return [self._sequence(world, places, asked, names)] if asked else []
 
     def _recorded(self, rng: random.Random, grown: float, names: _Names) -> list[ReadingSequence]:
@@ -181,11 +178,16 @@ class QuestionSampler:
     ) -> list[AskedText]:
         seen = [self._seen[world.frames[at].digest] for at in places]
         asked = self._synthetic_questions.ask(seen, n, rng)
-        if names.order is not None:
-            asked = [(text, answer) for text, answer in asked if _SLICED not in text + answer]
+        return self._all_renamed(asked, names, in_any_order=True)
+
+    def _all_renamed(
+        self, asked: Iterable[AskedText], names: _Names, *, in_any_order: bool
+    ) -> list[AskedText]:
+        """Return questions in the names of a home; one about slices cannot be renamed."""
         return [
-            self._renamed(text, answer.split(", "), names, in_any_order=True)
+            self._renamed(text, answer.split(", "), names, in_any_order=in_any_order)
             for text, answer in asked
+            if names.order is None or _SLICED not in text + answer
         ]
 
     def _in_words(self, question: Question, names: _Names) -> AskedText:
