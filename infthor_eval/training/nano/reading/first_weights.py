@@ -72,6 +72,13 @@ def _heads(grid: int) -> tuple[tuple[_Head, ...], ...]:
         _Head(fixture, fixture, back=2),
         _Head(rest, rest, back=1),
     )
+    compared = (  # whether two names in the question, or a name and a frame, are of one thing
+        _Head(rest, rest, thing, thing),
+        where,
+        _Head(thing, thing, back=2),
+        _Head(rest, rest, fixture, fixture),
+        _Head(rest, rest, back=1),
+    )
     return (
         (
             where,
@@ -88,6 +95,7 @@ def _heads(grid: int) -> tuple[tuple[_Head, ...], ...]:
             contents,
         ),
         answers,
+        compared,
     )
 
 
@@ -104,6 +112,7 @@ _SINK = 2.0
 _HAND_ON = 0.35
 _LOOK = 2.7
 _LOOK_AND_MATCH = 0.8  # of a look's scale, for heads that also compare
+_LOOK_AWAY = 3.2
 _N_FAST = 8  # frequencies by which positions are told apart
 _SLOW = 0.012  # radians a position; slower ones do not change in a few frames
 _QUERY_NOISE, _VALUE_NOISE = 0.15, 0.3
@@ -233,6 +242,8 @@ class _Setter:
             rows = slice(number * self._width, (number + 1) * self._width)
             if head.query is not None and head.key is not None:
                 self._compare(attention, rows, head.query, head.key, codes)
+            if head.query is not None and head.query is head.key and not head.back:
+                self._look_away(attention, rows)
             if head.back:
                 self._look_back(attention, rows, head)
             identity = _HAND_ON * torch.eye(self._width)
@@ -252,6 +263,12 @@ class _Setter:
         attention.k_proj.weight[rows, self._part(key)] += match
         sink = codes.thing_sink if query is Part.THING else codes.fixture_sink
         attention.q_proj.bias[rows] += _SINK * sink * slow
+
+    def _look_away(self, attention: Any, rows: slice) -> None:
+        """Look past the token itself, which is most like itself, by the fast frequencies."""
+        n = min(_N_FAST, self._width // 2)
+        attention.q_proj.bias[rows][:n] -= _LOOK_AWAY
+        attention.k_proj.bias[rows][:n] += _LOOK_AWAY
 
     def _look_back(self, attention: Any, rows: slice, head: _Head) -> None:
         """Look so many positions back by the fast frequencies, which turn keys against queries."""
