@@ -13,14 +13,14 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 from PIL import Image
 
-FRAMES = Path(__file__).parents[1] / "infthor_eval/sets/nieh_mini/metadata/kitchen-1-seed3/img"
-SHOWN = (2, 30, 58, 90, 100, 133)
-CLUES = (133,)
-QUESTION = "How many objects were on the dining table?"
+FRAMES = Path(__file__).parents[1] / "infthor_eval/sets/nieh_mini/metadata/bedroom-1-seed7/img"
+SHOWN = (5, 30, 52, 76, 81, 88)
+CLUES = (76,)
+QUESTION = "Where was the tennis racket before you picked it up?"
 LINES = (
-    ("gold answer", "2", "#222222"),
-    ("qwen2.5-vl-nano", "2", "#2a7f3f"),
-    ("blind", "1", "#b03030"),
+    ("gold answer", "desk", "#222222"),
+    ("qwen2.5-vl-nano", "desk", "#2a7f3f"),
+    ("blind", "cabinet", "#b03030"),
 )
 
 
@@ -38,7 +38,7 @@ def main() -> None:
         for spine in axis.spines.values():
             spine.set(color="#d08a00" if is_clue else "#bbbbbb", linewidth=3 if is_clue else 1)
     figure.text(0.012, 0.2, QUESTION, fontsize=12, weight="bold")
-    for place, (name, reply, colour) in zip((0.012, 0.16, 0.345), LINES, strict=True):
+    for place, (name, reply, colour) in zip((0.012, 0.19, 0.40), LINES, strict=True):
         figure.text(place, 0.06, f"{name}:", fontsize=10.5, color="#555555")
         figure.text(
             place + 0.0087 * len(name) + 0.012,

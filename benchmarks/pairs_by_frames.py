@@ -61,7 +61,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", help="folder of the runs")
     runs = load_runs(parser.parse_args().folder)
-    points = read_points(runs[runs.task == "nieh_mini_twins"])
+    points = read_points(runs[(runs.task == "nieh_mini_twins") & (runs.state == "whole")])
     print(points.round(1).to_string(index=False))
     draw(points).savefig(PICTURE, metadata={"Software": None})
 

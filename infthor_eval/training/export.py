@@ -87,4 +87,6 @@ def _write(
         loaded.image_processor.save_pretrained(folder)
         own = loaded.model.state_dict() if weights is None else weights
         loaded.model.save_pretrained(folder, state_dict=with_published_names(own))
+    for file in folder.glob("*.safetensors"):  # safetensors writes them for their owner alone
+        file.chmod((folder / _CONFIG).stat().st_mode)
     (folder / "README.md").write_text(_CARD.format(title=title, words=words), encoding="utf-8")

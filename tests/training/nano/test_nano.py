@@ -236,6 +236,7 @@ def test_training_is_the_same_for_a_seed_and_lowers_the_loss(data, tmp_path):
     assert sum(losses[0][15:20]) < 0.95 * sum(losses[0][:5])
     first, second = (load_file(tmp_path / name / "model.safetensors") for name in ("a", "b"))
     assert all(first[name].equal(second[name]) for name in first)
+    assert len({file.stat().st_mode for file in (tmp_path / "a").iterdir()}) == 1  # for all alike
     options = {"pretrained": str(tmp_path / "a"), "dtype": "float32"}
     check_adapter(load("qwen2.5-vl-nano", options, seed=0))
     check_adapter(load("qwen2.5-vl", options, seed=0))
