@@ -17,7 +17,6 @@ from infthor_eval.errors import (
     UsageError,
     UserCodeError,
     in_one_line,
-    unknown_name,
     wrap_user_code,
 )
 from infthor_eval.memory.functions import function_memory
@@ -167,8 +166,6 @@ def memory_class(name: str) -> Any:
     if names_a_file(name):
         own = load_from_file(name)
         return function_memory(name, own) if inspect.isfunction(own) else own
-    if name not in MEMORIES.names:
-        raise unknown_name("memory", name, MEMORIES.names)
     return MEMORIES.load(name, Memory)
 
 
