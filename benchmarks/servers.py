@@ -106,7 +106,10 @@ def _arguments(
 
 
 def _ask(suite: str, arguments: list[str], output: Path) -> tuple[dict[Any, Any], float]:
-    """Return the reply, or the steps of a plan, by unit, and the share of cached tokens."""
+    """Return the reply, or the steps of a plan, by unit, and the share of cached tokens.
+
+    The rest of a plan's record is not compared: tokens since a clue are not known of a server.
+    """
     process = subprocess.run(
         [*_COMMAND, *arguments, "--output", str(output)],
         env=ENVIRONMENT,
@@ -120,9 +123,9 @@ def _ask(suite: str, arguments: list[str], output: Path) -> tuple[dict[Any, Any]
     _, records = read_run(results.parent, find_suite(suite).records)
     read = sum(record.tokens.context or 0 for record in records)
     cached = sum(record.tokens.cached or 0 for record in records)
-    return {record.key: record.failure or record.payload for record in records}, cached / max(
-        read, 1
-    )
+    said = "steps" if suite == "plans" else "reply"
+    replies = {record.key: record.failure or getattr(record.payload, said) for record in records}
+    return replies, cached / max(read, 1)
 
 
 if __name__ == "__main__":
