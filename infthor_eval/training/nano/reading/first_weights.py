@@ -242,10 +242,11 @@ class _Setter:
             rows = slice(number * self._width, (number + 1) * self._width)
             if head.query is not None and head.key is not None:
                 self._compare(attention, rows, head.query, head.key, codes)
-            if head.query is not None and head.query is head.key and not head.back:
-                self._look_away(attention, rows)
             if head.back:
-                self._look_back(attention, rows, head)
+                share = 1.0 if head.query is None else _LOOK_AND_MATCH
+                self._look(attention, rows, head.back, _LOOK * share)
+            elif head.query is head.key:  # the token itself is most like itself
+                self._look(attention, rows, 0, -_LOOK_AWAY)
             identity = _HAND_ON * torch.eye(self._width)
             attention.v_proj.weight[rows, self._part(head.value)] += identity
             attention.o_proj.weight[self._part(head.to), rows] += identity
@@ -264,22 +265,18 @@ class _Setter:
         sink = codes.thing_sink if query is Part.THING else codes.fixture_sink
         attention.q_proj.bias[rows] += _SINK * sink * slow
 
-    def _look_away(self, attention: Any, rows: slice) -> None:
-        """Look past the token itself, which is most like itself, by the fast frequencies."""
-        n = min(_N_FAST, self._width // 2)
-        attention.q_proj.bias[rows][:n] -= _LOOK_AWAY
-        attention.k_proj.bias[rows][:n] += _LOOK_AWAY
+    def _look(self, attention: Any, rows: slice, back: int, strength: float) -> None:
+        """Look so many positions back by the fast frequencies, which turn keys against queries.
 
-    def _look_back(self, attention: Any, rows: slice, head: _Head) -> None:
-        """Look so many positions back by the fast frequencies, which turn keys against queries."""
+        With a negative strength look past the token there.
+        """
         half = self._width // 2
         n = min(_N_FAST, half)
-        angle = self._frequencies()[:n] * head.back
-        strength = _LOOK * (1.0 if head.query is None else _LOOK_AND_MATCH)
+        angle = self._frequencies()[:n] * back
         query, key = (one.bias[rows] for one in (attention.q_proj, attention.k_proj))
         query[:n] += strength
-        key[:n] += strength * torch.cos(angle)
-        key[half : half + n] += strength * torch.sin(angle)
+        key[:n] += abs(strength) * torch.cos(angle)
+        key[half : half + n] += abs(strength) * torch.sin(angle)
 
 
 def set_first_weights(
