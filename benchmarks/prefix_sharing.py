@@ -11,6 +11,8 @@ One run measures, with the same Qwen2.5-VL with random weights and the same fram
 
     python benchmarks/prefix_sharing.py --frames 120 --questions 24
 
+With --margins it says, where replies differ, how near a tie the tokens were at which they part.
+
 With --machine it also prints tokens per second in the form of published_evaluation.py, peak memory
 and, with --largest, the largest context that fits. On a GPU, for random weights of the real shape:
 
@@ -33,6 +35,7 @@ from typing import Any
 import torch
 from noise_set import question_texts, write_frames
 from prefix_ways import (
+    Answer,
     Replies,
     Timed,
     answer_in_batches,
@@ -143,6 +146,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--model-size", choices=("tiny", "7b"), default="tiny")
     parser.add_argument("--attention", default="sdpa", help="attn_implementation")
     parser.add_argument("--chunk-tokens", type=_numbers, default=[1024], help="sizes, with commas")
+    parser.add_argument(
+        "--margins", action="store_true", help="record how near a tie each token was"
+    )
     parser.add_argument("--machine", action="store_true", help="measure speeds and memory as well")
     parser.add_argument("--largest", action="store_true", help="find the largest context that fits")
     parser.add_argument(
@@ -169,6 +175,7 @@ def build(options: argparse.Namespace) -> TransformersModel:
         chunk_tokens=options.chunk_tokens[0],
         batch_size=options.batch_size[0],
         max_tokens=0,
+        margins=options.margins,
     )
     # A GPU draws seven billion weights in a second, a processor in minutes.
     with torch.device(options.device):
@@ -210,8 +217,7 @@ def machine_figures(
         clear_cache(model)
         if on_gpu:
             torch.cuda.reset_peak_memory_stats()
-        seconds, replies = timed(lambda some=some: [_prefill(model, some)])
-        tokens = replies[0][0]
+        seconds, tokens = timed(partial(_prefill, model, some))
         peak = torch.cuda.max_memory_allocated() / 2**30 if on_gpu else None
         points.append({"tokens": tokens, "rate": tokens / seconds, "peak_gib": peak})
     largest = _largest(model, frames) if options.largest else None
@@ -244,14 +250,14 @@ def _decoding_speed(
         answer_one_by_one(model, frames, [""], new)
         seconds, replies = timed(lambda new=new: answer_one_by_one(model, frames, [""], new))
         times.append(seconds)
-        lengths.append(len(replies[0]))
+        lengths.append(len(replies[0].token_ids))
     return (lengths[1] - lengths[0]) / (times[1] - times[0])
 
 
-def _prefill(model: TransformersModel, frames: Sequence[FrameRef]) -> tuple[int, ...]:
+def _prefill(model: TransformersModel, frames: Sequence[FrameRef]) -> int:
     talk = model.conversation()
     talk.append(*frames)
-    return (talk.reply(Decoding(max_new_tokens=1)).n_context_tokens or 0,)
+    return talk.reply(Decoding(max_new_tokens=1)).n_context_tokens or 0
 
 
 def _largest(model: TransformersModel, frames: Sequence[FrameRef]) -> int:
@@ -260,7 +266,7 @@ def _largest(model: TransformersModel, frames: Sequence[FrameRef]) -> int:
     while True:
         clear_cache(model)
         try:
-            fits = _prefill(model, repeated)[0]
+            fits = _prefill(model, repeated)
         except ModelError:
             return fits
         repeated *= 2
@@ -279,20 +285,43 @@ def report(measured: dict[str, list[Timed]], options: argparse.Namespace) -> Non
         if name in found:
             print(f"{name:16s}{found[name]:7.2f}")
     print(f"replies equal    {'yes' if found['replies equal'] else 'NO'}")
+    if found["parting margin"] is not None:
+        print(f"they part at     {found['parting margin']:.3f} nats")
 
 
-def figures(measured: dict[str, list[Timed]]) -> dict[str, float | bool]:
-    """Return the fastest seconds of each way, the factors of those that were measured, and whether
-    all replies are equal."""
+def figures(measured: dict[str, list[Timed]]) -> dict[str, float | bool | None]:
+    """Return the fastest seconds of each way, the factors of those that were measured, whether all
+    replies are equal, and the largest margin at which one parts from another."""
     best = {name: min(seconds for seconds, _ in runs) for name, runs in measured.items()}
-    replies = [reply for runs in measured.values() for _, reply in runs]
+    first, *others = [replies for runs in measured.values() for _, replies in runs]
     pairs = {name: name.split(" / ") for name in FACTORS}
     factors = {
         name: best[slow] / best[fast]
         for name, (slow, fast) in pairs.items()
         if slow in best and fast in best
     }
-    return {**best, **factors, "replies equal": all(reply == replies[0] for reply in replies)}
+    margins = [
+        _margin(answer, other)
+        for replies in others
+        for answer, other in zip(first, replies, strict=True)
+        if answer.token_ids != other.token_ids
+    ]
+    known = [margin for margin in margins if margin is not None]
+    return {
+        **best,
+        **factors,
+        "replies equal": not margins,
+        "parting margin": max(known) if margins and len(known) == len(margins) else None,
+    }
+
+
+def _margin(answer: Answer, other: Answer) -> float | None:
+    """Return by how many nats the surer of two answers preferred its token where they part."""
+    pairs = zip(answer.token_ids, other.token_ids, strict=False)
+    shorter = min(len(answer.token_ids), len(other.token_ids))
+    at = next((at for at, (one, two) in enumerate(pairs) if one != two), shorter)
+    margins = [given.margins[at] for given in (answer, other) if len(given.margins or ()) > at]
+    return max(margins, default=None)
 
 
 if __name__ == "__main__":

@@ -2,16 +2,17 @@
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import torch
 from transformers import DynamicCache
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Decoding
+from model_adapters import Decoding, Reply
 from model_adapters.hf.cached.model import TransformersModel
 
 __all__ = [
+    "Answer",
     "Replies",
     "Timed",
     "answer_in_batches",
@@ -25,8 +26,18 @@ PROMPT = (
     "\nAnswer the question given the agent's views in time order. Do not include explanation or "
     "reasoning in the answer. Answer with a single word or words.\nQuestion: "
 )
-Replies = list[tuple[int, ...]]
+
+
+class Answer(NamedTuple):
+    """Tokens of a reply, and by how many nats each was likelier than the second, if recorded."""
+
+    token_ids: tuple[int, ...]
+    margins: tuple[float, ...] | None = None
+
+
+Replies = list[Answer]
 Timed = tuple[float, Replies]
+T = TypeVar("T")
 
 
 def clear_cache(model: TransformersModel) -> None:
@@ -45,7 +56,7 @@ def answer_one_by_one(
     replies = []
     for question in questions:
         talk.append(PROMPT + question)
-        replies.append(talk.reply(Decoding(max_new_tokens=new_tokens)).token_ids)
+        replies.append(_answer(talk.reply(Decoding(max_new_tokens=new_tokens))))
         talk.rewind(start)
     return replies
 
@@ -57,8 +68,12 @@ def answer_in_batches(
     talk, decoding = model.conversation(), Decoding(max_new_tokens=new_tokens)
     talk.append(*frames)
     return [
-        reply.token_ids for reply in talk.replies([[PROMPT + text] for text in questions], decoding)
+        _answer(reply) for reply in talk.replies([[PROMPT + text] for text in questions], decoding)
     ]
+
+
+def _answer(reply: Reply) -> Answer:
+    return Answer(reply.token_ids, reply.margins)
 
 
 @torch.inference_mode()
@@ -111,7 +126,7 @@ def answer_with_transformers(
 
 def _decode(
     model: Any, cache: DynamicCache, ids: list[int], position: int, new_tokens: int
-) -> tuple[int, ...]:
+) -> Answer:
     bare, ends = model._loaded.model, model._loaded.generation.end_ids
     device = bare.device
     n_prefix = cache.get_seq_length()
@@ -132,11 +147,11 @@ def _decode(
             break
         feed = [token]
     cache.crop(n_prefix - cache.get_seq_length())
-    return tuple(reply)
+    return Answer(tuple(reply))
 
 
-def timed(run: Callable[[], Replies]) -> Timed:
-    """Return the seconds that a way took, and its replies."""
+def timed(run: Callable[[], T]) -> tuple[float, T]:
+    """Return the seconds that it took, and its result."""
     start = time.perf_counter()
     result = run()
     return time.perf_counter() - start, result

@@ -28,6 +28,7 @@ from model_adapters.hf.loading.card import read_card_words
 from model_adapters.hf.loading.hub import fetch
 from model_adapters.hf.loading.image_processors import image_backend, load_image_processor
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.loading.packed_attention import pack_attention
 from model_adapters.hf.loading.rope import apply_rope
 from model_adapters.hf.prompting.templates import chat_template, plain_template
 from model_adapters.options.checkpoints import CheckpointOptions, CheckpointReading, Placement
@@ -171,6 +172,7 @@ def assemble(
         ModelError: the generation settings are not supported, or min_pixels exceeds max_pixels.
     """
     _check_pixels(image_processor)
+    pack_attention(model)
     identity = dict(origin) | {
         "class": type(model).__name__,
         "n_parameters": model.num_parameters(),
