@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+# Modules are compiled when they are first imported, and most never are: a minute less.
+PIP := pip install --quiet --disable-pip-version-check --no-compile
 # What the package itself needs; and beside it what its tests, linters and documentation need.
 INSTALLED := $(VENV)/.installed
 DEVELOPED := $(VENV)/.developed
@@ -110,26 +112,26 @@ release: $(DEVELOPED) $(TOOLS)/.installed
 
 $(TOOLS)/.installed: .ci/release-tools.lock
 	$(PYTHON) -m venv $(TOOLS)
-	$(TOOLS)/bin/pip install --quiet --disable-pip-version-check --require-hashes -r .ci/release-tools.lock
+	$(TOOLS)/bin/$(PIP) --require-hashes -r .ci/release-tools.lock
 	touch $@
 
 $(INSTALLED): pyproject.toml setup.py constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.11 ...")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	$(BIN)/$(PIP) -c constraints.txt -e .
 	touch $@
 
 $(DEVELOPED): $(INSTALLED)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,docs]'
+	$(BIN)/$(PIP) -c constraints.txt -e '.[dev,docs]'
 	touch $@
 
 $(PEERS): $(DEVELOPED)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt --no-deps --upgrade --target $@ torchvision
+	$(BIN)/$(PIP) -c constraints.txt --no-deps --upgrade --target $@ torchvision
 	touch $@
 
 $(INSPECT):
 	$(PYTHON) -m venv $@
-	$@/bin/pip install --quiet --disable-pip-version-check --no-compile 'inspect_ai==0.3.285'
+	$@/bin/$(PIP) 'inspect_ai==0.3.285'
 	touch $@
 
 clean:

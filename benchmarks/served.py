@@ -54,8 +54,8 @@ def serve_transformers(
     dtype: str, environment: Mapping[str, str]
 ) -> AbstractContextManager[Served]:
     """Serve whatever checkpoints are asked for in transformers on a CPU within the context."""
-    start = ["-c", "from transformers.cli.transformers import main; main()", "serve"]
-    return _serve([*start, "--device", "cpu", "--dtype", dtype], environment)
+    server = str(Path(__file__).with_name("transformers_server.py"))
+    return _serve([server, "serve", "--device", "cpu", "--dtype", dtype], environment)
 
 
 @contextmanager

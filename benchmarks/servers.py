@@ -4,14 +4,10 @@ All questions of `nieh_mini` and all plans of `infthor_plans_mini`, greedy and i
 small trained model: behind vLLM's server and `transformers serve`, through `--model openai`, and in
 vLLM and transformers here.
 
-    make test-vllm                                  # once: the environment with vLLM
-    .venv-vllm/bin/python benchmarks/servers.py
-    .venv/bin/python benchmarks/servers.py --engines "transformers serve" \\
-        --pretrained NANO_FOLDER --adapter hf-vlm
-
-`transformers serve` wants all of torchvision or none of it. For a CPU there is but half of it, and
-a Qwen2.5-VL needs that: so it is asked in the ordinary environment, with a checkpoint of another
-family.
+    make test-vllm                      # once: the environment with vLLM
+    .venv-vllm/bin/python benchmarks/servers.py --engines "vLLM, here" "vLLM's server"
+    make .venv/test-peers               # once: half of torchvision (transformers_server.py)
+    .venv/bin/python benchmarks/servers.py --engines "transformers serve"
 """
 
 import argparse
@@ -89,7 +85,8 @@ def _arguments(
     if served is not None:
         given = f"base_url={served.url},model={checkpoint}"
         if name == "transformers serve":
-            given += ",send_stop=false"  # it fails on stop strings for models with images
+            # It fails on stop strings for models with images, and refuses the other field.
+            given += ",send_stop=false,send_repetition_penalty=false"
         return ["--model", "openai", "--model-args", given, *greedy]
     given = f"pretrained={checkpoint},dtype=float32"
     if name == HERE:

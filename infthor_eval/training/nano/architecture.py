@@ -34,6 +34,14 @@ _THETA = 1e8  # the slowest positions turn by less than a radian in the longest 
 # frames of any size become 168 x 168, which is between them.
 _MIN_PIXELS, _MAX_PIXELS = 28_000, 28_400
 _N_MERGED = 3000  # more than the number of words, so that every word is a token
+_END, _PAD = "<|im_end|>", "<|endoftext|>"
+# For servers, which otherwise look for Qwen2.5-VL's own marks between turns: a reply is what comes
+# behind the prompt.
+_RESPONSE_TEMPLATE = {
+    "defaults": {"role": "assistant"},
+    "start_anchor_pattern": r"\Z",
+    "fields": {"content": {"close": [_END, _PAD], "content": "text"}},
+}
 
 
 def image_processor() -> Any:
@@ -55,17 +63,16 @@ def build_untrained(
     """
     tokenizer = train_tokenizer(
         (*SPECIAL, *MARKS),
-        end="<|im_end|>",
-        pad="<|endoftext|>",
+        end=_END,
+        pad=_PAD,
         named={"image_token": "<|image_pad|>"},
         corpus=corpus,
         n_merged=_N_MERGED,
     )
+    tokenizer.response_template = _RESPONSE_TEMPLATE
     tokenizer.add_tokens([AddedToken(sentence, normalized=False) for sentence in sentences])
     ids = token_ids(SPECIAL, tokenizer)
-    model = draw_model(
-        _config(recipe, ids, len(tokenizer)), recipe.seed, ids["<|im_end|>"], ids["<|endoftext|>"]
-    )
+    model = draw_model(_config(recipe, ids, len(tokenizer)), recipe.seed, ids[_END], ids[_PAD])
     processor = image_processor()
     family = Qwen25VLFamily(model, processor, tokenizer)
     family.video = None  # it is trained on no film
@@ -97,8 +104,8 @@ def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
             "num_key_value_heads": len(Part),
             "max_position_embeddings": 32_768,
             "bos_token_id": None,
-            "eos_token_id": ids["<|im_end|>"],
-            "pad_token_id": ids["<|endoftext|>"],
+            "eos_token_id": ids[_END],
+            "pad_token_id": ids[_PAD],
             "tie_word_embeddings": True,
             "rope_parameters": {
                 "rope_type": "default",

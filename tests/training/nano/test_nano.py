@@ -7,12 +7,14 @@ import msgspec
 import numpy as np
 import pytest
 import torch
+import transformers
 from PIL import Image
 from safetensors.torch import load_file
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.qa_csv import write_questions
+from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.training.encoding import Encoder
 from infthor_eval.training.export import export
 from infthor_eval.training.nano import steps
@@ -36,6 +38,7 @@ from infthor_eval.training.nano.spelling import spellings
 from infthor_eval.training.nano.stages import TrainingData, train_small_model
 from infthor_eval.training.nano.whitening import whiten_patches
 from model_adapters import check_adapter, load
+from model_adapters.hf.families.qwen2_5_vl import NANO_FOLDER
 from model_adapters.hf.prompting.prompt import Frame
 
 from ...helpers.bundled import bundled_name
@@ -123,6 +126,17 @@ def test_words_and_some_texts_of_several_are_tokens(loaded, views):
     names = [spelling for name in views.units.types for spelling in spellings(name)]
     assert np.mean([len(loaded.tokenizer.tokenize(name)) for name in names]) < 1.6
     assert len(loaded.tokenizer.tokenize(" tennis racket")) == 1
+
+
+def test_a_server_takes_for_the_reply_what_comes_behind_the_prompt(loaded):
+    bundled = transformers.AutoTokenizer.from_pretrained(packaged_folder(NANO_FOLDER))
+    prompt = "<|vision_start|><|image_pad|><|vision_end|>\nQuestion: Have you seen a mug?"
+    for tokenizer in (loaded.tokenizer, bundled):
+        reply = tokenizer("a mug, a knife<|im_end|>")["input_ids"]
+        message = tokenizer.parse_response(
+            reply, prefix=tokenizer.decode(tokenizer(prompt).input_ids)
+        )
+        assert message == {"role": "assistant", "content": "a mug, a knife"}
 
 
 def test_synthetic_plans_replace_objects_in_plan_and_actions():
