@@ -35,7 +35,7 @@ def _features(tower, grids: list[tuple[int, int, int]]) -> torch.Tensor:
         max_size=4,
     )
 )
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_features_of_any_sizes_are_those_of_one_window_after_the_other(grids):
     plain, packed = _tower(), _tower()
     pack_attention(packed)
