@@ -1,7 +1,7 @@
 """The form of replies, right or wrong: a leaning to yes, and replies that are no answer at all."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import msgspec
 
@@ -10,9 +10,11 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.scoring import says_number, says_yes_or_no
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["YesNo", "format_failures", "yes_no"]
+__all__ = ["YesNo", "format_failures", "repetition_note", "yes_no"]
 
 Record = UnitRecord[NiehAnswer]
+
+_REPEATED = "repeats the question"
 
 
 class YesNo(msgspec.Struct, frozen=True):
@@ -70,7 +72,22 @@ def _failures(record: Record, response: str, max_new_tokens: int | None) -> list
         and (record.tokens.reply or 0) >= max_new_tokens
     ):
         reasons.append("cut off at the token limit")
+    question = record.payload.question
+    if question and question in (record.payload.reply or ""):
+        reasons.append(_REPEATED)
     return reasons
+
+
+def repetition_note(failures: Mapping[str, int], n_answered: int) -> str | None:
+    """Return a remark if most replies repeat their question, as behind a server that gives the
+    prompt back; `failures` are the counts of `format_failures`."""
+    n_repeated = failures.get(_REPEATED, 0)
+    if n_repeated <= n_answered / 2:
+        return None
+    return (
+        f"{n_repeated:,} of {n_answered:,} replies repeat their question, and are scored so. Does "
+        "the server give the prompt back with the reply?"
+    )
 
 
 def _gold(record: Record) -> set[str]:

@@ -6,6 +6,7 @@ from infthor_eval.formats.published import PublishedRow, PublishedTable, publish
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.rescoring.report import sources_of
+from infthor_eval.nieh.results.answer_form import repetition_note
 from infthor_eval.nieh.results.cells import Cell, mean_cell
 from infthor_eval.nieh.results.control_tables import control_tables, without_alike_notes
 from infthor_eval.nieh.results.effective_length import effective_lengths
@@ -101,6 +102,11 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
     numbers = ("total", "95 %", "bootstrap", "n", *(_LEFT_OUT[at] for at in shown))
     notes = (
         *dict.fromkeys(_nothing_asked(name, task) for _, name, task in tasks if not task.n),
+        *(
+            f"{run}, {name}: {note}"
+            for run, name, task in tasks
+            if (note := repetition_note(task.format_failures, task.total.n_answered))
+        ),
         *_notes(runs),
     )
     table = Table("NIEH accuracy, %, strict scorer", (*_NAMES, *map(Column, numbers)), rows, notes)

@@ -1,6 +1,7 @@
+import pytest
 from rich.console import Console
 
-from infthor_eval.nieh.results.tables import clues_table, tables
+from infthor_eval.nieh.results.tables import clues_table, overview, tables
 from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.report.comparison import compare
 from infthor_eval.report.suites.nieh import NiehPresenter
@@ -80,6 +81,17 @@ def test_a_leaning_to_yes_and_the_form_of_replies_have_a_table():
         *("a run", "nieh_gt", "3", "33.3", "33.3", "25.0"),  # 50 tokens of two right answers
         "1 cut off at the token limit, 1 empty, 1 neither yes nor no, 1 no number",
     )
+
+
+@pytest.mark.parametrize(("n_repeating", "is_told"), [(2, False), (3, True)])
+def test_replies_that_repeat_their_questions_are_told_below_the_accuracy(n_repeating, is_told):
+    asked = "Have you seen a mug?"
+    replies = [f"Question: {asked}yes"] * n_repeating + ["yes"] * (4 - n_repeating)
+    records = [make_record(i, reply, question=asked) for i, reply in enumerate(replies)]
+    table = overview([make_run(make_config(), records)])[0]
+    told = [note for note in table.notes if "repeat their question" in note]
+    assert bool(told) == is_told
+    assert not told or told[0].startswith("a run, nieh_gt: 3 of 4 replies")
 
 
 def test_a_run_of_a_published_checkpoint_is_set_against_its_row_unless_its_frames_are_simulated():
