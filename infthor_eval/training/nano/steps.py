@@ -73,16 +73,17 @@ def run_stage(
         DataError: a state is damaged or cannot be written.
         UsageError: the states are of another recipe or other data.
     """
-    groups: list[tuple[dict[str, Any], float]] = [
-        (group, group["lr"]) for one in stage.optimizers for group in one.param_groups
-    ]
-    trained = [parameter for group, _ in groups for parameter in group["params"]]
+    highest = [group["lr"] for group in _groups(stage)]
+    first = checkpoints.restore(stage.network, *stage.optimizers)
+    # Only now, as an optimizer that is restored has other groups, with the state's learning rates.
+    groups = _groups(stage)
+    trained = [parameter for group in groups for parameter in group["params"]]
     stage.network.train()
-    for number in range(checkpoints.restore(stage.network, *stage.optimizers), stage.n_steps):
+    for number in range(first, stage.n_steps):
         warm_up = min(1.0, (number + 1) / _WARM_UP)
         decay = 0.5 * (1 + math.cos(math.pi * number / stage.n_steps))
-        for group, highest in groups:
-            group["lr"] = highest * warm_up * (_LOWEST + (1 - _LOWEST) * decay)
+        for group, lr in zip(groups, highest, strict=True):
+            group["lr"] = lr * warm_up * (_LOWEST + (1 - _LOWEST) * decay)
         stage.network.zero_grad()
         loss = stage.compute(number)
         torch.nn.utils.clip_grad_norm_(trained, _CLIP)
@@ -93,3 +94,7 @@ def run_stage(
             checkpoints.save(n_done, stage.network, *stage.optimizers)
         on_step(NanoProgress(stage.name, n_done, stage.n_steps, loss.item()))
     stage.network.eval()
+
+
+def _groups(stage: Stage) -> list[dict[str, Any]]:
+    return [group for optimizer in stage.optimizers for group in optimizer.param_groups]
