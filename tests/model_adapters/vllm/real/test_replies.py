@@ -37,16 +37,20 @@ def test_replies_are_those_of_transformers(
         assert facts(replies[0]) == facts(replies[1])
 
 
-def test_replies_in_small_steps_and_blocks_are_the_same(
-    start: Start, in_process: Start, frames: list[FrameRef]
+_SMALL_STEPS = {
+    "max_num_seqs": 2,
+    "max_num_batched_tokens": 256,
+    "block_size": 32,
+    "mm_encoder_tp_mode": "data",
+    "threads": 2,
+}
+
+
+@pytest.mark.parametrize("options", [_SMALL_STEPS, {"tensor_parallel_size": 2}])
+def test_replies_in_small_steps_or_by_two_processes_are_the_same(
+    options: dict[str, Any], start: Start, in_process: Start, frames: list[FrameRef]
 ) -> None:
-    small = {
-        "max_num_seqs": 2,
-        "max_num_batched_tokens": 256,
-        "block_size": 32,
-        "mm_encoder_tp_mode": "data",
-    }
-    models = (start(**small, threads=2), in_process("qwen2.5-vl"))
+    models = (start(**options), in_process("qwen2.5-vl"))
     continuations = [[*parts] for parts in _prompts(frames)]
     replies = [model.conversation().replies(continuations, up_to(50)) for model in models]
     assert [facts(reply) for reply in replies[0]] == [facts(reply) for reply in replies[1]]
