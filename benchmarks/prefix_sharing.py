@@ -35,7 +35,6 @@ from typing import Any
 import torch
 from noise_set import question_texts, write_frames
 from prefix_ways import (
-    Answer,
     Replies,
     Timed,
     answer_in_batches,
@@ -48,6 +47,7 @@ from transformers import Qwen2_5_VLConfig
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.report.differences import margin_of_difference
 from model_adapters import Decoding
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.options.tiny import TinyOptions
@@ -250,7 +250,7 @@ def _decoding_speed(
         answer_one_by_one(model, frames, [""], new)
         seconds, replies = timed(lambda new=new: answer_one_by_one(model, frames, [""], new))
         times.append(seconds)
-        lengths.append(len(replies[0].token_ids))
+        lengths.append(len(replies[0].ids))
     return (lengths[1] - lengths[0]) / (times[1] - times[0])
 
 
@@ -301,10 +301,10 @@ def figures(measured: dict[str, list[Timed]]) -> dict[str, float | bool | None]:
         if slow in best and fast in best
     }
     margins = [
-        _margin(answer, other)
+        margin_of_difference(answer, other)
         for replies in others
         for answer, other in zip(first, replies, strict=True)
-        if answer.token_ids != other.token_ids
+        if answer.ids != other.ids
     ]
     known = [margin for margin in margins if margin is not None]
     return {
@@ -313,15 +313,6 @@ def figures(measured: dict[str, list[Timed]]) -> dict[str, float | bool | None]:
         "replies equal": not margins,
         "parting margin": max(known) if margins and len(known) == len(margins) else None,
     }
-
-
-def _margin(answer: Answer, other: Answer) -> float | None:
-    """Return by how many nats the surer of two answers preferred its token where they part."""
-    pairs = zip(answer.token_ids, other.token_ids, strict=False)
-    shorter = min(len(answer.token_ids), len(other.token_ids))
-    at = next((at for at, (one, two) in enumerate(pairs) if one != two), shorter)
-    margins = [given.margins[at] for given in (answer, other) if len(given.margins or ()) > at]
-    return max(margins, default=None)
 
 
 if __name__ == "__main__":

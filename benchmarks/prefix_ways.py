@@ -2,17 +2,17 @@
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import torch
 from transformers import DynamicCache
 
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.report.presenter import ReplyTokens
 from model_adapters import Decoding, Reply
 from model_adapters.hf.cached.model import TransformersModel
 
 __all__ = [
-    "Answer",
     "Replies",
     "Timed",
     "answer_in_batches",
@@ -26,16 +26,7 @@ PROMPT = (
     "\nAnswer the question given the agent's views in time order. Do not include explanation or "
     "reasoning in the answer. Answer with a single word or words.\nQuestion: "
 )
-
-
-class Answer(NamedTuple):
-    """Tokens of a reply, and by how many nats each was likelier than the second, if recorded."""
-
-    token_ids: tuple[int, ...]
-    margins: tuple[float, ...] | None = None
-
-
-Replies = list[Answer]
+Replies = list[ReplyTokens]
 Timed = tuple[float, Replies]
 T = TypeVar("T")
 
@@ -72,8 +63,8 @@ def answer_in_batches(
     ]
 
 
-def _answer(reply: Reply) -> Answer:
-    return Answer(reply.token_ids, reply.margins)
+def _answer(reply: Reply) -> ReplyTokens:
+    return ReplyTokens(reply.token_ids, reply.margins or ())
 
 
 @torch.inference_mode()
@@ -126,7 +117,7 @@ def answer_with_transformers(
 
 def _decode(
     model: Any, cache: DynamicCache, ids: list[int], position: int, new_tokens: int
-) -> Answer:
+) -> ReplyTokens:
     bare, ends = model._loaded.model, model._loaded.generation.end_ids
     device = bare.device
     n_prefix = cache.get_seq_length()
@@ -147,7 +138,7 @@ def _decode(
             break
         feed = [token]
     cache.crop(n_prefix - cache.get_seq_length())
-    return Answer(tuple(reply))
+    return ReplyTokens(tuple(reply), ())
 
 
 def timed(run: Callable[[], T]) -> tuple[float, T]:

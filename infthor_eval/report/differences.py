@@ -17,7 +17,15 @@ from infthor_eval.report.presenter import THOUGHT, ReplyTokens
 from infthor_eval.report.same_questions import Side, find_sides
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["NEAR_TIE", "Answer", "Compared", "QuestionDifference", "compare_questions"]
+__all__ = [
+    "NEAR_TIE",
+    "Answer",
+    "Compared",
+    "QuestionDifference",
+    "compare_questions",
+    "differing_token",
+    "margin_of_difference",
+]
 
 Record = UnitRecord[Any]
 
@@ -72,21 +80,15 @@ class QuestionDifference:
     def token(self) -> int | None:
         """The first token of the reply that differs, from 1; None if there is none, or its tokens
         were not recorded."""
-        tokens = [answer.tokens for answer in self.answers]
-        if tokens[0] is None or tokens[1] is None or tokens[0].ids == tokens[1].ids:
-            return None
-        return 1 + _n_equal(tokens[0].ids, tokens[1].ids)
+        first, second = (answer.tokens for answer in self.answers)
+        return None if first is None or second is None else differing_token(first, second)
 
     @property
     def margin(self) -> float | None:
         """How much likelier than the second the token was that the surer run chose there, in nats;
         None if that was not recorded."""
-        at = self.token
-        if at is None:
-            return None
-        margins = [answer.tokens.margins for answer in self.answers if answer.tokens is not None]
-        # One that was cut off at its longest has no token there.
-        return max((of_reply[at - 1] for of_reply in margins if len(of_reply) >= at), default=None)
+        first, second = (answer.tokens for answer in self.answers)
+        return None if first is None or second is None else margin_of_difference(first, second)
 
     @property
     def is_near_tie(self) -> bool:
@@ -94,6 +96,22 @@ class QuestionDifference:
         margin = self.margin
         is_alike = self.effects <= {Effect.REPLY, Effect.CUT} and not self.possible
         return is_alike and margin is not None and margin <= NEAR_TIE
+
+
+def differing_token(first: ReplyTokens, second: ReplyTokens) -> int | None:
+    """Return the first token that differs between two replies, from 1; None if there is none."""
+    return None if first.ids == second.ids else 1 + _n_equal(first.ids, second.ids)
+
+
+def margin_of_difference(first: ReplyTokens, second: ReplyTokens) -> float | None:
+    """Return how much likelier than the second the token was that the surer reply has where they
+    first differ, in nats; None if they do not, or that was not recorded."""
+    at = differing_token(first, second)
+    if at is None:
+        return None
+    margins = (first.margins, second.margins)
+    # One that was cut off at its longest has no token there.
+    return max((of_reply[at - 1] for of_reply in margins if len(of_reply) >= at), default=None)
 
 
 def _n_equal(first: Sequence[Any], second: Sequence[Any]) -> int:

@@ -2,7 +2,7 @@
 
 transformers' vision towers call torch's kernel for one image or window after the other, unless
 attention is flash-attn's, which takes all at once. For a frame of 300x300 the tower of Qwen2.5-VL
-7B makes 256 calls, and on an H100 they were most of a frame's time (benchmarks/gpu.md).
+7B makes 256 calls, and on an H100 they were most of a frame's time (benchmarks/gpu_h100.md).
 """
 
 import copy
