@@ -13,6 +13,8 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from tiny_families.trial import torchvision_path
+
 __all__ = ["Served", "serve_transformers", "serve_vllm"]
 
 _START_S = 600
@@ -55,7 +57,8 @@ def serve_transformers(
 ) -> AbstractContextManager[Served]:
     """Serve whatever checkpoints are asked for in transformers on a CPU within the context."""
     server = str(Path(__file__).with_name("transformers_server.py"))
-    return _serve([server, "serve", "--device", "cpu", "--dtype", dtype], environment)
+    words = [server, "serve", "--device", "cpu", "--dtype", dtype]
+    return _serve(words, {**environment, **torchvision_path()})
 
 
 @contextmanager

@@ -1,38 +1,24 @@
 """`transformers serve` where there is but half of torchvision, whose other half is built for CUDA.
 
-    python benchmarks/transformers_server.py serve --device cpu
+    PYTHONPATH=tests/peers:.venv/test-peers python benchmarks/transformers_server.py serve
 
-A Qwen2.5-VL is served with torchvision alone. Its Python half is looked for where `make test` puts
-it, if it is not in the environment. What that half lacks are the names of operators, which nothing
-here calls, and the decoder of pictures, for which Pillow's stands: a PNG has the same pixels in
-both.
+A Qwen2.5-VL is served with torchvision alone. What its Python half lacks is the decoder of
+pictures, for which Pillow's stands: a PNG has the same pixels in both.
 """
 
-import importlib.util
 import io
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
+import torchvision.io
 from PIL import Image
-
-_PEERS = Path(sys.prefix) / "test-peers"
-_OPERATOR = "(Tensor dets, Tensor scores, float iou_threshold) -> Tensor"
+from transformers.cli.transformers import main as run
 
 
 def main() -> None:
-    """Complete torchvision, and run the command of transformers with this one's words."""
-    if importlib.util.find_spec("torchvision") is None:
-        sys.path.append(str(_PEERS))
-    for name in ("nms", "qnms"):
-        torch.library.define(f"torchvision::{name}", _OPERATOR)
-    import torchvision.io
-
+    """Replace the decoder, and run the command of transformers with this one's words."""
     torchvision.io.decode_image = torchvision.io.image.decode_image = _decode
-    from transformers.cli.transformers import main as run
-
     run()
 
 
