@@ -65,7 +65,7 @@ def _arguments() -> argparse.Namespace:
     limits.add_argument("--gib", type=float, help="GPU memory that the process may take")
     limits.add_argument("--pretend-at", type=int, metavar="TOKENS")
     parser.set_defaults(
-        seed=0, attention="sdpa", chunk_tokens=[1024], batch_size=[1], margins=False
+        seed=0, attention="sdpa", chunk_tokens=[None], batch_size=[1], margins=False
     )
     return parser.parse_args()
 

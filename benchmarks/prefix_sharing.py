@@ -145,7 +145,12 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--model-size", choices=("tiny", "7b"), default="tiny")
     parser.add_argument("--attention", default="sdpa", help="attn_implementation")
-    parser.add_argument("--chunk-tokens", type=_numbers, default=[1024], help="sizes, with commas")
+    parser.add_argument(
+        "--chunk-tokens", type=_numbers, help="sizes, with commas; default that of the option"
+    )
+    parser.add_argument(
+        "--without-cudnn", action="store_true", help="leave cuDNN's kernel out of sdpa's choice"
+    )
     parser.add_argument(
         "--margins", action="store_true", help="record how near a tie each token was"
     )
@@ -158,6 +163,11 @@ def _arguments() -> argparse.Namespace:
     if options.largest and not options.device.startswith("cuda"):
         parser.error("--largest needs --device cuda, as a CPU swaps memory and has no clear limit")
     options.machine = options.machine or options.largest
+    options.chunk_tokens = options.chunk_tokens or [
+        TinyOptions().chunk_size(torch.device(options.device).type)
+    ]
+    if options.without_cudnn:
+        torch.backends.cuda.enable_cudnn_sdp(False)
     return options
 
 

@@ -246,7 +246,7 @@ def _machine_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--attention", choices=("sdpa", "flash_attention_2"), default="sdpa", help="for memory"
     )
-    group.add_argument("--chunk-tokens", type=int, default=1024, help="the option of that name")
+    group.add_argument("--chunk-tokens", type=int, default=4096, help="the option of that name")
     group.add_argument(
         "--parallel", choices=("layers", "tensor"), default="layers", help="layers is device_map"
     )

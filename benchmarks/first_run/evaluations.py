@@ -26,6 +26,7 @@ _ROOT = BENCHMARKS.parent
 _QUESTIONS = _ROOT / "infthor_eval/sets/nieh_mini/qa_set_nieh_mini.csv"
 _TABLE4 = _ROOT / "results/published/nieh_table4.yaml"
 _TINY = ("qwen2.5-vl-tiny", "llava-onevision-tiny", "deepseek-vl-tiny", "pixtral-tiny")
+_NEAR_TIE = 0.001  # nats, in float32
 _TIES = (
     0.05  # share of replies of random weights that may differ, as two tokens are nearly as likely
 )
@@ -63,11 +64,13 @@ def run_tiny_models(work: Work) -> Outcome:
 def compare_with_cpu(work: Work) -> Outcome:
     """Ask the same questions in float32 on the device and on the processor."""
     device = work.machine.device
-    here = _tiny_run(work, "device", f"device={device}")
-    there = _tiny_run(work, "cpu", "device=cpu")
-    n, equal = len(here.records), here.n_equal(there)
-    right = n - equal <= _TIES * n
+    here = _tiny_run(work, "device", f"device={device},margins=true")
+    there = _tiny_run(work, "cpu", "device=cpu,margins=true")
+    n, equal, margin = len(here.records), here.n_equal(there), here.parting_margin(there)
+    right = equal == n or (margin is not None and margin <= _NEAR_TIE)
     text = f"{equal} of {n} replies equal"
+    if margin is not None:
+        text += f"; the others part {'at a near tie, ' if right else ''}by {margin:.4f} nats"
     if not right:
         eager = _tiny_run(work, "eager", f"device={device},attn_implementation=eager")
         text += f"; {eager.n_equal(there)} with attn_implementation=eager on the device"

@@ -90,7 +90,7 @@ STEPS = (
         "as on a CPU",
         "Are the results those of a processor? If many replies differ, and with "
         "`attn_implementation=eager` they do not, it is the kernel.",
-        "all replies equal, or all but a few (near ties of random weights)",
+        "replies equal, or they part at a near tie, as two tokens of random weights often are",
         120,
         _nothing,
         compare_with_cpu,
@@ -100,7 +100,7 @@ STEPS = (
         "Are the estimates right, and which kernel is the default? `flash_attention_2` if replies "
         "are equal and it is 1.2 times as fast at 128K.",
         "with SDPA 7,400 tokens/s at 16K and 4,000 at 128K, 35 decoded tokens/s, peak 26 GB (24 "
-        "with flash, which is faster), about 741,000 tokens fit; replies equal, or "
+        "with flash, which is faster), about 660,000 tokens fit; replies equal, or "
         "they part at a near tie",
         560,
         _nothing,
@@ -109,7 +109,7 @@ STEPS = (
     Step(
         "chunks",
         "The default of `chunk_tokens`: the smallest within 5 % of the best.",
-        "1024 is within 5 % of the best",
+        "4096 is within 5 % of the best",
         300,
         _nothing,
         measure_chunks,

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from infthor_eval.report.differences import margin_of_difference
+from infthor_eval.report.presenter import ReplyTokens
 from infthor_eval.runs import UnitRecord, read_run
 from infthor_eval.suites import find_suite
 
@@ -64,6 +66,22 @@ class Run:
         """Return how many replies are those of another run."""
         theirs = other.replies
         return sum(reply == theirs.get(key) for key, reply in self.replies.items())
+
+    def parting_margin(self, other: "Run") -> float | None:
+        """Return the largest margin at which a reply parts from that of another run, in nats; None
+        if none does, or one's was not recorded."""
+        theirs = {record.key: record.payload for record in other.records}
+        margins = [
+            margin_of_difference(_tokens(record.payload), _tokens(theirs[record.key]))
+            for record in self.records
+            if record.payload.reply != theirs[record.key].reply
+        ]
+        known = [margin for margin in margins if margin is not None]
+        return max(known) if margins and len(known) == len(margins) else None
+
+
+def _tokens(payload: Any) -> ReplyTokens:
+    return ReplyTokens(payload.reply_ids, payload.margins)
 
 
 @dataclass

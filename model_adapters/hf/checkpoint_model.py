@@ -76,6 +76,7 @@ class HfModel(CheckpointModel):
     def __init__(self, name: str, loaded: LoadedCheckpoint, options: HfOptions) -> None:
         super().__init__(name, loaded, options.threads)
         self._options = options
+        self._chunk_tokens = options.chunk_size(loaded.model.device.type)
 
     @property
     def capabilities(self) -> Capabilities:
@@ -101,7 +102,7 @@ class HfModel(CheckpointModel):
             "max_tokens": self._context_limit,
             "prompt": options.prompt,
             "share_prefix": options.share_prefix,
-            "chunk_tokens": options.chunk_tokens,
+            "chunk_tokens": self._chunk_tokens,
             "batch_size": options.batch_size,
             "generation": {
                 "repetition_penalty": generation.repetition_penalty,

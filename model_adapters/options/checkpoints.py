@@ -23,6 +23,8 @@ _PACKAGES = {
 _LARGEST = 2**53  # largest value of an option; anything above is a typing error
 _SIZES = ("chunk_tokens", "batch_size", "feature_cache_mb", "frames_ahead_mb", "max_tokens")
 _MOST_THREADS = 1024
+# Defaults of chunk_tokens: a GPU waits for the calls of smaller ones (benchmarks/gpu_h100.md).
+_CHUNK, _CHUNK_ON_GPU = 1024, 4096
 _IMAGE_BACKENDS = ("pil", "torchvision")
 _PROMPTS = ("chat", "plain")
 _ROPES = ("dynamic", "linear", "longrope", "longrope-scaled", "yarn")
@@ -166,7 +168,8 @@ class HfOptions(Reading, Placement):
     Attributes:
         share_prefix: encode the common prefix of two prompts once; false encodes every prompt as a
             whole.
-        chunk_tokens: most tokens encoded in one forward pass.
+        chunk_tokens: most tokens encoded in one forward pass; 1024 on a CPU and 4096 on a GPU where
+            None.
         batch_size: most continuations of one prefix that are answered together. They read the
             prefix's keys and values together, and a reply can differ by rounding with what is
             answered beside it.
@@ -190,7 +193,7 @@ class HfOptions(Reading, Placement):
     )
 
     share_prefix: bool = True
-    chunk_tokens: int = 1024
+    chunk_tokens: int | None = None
     batch_size: int = 64
     kv_offload: bool = False
     feature_cache_mb: int = 128
@@ -200,7 +203,7 @@ class HfOptions(Reading, Placement):
 
     def __post_init__(self) -> None:
         if (
-            self.chunk_tokens < 1
+            (self.chunk_tokens is not None and self.chunk_tokens < 1)
             or self.batch_size < 1
             or self.feature_cache_mb < 0
             or self.frames_ahead_mb < 0
@@ -217,6 +220,12 @@ class HfOptions(Reading, Placement):
             raise ValueError(f"frame_threads={self.frame_threads} is not from 0 to {_MOST_THREADS}")
         super().__post_init__()
         Placement.__post_init__(self)
+
+    def chunk_size(self, device_type: str) -> int:
+        """Return most tokens of one forward pass on a device, by torch's name of its type."""
+        if self.chunk_tokens is not None:
+            return self.chunk_tokens
+        return _CHUNK if device_type == "cpu" else _CHUNK_ON_GPU
 
 
 @dataclass(frozen=True, kw_only=True)

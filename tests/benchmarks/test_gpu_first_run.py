@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import psutil
@@ -148,6 +149,31 @@ def test_one_gpu_without_weights_runs_what_it_can(script, machine):
         "the real model",
         "cost",
     ]
+
+
+def test_a_gpu_is_timed_without_the_kernel_that_plans_each_length(script, machine):
+    kernels = importlib.import_module("first_run.speeds")._kernels
+    assert list(kernels(machine)) == ["sdpa", "sdpa without cuDNN"]
+    assert list(kernels(replace(machine, flash=True))) == [
+        "sdpa",
+        "flash_attention_2",
+        "sdpa without cuDNN",
+    ]
+    assert list(kernels(replace(machine, device="cpu"))) == ["sdpa"]
+
+
+@pytest.mark.parametrize(
+    ("margins", "expected"), [((0.5, 0.002), 0.002), ((0.5,), None), ((), None)]
+)
+def test_replies_part_at_a_margin_if_it_was_recorded(script, margins, expected):
+    run = importlib.import_module("first_run.work").Run
+
+    def of(reply, ids):
+        payload = SimpleNamespace(reply=reply, reply_ids=ids, margins=margins)
+        return run("m", [SimpleNamespace(key="q", payload=payload)])
+
+    assert of("a b", (1, 2)).parting_margin(of("a c", (1, 3))) == expected
+    assert of("a b", (1, 2)).parting_margin(of("a b", (1, 2))) is None
 
 
 def test_commands_of_the_real_model_are_commands_that_there_are(

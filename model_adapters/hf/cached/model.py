@@ -43,7 +43,7 @@ class TransformersModel(HfModel):
             loaded.model,
             loaded.family,
             self._embed,
-            chunk_tokens=options.chunk_tokens,
+            chunk_tokens=self._chunk_tokens,
             rope=self._rope,
             storage=torch.device("cpu") if options.kv_offload else None,
         )
@@ -89,7 +89,7 @@ class TransformersModel(HfModel):
             self._embed,
             prefix=self._prefix,
             continuations=[prompt[common:] for prompt in prompts],
-            chunk_tokens=self._options.chunk_tokens,
+            chunk_tokens=self._chunk_tokens,
         )
 
     def answer_each(
@@ -190,6 +190,6 @@ class TransformersModel(HfModel):
             prompts=prompts,
             n_shared=common,
             replies=replies,
-            chunk_tokens=self._options.chunk_tokens,
+            chunk_tokens=self._chunk_tokens,
         )
         return [cached, *[self._prefix.n_tokens] * (len(prompts) - 1)]

@@ -173,6 +173,8 @@ def assemble(
     """
     _check_pixels(image_processor)
     pack_attention(model)
+    # torch rounds convolutions in float32 to ten bits on a GPU, and vision towers begin with one.
+    torch.backends.cudnn.allow_tf32 = False
     identity = dict(origin) | {
         "class": type(model).__name__,
         "n_parameters": model.num_parameters(),

@@ -106,11 +106,12 @@ class Rehearsal:
         self._frames = frames
         self._usages: dict[int, Usage] = {}
         options = rehearsed.options
+        self._chunk_tokens = options.chunk_size("cuda")
         cache_bytes = options.feature_cache_mb * _MIB if options.share_prefix else 0
         self._features = 0 if rehearsed.problem else cache_bytes
         self._embed = rehearsed.family.make_embed(cache_bytes, Ahead(n_threads=0))
         self._prefix = Prefix(
-            rehearsed.model, rehearsed.family, self._embed, chunk_tokens=options.chunk_tokens
+            rehearsed.model, rehearsed.family, self._embed, chunk_tokens=self._chunk_tokens
         )
         self._chunk = self._frames_of_a_chunk()
         with self._running():
@@ -218,7 +219,7 @@ class Rehearsal:
 
     def _frames_of_a_chunk(self) -> list[Piece]:
         """Return pieces of one chunk: frames, or text where frames cannot be counted."""
-        size = self._rehearsed.options.chunk_tokens
+        size = self._chunk_tokens
         if self._rehearsed.problem:
             return [_TOKEN] * size
         pieces: list[Piece] = []
@@ -277,7 +278,7 @@ class Rehearsal:
             self._embed,
             prefix=self._prefix,
             continuations=[[_TOKEN] * _QUESTION] * min(options.batch_size, _TOGETHER),
-            chunk_tokens=options.chunk_tokens,
+            chunk_tokens=self._chunk_tokens,
         )
 
 

@@ -69,6 +69,12 @@ def test_half_precision_answers_the_same_every_time(
     model.close()
 
 
+def test_float32_is_not_rounded_on_a_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch.backends.cudnn, "allow_tf32", True)
+    _tiny("qwen2.5-vl", {}).close()
+    assert not torch.backends.cudnn.allow_tf32
+
+
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_model_on_another_device_leaves_nothing_on_the_cpu(

@@ -1,0 +1,17 @@
+import pytest
+
+from model_adapters.options.checkpoints import HfOptions
+
+
+def test_a_gpu_gets_larger_chunks_unless_their_size_is_given() -> None:
+    assert {kind: HfOptions().chunk_size(kind) for kind in ("cpu", "cuda", "xpu")} == {
+        "cpu": 1024,
+        "cuda": 4096,
+        "xpu": 4096,
+    }
+    assert HfOptions(chunk_tokens=10).chunk_size("cuda") == 10
+
+
+def test_a_chunk_has_a_token_at_least() -> None:
+    with pytest.raises(ValueError, match="chunk_tokens and batch_size must be positive"):
+        HfOptions(chunk_tokens=0)
