@@ -1,19 +1,28 @@
 """Results of runs on standard output: tables, or a format for another program."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
 import click
 import msgspec
 
 from infthor_eval.cli.options.show import ShowOptions
 from infthor_eval.cli.progress.notes import print_failure
+from infthor_eval.reasons import count_reasons
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
-from infthor_eval.runs import RunSummary, Suite, Usage, mark_incomplete, read_header
+from infthor_eval.runs import (
+    RunSummary,
+    Suite,
+    UnitRecord,
+    Usage,
+    mark_incomplete,
+    read_header,
+)
 from infthor_eval.runs.completeness import count_missing
 from infthor_eval.runs.journals.shards import read_run_log
 from infthor_eval.runs.results import results_document
@@ -23,7 +32,7 @@ from infthor_eval.suites import find_suite
 from infthor_eval.tables import Table
 from infthor_eval.terminal import print_line
 
-__all__ = ["RunResults", "print_results", "read_run_results"]
+__all__ = ["RunResults", "print_failures", "print_results", "read_run_results"]
 
 _SHOWN_BY_TABLES = {"frames"}  # the options that the suites' tables show beside a run's name
 
@@ -47,8 +56,9 @@ class RunResults:
     n_missing: int | None
 
 
-def read_run_results(folder: Path) -> RunResults:
-    """The run in a folder, summed up from its journal; bad lines are named and left out.
+def read_run_results(folder: Path) -> tuple[RunResults, Sequence[UnitRecord[Any]]]:
+    """The run in a folder, summed up from its journal, and its records; bad lines are named and
+    left out.
 
     Raises:
         DataError: there is no journal, or one of another format.
@@ -61,7 +71,26 @@ def read_run_results(folder: Path) -> RunResults:
     n_missing = count_missing(header, len(log.records))
     if n_missing is None and results is not None:
         n_missing = results.n_missing
-    return RunResults(folder, suite, summary, log.usage, n_missing)
+    return RunResults(folder, suite, summary, log.usage, n_missing), log.records
+
+
+def print_failures(records: Iterable[UnitRecord[Any]], folder: Path | None = None) -> int:
+    """Print why units have no result, a line for each task and reason; return how many these are.
+
+    Args:
+        records: the records of a run.
+        folder: its folder, where several runs are spoken of.
+    """
+    failed = [
+        ((record.task, record.state), record.failure)
+        for record in records
+        if record.failure is not None
+    ]
+    where = "" if folder is None else f"{folder}: "
+    for (task, state), reason, n in count_reasons(failed):
+        what = "failed, in no score: " if state == "failed" else ""  # else the reason says so
+        print_failure(f"{where}{task}: {n} sample(s) {what}{reason}")
+    return len(failed)
 
 
 def print_results(runs: Sequence[RunResults], options: ShowOptions) -> None:

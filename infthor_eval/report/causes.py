@@ -130,7 +130,8 @@ _KINDS = (
     _Kind("the chat template or system prompt", _TOKENS, _each("model", "prompt chat_template")),
     _Kind("the size of images", _PIXELS, ("model.image_processor.size", "model.max_frames")),
     _Kind("the preparation of images", _PIXELS, _each("model", "image_processor image_backend")),
-    _Kind("the engine", _READ, ("host", "adapter", *_each("model", "engine base_url adapter"))),
+    _Kind("the file or package that the model comes from", _READ, ("adapter",)),
+    _Kind("the engine", _READ, ("host", *_each("model", "engine base_url adapter"))),
     _Kind(
         "the limit of the model's context",
         _CHOSEN | {Effect.FAILED} | _READ,

@@ -96,6 +96,8 @@ class Sample:
             yield f"    {line}"
         for name, value in presenter.details(self.record).items():
             yield f"  {name}: {value}"
+        for number, step in enumerate(self.steps, 1):
+            yield f"  {number:4d}. {_in_words(step)}"
 
     def _scores_in_words(self) -> str:
         return ", ".join(f"{name} {score:g}" for name, score in self.scores.items()) or "-"
@@ -118,6 +120,7 @@ class Sample:
                 pictures=pictures,
                 note=note,
                 scores=self._scores_in_words(),
+                steps=list(map(_in_words, self.steps)),
                 request=self._request_in_words(),
             )
         )
@@ -169,3 +172,10 @@ def load_sample(
     """See `infthor_eval.load_sample`."""
     runs = read_report_runs([Path(folder)], warnings.warn)
     return find_samples(runs, name, None if data is None else Path(data))[0]
+
+
+def _in_words(step: StepRow) -> str:
+    """Return a step's action, its reward, and what was wrong with it."""
+    reward = "" if step.reward is None else f", reward {step.reward:g}"
+    error = f": {step.error}" if step.error else ""
+    return f"{step.action or '(no action)'}{reward}{error}"

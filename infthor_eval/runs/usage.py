@@ -66,10 +66,13 @@ class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
     def description(self) -> str:
         """The usage in words."""
         cost = "" if self.cost is None else f", {self.cost:.4f} US dollars"
+        requests = f"{self.requests:,} request{'s' if self.requests != 1 else ''}"
+        if self.requests and self.hit_rate is None:
+            return f"{requests}, their tokens not counted{cost}"
         share = "" if self.hit_rate is None else f", {100 * self.hit_rate:.1f} %"
         return (
-            f"{self.requests:,} requests, {self.context:,} tokens read ({self.cached:,} of them "
-            f"cached{share}), {self.reply:,} written{cost}"
+            f"{requests}, {self.context:,} tokens read ({self.cached:,} of them cached{share}), "
+            f"{self.reply:,} written{cost}"
         )
 
 

@@ -1,5 +1,6 @@
 """A sample of a run: in words, and as the cell of a notebook."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -68,4 +69,7 @@ def test_an_episode_has_its_steps(tmp_path: Path, run_cli) -> None:
     name = infthor_eval.load_run(folder)["id"][0]
     sample = infthor_eval.load_sample(folder, name)
     assert f"{len(sample.steps)} steps" in sample._repr_html_()
+    listed = [line for line in sample.lines() if re.match(r" +\d+\. ", line)]
+    assert len(listed) == len(sample.steps) > 0
+    assert all(step.action in line for step, line in zip(sample.steps, listed, strict=True))
     assert sample.prompt is None

@@ -33,7 +33,7 @@ def test_the_hit_rate_is_a_share_of_what_was_read(counts: list[tuple[int, int]])
             Usage(2, 1000, 250, 10),
             "2 requests, 1,000 tokens read (250 of them cached, 25.0 %), 10 written",
         ),
-        (Usage(2), "2 requests, 0 tokens read (0 of them cached), 0 written"),
+        (Usage(2), "2 requests, their tokens not counted"),
         (
             Usage(2, 1000, 0, 10, 0.5),
             "2 requests, 1,000 tokens read (0 of them cached, 0.0 %), 10 written, 0.5000 US "

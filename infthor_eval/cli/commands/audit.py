@@ -81,7 +81,7 @@ def _read_summary(folder: Path) -> "RunSummary":
     from infthor_eval.errors import UsageError
     from infthor_eval.nieh.results.summary import NiehSummary
 
-    run = read_run_results(folder).summary
+    run = read_run_results(folder)[0].summary
     if not isinstance(run.summary, NiehSummary):
         raise UsageError(
             f"{folder}: a run of {run.header.suite}; only runs of nieh can stand beside guesses"

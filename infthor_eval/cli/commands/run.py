@@ -24,7 +24,7 @@ from infthor_eval.cli.progress.notes import (
     quiet_notes,
 )
 from infthor_eval.cli.progress.runs import execute_runs
-from infthor_eval.cli.results import RunResults, print_results
+from infthor_eval.cli.results import RunResults, print_failures, print_results
 from infthor_eval.errors import DataError
 from infthor_eval.reasons import count_reasons
 from infthor_eval.runs import (
@@ -146,7 +146,8 @@ def evaluate(
     with quiet_notes(show.quiet):
         for outcome in outcomes:
             _print_faults(outcome)
-    n_failed = sum(map(_print_failures, outcomes))  # every run prints its failures
+    # Every run prints its failures.
+    n_failed = sum(print_failures(outcome.records) for outcome in outcomes)
     n_void = sum(map(_print_if_void, outcomes))
     n_unsent = sum(not _send(outcome, senders) for outcome in outcomes if not outcome.n_missing)
     close_failures = [outcome.close_failure for outcome in outcomes if outcome.close_failure]
@@ -180,15 +181,3 @@ def _print_faults(outcome: RunOutcome) -> None:
     faults = [(record.task, fault) for record in outcome.records for fault in record.faults]
     for task, reason, n in count_reasons(faults):
         print_note(f"{task}: {n} fault(s): {reason}", "yellow")
-
-
-def _print_failures(outcome: RunOutcome) -> int:
-    failed = [
-        ((record.task, record.state), record.failure)
-        for record in outcome.records
-        if record.failure is not None
-    ]
-    for (task, state), reason, n in count_reasons(failed):
-        what = "failed, in no score: " if state == "failed" else ""  # else the reason says so
-        print_failure(f"{task}: {n} sample(s) {what}{reason}")
-    return len(failed)

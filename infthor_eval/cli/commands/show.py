@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.show import ShowOptions, sample_options
 from infthor_eval.cli.options.values import PATH
 from infthor_eval.cli.progress.notes import print_failure
-from infthor_eval.cli.results import print_results, read_run_results
+from infthor_eval.cli.results import print_failures, print_results, read_run_results
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import is_trajectory_file
 from infthor_eval.terminal import print_line
@@ -55,7 +56,15 @@ def command(paths: tuple[Path, ...], per_sample: bool, question: str | None, **p
     elif per_sample or options.format == "parquet":
         _print_samples(paths, options)
     else:
-        print_results([read_run_results(folder) for folder in paths], options)
+        _print_runs(paths, options)
+
+
+def _print_runs(folders: Sequence[Path], options: ShowOptions) -> None:
+    """Print the results of runs, and why units have none."""
+    runs, records = zip(*map(read_run_results, folders), strict=True)
+    print_results(runs, options)
+    for run, of_run in zip(runs, records, strict=True):
+        print_failures(of_run, run.folder if len(runs) > 1 else None)
 
 
 def _print_trajectories(paths: tuple[Path, ...], options: ShowOptions) -> None:

@@ -10,7 +10,16 @@ from infthor_eval.runs import UnitRecord
 from infthor_eval.statistics import bootstrap_interval, clustered_mean
 from infthor_eval.tables import TableCell, answered_cell, interval_cell
 
-__all__ = ["Cell", "Score", "make_cell", "mean_cell", "score_interval", "score_of", "with_missing"]
+__all__ = [
+    "Cell",
+    "Score",
+    "both_intervals",
+    "make_cell",
+    "mean_cell",
+    "score_interval",
+    "score_of",
+    "with_missing",
+]
 
 Record = UnitRecord[NiehAnswer]
 
@@ -92,6 +101,15 @@ def mean_cell(cell: Cell | None, metric: str, n_digits: int = 2) -> TableCell:
     score = cell.scores.get(metric)
     mean = "" if score is None else f"{100 * score.mean:.{n_digits}f}"
     return answered_cell(mean, cell.n_answered, cell.n)
+
+
+def both_intervals(cell: Cell, metric: str) -> tuple[TableCell, TableCell]:
+    """Return the clustered interval of a mean in percent, and that by resampling; `-` for one that
+    there is not, as of a single trajectory."""
+    score = cell.scores.get(metric)
+    resampled = None if score is None else score.bootstrap
+    low, high = (None, None) if resampled is None else (100 * end for end in resampled)
+    return score_interval(cell, metric, "{}–{}"), interval_cell(low, high, pattern="{}–{}")
 
 
 def score_interval(cell: Cell, metric: str, pattern: str = "[{}, {}]") -> TableCell:

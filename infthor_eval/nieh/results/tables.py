@@ -7,7 +7,7 @@ from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.rescoring.report import sources_of
 from infthor_eval.nieh.results.answer_form import repetition_note
-from infthor_eval.nieh.results.cells import Cell, mean_cell
+from infthor_eval.nieh.results.cells import Cell, both_intervals, mean_cell
 from infthor_eval.nieh.results.control_tables import control_tables, without_alike_notes
 from infthor_eval.nieh.results.effective_length import effective_lengths
 from infthor_eval.nieh.results.evidence_tables import (
@@ -45,6 +45,7 @@ _LEGEND = (
     "strict takes words that are 80 % alike (most plurals in -s) and the published synonyms, and "
     "drops no article; `infthor-eval show RUN --question ID` says why a reply got its score.",
 )
+_ALONE = "Questions on one trajectory alone have no interval: nothing is known of others."
 _EMBEDDED = (
     "Questions on frames of the embedded simulator: not comparable with the published rows, which "
     "are on AI2-THOR's own frames."
@@ -107,6 +108,7 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
             for run, name, task in tasks
             if (note := repetition_note(task.format_failures, task.total.n_answered))
         ),
+        *([_ALONE] if any(_is_alone(task) for *_, task in with_samples) else []),
         *_notes(runs),
     )
     table = Table("NIEH accuracy, %, strict scorer", (*_NAMES, *map(Column, numbers)), rows, notes)
@@ -120,11 +122,16 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
     ]
 
 
+def _is_alone(task: TaskSummary) -> bool:
+    scores = task.total.scores.values()
+    return any(score.n_trajectories == 1 for score in scores)
+
+
 def _name_and_total(name: str, task: TaskSummary) -> tuple[str, ...]:
     total = task.total
     metric = main_metric(task)
     name_and_metric = name if metric == "strict" else f"{name}, {metric}"
-    return name_and_metric, mean_cell(total, metric), *_intervals(total, metric), str(total.n)
+    return name_and_metric, mean_cell(total, metric), *both_intervals(total, metric), str(total.n)
 
 
 def _left_out(task: TaskSummary) -> tuple[str, str, str]:
@@ -216,7 +223,7 @@ def _cells(task: TaskSummary, metric: str, *, is_guessed: bool) -> list[str]:
     return [
         *by_clues,
         mean_cell(total, metric),
-        *_intervals(total, metric),
+        *both_intervals(total, metric),
         *apart,
         *([above] if is_guessed else []),
         str(total.n),
@@ -224,23 +231,11 @@ def _cells(task: TaskSummary, metric: str, *, is_guessed: bool) -> list[str]:
     ]
 
 
-def _intervals(cell: Cell, metric: str) -> tuple[str, str]:
-    """Return the clustered interval, and that by resampling; one trajectory has neither."""
-    score = cell.scores.get(metric)
-    if score is None:
-        return _range(None, None), _range(None, None)
-    return _range(score.low, score.high), _range(*(score.bootstrap or (None, None)))
-
-
 def _mean_of(cell: Cell | None, metric: str) -> TableCell:
     if not cell or not cell.n:
         return TableCell("-", {"": "", "questions": ""})
     mean = mean_cell(cell, metric)
     return TableCell(f"{mean} ({cell.n})", {**mean.numbers, "questions": str(cell.n)})
-
-
-def _range(low: float | None, high: float | None) -> TableCell:
-    return interval_cell(_in_percent(low), _in_percent(high), pattern="{}–{}")
 
 
 def _in_percent(share: float | None) -> float | None:

@@ -20,14 +20,18 @@ def headline(results: Sequence[TaskResult]) -> str:
 
 
 def _sentence(by_task: dict[str, list[TaskResult]]) -> str:
-    # The tasks of most runs come first, in their order.
-    tasks = sorted(by_task, key=lambda task: -len(by_task[task]))
+    # The tasks of most runs come first, and of these the ones that guessing never gets right.
+    tasks = sorted(by_task, key=lambda task: (-len(by_task[task]), _may_guess(by_task[task])))
     clauses = [_clause(task, by_task[task]) for task in tasks[:_MOST_TASKS]]
     n_more = len(tasks) - _MOST_TASKS
     if n_more > 0:
         clauses.append(f"{n_more} more {'task is' if n_more == 1 else 'tasks are'} in the table")
     text = "; ".join(clauses)
     return f"{text[0].upper()}{text[1:]}."
+
+
+def _may_guess(results: Sequence[TaskResult]) -> bool:
+    return any(result.chance != 0.0 for result in results)
 
 
 def _clause(task: str, results: Sequence[TaskResult]) -> str:

@@ -30,10 +30,12 @@ def _cost_row(run: PresentedRun) -> Row:
     seconds = sum(record.seconds for record in run.records)
     rate = f"{len(run.records) / seconds:,.2f}" if seconds >= _MEASURABLE_S else "-"
     usage = run.usage
-    cached = "-" if usage.hit_rate is None else f"{100 * usage.hit_rate:.1f}"
-    counts = f"{usage.requests:,}", f"{usage.context:,}", cached, f"{usage.reply:,}"
+    requests = f"{usage.requests:,}"
+    tokens = ("-", "-", "-")  # where nobody counts them
+    if usage.hit_rate is not None:
+        tokens = (f"{usage.context:,}", f"{100 * usage.hit_rate:.1f}", f"{usage.reply:,}")
     cost = "-" if usage.cost is None else f"{usage.cost:.4f}"
-    return Row((run.label, str(len(run.records)), f"{seconds:.1f}", rate, *counts, cost))
+    return Row((run.label, str(len(run.records)), f"{seconds:.1f}", rate, requests, *tokens, cost))
 
 
 def left_out_table(runs: Sequence[PresentedRun]) -> Table | None:

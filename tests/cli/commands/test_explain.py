@@ -102,6 +102,16 @@ def test_a_planted_cause_is_named(run, run_cli, first, second, cause, setting):
     assert setting in out.split("Where")[0]
 
 
+def test_another_version_of_ones_own_file_is_named(run, run_cli, tmp_path):
+    runs = []
+    for reply in ("yes", "no"):
+        file = tmp_path / reply / "mine.py"
+        file.parent.mkdir()
+        file.write_text(f"def answer(images, text):\n    return {reply!r}\n")
+        runs.append(run(model=f"{file}:answer"))
+    assert most(run_cli("explain", *runs)[1]) == "the file or package that the model comes from"
+
+
 def test_the_seed_and_a_truncated_context_are_named(run, run_cli, make_nieh_set):
     """All questions of a set are asked: the seed draws those of a limit too."""
     data = make_nieh_set(size=300, n_frames=12)

@@ -111,6 +111,20 @@ def test_a_folder_without_a_run_is_named(run_cli, tmp_path):
     )
 
 
+def test_why_units_failed_is_said_again_and_of_several_runs_with_the_folder(tmp_path, run_cli):
+    model = tmp_path / "dead.py"
+    model.write_text("def answer(images, text):\n    raise ValueError('is away')\n")
+    words = option_words(model=f"{model}:answer,blind", tasks="nieh_mini_gt", limit=2)
+    code, _, printed = run_cli(*words, "--output", tmp_path / "out")
+    assert code == 1
+    dead, blind = (next((tmp_path / "out" / name).iterdir()) for name in ("answer", "blind"))
+    code, _, err = run_cli("show", dead)
+    assert code == 0
+    assert err.startswith("nieh_mini_gt: 2 sample(s) failed, in no score: answer fails")
+    assert err in printed
+    assert run_cli("show", dead, blind)[2] == f"{dead}: {err}"
+
+
 # -- ls
 
 

@@ -94,6 +94,13 @@ def test_replies_that_repeat_their_questions_are_told_below_the_accuracy(n_repea
     assert not told or told[0].startswith("a run, nieh_gt: 3 of 4 replies")
 
 
+@pytest.mark.parametrize("n_trajectories", [1, 2])
+def test_a_single_trajectory_says_why_it_has_no_interval(n_trajectories):
+    records = [make_record(at, "yes", cluster=f"t{at % n_trajectories}") for at in range(4)]
+    notes = overview([make_run(make_config(), records)])[0].notes
+    assert any("no interval" in note for note in notes) == (n_trajectories == 1)
+
+
 def test_a_run_of_a_published_checkpoint_is_set_against_its_row_unless_its_frames_are_simulated():
     records = right_but_every(20, 200)
     (row,) = minus(make_run(make_config(), records))

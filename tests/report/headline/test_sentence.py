@@ -40,6 +40,15 @@ def test_guessing_is_left_out_unless_it_is_known_of_all():
     assert said(*results) == "On nieh_gt a gets 50.0 % of the questions right and b 25.0 %."
 
 
+def test_a_task_that_guessing_never_gets_right_comes_first():
+    tasks = ("nieh_gt", "nieh_full", "nieh_twins")
+    results = [
+        make_result("a", 0.5, task=task, chance=0.0 if task == "nieh_twins" else 0.25)
+        for task in tasks
+    ]
+    assert said(*results).startswith("On nieh_twins a gets")
+
+
 def test_guessing_on_different_questions_is_a_range():
     results = [make_result("a", 0.5), make_result("b", 0.25, chance=0.4)]
     assert "guessing 25.0 to 40.0 %, by the questions answered" in said(*results)
