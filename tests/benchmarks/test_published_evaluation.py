@@ -1,7 +1,9 @@
 """The simulation of a full evaluation, by hand on cases small enough for that."""
 
 import importlib
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +23,18 @@ def costs(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 @pytest.fixture
-def simulation(costs: Any) -> Any:
+def script(costs: Any) -> Any:
     return importlib.import_module("published_evaluation")
+
+
+@pytest.fixture
+def simulation(costs: Any) -> Any:
+    return importlib.import_module("evaluation_runs")
+
+
+@pytest.fixture
+def read(costs: Any) -> Callable[[list[str]], Any]:
+    return partial(importlib.import_module("evaluation_options").read_arguments, "")
 
 
 @pytest.fixture
@@ -32,8 +44,8 @@ def shape(costs: Any) -> Any:
 
 
 @pytest.fixture
-def machine(simulation: Any) -> Any:
-    return simulation.machine_of(simulation._arguments([]))
+def machine(script: Any, read: Any) -> Any:
+    return script.machine_of(read([]))
 
 
 def test_a_request_encodes_what_is_not_there_and_looks_back_at_all(costs: Any) -> None:
@@ -105,11 +117,9 @@ def test_the_longest_goes_first_to_whoever_is_free(costs: Any) -> None:
 
 
 def test_a_trajectory_is_encoded_once_and_windows_by_what_they_share(
-    simulation: Any, shape: Any
+    simulation: Any, read: Any, shape: Any
 ) -> None:
-    options = simulation._arguments(
-        ["--text-tokens", "5", "--reply-tokens", "2", "--step-tokens", "0"]
-    )
+    options = read(["--text-tokens", "5", "--reply-tokens", "2", "--step-tokens", "0"])
     trajectory = simulation.Trajectory(20, ((3,), (12,), (3,)))
     gt, full, *_, plans = simulation.modes(options)
     requests, _ = simulation.requests(trajectory, full, shape, options)
@@ -133,8 +143,8 @@ def test_a_trajectory_is_encoded_once_and_windows_by_what_they_share(
     assert len(requests) == 20
 
 
-def test_the_haystack_is_the_harness_own(simulation: Any, shape: Any) -> None:
-    options = simulation._arguments(["--text-tokens", "0"])
+def test_the_haystack_is_the_harness_own(simulation: Any, read: Any, shape: Any) -> None:
+    options = read(["--text-tokens", "0"])
     mode = simulation.Mode("haystack", simulation._haystack_of(1, 0))
     # Windows of 10 frames, which begin 0, 2, 4, 6, 8 before the clue.
     wide = replace(shape, frame_tokens=100)
@@ -148,11 +158,9 @@ def test_the_haystack_is_the_harness_own(simulation: Any, shape: Any) -> None:
 
 
 def test_a_run_counts_what_is_too_long_and_what_no_node_has_room_for(
-    simulation: Any, costs: Any, shape: Any, machine: Any
+    simulation: Any, read: Any, costs: Any, shape: Any, machine: Any
 ) -> None:
-    options = simulation._arguments(
-        ["--text-tokens", "0", "--reply-tokens", "0", "--max-context", "250"]
-    )
+    options = read(["--text-tokens", "0", "--reply-tokens", "0", "--max-context", "250"])
     small = replace(
         machine, memory=100, usable=1.0, gpus_per_node=32, attention="flash_attention_2"
     )
@@ -179,24 +187,24 @@ def test_a_run_counts_what_is_too_long_and_what_no_node_has_room_for(
 
 
 def test_the_same_seed_gives_the_same_table(
-    simulation: Any, capsys: pytest.CaptureFixture[str]
+    script: Any, simulation: Any, read: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = option_words(
         trajectories="3", haystack="8", prefill="pixtral=1000:9000,9000:6000", decode="pixtral=9"
     )
-    options = simulation._arguments(words)
+    options = read(words)
     trajectories = simulation.draw(options)
     assert trajectories == simulation.draw(options)
     assert {300 <= trajectory.n_frames <= 2287 for trajectory in trajectories} == {True}
-    machine = simulation.machine_of(options)
-    rates = simulation.rates_of(simulation.MODELS[3], machine, options)
+    machine = script.machine_of(options)
+    rates = script.rates_of(script.MODELS[3], machine, options)
     assert rates.step == pytest.approx(1 / 9)
-    assert rates != simulation.rates_of(simulation.MODELS[3], machine, simulation._arguments([]))
+    assert rates != script.rates_of(script.MODELS[3], machine, read([]))
     runs = [
         simulation.run(mode, model, trajectories, rates, machine, options)
         for mode in simulation.modes(options)
-        for model in simulation.MODELS
+        for model in script.MODELS
     ]
-    table_lines = simulation.cost_table(runs, 120, 3.0).splitlines()
+    table_lines = script.cost_table(runs, 120, 3.0).splitlines()
     assert len(table_lines) == 1 + 4 * 4 + 4 + 1
     assert {len(line) for line in table_lines} == {len(table_lines[0])}
