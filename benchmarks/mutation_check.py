@@ -49,7 +49,8 @@ _MODULES = {
     ),
     "driver": (
         "infthor_eval/runs/work/driver.py",
-        "tests/runs/work/test_driver.py tests/runs/test_results.py",
+        "tests/runs/work/test_driver.py tests/runs/work/test_refusals.py "
+        "tests/runs/work/test_scheduling.py tests/runs/test_results.py",
     ),
 }
 # Hypothesis' profile "ci" draws the same examples each time, remembers none and sets no deadlines.
