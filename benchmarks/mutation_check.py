@@ -36,7 +36,11 @@ from typing import Any, NamedTuple
 # Name: module, and the tests that should kill its mutants.
 _MODULES = {
     "scoring": ("infthor_eval/nieh/scoring.py", "tests/nieh/test_scoring.py"),
-    "rewards": ("infthor_eval/plans/rewards.py", "tests/plans/test_rewards.py"),
+    "rewards": (
+        "infthor_eval/plans/rewards.py",
+        "tests/plans/test_rewards.py tests/plans/test_rewards_of_ways.py "
+        "tests/plans/test_rewards_of_goals.py",
+    ),
     "statistics": ("infthor_eval/statistics.py", "tests/test_statistics.py"),
     "haystack": ("infthor_eval/nieh/contexts/haystack.py", "tests/nieh/contexts/test_haystack.py"),
     "journal": (
@@ -45,7 +49,8 @@ _MODULES = {
     ),
     "driver": (
         "infthor_eval/runs/work/driver.py",
-        "tests/runs/work/test_driver.py tests/runs/test_results.py",
+        "tests/runs/work/test_driver.py tests/runs/work/test_refusals.py "
+        "tests/runs/work/test_scheduling.py tests/runs/test_results.py",
     ),
 }
 # Hypothesis' profile "ci" draws the same examples each time, remembers none and sets no deadlines.

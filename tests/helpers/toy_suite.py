@@ -1,4 +1,4 @@
-"""The smallest suite: sums, in two groups, one of which cannot be done."""
+"""The smallest suite: sums, in two groups, one of which cannot be done; and runs of it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -102,3 +102,25 @@ class ToySuite:
     def tables(self, summaries):
         rows = tuple(Row((run.header.name, str(run.summary.numbers[0]))) for run in summaries)
         return [Table("Sums", (Column("who", False), Column("right")), rows)]
+
+
+class Watching:
+    """Keeps what a run tells; it has no notes."""
+
+    def __init__(self):
+        self.begun, self.seen = None, []
+
+    def begin(self, work, n_recovered):
+        self.begun = (work.n_units, len(work.skipped), n_recovered)
+
+    def done(self, record, resumed):
+        self.seen.append((record.id, record.failure, resumed))
+
+    def note(self, text):
+        raise AssertionError(text)
+
+
+def run(run_request, suite=None):
+    """The outcome of a run, and what it told."""
+    watching = Watching()
+    return runs.execute(runs.prepare(run_request, suite or ToySuite()), watching), watching

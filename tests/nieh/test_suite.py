@@ -1,3 +1,5 @@
+"""Runs of NIEH from the request to the results."""
+
 import itertools
 import json
 from collections import Counter
@@ -6,7 +8,7 @@ import pytest
 
 from infthor_eval.cli.options.run import RunOptions
 from infthor_eval.cli.options.values import ModelSpec
-from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.errors import UsageError
 from infthor_eval.exports.lm_eval import export
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
@@ -14,16 +16,11 @@ from infthor_eval.nieh import samples
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.runs import execute, prepare_all, read_run
-from model_adapters import Capabilities, Reply
 
 from ..helpers.questions import make_question
-from .watching import Watcher
+from .watching import Watcher, replies
 
 TINY = "qwen2.5-vl-tiny"
-
-
-def replies(outcome):
-    return {record.key: record.payload.reply for record in outcome.records}
 
 
 def cells(outcome):
@@ -122,109 +119,6 @@ def test_a_changed_frame_of_the_same_size_is_noticed(prepare_run, data):
     assert {record.attempt for record in watcher.evaluated} == {2}
 
 
-class Recorder:
-    """A scripted model that keeps what it was asked."""
-
-    name = "recorder"
-    capabilities = Capabilities(token_ids=False)
-
-    def __init__(self):
-        self.requests = []
-
-    def identity(self):
-        return {}
-
-    def tokens_per_frame(self, frame):
-        return 100
-
-    def conversation(self):
-        return Talk(self)
-
-    def close(self):
-        pass
-
-
-class Talk:
-    def __init__(self, model):
-        self.model, self.parts = model, []
-
-    @property
-    def n_tokens(self):
-        return len(self.parts)
-
-    def append(self, *parts, role="user"):
-        assert role == "user"
-        self.parts += parts
-
-    def mark(self):
-        return len(self.parts)
-
-    def rewind(self, mark):
-        del self.parts[mark:]
-
-    def replies(self, continuations, decoding):
-        assert (decoding.max_new_tokens, decoding.greedy, decoding.stop) == (50, True, ())
-        return [self.reply_to([*self.parts, *parts]) for parts in continuations]
-
-    def reply_to(self, parts):
-        self.model.requests.append(parts)
-        for part in parts[:-1]:
-            part.load()
-        return Reply(
-            "first line\nmug", n_reply_tokens=2, n_context_tokens=len(parts), n_cached_tokens=0
-        )
-
-
-@pytest.fixture
-def recorder(monkeypatch):
-    """Takes the place of the tiny model."""
-    model = Recorder()
-    monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
-    return model
-
-
-def test_a_model_is_asked_by_trajectory_and_in_the_published_words(prepare_run, recorder):
-    outcome = execute(prepare_run(TINY, tasks=("nieh_full",)))
-    names = [[part.path.parts[-3] for part in parts[:-1]] for parts in recorder.requests]
-    assert names == [["traj_a"] * 6] * 3 + [["traj_b"] * 6] * 2
-    assert recorder.requests[0][-1] == (
-        "\n"
-        "Answer the question given the agent's views in time order. Do not include explanation "
-        "or reasoning in the answer. Answer with a single word or words.\n"
-        "Question: Is there a mug?"
-    )
-    assert set(replies(outcome).values()) == {"first line\nmug"}
-    assert {
-        (record.tokens.context, record.tokens.cached, record.tokens.reply)
-        for record in outcome.records
-    } == {(7, 0, 2)}
-
-
-def test_a_unit_that_fails_is_recorded_and_the_run_goes_on(prepare_run, recorder, data):
-    frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
-    frame.write_bytes(frame.read_bytes()[:60])
-    outcome = execute(prepare_run(TINY))
-    failed = [record for record in outcome.records if record.failure]
-    assert len(outcome.records) == 10
-    assert Counter(record.task for record in failed) == {"nieh_gt": 2, "nieh_full": 3}
-    assert all(str(frame) in record.failure for record in failed)
-
-
-def test_a_failed_unit_is_tried_again_by_the_next_run(prepare_run, recorder, data):
-    frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
-    whole = frame.read_bytes()
-    # Its size is part of the set's fingerprint.
-    frame.write_bytes(whole[:60] + bytes(len(whole) - 60))
-    failed = {record.key for record in execute(prepare_run(TINY)).records if record.failure}
-    frame.write_bytes(whole)
-    watcher = Watcher()
-    outcome = execute(prepare_run(TINY), watcher)
-    assert len(failed) == 5
-    assert {record.key for record in watcher.evaluated} == failed
-    assert {record.attempt for record in watcher.evaluated} == {2}
-    assert not any(record.failure for record in outcome.records)
-
-
 def test_a_frame_that_is_no_image_has_the_samples_that_need_it_skipped(prepare_run, data):
     (data / "metadata" / "traj_b" / "img" / "000000002.png").write_text("text")
     outcome = execute(prepare_run())
@@ -254,70 +148,6 @@ def test_the_tiny_model_runs_through_and_shares_prefixes(prepare_run):
         "traj_b": 2,
     }
     assert all(cached[0] < min(cached[1:]) for cached in by_trajectory.values())
-
-
-def test_batches_give_the_same_replies_and_one_that_fails_takes_no_other_with_it(
-    prepare_run, monkeypatch
-):
-    tasks = ("nieh_full",)
-    alone = execute(prepare_run(TINY, tasks=tasks))
-    together = execute(prepare_run(TINY, {"batch_size": "4"}, tasks=tasks))
-    assert replies(together) == replies(alone)
-    assert not any(record.faults for record in together.records)
-
-    from model_adapters.backend import BackendConversation
-
-    whole = BackendConversation.replies
-
-    def one_at_a_time(talk, continuations, decoding):
-        if len(continuations) > 1:
-            raise ModelError("out of memory on a batch")
-        return whole(talk, continuations, decoding)
-
-    monkeypatch.setattr(BackendConversation, "replies", one_at_a_time)
-    with_retries = execute(prepare_run(TINY, {"batch_size": "3"}, tasks=tasks))
-    assert replies(with_retries) == replies(alone)
-    assert Counter(record.faults for record in with_retries.records) == {
-        ("asked with 2 others: out of memory on a batch",): 3,
-        ("asked with 1 others: out of memory on a batch",): 2,
-    }
-
-
-def test_one_of_a_batch_that_cannot_be_answered_fails_alone(prepare_run, monkeypatch):
-    from model_adapters.backend import BackendConversation
-
-    whole = BackendConversation.replies
-
-    def but_the_sink(talk, continuations, decoding):
-        if any("sink" in parts[-1] for parts in continuations):
-            raise ModelError("no sink, please")
-        return whole(talk, continuations, decoding)
-
-    monkeypatch.setattr(BackendConversation, "replies", but_the_sink)
-    outcome = execute(prepare_run(TINY, {"batch_size": "4"}, tasks=("nieh_full",)))
-    (failed,) = [record for record in outcome.records if record.failure]
-    assert failed.payload.question == "Is there a sink?"
-    assert failed.failure == "no sink, please"
-    assert failed.faults == ("asked with 1 others: no sink, please",)
-
-
-# -- sizes and limits
-
-
-def test_a_model_that_counts_no_tokens_is_asked_once_the_size_of_a_frame_is_told(
-    prepare_run, recorder, monkeypatch
-):
-    monkeypatch.setattr(
-        Recorder, "capabilities", Capabilities(counts_tokens=False, token_ids=False)
-    )
-    monkeypatch.setattr(Recorder, "tokens_per_frame", lambda *_: None)
-    tasks = ("nieh_truncate_head_8k",)
-    with pytest.raises(UsageError, match="which recorder does not count; give --tokens-per-frame"):
-        execute(prepare_run(TINY, tasks=tasks))
-    watcher = Watcher()
-    execute(prepare_run(TINY, tasks=tasks, suite_options={"tokens_per_frame": 2000}), watcher)
-    assert {len(parts) for parts in recorder.requests} == {8192 // 2000 + 1}
-    assert watcher.work.costs == []
 
 
 def test_the_limit_is_of_questions_that_can_be_asked_with_all_their_variants(make_nieh_set):
@@ -398,94 +228,3 @@ def test_a_baseline_reads_the_whole_key_whatever_is_asked_of_it(prepare_run):
         whole, few = (replies(execute(prepare_run(model, limit=limit))) for limit in (None, 2))
         assert len(few) == 4
         assert few.items() <= whole.items()
-
-
-# -- decoding that the task file asks for
-
-
-@pytest.fixture
-def sampling(task_files):
-    """Has `nieh_gt` decode as the given lines say."""
-
-    def write(settings):
-        (task_files / "nieh" / "nieh_gt.yaml").write_text(
-            "include: _nieh.yaml\ntask: nieh_gt\ndataset_kwargs: {context: clues}\n"
-            f"generation_kwargs: {{{settings}}}\n"
-        )
-
-    return write
-
-
-def test_a_temperature_in_the_task_file_samples_and_the_seed_decides_what(
-    prepare_run, sampling, tmp_path
-):
-    def reply_with(settings, seed=0, folder="out"):
-        sampling(settings)
-        return replies(
-            execute(prepare_run(TINY, tasks=("nieh_gt",), seed=seed, output=tmp_path / folder))
-        )
-
-    greedy = reply_with("max_gen_toks: 12, do_sample: false, temperature: 0.0")
-    drawn = reply_with("max_gen_toks: 12, do_sample: true, temperature: 2.0")
-    assert drawn != greedy
-    assert (
-        reply_with("max_gen_toks: 12, do_sample: true, temperature: 2.0", folder="again") == drawn
-    )
-    assert reply_with("max_gen_toks: 12, temperature: 2.0", folder="without the word") == drawn
-    assert (
-        reply_with(
-            "max_gen_toks: 12, do_sample: true, temperature: 2.0, top_p: 0.000001", folder="top"
-        )
-        == greedy
-    )
-
-
-def test_another_seed_draws_other_replies_from_the_same_weights(prepare_run, sampling, tmp_path):
-    from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
-
-    save_tiny_checkpoint(tmp_path / "checkpoint", seed=0)
-    sampling("max_gen_toks: 12, do_sample: true, temperature: 2.0")
-    options = {"pretrained": str(tmp_path / "checkpoint"), "device": "cpu"}
-    first, second = (
-        replies(execute(prepare_run("qwen2.5-vl", options, tasks=("nieh_gt",), seed=seed)))
-        for seed in (0, 1)
-    )
-    assert first.keys() == second.keys()
-    assert first != second
-
-
-@pytest.mark.parametrize(
-    ("settings", "expected"),
-    [
-        ("do_sample: false, temperature: 0.7", "temperature 0.7 without do_sample has no effect"),
-        ("do_sample: true, temperature: 0.0", "do_sample with temperature 0 contradict each other"),
-        ("num_beams: 4", "num_beams is not known; there are until, max_gen_toks"),
-        ("until: [7]", r"until is \[7\]; it is a text or a list of texts"),
-        ("do_sample: 'no'", "do_sample is 'no'; it is true or false"),
-        ("temperature: -1.0", "temperature must be 0"),
-        ("temperature: warm", "temperature is 'warm'; it is a number"),
-        ("top_p: most", "top_p is 'most'; it is a number"),
-        ("top_p: 1.5", "top_p must be above 0 and at most 1, not 1.5"),
-        ("max_gen_toks: 0", "max_new_tokens must be at least 1, not 0"),
-        ("max_gen_toks: many", "max_gen_toks is 'many'; it is a whole number"),
-    ],
-)
-def test_settings_that_would_not_act_are_refused_before_a_model_is_loaded(
-    prepare_run, sampling, settings, expected
-):
-    sampling(settings if "max_gen_toks" in settings else f"max_gen_toks: 12, {settings}")
-    with pytest.raises(
-        UsageError, match=rf"nieh_gt\.yaml: generation_kwargs: {expected}"
-    ) as caught:
-        prepare_run(TINY, tasks=("nieh_gt",))
-    assert "\n" not in str(caught.value)
-
-
-def test_a_stop_text_of_the_task_file_ends_replies(prepare_run, sampling):
-    sampling("max_gen_toks: 12, until: []")
-    whole = replies(execute(prepare_run(TINY, tasks=("nieh_gt",))))
-    mark = next(text[1] for text in whole.values() if len(text) > 1)
-    sampling(f"max_gen_toks: 12, until: {json.dumps([mark])}")
-    assert replies(execute(prepare_run(TINY, tasks=("nieh_gt",)))) == {
-        key: text.partition(mark)[0] for key, text in whole.items()
-    }

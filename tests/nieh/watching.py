@@ -1,6 +1,11 @@
-"""An observer that keeps what it is told."""
+"""What a run tells: an observer that keeps it, and the replies of its records."""
 
-from infthor_eval.runs import UnitRecord, Workload
+from infthor_eval.runs import RunOutcome, UnitKey, UnitRecord, Workload
+
+
+def replies(outcome: RunOutcome) -> dict[UnitKey, str | None]:
+    """The reply of each unit."""
+    return {record.key: record.payload.reply for record in outcome.records}
 
 
 class Watcher:

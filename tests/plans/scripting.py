@@ -1,10 +1,16 @@
 """A model without weights that says what it is told to say."""
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.object_ids import Words
+from infthor_eval.formats.trajectory import iter_trajectories
+from infthor_eval.plans.actors.habits import expert_texts
+from infthor_eval.plans.plan import plans_of, tasks_of
 from model_adapters import Capabilities, Part, Reply, Transcript, check_turns
 
+FIRST_GOAL = "<|goal|>Your main goal: put a fork in the drawer<|goal|>"  # of FORK, in a prompt
 CAPABILITIES = Capabilities(token_ids=False, sampling=True, choices=True)
 
 
@@ -75,3 +81,25 @@ def actions_in_prompt(parts: Sequence[Part]) -> list[str]:
     """The actions of that plan up to now."""
     text = "".join(part if isinstance(part, str) else "" for part in parts)
     return text.rpartition("<|plan|>")[2].split("<|act|>")[1:-1:2]
+
+
+def frames_in_prompt(parts: Sequence[Part]) -> list[FrameRef]:
+    """What was seen."""
+    return [part for part in parts if isinstance(part, FrameRef)]
+
+
+def as_expert(folder: Path) -> Callable[[Sequence[Part], object], str]:
+    """Says what the expert did for the plan, by the words of goal and plan and the actions up to
+    now."""
+    known = {}
+    for trajectory in iter_trajectories(folder):
+        tasks = tasks_of(trajectory)
+        for plan in plans_of(trajectory, Words.PUBLISHED):
+            key = tasks[plan.task].text, plan.text
+            assert key not in known
+            known[key] = expert_texts(trajectory, plan, Words.PUBLISHED)
+
+    def say(parts, decoding):
+        return known[goal_in_prompt(parts), plan_in_prompt(parts)][len(actions_in_prompt(parts))]
+
+    return say

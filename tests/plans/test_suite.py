@@ -1,40 +1,20 @@
 """Runs of plans by baselines, from the request to the tables."""
 
 import json
-from collections import Counter
-from pathlib import Path
 
 import pytest
 
 from infthor_eval.episodes.records import NOT_ATTEMPTED
-from infthor_eval.errors import DataError, UsageError
+from infthor_eval.errors import UsageError
 from infthor_eval.formats.published import PublishedRow, PublishedTable
 from infthor_eval.runs import execute
 
 from ..helpers.command_line import assert_refused, option_words
 from ..helpers.refusals import read_one_line
-from ..helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
+from ..helpers.trajectories import FORK, MUG, cut_trajectory, write_trajectories
+from .outcomes import cells, payloads, summary
 
 pytestmark = pytest.mark.usefixtures("shared_simulators")
-
-
-def payloads(outcome):
-    return [record.payload for record in outcome.records]
-
-
-def summary(outcome, task="infthor_plans"):
-    return outcome.summary.summary.tasks[task]
-
-
-def cells(outcome, title):
-    """A table's one row, by the names of its columns."""
-    (table,) = [
-        table
-        for table in outcome.run.suite.tables([outcome.summary])
-        if table.title.startswith(title)
-    ]
-    (row,) = [row for row in table.rows if not row.is_published]
-    return dict(zip((column.name for column in table.columns), row.cells, strict=False))
 
 
 # -- what a run finds
@@ -159,153 +139,6 @@ def test_habits_are_learnt_in_other_scenes_alone(prepare_run, data, tmp_path):
     assert learnt[0].steps[0].action == "MoveAhead"
     assert learnt[1].steps[0].message.startswith("PickupObject Fork: ")  # the cabinet is closed
     assert learnt[1].ended == "not in view"
-
-
-# -- what cannot be evaluated
-
-
-def refused_in(plan):
-    """The kitchen, with an action of the expert in that plan that no simulator can carry out."""
-    document = cut_trajectory(FORK)
-    low = next(low for low in document["plan"]["low_actions"] if low["high_idx"] == plan)
-    low["api_action"] = {"action": "OpenObject", "objectId": "Wardrobe|+00.00|+00.00|+00.00"}
-    return document
-
-
-@pytest.mark.parametrize("after_failure", ["continue", "stop"])
-def test_plans_that_the_expert_cannot_do_here_count_for_nobody(
-    prepare_run, tmp_path, after_failure
-):
-    data = write_trajectories(tmp_path / "refused", refused_in(2))
-    for model, ended in (("planner", "done"), ("scripted", "refused by the simulator")):
-        outcome = execute(prepare_run(model, data=data, after_failure=after_failure))
-        assert payloads(outcome)[0].ended == ended
-        task = summary(outcome)
-        assert (task.n_plans, task.n_failed, sum(task.endings.values())) == (2, 0, 2)
-        ((reason, number),) = task.excluded.items()
-        assert reason.startswith(
-            "the expert's action 15 (OpenObject Wardrobe, in plan 2) is refused here: "
-        )
-        assert number == 2
-        assert {name: rate.n for name, rate in task.success.items()} == {
-            "Go to": 1,
-            "Pick up": 1,
-            "total": 2,
-        }
-        assert cells(outcome, "Plans completed")["excluded"] == "2"
-        (table, *_) = outcome.run.suite.tables([outcome.summary])
-        assert f"2 left out: {reason}" in table.notes
-
-
-def test_a_plan_about_what_is_not_there_counts_for_nobody(prepare_run, tmp_path):
-    document = cut_trajectory(FORK)
-    document["plan"]["high_pddl"][3]["planner_action"]["receptacleObjectId"] = (
-        "Elephant|+00.00|+00.00|+00.00"
-    )
-    outcome = execute(prepare_run(data=write_trajectories(tmp_path / "elephant", document)))
-    task = summary(outcome)
-    assert task.excluded == {"the scene has no object for 'Elephant|+00.00|+00.00|+00.00'": 1}
-    assert (task.n_plans, task.n_failed, task.endings) == (3, 0, {"done": 3})
-
-
-def test_trajectories_in_a_scene_that_is_not_here_count_for_nobody(prepare_run, data):
-    document = cut_trajectory(MUG, 2, called="elsewhere")
-    document["scene"]["floor_plan"] = "FloorPlan7"
-    (data / "elsewhere.json").write_text(json.dumps(document))
-    outcome = execute(prepare_run("scripted"))
-    task = summary(outcome)
-    ((reason, number),) = task.excluded.items()
-    assert reason.startswith("scene FloorPlan7: ")
-    assert (number, task.n_plans, task.n_failed) == (2, 4, 0)
-    assert all(not record.faults for record in outcome.records)
-
-
-def test_where_all_is_left_out_the_exit_code_says_so(run_cli, tmp_path):
-    document = cut_trajectory(MUG, 2)
-    document["scene"]["floor_plan"] = "FloorPlan7"
-    data = write_trajectories(tmp_path / "elsewhere", document)
-    arguments = option_words(
-        model="scripted", tasks="infthor_plans", data=str(data), output=str(tmp_path / "o")
-    )
-    code, out, err = run_cli("run", *arguments)
-    assert code == 1
-    assert "scene FloorPlan7" in out and "--scenes DIR" in " ".join(out.split())
-    assert "no result: every sample is excluded" in err
-
-
-BROKEN = {
-    "no JSON": ("{", "not a trajectory"),
-    "of another form": ('{"scene": 5}', "not a trajectory"),
-    "unknown plan kind": (
-        lambda it: it["plan"]["high_pddl"][1]["discrete_action"].update(action="Juggle"),
-        "sub-goal 1 is 'Juggle'; there are GotoLocation",
-    ),
-    "no goal": (
-        lambda it: it["sub_tasks"][0]["task_info"].update(goal=""),
-        "task 0: a task has no goal",
-    ),
-    "an action without a name": (
-        lambda it: it["plan"]["low_actions"][5]["api_action"].update(action=" "),
-        "not a trajectory (Expected `str` matching regex",
-    ),
-    "no action": (
-        lambda it: it["plan"].update(low_actions=[]),
-        "no plan with an action; leave it out",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_trajectory_is_skipped_named_and_counted(prepare_run, data, name):
-    damage, expected = BROKEN[name]
-    document = cut_trajectory(FORK, called="broken")
-    if isinstance(damage, str):
-        (data / "broken.json").write_text(damage)
-    else:
-        damage(document)
-        (data / "broken.json").write_text(json.dumps(document))
-    run = prepare_run("scripted")
-    (skipped,) = run.evaluation.bind(run.suite.baselines["scripted"](0)).workload.skipped
-    assert skipped.key.id == "broken.json"
-    assert expected in skipped.reason
-    assert "\n" not in skipped.reason
-    assert str(data) not in skipped.reason  # the run is the same one wherever its data lie
-
-
-def test_files_that_cannot_be_read_are_skipped_too(prepare_run, data):
-    (data / "a.jsonl.gz").write_bytes(b"no gzip")
-    (data / "b.json").mkdir()
-    (data / "c.json").symlink_to("nowhere")
-    (data / "d.jsonl").write_text(json.dumps(cut_trajectory(MUG, 1, called="sound")) + "\n{\n")
-    outcome = execute(prepare_run())
-    assert {record.cluster for record in outcome.records} == {FORK, "sound"}
-    task = summary(outcome)
-    assert (sum(task.skipped.values()), task.n_trajectories) == (3, 2)
-    assert cells(outcome, "Plans completed")["skipped"] == "3"
-    assert all(
-        any(name in reason for reason in task.skipped)
-        for name in ("a.jsonl.gz", "c.json", "d.jsonl:2")
-    )
-
-
-def test_nothing_to_evaluate_is_refused_in_one_line(prepare_run, tmp_path):
-    nowhere, empty, broken = (tmp_path / name for name in ("nowhere", "empty", "broken"))
-    empty.mkdir()
-    broken.mkdir()
-    (broken / "a.json").write_text("{")
-    for place, error, expected in (
-        (None, UsageError, "no trajectories of its own; give them as --data"),
-        (nowhere, UsageError, "there is no such file or folder"),
-        (empty, DataError, "no .json, .jsonl, .jsonl.gz file"),
-        (broken, DataError, "nothing to evaluate"),
-    ):
-        with pytest.raises(error, match=expected) as caught:
-            prepare_run(data=place)
-        read_one_line(caught)
-    twice = write_trajectories(tmp_path / "twice", cut_trajectory(FORK, 1))
-    write_trajectories(twice / "again", cut_trajectory(FORK, 2))
-    with pytest.raises(DataError, match=f"{FORK} is the name of another trajectory too"):
-        prepare_run(data=twice)
 
 
 # -- final tasks
@@ -437,117 +270,3 @@ def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(
     mended = execute(prepare_run(after_failure="stop"))
     assert [record.payload.ended for record in mended.records] == ["done"] * 4
     assert [record.attempt for record in mended.records] == [1, 2, 2, 2]
-
-
-# -- task files
-
-SETTINGS = [
-    ("plan: all", "dataset_kwargs: plan is not known; did you mean plans?"),
-    ("colour: red", "dataset_kwargs: colour is not known; there are plans, bundled, rewards"),
-    ("plans: some", "dataset_kwargs: plans is 'some'; there are all, final"),
-    ("after_failure: weep", "dataset_kwargs: after_failure is 'weep'; there are continue, stop"),
-    ("max_steps: 0", "dataset_kwargs: max_steps is 0; it is a whole number above 0"),
-    ("max_steps: true", "dataset_kwargs: max_steps is True; it is a whole number above 0"),
-    ("max_steps: 2.5", "dataset_kwargs: max_steps is 2.5; it is a whole number above 0"),
-    ("preamble: 7", "dataset_kwargs: preamble is 7; it is a text"),
-    ("bundled:", "dataset_kwargs: bundled is None; it is a text"),
-    ("rewards: generous", "unknown reward rules 'generous'; there are default, published"),
-    (
-        "history: all",
-        "history all: there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, "
-        "goals and plans",
-    ),
-    ("bundled: nothing", "the installation lacks its data folder 'sets/nothing'"),
-]
-
-
-@pytest.fixture
-def task_file(task_files: Path):
-    """Has `infthor_plans` say something else."""
-
-    def write_task(settings, more=""):
-        (task_files / "plans" / "infthor_plans.yaml").write_text(
-            f"include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {{{settings}}}\n{more}"
-        )
-
-    return write_task
-
-
-@pytest.mark.parametrize(
-    ("settings", "expected"), SETTINGS, ids=[expected for _, expected in SETTINGS]
-)
-def test_a_setting_that_would_not_act_is_refused(prepare_run, task_file, settings, expected):
-    task_file(settings)
-    with pytest.raises((DataError, UsageError)) as caught:
-        prepare_run()
-    assert expected in read_one_line(caught)
-
-
-def test_settings_of_a_task_file_act_and_options_go_before_them(prepare_run, task_file):
-    task_file("max_steps: 2, rewards: published")
-    plans = payloads(execute(prepare_run()))
-    assert Counter(plan.ended for plan in plans) == {
-        "step limit": 1,
-        "done": 2,
-        "refused by the simulator": 1,
-    }
-    plans = payloads(execute(prepare_run(rewards="default")))
-    assert Counter(plan.ended for plan in plans) == {"step limit": 2, "done": 2}
-
-
-@pytest.mark.parametrize(
-    ("more", "expected"),
-    [
-        ("", "no dataset_kwargs; tasks of plans need dataset_kwargs, generation_kwargs"),
-        ("dataset_kwargs: 5", "dataset_kwargs must be a mapping of settings"),
-        (
-            "dataset_kwargs: {}\ngeneration_kwargs: {max_gen_toks: 0}",
-            "max_new_tokens must be at least 1, not 0",
-        ),
-        (
-            "dataset_kwargs: {}\ngeneration_kwargs: {max_gen_toks: 9, beams: 2}",
-            "generation_kwargs: beams is not known",
-        ),
-        (
-            "dataset_kwargs: {}\ngeneration_kwargs: 7",
-            "generation_kwargs is 7; it is a mapping of settings",
-        ),
-    ],
-)
-def test_what_is_wrong_beside_the_settings_is_refused_too(prepare_run, task_files, more, expected):
-    (task_files / "plans" / "infthor_plans.yaml").write_text(
-        f"include: _plans.yaml\ntask: infthor_plans\n{more}\n"
-    )
-    with pytest.raises((DataError, UsageError)) as caught:
-        prepare_run(data=None)
-    assert expected in read_one_line(caught)
-
-
-def test_another_setting_is_another_run(prepare_run, data):
-    def identity(**changes):
-        run = prepare_run(**changes)
-        return run.evaluation.bind(run.suite.baselines["planner"](0)).workload.config
-
-    plain = identity()
-    for changes in (
-        {"rewards": "published"},
-        {"words": "natural"},
-        {"force_action": True},
-        {"history": "published"},
-        {"history": "last:100"},
-        {"after_failure": "stop"},
-        {"constrained": True},
-        {"greedy": True},
-        {"frames": "blank"},
-        {
-            "tasks": ("infthor_final",),
-            "data": write_trajectories(
-                data.parent / "final", cut_trajectory(CANDLE, 2, final=True)
-            ),
-        },
-    ):
-        assert identity(**changes) != plain
-    document = cut_trajectory(FORK)
-    document["plan"]["low_actions"].pop()
-    (data / f"{FORK}.json").write_text(json.dumps(document))
-    assert identity() != plain

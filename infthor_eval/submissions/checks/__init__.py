@@ -2,5 +2,5 @@
 
 To add or change a check of submissions: a class with the members of `case.py: Check` in a module of
 `infthor_eval/submissions/checks/`, its name in `checking.py: CHECKS`, and a forged submission in
-`tests/submissions/test_forged.py`.
+`tests/submissions/forged_answers.py` or `tests/submissions/forged_runs.py`.
 """

@@ -9,18 +9,23 @@ from http.server import BaseHTTPRequestHandler
 from io import BytesIO
 from typing import Any
 
+import pytest
 from PIL import Image
 
-from model_adapters import load
+from infthor_eval.errors import ModelError
+from model_adapters import Decoding, Reply, load
 
 from ..policies.servers import Answer, serve
 
 __all__ = [
     "always_say",
+    "always_send",
+    "ask_once",
     "completion",
     "images_in",
     "keep_requests",
     "open_model",
+    "read_refusal",
     "serve_chat",
     "talkative",
 ]
@@ -65,6 +70,19 @@ def always_say(text: str) -> Answer:
     return lambda *_: completion(text)
 
 
+def always_send(status: int, body: bytes, headers: dict[str, str] | None = None) -> Answer:
+    """Sends the same bytes whatever it is asked."""
+
+    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+        handler.send_response(status)
+        for name, value in {"Content-Length": str(len(body)), **(headers or {})}.items():
+            handler.send_header(name, value)
+        handler.end_headers()
+        handler.wfile.write(body)
+
+    return answer
+
+
 @contextmanager
 def serve_chat(answer: Answer = talkative) -> Iterator[str]:
     """The base_url of a server, for as long as it is needed."""
@@ -82,6 +100,25 @@ def open_model(answer: Answer = talkative, **options: object) -> Iterator[Any]:
             yield model
         finally:
             model.close()
+
+
+def ask_once(model: Any) -> Reply:
+    """The model's reply to one question."""
+    talk = model.conversation()
+    talk.append("What is it?")
+    return talk.reply(Decoding(max_new_tokens=5))
+
+
+def read_refusal(answer: Answer, **options: object) -> str:
+    """The one line that a model behind such a server ends in."""
+    with open_model(answer, **options) as model, pytest.raises(ModelError) as caught:
+        ask_once(model)
+    message = str(caught.value)
+    assert message.startswith("http://127.0.0.1:")
+    assert "\n" not in message
+    assert "; " in message  # a mend
+    assert len(message) < 600
+    return message
 
 
 def images_in(request: dict[str, Any]) -> list[Image.Image]:

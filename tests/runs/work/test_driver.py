@@ -8,51 +8,20 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from queue import SimpleQueue
 
 import msgspec
 import pytest
 
-from infthor_eval.errors import DataError, ModelError, Terminated, UsageError
-from infthor_eval.runs import (
-    Group,
-    RunRequest,
-    Unit,
-    UnitKey,
-    execute,
-    prepare,
-    read_header,
-    read_run,
-)
+from infthor_eval.errors import DataError, Terminated
+from infthor_eval.runs import UnitKey, execute, prepare, read_header, read_run
 from infthor_eval.runs.journals.tracebacks import StoredTracebacks
-from infthor_eval.runs.work.scheduling import run_groups
 from infthor_eval.workers import WorkerSettings
-from model_adapters import Capabilities
-from tests.helpers.toy_suite import Adder, Sum, Sums, ToySuite, is_broken, make_suite
+from tests.helpers.toy_suite import Sum, Sums, ToySuite, Watching, is_broken, make_suite, run
 from tests.runs.toy_command import request
 
 from ...helpers.waiting import PATIENCE_S, wait_until
 
 TOY = Path(__file__).parents[1] / "toy_command.py"
-
-
-class Watching:
-    def __init__(self):
-        self.begun, self.seen = None, []
-
-    def begin(self, work, n_recovered):
-        self.begun = (work.n_units, len(work.skipped), n_recovered)
-
-    def done(self, record, resumed):
-        self.seen.append((record.id, record.failure, resumed))
-
-    def note(self, text):
-        raise AssertionError(text)
-
-
-def run(run_request: RunRequest, suite=None):
-    watching = Watching()
-    return execute(prepare(run_request, suite or ToySuite()), watching), watching
 
 
 def start(output, *arguments):
@@ -339,122 +308,3 @@ def test_a_killed_command_goes_on_and_shows_progress_table_results_and_export(tm
         ("5", None),
         ("6", None),
     ]
-
-
-def test_a_subject_that_cannot_do_what_the_suite_needs_is_refused(tmp_path, monkeypatch):
-    class Policy(Adder):
-        def act(self, frame, instruction):
-            raise AssertionError
-
-        def reset(self):
-            raise AssertionError
-
-    monkeypatch.setattr("infthor_eval.runs.request.is_known", lambda name: name == "arm")
-    monkeypatch.setattr("infthor_eval.runs.request.check_options", lambda *_: None)
-    monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: Policy())
-    with pytest.raises(
-        UsageError,
-        match="arm cannot be evaluated on toy, which needs a model that answers in words",
-    ):
-        run(request(tmp_path, model="arm"))
-
-
-def test_a_file_that_may_be_meant_by_an_unknown_name_is_named(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("edge.py").touch()
-    with pytest.raises(UsageError, match=r"in \./edge\.py is meant, give --model edge\.py:CLASS"):
-        prepare(request(tmp_path, model="edge"), ToySuite())
-
-
-def test_unknown_names_and_options_are_refused_before_anything_is_done(tmp_path):
-    with pytest.raises(UsageError, match="did you mean 'adder'"):
-        prepare(request(tmp_path, model="ader"), ToySuite())
-    with pytest.raises(UsageError, match="adder has no option a"):
-        prepare(request(tmp_path, model_options={"a": "1"}), ToySuite())
-
-
-# -- several at a time
-
-
-def groups(n):
-    return [
-        Group([Unit(UnitKey("t", f"{g}.{u}"), "c", Sum((g, u))) for u in range(3)])
-        for g in range(n)
-    ]
-
-
-def test_groups_in_flight_are_done_at_the_same_time_and_each_in_its_order():
-    running, most = [], []
-
-    def do(group):
-        running.append(group)
-        most.append(len(running))
-        for unit in group.units:
-            time.sleep(0.02)
-            yield unit.record("f", unit.payload)
-        running.remove(group)
-
-    records = list(run_groups(groups(6), do, 3))
-    assert 1 < max(most) <= 3
-    assert sorted(record.id for record in records) == sorted(
-        u.key.id for g in groups(6) for u in g.units
-    )
-    for number in range(6):
-        assert [r.id for r in records if r.id.startswith(f"{number}.")] == [
-            f"{number}.{u}" for u in range(3)
-        ]
-
-
-def test_a_thread_that_finds_the_last_group_taken_ends(monkeypatch):
-    class Slow(SimpleQueue):
-        def empty(self):
-            is_empty = super().empty()
-            time.sleep(0.02)
-            return is_empty
-
-    monkeypatch.setattr("infthor_eval.runs.work.scheduling.SimpleQueue", Slow)
-    records = list(
-        run_groups(
-            groups(3), lambda group: (unit.record("f", unit.payload) for unit in group.units), 2
-        )
-    )
-    assert len(records) == 9
-
-
-def test_an_error_in_a_thread_ends_the_run_with_that_error():
-    def do(group):
-        yield group.units[0].record("f", group.units[0].payload)
-        raise ZeroDivisionError("a bug")
-
-    with pytest.raises(ZeroDivisionError, match="a bug"):
-        list(run_groups(groups(5), do, 2))
-
-
-def test_a_subject_with_several_in_flight_gives_the_same_records(tmp_path):
-    class Wide(Adder):
-        capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=2)
-
-    class WideSuite(ToySuite):
-        baselines = {"adder": Wide}  # noqa: RUF012
-
-    one, two = run(request(tmp_path / "1"))[0], run(request(tmp_path / "2"), WideSuite())[0]
-    assert one.records == two.records
-
-
-def test_a_suite_that_refuses_its_work_ends_before_a_journal_is_begun(tmp_path):
-    def refuse():
-        raise ModelError("no")
-
-    closed = []
-
-    class Held(Adder):
-        def __init__(self, seed):
-            super().__init__(seed)
-            self.close = lambda: closed.append(self)
-
-    suite = make_suite(refuse)
-    suite.baselines = {"adder": Held}
-    with pytest.raises(ModelError, match="no"):
-        run(request(tmp_path), suite)
-    assert len(closed) == 1
-    assert not list(tmp_path.iterdir())

@@ -1,0 +1,241 @@
+"""What a server replies, of whatever shape, is the reply or one line, and tells no key."""
+
+import json
+from http.server import BaseHTTPRequestHandler
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from infthor_eval.errors import ModelError
+from model_adapters.served.openai.completions import read_completion
+
+from ..policies.servers import Answer, send
+from .talking import always_say, always_send, ask_once, completion, open_model, read_refusal
+
+KEY = "sk-0123456789abcdef0123456789"
+
+
+def _answers(document: Any) -> Answer:
+    return lambda *_: document
+
+
+def _with_usage(**changes: Any) -> dict[str, Any]:
+    document = completion()
+    document["usage"] |= changes
+    return document
+
+
+SHAPES: dict[str, tuple[Answer, str]] = {
+    "nothing": (
+        always_send(200, b""),
+        "does not answer with a chat completion (Input data was truncated)",
+    ),
+    "no content": (always_send(204, b""), "does not answer with a chat completion"),
+    "no JSON": (
+        always_send(200, b"<html>hello</html>", {"Content-Type": "text/html"}),
+        "with a chat completion (JSON is",
+    ),
+    "no text": (always_send(200, b"\xff\xfe\x00" * 9), "does not answer with a chat completion"),
+    "deep": (always_send(200, b"[" * 200_000), "does not answer with a chat completion"),
+    "half": (
+        always_send(200, json.dumps(completion()).encode()[:-20]),
+        "does not answer with a chat completion",
+    ),
+    "a list": (_answers([completion()]), "(Expected `object`, got `array`)"),
+    "a stream": (
+        always_send(200, b"data: {}\n\ndata: [DONE]\n\n", {"Content-Type": "text/event-stream"}),
+        "does not answer with a chat completion",
+    ),
+    "another object": (_answers({"detail": "hello"}), "(Object missing required field `choices`)"),
+    "choices of another type": (
+        _answers(completion() | {"choices": "yes"}),
+        "(Expected `array`, got `str` - at",
+    ),
+    "no choices": (_answers(completion() | {"choices": []}), "answers without choices"),
+    "choices that are none": (
+        _answers(completion() | {"choices": [None]}),
+        "(Expected `object`, got `null` - at",
+    ),
+    "a choice without a message": (
+        _answers(completion() | {"choices": [{"text": "yes"}]}),
+        "field `message` - at",
+    ),
+    "content of another type": (
+        _answers(completion(message={"content": 7})),
+        "(Expected `str | null`, got `int` - at",
+    ),
+    "half a pair": (
+        always_send(200, json.dumps(completion("\ud800")).encode()),
+        "does not answer with a chat completion",
+    ),
+    "no words": (_answers(completion(None)), "gives no text; see its log"),
+    "no words, strange reason": (
+        _answers(completion(None, finish_reason="x\ny")),
+        "gives no text; see its log",
+    ),
+    "no words, too long": (
+        _answers(completion(None, finish_reason="length")),
+        "the token limit was reached before any text",
+    ),
+    "filtered": (
+        _answers(completion("", finish_reason="content_filter")),
+        "the server's content filter blocked it",
+    ),
+    "tools": (
+        _answers(completion(None, finish_reason="tool_calls")),
+        "it calls a tool, though none was offered",
+    ),
+    "tokens below 0": (
+        _answers(_with_usage(prompt_tokens=-1)),
+        "(Expected `int` >= 0 - at `$.usage.prompt_tokens`)",
+    ),
+    "tokens in words": (
+        _answers(_with_usage(completion_tokens="2")),
+        "(Expected `int`, got `str` - at",
+    ),
+    "tokens without end": (
+        _answers(_with_usage(prompt_tokens=10**40)),
+        "does not answer with a chat completion",
+    ),
+    "a redirect": (
+        always_send(307, b"", {"Location": "http://127.0.0.1:1/v1"}),
+        "answers 307 Temporary Redirect: nothing; r",
+    ),
+    "a redirect for good": (
+        always_send(301, b"", {"Location": "/v1"}),
+        "redirects are not followed",
+    ),
+    "no such model": (
+        always_send(404, b'{"error": {"message": "no m"}}'),
+        'answers 404 Not Found: \'{"error": {"message"',
+    ),
+    "a bad request": (
+        always_send(400, b"top_p\nis not taken"),
+        "answers 400 Bad Request: 'top_p is not taken'; check",
+    ),
+    "too many frames for vLLM": (
+        always_send(400, b"At most 2 image(s) may be provided in one prompt."),
+        "in one prompt.'; start the server with a higher --limit-mm-per-prompt",
+    ),
+    "a key that is not taken": (
+        always_send(401, b"who?"),
+        "answers 401 Unauthorized: 'who?'; set the environment variable",
+    ),
+    "another status": (always_send(499, b""), "answers 499: nothing; check"),
+    "no money": (
+        always_send(429, b'{"error": {"code": "insufficient_quota"}}'),
+        "answers 429 Too Many Requests",
+    ),
+    "packed": (
+        always_send(200, b"\x1f\x8b", {"Content-Encoding": "gzip"}),
+        "answers in an encoding that was not requested",
+    ),
+    "strange letters": (
+        always_send(418, b"\xff\xfe", {"Content-Type": "text/plain; charset=none-such"}),
+        "answers 418",
+    ),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_reply_of_any_shape_is_one_line_and_not_asked_for_again(shape: str) -> None:
+    answer, message = SHAPES[shape]
+    n_asked = 0
+
+    def counted(request: Any, handler: BaseHTTPRequestHandler) -> Any:
+        nonlocal n_asked
+        n_asked += 1
+        return answer(request, handler)
+
+    assert message in read_refusal(counted, retries=3)
+    assert n_asked == 1
+
+
+@given(st.binary(max_size=200) | st.text(max_size=80).map(str.encode))
+def test_no_bytes_are_a_traceback(content: bytes) -> None:
+    try:
+        read_completion("here", content).text("here")
+    except ModelError as error:
+        assert "\n" not in str(error)
+
+
+_VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: (
+        st.lists(inner, max_size=2) | st.dictionaries(st.text(max_size=5), inner, max_size=2)
+    ),
+    max_leaves=4,
+)
+
+
+@settings(max_examples=200)
+@given(st.data())
+def test_no_document_is_a_traceback(data: st.DataObject) -> None:
+    document = completion()
+    place = data.draw(
+        st.sampled_from([(), ("choices",), ("usage",), ("choices", 0), ("choices", 0, "message")])
+    )
+    within: Any = document
+    for step in place:
+        within = within[step]
+    key = data.draw(st.sampled_from(sorted(within))) if isinstance(within, dict) else 0
+    within[key] = data.draw(_VALUES)
+    try:
+        text = read_completion("here", json.dumps(document).encode()).text("here")
+    except ModelError as error:
+        assert "\n" not in str(error)
+    else:
+        assert isinstance(text, str)
+
+
+@pytest.mark.parametrize(
+    ("document", "text"),
+    [
+        (completion("a mug", finish_reason="length"), "a mug"),
+        (completion("I will not", finish_reason="content_filter"), "I will not"),
+        (completion(None, message={"refusal": "I will not"}), "I will not"),
+        (completion("", finish_reason="stop"), ""),
+        (completion("", finish_reason="length"), ""),
+        (completion("yes", usage=None), "yes"),
+        (
+            completion("yes")
+            | {"choices": [*completion("yes")["choices"], *completion("no")["choices"]]},
+            "yes",
+        ),
+        (completion("yes") | {"extra": [1, {"more": None}]}, "yes"),
+    ],
+)
+def test_what_was_said_is_the_reply(document: dict[str, Any], text: str) -> None:
+    with open_model(_answers(document)) as model:
+        assert ask_once(model).text == text
+
+
+@pytest.mark.parametrize("status", [200, 400, 401, 429, 500])
+def test_a_server_that_says_the_key_again_does_not_have_it_told(
+    status: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", KEY)
+    heard = []
+
+    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> Any:
+        heard.append(handler.headers["Authorization"])
+        if status == 200:
+            return completion(f"The key is {heard[0]}.")
+        return send(handler, status, f"wrong key: {'x' * 170} {heard[0]}".encode())
+
+    if status == 200:
+        with open_model(answer) as model:
+            message = ask_once(model).text
+        assert message == "The key is Bearer [key]."
+    else:
+        message = read_refusal(answer)
+    assert set(heard) == {f"Bearer {KEY}"}
+    assert KEY[:8] not in message
+
+
+def test_a_short_key_keeps_no_secret(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "mug")
+    with open_model(always_say("a mug")) as model:
+        assert ask_once(model).text == "a mug"
