@@ -67,7 +67,8 @@ def train_small_model(
         data: what it is trained on.
         states: folder of the states.
         on_step: called after every step.
-        print_note: called with a line for each reason for which items were skipped.
+        print_note: called with a line for each reason for which items were skipped, and before what
+            takes minutes.
 
     Returns:
         The trained model with weights rounded to bfloat16.
@@ -158,6 +159,7 @@ def _reading(training: _Training, print_note: Callable[[str], None]) -> Stage:
     set_first_weights(
         loaded, units, views.loose.tolist(), views.fixtures.tolist(), GRID, recipe.seed
     )
+    print_note(f"{len(frames):,} frames: computing what the tower tells of them")
     told = read_frame_units(frames, image_processor(), tower, units)
     labelled = label_units(seen, units, views.loose, GRID, recipe.seed)
     network = ReadingNetwork(loaded, told, units)
