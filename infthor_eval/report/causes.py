@@ -101,6 +101,9 @@ _FILE = "tasks.*.config"
 _CONTEXT = "tasks.*.config.dataset_kwargs"
 _DECODING = "tasks.*.decoding"
 
+_ENGINE = _Kind("the engine", _READ, ("host", *_each("model", "engine base_url adapter")))
+_ENGINE_SETTING = ("model", "engine")
+
 # In the order in which they are named where the records do not tell them apart: what usually
 # changes more comes first. A setting is of the first kind that has it.
 _KINDS = (
@@ -131,7 +134,7 @@ _KINDS = (
     _Kind("the size of images", _PIXELS, ("model.image_processor.size", "model.max_frames")),
     _Kind("the preparation of images", _PIXELS, _each("model", "image_processor image_backend")),
     _Kind("the file or package that the model comes from", _READ, ("adapter",)),
-    _Kind("the engine", _READ, ("host", *_each("model", "engine base_url adapter"))),
+    _ENGINE,
     _Kind(
         "the limit of the model's context",
         _CHOSEN | {Effect.FAILED} | _READ,
@@ -193,18 +196,30 @@ def differing_causes(first: RunConfig[Any], second: RunConfig[Any]) -> list[Caus
 
     The only task of one run is compared with the only one of the other, whatever their names.
     """
-    settings = [dict(_flat(document)) for document in _documents(first, second)]
+    one, other = (dict(_flat(document)) for document in _documents(first, second))
+    pairs = {path: (one.get(path, _ABSENT), other.get(path, _ABSENT)) for path in one | other}
+    differing = {path: values for path, values in pairs.items() if len(set(values)) > 1}
     found: dict[str, list[Setting]] = {}
-    for path in dict.fromkeys((*settings[0], *settings[1])):
-        values = [of_run.get(path, _ABSENT) for of_run in settings]
-        if values[0] != values[1] and not _TOLD_ELSEWHERE.has(path):
-            kind = next(kind for kind in _KINDS if kind.has(path))
-            found.setdefault(kind.name, []).append(Setting(".".join(path), *values))
+    for path, values in differing.items():
+        if _TOLD_ELSEWHERE.has(path):
+            continue
+        kind = next(kind for kind in _KINDS if kind.has(path))
+        if _ENGINE_SETTING in differing and _is_of_engine(path, values):
+            kind = _ENGINE
+        found.setdefault(kind.name, []).append(Setting(".".join(path), *values))
     return [
         Cause(kind.name, kind.effects, tuple(found[kind.name]))
         for kind in _KINDS
         if kind.name in found
     ]
+
+
+def _is_of_engine(path: Path, values: Sequence[Any]) -> bool:
+    """Return whether a setting differs because engines do: it is one that only one engine has, or
+    the name of the same model with another engine behind it."""
+    if path == ("model", "name"):
+        return len({str(value).partition("@")[0] for value in values}) == 1
+    return path[0] == "model" and _ABSENT in values
 
 
 def _documents(first: RunConfig[Any], second: RunConfig[Any]) -> list[dict[str, Any]]:

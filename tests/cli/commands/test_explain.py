@@ -221,6 +221,21 @@ def test_another_revision_is_named(run, run_cli, tmp_path):
     assert "model.revision is old in A, new in B (3 of the 3 questions that differ, +0.00)." in out
 
 
+def test_settings_that_one_engine_alone_has_are_the_engine(run, run_cli, tmp_path):
+    def in_vllm(lines: list[dict[str, Any]]) -> None:
+        model = lines[0]["config"]["model"]
+        del model["share_prefix"]
+        model.update(name=f"{model['name']}@vllm", engine="vllm", max_frames=40)
+        for line in lines[1:]:
+            line["payload"]["reply"] = "another reply"
+
+    code, out, _ = run_cli("explain", run(), edited(run(), tmp_path / "vllm", in_vllm))
+    assert (code, most(out)) == (1, "the engine")
+    assert "As much may be explained" not in out
+    listed = out.split("What differs")[1].split("Where")[0]
+    assert all(f"model.{name}" in listed for name in ("share_prefix", "max_frames"))
+
+
 def test_a_scorer_is_named_and_carries_what_it_changes(source, rescore, run_cli):
     records = [
         make_record(0, "Sofa", ("Sofa",), scores={"reference": 1.0, "strict": 0.0}),
