@@ -99,9 +99,8 @@ STEPS = (
         "speed",
         "Are the estimates right, and which kernel is the default? `flash_attention_2` if replies "
         "are equal and it is 1.2 times as fast at 128K.",
-        "with SDPA 7,400 tokens/s at 16K and 4,000 at 128K, 35 decoded tokens/s, peak 26 GB (24 "
-        "with flash, which is faster), about 660,000 tokens fit; replies equal, or "
-        "they part at a near tie",
+        "with SDPA 7,400 tokens/s at 16K, 4,000 at 128K, 35 decoded, peak 26 GB (24 with flash), "
+        "660,000 tokens fit; replies equal but for near ties",
         560,
         _nothing,
         measure_speed,

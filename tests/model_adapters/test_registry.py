@@ -255,7 +255,7 @@ def test_tiny_models_are_described_as_random_and_the_nano_model_as_trained() -> 
 
 
 def test_switches_are_on_where_they_have_not_their_defaults() -> None:
-    typed = {"share_prefix": "yes", "chunk_tokens": "1_024", "kv_offload": "1", "dtype": "float32"}
+    typed = {"share_prefix": "yes", "batch_size": "6_4", "kv_offload": "1", "dtype": "float32"}
     assert switched_on("qwen2.5-vl", typed) == {"kv_offload": "1"}
     typed["attn_implementation"] = "eager"
     assert list(switched_on("qwen2.5-vl", typed)) == ["attn_implementation", "kv_offload"]
