@@ -101,7 +101,7 @@ def _glm(name: str, **text: Any) -> Family:
         config=config,
         images={"image_processor_type": f"{name}ImageProcessor", "size": _SMALL},
         processor={"processor_class": f"{name}Processor"},
-        video=video(f"{name}VideoProcessor"),
+        video=video(f"{name}VideoProcessor", size=_SMALL),
     )
 
 
