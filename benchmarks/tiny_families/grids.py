@@ -1,6 +1,7 @@
 """Families whose towers take an image of any size as a grid of patches."""
 
 from collections.abc import Mapping
+from copy import deepcopy
 from typing import Any
 
 from model_adapters.tiny.twin import HEAD, HIDDEN, SPREAD
@@ -33,7 +34,7 @@ def _qwen(
     def config(vocabulary: Vocabulary) -> dict[str, Any]:
         return {
             **{f"{name}_id": vocabulary[token] for name, token in _QWEN_TOKENS.items()},
-            "text_config": vocabulary.text(**text),
+            "text_config": vocabulary.text(**deepcopy(dict(text))),  # configs write into it
             "vision_config": {**GRID_TOWER, **vision},
         }
 
@@ -88,7 +89,12 @@ def _glm(name: str, **text: Any) -> Family:
         return {
             **{name: vocabulary[token] for name, token in named.items()},
             "text_config": vocabulary.text(
-                **{**_three_axes(2, 3, 3, partial_rotary_factor=0.5), **text}
+                # transformers has biases whatever this says, vLLM has them if it says so.
+                **{
+                    "attention_bias": True,
+                    **_three_axes(2, 3, 3, partial_rotary_factor=0.5),
+                    **text,
+                }
             ),
             "vision_config": {**GRID_TOWER, "image_size": 56, "patch_size": PATCH},
         }
@@ -111,6 +117,7 @@ _GLM_EXPERTS = {
     "moe_intermediate_size": 32,
     "n_shared_experts": 1,
     "first_k_dense_replace": 1,
+    "use_qk_norm": False,  # of the published config; vLLM reads it
 }
 
 _ERNIE_TOKENS = {
@@ -178,7 +185,11 @@ def _lfm2_config(vocabulary: Vocabulary) -> dict[str, Any]:
     return {
         "image_token_id": vocabulary["<image>"],
         "text_config": vocabulary.text(
-            "lfm2", layer_types=["conv", "full_attention"], block_multiple_of=32
+            "lfm2",
+            layer_types=["conv", "full_attention"],
+            block_multiple_of=32,
+            conv_dim=HIDDEN,  # these two are of the published config, and vLLM reads them
+            block_dim=HIDDEN,
         ),
         "vision_config": {
             **TOWER,
@@ -276,7 +287,8 @@ GRIDS = {
         patch=PATCH,
     ),
     "qwen3_vl": _qwen3(_INTERLEAVED, **_DEEPSTACK),
-    "qwen3_vl_moe": _qwen3({**_INTERLEAVED, **_EXPERTS}, **_DEEPSTACK),
+    # vLLM reads from the published config what transformers does in any case.
+    "qwen3_vl_moe": _qwen3({**_INTERLEAVED, **_EXPERTS, "norm_topk_prob": True}, **_DEEPSTACK),
     "qwen3_5": _qwen3({**_INTERLEAVED, **_LINEAR}),
     "glm4v": _glm("Glm4v"),
     "glm46v": _glm("Glm46V", model_type="glm4v_text"),

@@ -77,7 +77,7 @@ def _llama4_config(vocabulary: Vocabulary) -> dict[str, Any]:
             intermediate_size_mlp=64,
             num_local_experts=2,
             no_rope_layers=[1, 0],
-            attention_chunk_size=WINDOW,
+            attention_chunk_size=2 * WINDOW,  # whole blocks of vLLM's cache
             floor_scale=WINDOW,  # positions at which the temperature of attention changes
         ),
     }

@@ -17,6 +17,7 @@ __all__ = ["ACTIVE", "EncoderCacheMaker", "encoder_cache_of", "register"]
 # Set by our engine. Whatever else uses vLLM in this environment keeps vLLM as it is.
 ACTIVE = "INFTHOR_EVAL_VLLM_PLUGIN"
 _MODELS = {
+    "cohere2_vision": "Cohere2VisionForConditionalGeneration",
     "gemma3_mm": "Gemma3ForConditionalGeneration",
     "llava": "LlavaForConditionalGeneration",
     "llava_next": "LlavaNextForConditionalGeneration",
