@@ -63,7 +63,10 @@ def _groups(scored: Sequence[TaskResult]) -> Iterator[str]:
             ends = f"{chances[0]:.1f} to {chances[-1]:.1f}\u00a0%, by the questions answered"
         named.append(f"guessing {ends}")
     *rest, last = named
-    yield from [", ".join(rest), last] if rest else [last]
+    if rest:
+        # What has a comma within is closed by one.
+        yield ", ".join(rest) + ("," if ", " in rest[-1] else "")
+    yield last
 
 
 def _in_order(results: Sequence[TaskResult]) -> list[TaskResult]:

@@ -10,7 +10,7 @@ const groupResults = sample => {
   const { members } = sample;
   const names = metricsOf(members);
   const titles = members.map((_, at) => nameOf(sample, at));
-  const head = ["run", "", ...titles.map(name => `${suites[sample.suite].reply}, ${name}`), ...names, "seconds", "tokens"];
+  const head = ["run", "outcome", ...titles.map(name => `${suites[sample.suite].reply}, ${name}`), ...names, "seconds", "tokens"];
   const each = (results, value) => results.map(result => result ? value(result) : "-").join(" · ");
   const rows = ofSuite(sample).map(([result, at]) => {
     const results = members.map(member => member.results[at]);

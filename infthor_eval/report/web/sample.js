@@ -41,7 +41,7 @@ const resultTable = (head, n_words, rows) => make("div", { class: "scroll" }, ma
 
 const results = sample => {
   const names = metricsOf([sample]);
-  const head = ["run", "", suites[sample.suite].reply, ...names, "seconds", "tokens"];
+  const head = ["run", "outcome", suites[sample.suite].reply, ...names, "seconds", "tokens"];
   const rows = ofSuite(sample).map(([result, at]) => {
     const name = make("td", { class: "run" }, runs[at]);
     if (!result) return make("tr", {}, name, make("td", {}, mark(null, runs[at])), make("td", { class: "note" }, "not evaluated"));

@@ -74,7 +74,7 @@ def test_of_many_runs_the_ends_are_named():
     results = [make_result(f"m{number}", number / 10) for number in range(6)]
     assert said(*results) == (
         "On nieh_gt m5 gets 50.0 % of the questions right, the highest of 6 runs, m0 0.0 %, the "
-        "lowest and guessing 25.0 %."
+        "lowest, and guessing 25.0 %."
     )
 
 
