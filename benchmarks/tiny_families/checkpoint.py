@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -45,7 +46,8 @@ class Vocabulary:
 
     def text(self, model_type: str | None = None, **settings: Any) -> dict[str, Any]:
         """Return the config of a language model of two layers for this vocabulary."""
-        more = {"head_dim": HEAD, "max_position_embeddings": 32_768, **settings}
+        # transformers writes into what it is given, and families share their settings.
+        more = {"head_dim": HEAD, "max_position_embeddings": 32_768, **deepcopy(settings)}
         if model_type is not None:
             more["model_type"] = model_type
         if self.chat.begin is not None:

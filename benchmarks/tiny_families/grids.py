@@ -1,7 +1,6 @@
 """Families whose towers take an image of any size as a grid of patches."""
 
 from collections.abc import Mapping
-from copy import deepcopy
 from typing import Any
 
 from model_adapters.tiny.twin import HEAD, HIDDEN, SPREAD
@@ -34,7 +33,7 @@ def _qwen(
     def config(vocabulary: Vocabulary) -> dict[str, Any]:
         return {
             **{f"{name}_id": vocabulary[token] for name, token in _QWEN_TOKENS.items()},
-            "text_config": vocabulary.text(**deepcopy(dict(text))),  # configs write into it
+            "text_config": vocabulary.text(**text),
             "vision_config": {**GRID_TOWER, **vision},
         }
 

@@ -15,6 +15,17 @@ FORGERIES = {}
 forgery = collect_into(FORGERIES)
 
 
+def key_with_errors(material, root, share):
+    """A submission of the key, with another answer in a share of the replies."""
+    draw = random.Random(3)
+    other = reader(0.0, "x")
+
+    def reply(record):
+        return other(record) if draw.random() < share else key(record)
+
+    return submit(root, "forged", reply_with(material.runs["homes", "shown"], reply))
+
+
 @forgery("scores", "1 stored scores")
 def one_score_edited(material, root):
     run = honest(material)
@@ -87,13 +98,7 @@ def the_cells_of_the_key(material, root):
 
 @forgery("key words", "to the letter")
 def the_key_with_errors(material, root):
-    draw = random.Random(3)
-    other = reader(0.0, "x")
-
-    def reply(record):
-        return other(record) if draw.random() < 0.08 else key(record)
-
-    return submit(root, "forged", reply_with(material.runs["homes", "shown"], reply))
+    return key_with_errors(material, root, 0.08)
 
 
 @forgery("key score", "as only the key is")
@@ -121,13 +126,7 @@ def a_guessers_replies_under_another_name(material, root):
 
 @forgery("key spelling", "spelled as the key alone spells")
 def half_of_the_key(material, root):
-    draw = random.Random(3)
-    other = reader(0.0, "x")
-
-    def reply(record):
-        return other(record) if draw.random() < 0.5 else key(record)
-
-    return submit(root, "forged", reply_with(material.runs["homes", "shown"], reply))
+    return key_with_errors(material, root, 0.5)
 
 
 @forgery("records", "exactly as long")

@@ -204,16 +204,11 @@ def _print_change(name: str, change: Change) -> None:
 def _print_failures(rescored: Rescored) -> int:
     """Print why replies could not be scored or judged; return the number of these."""
     from infthor_eval.cli.progress.notes import print_failure
+    from infthor_eval.cli.results import print_failures
     from infthor_eval.reasons import count_reasons
 
-    failed = [
-        (r.task, r.failure)
-        for r in rescored.records
-        if r.failure is not None and r.payload.reply is not None
-    ]
-    for task, reason, n in count_reasons(failed):
-        print_failure(f"{task}: {n} sample(s) failed, in no score: {reason}")
+    n_failed = print_failures(r for r in rescored.records if r.payload.reply is not None)
     unasked = rescored.judgement.failures if rescored.judgement else ()
     for name, reason, n in count_reasons(("judge", reason) for reason in unasked):
         print_failure(f"{name}: not asked about {n} replies, whose strict score stands: {reason}")
-    return len(failed) + len(unasked)
+    return n_failed + len(unasked)
