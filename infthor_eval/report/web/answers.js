@@ -42,8 +42,13 @@ const framesOf = (member, result) => {
   return [make("div", { class: "frames small" }, ...cards), note, ...told];
 };
 
-const whyOf = result => result.why === undefined ? [] : [make("details", {}, make("summary", {}, "Why this score"),
-  make("pre", { tabindex: "0" }, explanations[result.why]))];
+const whyOf = result => {
+  if (result.why === undefined) return [];
+  const text = make("pre", { tabindex: "0" });
+  const fold = make("details", {}, make("summary", {}, "Why this score"), text);
+  fold.addEventListener("toggle", async () => { text.textContent = (await explanationsRead())[result.why]; }, { once: true });
+  return [fold];
+};
 
 const answerPart = (member, name, at) => {
   const result = member.results[at];

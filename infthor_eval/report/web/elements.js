@@ -6,7 +6,12 @@ const dataOf = async ({ dataset, textContent }) => {
   const packed = new Blob([Uint8Array.from(atob(textContent), letter => letter.charCodeAt(0))]);
   return new Response(packed.stream().pipeThrough(new DecompressionStream("deflate"))).text();
 };
-const { runs, suites, metrics, samples, details, pictures, large, frames, prompts, tracebacks, explanations } = JSON.parse(await dataOf(byId("data")));
+const { runs, suites, metrics, samples, details, pictures, large, frames, prompts, tracebacks } = JSON.parse(await dataOf(byId("data")));
+// Why replies got their scores: read when the first one is unfolded, as there may be megabytes of them.
+const explanationsRead = (() => {
+  let read = null;
+  return () => (read ??= dataOf(byId("explanations")).then(JSON.parse));
+})();
 const MARKS = { right: "✓", partly: "◐", wrong: "✗", failed: "!", "not asked": "·", excluded: "–" };
 
 const make = (name, attributes = {}, ...children) => {

@@ -128,7 +128,7 @@ def write_page(page: Page, path: Path) -> int:
     """
     values = {
         "page": page,
-        "data": _data(page),
+        "data": {name: _embedded(page, value) for name, value in _data(page).items()},
         "svg": Markup,
         "csv": lambda table: export_tables([table], "csv"),
     }
@@ -145,10 +145,11 @@ def _read(name: str) -> str:
     return read_part(__package__, name)
 
 
-def _data(page: Page) -> Markup:
-    """Return the data of the samples' browser, as JSON that is safe in a script element."""
+def _data(page: Page) -> dict[str, Any]:
+    """Return the data of the samples' browser by the ids of their script elements: explanations are
+    read when the first one is unfolded, as there may be megabytes of them."""
     samples, facts = _share_details(msgspec.to_builtins(page.samples))
-    document: dict[str, Any] = {
+    document = {
         "runs": [run.label for run in page.runs],
         "suites": msgspec.to_builtins(page.suites),
         "metrics": list(page.metrics),
@@ -159,9 +160,13 @@ def _data(page: Page) -> Markup:
         "frames": msgspec.to_builtins(page.frames),
         "prompts": msgspec.to_builtins(page.prompts),
         "tracebacks": list(page.tracebacks),
-        "explanations": list(page.explanations),
     }
-    text = json.dumps(document, ensure_ascii=False, separators=(",", ":"))
+    return {"data": document, "explanations": list(page.explanations)}
+
+
+def _embedded(page: Page, value: Any) -> Markup:
+    """Return a value as JSON that is safe in a script element."""
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     for letter, escaped in _ESCAPED.items():
         text = text.replace(letter, escaped)
     if page.is_packed:

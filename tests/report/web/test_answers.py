@@ -34,7 +34,7 @@ def test_a_question_is_shown_in_all_contexts_with_frames_and_reasons(page, open_
     heads = answers.locator("h4").all_inner_texts()
     assert {sample.task for sample in same} <= {head.split()[1].rstrip(",") for head in heads}
     answers.first.locator("details summary").click()
-    assert "strict: " in answers.first.locator("pre").inner_text()
+    answers.first.locator("pre", has_text="strict: ").wait_for()
     tab.locator("details.answers > summary").click()
     tab.keyboard.press("j")
     assert tab.locator("details.answers").get_attribute("open") is None  # as it was left
