@@ -2,6 +2,7 @@
 
 from infthor_eval.episodes.config import EpisodesConfig, EpisodeTaskConfig
 from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.quantities import Amount
 
 __all__ = ["ArmTaskConfig", "ManipulationConfig"]
 
@@ -18,7 +19,7 @@ class ArmTaskConfig(EpisodeTaskConfig, frozen=True, kw_only=True, omit_defaults=
     """
 
     kind: ManipulationKind
-    radius: float
+    radius: Amount
     instruction: str | None = None
     stand: str | None = None
     hand: str | None = None

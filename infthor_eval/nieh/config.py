@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
+from infthor_eval.quantities import MOST, Count, Total
 from infthor_eval.runs import RunConfig, TaskConfig
 
 __all__ = [
@@ -49,6 +50,10 @@ class MemoryIdentity(msgspec.Struct, frozen=True):
     privileged: bool
 
 
+def _is_count_or_none(value: Any) -> bool:
+    return value is None or (isinstance(value, int) and 0 <= value <= MOST)
+
+
 class NiehTaskConfig(TaskConfig, frozen=True, kw_only=True, omit_defaults=True):
     """The config of a task.
 
@@ -67,7 +72,7 @@ class NiehTaskConfig(TaskConfig, frozen=True, kw_only=True, omit_defaults=True):
     metrics: MetricsConfig
     data: str
     simulator: str | None
-    n_samples: int
+    n_samples: Count
     skipped: tuple[SkippedSample, ...]
     sources: dict[str, Any] = msgspec.field(default_factory=dict)
     film: Literal["video", "images"] | None = None
@@ -78,12 +83,12 @@ class NiehTaskConfig(TaskConfig, frozen=True, kw_only=True, omit_defaults=True):
         """Check what summaries read; msgspec turns the error into its own."""
         if not isinstance(self.dataset_kwargs.get("context"), str):
             raise TypeError("`config.dataset_kwargs.context` is no name")
-        if not isinstance(self.budget, int | None):
+        if not _is_count_or_none(self.budget):
             raise TypeError("`config.dataset_kwargs.budget` is no number of tokens")
         if "max_new_tokens" not in self.decoding:
             raise TypeError("`decoding.max_new_tokens` is missing")
         # None for imported replies, whose limit nobody wrote down.
-        if not isinstance(self.decoding["max_new_tokens"], int | None):
+        if not _is_count_or_none(self.decoding["max_new_tokens"]):
             raise TypeError("`decoding.max_new_tokens` is no number of tokens")
         _ = self.memory
 
@@ -138,13 +143,13 @@ class NiehConfig(RunConfig[NiehTaskConfig], frozen=True, kw_only=True, omit_defa
         rescored: who scored its replies again; None for a run that asked.
     """
 
-    k_tokens: int | None = None
-    tokens_per_frame: int | None = None
+    k_tokens: Count | None = None
+    tokens_per_frame: Count | None = None
     prompt: str | None = None
     memory: str | None = None
     memory_args: str | None = None
     budget: str | None = None
-    repeats: int = 1
+    repeats: Total = 1
     rescored: RescoredConfig | None = None
 
     @property

@@ -7,6 +7,7 @@ import msgspec
 
 import infthor_eval
 from infthor_eval.errors import DataError, in_one_line
+from infthor_eval.quantities import Count
 from infthor_eval.storage.digests import fingerprint, json_values
 
 __all__ = ["Config", "RunConfig", "TaskConfig", "TaskConfigType", "require_tasks"]
@@ -65,7 +66,7 @@ class RunConfig(
     model: dict[str, Any] = {}
     adapter: dict[str, Any] = {}
     suite_code: dict[str, Any] = {}
-    limit: int | None = None
+    limit: Count | None = None
     seed: int | None = None
     tasks: dict[str, TaskConfigType] = {}
     frames: str = ""

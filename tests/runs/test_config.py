@@ -131,3 +131,19 @@ def test_a_config_that_json_cannot_hold_is_refused_with_the_fields_name(settings
         config.complete("toy", {"name": "m"})
     assert words in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"n_samples": 10**400},
+        {"n_samples": -1},
+        {"decoding": {"max_new_tokens": 10**400}},
+        {"config": {"dataset_kwargs": {"context": "memory", "budget": 10**400}}},
+        {"config": {"dataset_kwargs": {"context": "memory", "budget": -1}}},
+    ],
+)
+def test_counts_that_no_mean_can_be_over_are_refused(changes):
+    msgspec.convert(TASK, NiehTaskConfig)
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.convert(TASK | changes, NiehTaskConfig)
