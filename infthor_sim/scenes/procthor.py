@@ -45,7 +45,15 @@ def read_asset_sizes(root: Path) -> dict[str, tuple[float, float, float]]:
             content = json.load(file)
         listed = [asset for assets in content.values() for asset in assets]
         return {str(asset["assetId"]): _extents(asset["boundingBox"]) for asset in listed}
-    except (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (
+        OSError,
+        EOFError,
+        LookupError,
+        TypeError,
+        ValueError,
+        OverflowError,
+        AttributeError,
+    ) as error:
         raise DataError(f"{path}: not a readable asset database ({error!r})") from error
 
 
@@ -67,7 +75,7 @@ def build_house(
     """
     try:
         return _build(house, assets)
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+    except (LookupError, TypeError, ValueError, OverflowError, AttributeError) as error:
         raise DataError(f"house: not in ProcTHOR's form ({error!r})") from error
 
 

@@ -26,7 +26,7 @@ def recorded_object(entry: Mapping[str, Any]) -> SimObject:
     """
     try:
         return _object(entry)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
         name = entry.get("objectId", "?") if isinstance(entry, Mapping) else "?"
         raise DataError(
             f"object {name}: not in the form of AI2-THOR's metadata ({error!r})"

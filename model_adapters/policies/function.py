@@ -41,7 +41,7 @@ class FunctionPolicy:
         steps = self._call(frame.load(), instruction, **self._options)
         try:
             numbers = np.asarray(steps, dtype=np.float64)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise ModelError(
                 f"{self.name} returned {steps!r:.60} ({in_one_line(error)}); return seven numbers: "
                 "x, y, z in metres, roll, pitch, yaw in radians, gripper 0 to 1"

@@ -77,7 +77,13 @@ def test_missing_data_are_named(folder, tmp_path):
 
 @pytest.mark.parametrize(
     "line",
-    ['{"scene":"FloorPlan901"}', '{"scene":"FloorPlan901","objects":[{"objectId":"A"}]}', "[1]"],
+    [
+        '{"scene":"FloorPlan901"}',
+        '{"scene":"FloorPlan901","objects":[{"objectId":"A"}]}',
+        '{"scene":"FloorPlan901","objects":[{"objectId":"A|1|1|1","position":{"x":1%s}}]}'
+        % ("0" * 400),
+        "[1]",
+    ],
 )
 def test_malformed_objects_are_named(folder, line):
     with gzip.open(folder / "thor_scenes" / "objects.jsonl.gz", "wt", encoding="utf-8") as file:

@@ -140,12 +140,24 @@ def test_assets_have_their_sizes_where_the_folder_has_them(tmp_path):
         Catalogue(tmp_path).house(house())
 
 
-@pytest.mark.parametrize("broken", ["rooms", "walls"])
-def test_malformed_houses_are_refused(broken):
+def without_rooms(bad):
+    del bad["rooms"]
+
+
+def without_walls(bad):
+    del bad["walls"]
+
+
+def with_a_wall_beyond_numbers(bad):
+    bad["walls"][0]["polygon"][0]["x"] = 10**400  # Python has such an integer, and no such float
+
+
+@pytest.mark.parametrize("break_it", [without_rooms, without_walls, with_a_wall_beyond_numbers])
+def test_malformed_houses_are_refused(break_it):
     bench = Bench(size=20)
     bench.ok("Reset", sceneName="Procedural")
     bench.ok("Initialize", fastActionEmit=False)
     bad = copy.deepcopy(house())
-    del bad[broken]
+    break_it(bad)
     assert "ProcTHOR" in bench.refused("CreateHouse", house=bad)
     bench.ok("CreateHouse", house=house())

@@ -40,6 +40,10 @@ def words(image, instruction):
     return "up"
 
 
+def beyond(image, instruction):
+    return [0, 0, 0, 0, 0, 0, 10**400]
+
+
 def few(image, instruction):
     return [0, 1]
 
@@ -124,7 +128,11 @@ def test_an_arm_is_moved_by_seven_numbers_or_rows_of_them(own, frame):
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("words", r"returned 'up' .*; return seven numbers"), ("few", r"shape \[1, 2\]")],
+    [
+        ("words", r"returned 'up' .*; return seven numbers"),
+        ("beyond", r"too large.*; return seven numbers"),
+        ("few", r"shape \[1, 2\]"),
+    ],
 )
 def test_other_movements_are_errors(own, frame, name, message):
     with pytest.raises(ModelError, match=message):
