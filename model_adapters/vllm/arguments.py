@@ -16,6 +16,8 @@ _LENGTH_IN_CONFIG = ("yarn", "longrope", "longrope-scaled")
 # vLLM multiplies the original length of these by a factor before it places YaRN's ramp;
 # transformers does not.
 _FOURFOLD = {"qwen2_vl": 4, "qwen2_5_vl": 4}
+# Llama 4's; vLLM leaves it out of contexts up to 32,768 tokens, whatever the config says.
+_TUNING = "attn_temperature_tuning"
 _NO_VIDEO = 0  # otherwise vLLM reserves memory for the longest possible video
 
 
@@ -65,6 +67,9 @@ def model_arguments(
         arguments["ec_manager_config"] = encoder_cache_of(options.encoder_cache_tokens)
     if options.rope is not None:
         arguments["hf_overrides"] = rope_overrides(config, options.rope)
+    tuning = getattr(config.get_text_config(), _TUNING, None)
+    if tuning is not None:
+        arguments["override_generation_config"] = {_TUNING: bool(tuning)}
     arguments["mm_processor_kwargs"] = {
         "use_fast": options.image_backend == "torchvision",
         **options.image_settings(),

@@ -1,7 +1,9 @@
 """What vLLM calls in its own processes: a plugin, and the maker of its cache of encoded frames.
 
 The plugin loads checkpoints of new transformers. See `hf.tower_names` for the two forms; vLLM 0.32
-reads one of them alone.
+reads one of them alone. It also lets processors forget by what they were loaded: vLLM counts the
+tokens of an image with these arguments, too, and transformers keeps what it counted with among the
+defaults of the processor's calls, which then refuse it.
 """
 
 import functools
@@ -22,26 +24,45 @@ _MODELS = {
     "llava": "LlavaForConditionalGeneration",
     "llava_next": "LlavaNextForConditionalGeneration",
     "llava_onevision": "LlavaOnevisionForConditionalGeneration",
+    "qwen3_vl_moe": "Qwen3VLMoeForConditionalGeneration",
 }
+# The axis of the hidden size in the experts' weights as published; transformers exchanges the last
+# two when it reads them, and saves them as it has them.
+_HIDDEN_AXES = {"mlp.experts.gate_up_proj": 1, "mlp.experts.down_proj": 2}
+_LOADED_BY = "use_fast"
 _TOKENS = "tokens"
 _Weights = Iterable[tuple[str, Any]]
 
 
 def register() -> None:
-    """Let vLLM's models take both's names; vLLM calls it (entry point `vllm.general_plugins`)."""
+    """Let vLLM's models take both's forms; vLLM calls it (entry point `vllm.general_plugins`)."""
     if os.environ.get(ACTIVE) != "1":
         return
     for module, name in _MODELS.items():
         model = getattr(importlib.import_module(f"vllm.model_executor.models.{module}"), name)
         if not hasattr(model.load_weights, "__wrapped__"):
             model.load_weights = _taking_both(model.load_weights)
+    processor = importlib.import_module("transformers.processing_utils").ProcessorMixin
+    if not hasattr(processor._merge_kwargs, "__wrapped__"):
+        processor._merge_kwargs = _forgetting(processor._merge_kwargs)
+
+
+def _forgetting(merge: Callable[..., Any]) -> Callable[..., Any]:
+    @functools.wraps(merge)
+    def merged(processor: Any, of_call: Any, *args: Any, **kwargs: Any) -> Any:
+        for defaults in getattr(of_call, "_defaults", {}).values():
+            defaults.pop(_LOADED_BY, None)
+        return merge(processor, of_call, *args, **kwargs)
+
+    return merged
 
 
 def _taking_both(load_weights: Callable[[Any, _Weights], Any]) -> Callable[[Any, _Weights], Any]:
     @functools.wraps(load_weights)
     def load(model: Any, weights: _Weights) -> Any:
-        has_level = hasattr(getattr(model, "vision_tower", None), "vision_model")
-        return load_weights(model, _with_level(weights) if has_level else weights)
+        if hasattr(getattr(model, "vision_tower", None), "vision_model"):
+            weights = _with_level(weights)
+        return load_weights(model, _with_axes(weights, model.config.get_text_config().hidden_size))
 
     return load
 
@@ -49,6 +70,13 @@ def _taking_both(load_weights: Callable[[Any, _Weights], Any]) -> Callable[[Any,
 def _with_level(weights: _Weights) -> Iterator[tuple[str, Any]]:
     for name, tensor in weights:
         yield published_name(name), tensor
+
+
+def _with_axes(weights: _Weights, hidden_size: int) -> Iterator[tuple[str, Any]]:
+    for name, tensor in weights:
+        axis = next((axis for end, axis in _HIDDEN_AXES.items() if name.endswith(end)), None)
+        is_exchanged = axis is not None and tensor.shape[axis] != hidden_size
+        yield name, tensor.transpose(1, 2) if is_exchanged else tensor
 
 
 class EncoderCacheMaker:

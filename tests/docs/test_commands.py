@@ -10,6 +10,7 @@ from pathlib import Path
 
 import click
 import pytest
+from PIL import Image
 
 from infthor_eval.cli.main import _infthor_eval
 from infthor_eval.runs import Catalog
@@ -27,6 +28,7 @@ from .commands import (
 )
 
 COMMANDS = [command for page in all_pages() for code in code_of(page) for command in code.commands]
+_PICTURES = 12
 BLOCKS = [
     pytest.param(page, code, id=f"{page}-{number}")
     for page in all_pages()
@@ -45,6 +47,9 @@ def folder_of(tmp_path_factory):
         folder = tmp_path_factory.mktemp("reader")
         written_files(page, folder)
         (folder / "tasks").symlink_to(ROOT / "tasks")
+        for table in folder.glob("*/questions.csv"):  # beside a reader's own pictures
+            for number in range(_PICTURES):
+                Image.new("RGB", (28, 28)).save(table.parent / f"{number}.png")
         return folder
 
     return folder_of

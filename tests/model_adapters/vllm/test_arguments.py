@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from transformers import LlamaConfig, Qwen2_5_VLConfig
+from transformers import Llama4Config, LlamaConfig, Qwen2_5_VLConfig
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.plugins import import_target
@@ -58,6 +58,14 @@ def test_without_options_vllm_gets_what_it_needs_and_the_rest_is_its_own_choice(
         "enforce_eager": False,
         "enable_prefix_caching": True,
     }
+
+
+def test_llama_4_has_the_temperature_of_its_config_in_every_length() -> None:
+    config = Llama4Config(text_config={"attn_temperature_tuning": True})
+    arguments = model_arguments(
+        FOLDER, config, VllmOptions(pretrained="x"), max_tokens=9, max_frames=1
+    )
+    assert arguments["override_generation_config"] == {"attn_temperature_tuning": True}
 
 
 def test_every_option_arrives_under_vllms_name() -> None:
@@ -188,7 +196,7 @@ def test_limits_of_a_frames_area_are_the_processors() -> None:
 )
 def test_whatever_is_chosen_vllm_takes_all_of_it_and_no_none(chosen: dict[str, Any]) -> None:
     typed = VllmOptions(pretrained="x", max_frames=chosen.pop("image", None), **chosen)
-    config = SimpleNamespace()
+    config = LlamaConfig()
     arguments = model_arguments(
         FOLDER, config, typed, max_tokens=100, max_frames=frame_limit(100, 7, typed)
     )
