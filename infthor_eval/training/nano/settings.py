@@ -153,6 +153,8 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
         labelled: share of the steps, the first ones, in which frames are known by what they show,
             and not by what the tower tells of them.
         renamed: share of the homes in which each type of thing is taken for another.
+        turned: share of the homes in which a type of thing that nobody opens is open where it was
+            closed, and the other way round.
         single: share of the steps, the first ones, in which all questions are on single frames.
         ramp: share of the steps, from there on, in which the numbers of frames grow.
         synthetic: share of the frames with synthetic questions, by rules from what they show.
@@ -170,6 +172,7 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     together: int = 12
     labelled: float = 0.5
     renamed: float = 0.7
+    turned: float = 0.5
     single: float = 0.15
     ramp: float = 0.3
     synthetic: float = 0.25
@@ -190,7 +193,16 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
         _require_counts(
             self, ("tokens_per_step", "together", "synthetic_frames", "events_in_a_row")
         )
-        shares = ("labelled", "renamed", "single", "synthetic", "events", "recalled", "whole")
+        shares = (
+            "labelled",
+            "renamed",
+            "turned",
+            "single",
+            "synthetic",
+            "events",
+            "recalled",
+            "whole",
+        )
         _require_shares(self, shares)
         if not 0 < self.ramp <= 1:
             raise ValueError(f"ramp is {self.ramp}; use a number above 0 and at most 1")

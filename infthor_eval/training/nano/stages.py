@@ -25,7 +25,7 @@ from infthor_eval.training.nano.reading.question_sampler import QuestionSampler
 from infthor_eval.training.nano.reading.renaming import Vocabulary
 from infthor_eval.training.nano.reading.stage import reading_stage
 from infthor_eval.training.nano.seeing.network import SeeingNetwork
-from infthor_eval.training.nano.seeing.stage import lower_thresholds, seeing_stage
+from infthor_eval.training.nano.seeing.stage import lower_thresholds, raise_units, seeing_stage
 from infthor_eval.training.nano.seeing.view_dataset import ViewDataset
 from infthor_eval.training.nano.seen_objects import SeenFrame, read_seen_frames
 from infthor_eval.training.nano.settings import NanoRecipe
@@ -87,6 +87,7 @@ def train_small_model(
 
     run(_seeing(training), _settings(recipe, _SEEING))
     run(_reading(training, print_note), _settings(recipe))
+    raise_units(training.tower, training.views.units)
     # Halves the file; no answer of the bundled model depends on the rounding.
     training.loaded.model.to(torch.bfloat16)
     return training.loaded

@@ -23,14 +23,15 @@ from infthor_eval.training.nano.seen_objects import SeenFrame, SeenObject
 __all__ = ["AskedText", "SyntheticQuestions"]
 
 _PRESENCE = ("Have you seen {0}?", "Is there any {1} in this room?")
+_OPENNESS = ("Is {} open now?", "Was {} open?")
 _PLACE = (
     "Where is {} now?",
     "Where was {} before you picked it up?",
     "Where did you move {} to?",
 )
-_OPEN = ("Is {} open now?", "Was {} open?")
 _PER_KIND = 3  # most questions of one kind on some frames
-_MOST_LISTED = 3  # most objects of an answer that lists them
+_MOST_LISTED = 4  # most objects of a receptacle that questions list
+_OTHERS = "Which other things that can be picked up were directly {} when you picked up {} from it?"
 
 AskedText = tuple[str, str]
 """Text of a question, and its answer."""
@@ -98,17 +99,46 @@ class SyntheticQuestions:
         for index, names in enumerate(self._shown):
             for name in names:
                 self._frames_with[name].append(index)
-        held = {one.type for _, objects in seen for one in objects if one.is_held}
-        self._movable = {canonical_type(name) for name in held}
+        objects = [one for _, inside in seen for one in inside]
+        self._movable = {canonical_type(one.type) for one in objects if one.is_held}
+        self._holders = {canonical_type(one.parent) for one in objects if one.parent}
+        n_open, n_closed = (
+            sum(one.is_open is is_open and self._is_fixed(one) for one in objects)
+            for is_open in (True, False)
+        )
+        self._asked_of_closed = min(1.0, n_open / max(1, n_closed))
 
-    def ask(self, seen: Sequence[SeenFrame], n: int, rng: random.Random) -> list[AskedText]:
-        """Return up to `n` distinct questions on frames, in random order."""
+    def _is_fixed(self, one: SeenObject) -> bool:
+        return one.is_shown and canonical_type(one.type) not in self._movable
+
+    def ask(
+        self, shown: Sequence[Sequence[SeenObject]], n: int, rng: random.Random
+    ) -> list[AskedText]:
+        """Return up to `n` distinct questions on what frames show, in random order; each kind of
+        question is as likely as another.
+
+        Args:
+            shown: what each of the frames shows.
+            n: most questions.
+            rng: source of all random choices.
+        """
         sight = _Sight()
-        for _, objects in seen:
+        for objects in shown:
             sight.add(objects)
-        kinds = (self._presence, self._absence, self._places, self._openness, self._held)
-        asked = dict.fromkeys(one for kind in kinds for one in kind(sight, rng))
-        return rng.sample([*asked], min(n, len(asked)))
+        kinds = (
+            self._presence,
+            self._absence,
+            self._places,
+            self._whether_there,
+            self._contents,
+            self._openness,
+            self._held,
+        )
+        drawn = [rng.sample(asked, len(asked)) for asked in ([*kind(sight, rng)] for kind in kinds)]
+        asked: dict[AskedText, None] = {}
+        while len(asked) < n and any(drawn):
+            asked.setdefault(rng.choice([one for one in drawn if one]).pop())
+        return [*asked]
 
     def _presence(self, sight: _Sight, rng: random.Random) -> Iterator[AskedText]:
         for name in _some(self._movable_first(sight.shown), rng):
@@ -125,28 +155,45 @@ class SyntheticQuestions:
                 yield _presence_text(rng.choice(self._movable_first(absent)), rng), "no"
 
     def _places(self, sight: _Sight, rng: random.Random) -> Iterator[AskedText]:
-        known = [name for name in sight.places if name in self._movable]
-        for name in _some(known, rng):
-            place = sight.places[name]
-            yield rng.choice(_PLACE).format(with_the(name)), answer_of(place)
-        for name in _some(known, rng)[:1]:
-            place = rng.choice([sight.places[name], rng.choice([*sight.places.values()])])
-            text = f"Is {with_the(name)} {in_or_on(place)}?"
-            yield text, "yes" if place == sight.places[name] else "no"
-        yield from self._contents(sight, rng)
+        for name in _some(self._with_places(sight), rng):
+            yield rng.choice(_PLACE).format(with_the(name)), answer_of(sight.places[name])
+
+    def _with_places(self, sight: _Sight) -> list[str]:
+        return [name for name in sight.places if name in self._movable]
+
+    def _whether_there(self, sight: _Sight, rng: random.Random) -> Iterator[AskedText]:
+        """Yield whether something is in a receptacle: in its own, or as often in another one that
+        is there."""
+        there = {*sight.places.values(), *(name for name in sight.shown if name in self._holders)}
+        for name in _some(self._with_places(sight), rng):
+            own = sight.places[name]
+            others = sorted(there - {own})
+            place = rng.choice(others) if others and rng.random() < 0.5 else own
+            yield f"Is {with_the(name)} {in_or_on(place)}?", "yes" if place == own else "no"
 
     def _contents(self, sight: _Sight, rng: random.Random) -> Iterator[AskedText]:
         contents: dict[str, list[str]] = defaultdict(list)
-        for name, place in sight.places.items():
-            if name in self._movable:
-                contents[place].append(answer_of(name))
+        for name in self._with_places(sight):
+            contents[sight.places[name]].append(name)
         short = [place for place, names in contents.items() if len(names) <= _MOST_LISTED]
-        for place in _some(short, rng)[:1]:
-            yield f"What objects were {in_or_on(place)}?", ", ".join(sorted(contents[place]))
+        for place in _some(short, rng):
+            names, where = contents[place], in_or_on(place)
+            yield f"What objects {rng.choice(('are', 'were'))} {where}?", _listed(names)
+            if len(names) > 1:
+                taken = rng.choice(names)
+                others = [name for name in names if name != taken]
+                yield _OTHERS.format(where, with_the(taken)), _listed(others)
 
     def _openness(self, sight: _Sight, rng: random.Random) -> Iterator[AskedText]:
-        for name in _some([*sight.openness], rng):
-            text = rng.choice(_OPEN).format(with_the(name))
+        """Yield whether things are open. Fixtures are closed most of the time, and are asked about
+        as often when they are open; others are turned in half the homes (`homes.Home`)."""
+        asked = [
+            name
+            for name, is_open in sight.openness.items()
+            if is_open or name in self._movable or rng.random() < self._asked_of_closed
+        ]
+        for name in _some(asked, rng):
+            text = rng.choice(_OPENNESS).format(with_the(name))
             yield text, "yes" if sight.openness[name] else "no"
 
     def _held(self, sight: _Sight, rng: random.Random) -> Iterator[AskedText]:
@@ -158,6 +205,10 @@ class SyntheticQuestions:
         """Return those that can be picked up, or all if there are none: furniture tells no world
         from another."""
         return [name for name in names if name in self._movable] or [*names]
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(sorted(map(answer_of, names)))
 
 
 def _some(names: Sequence[str], rng: random.Random) -> list[str]:

@@ -28,15 +28,19 @@ MUG_IN_SINK = _frame(_seen("Mug", "SinkBasin"), _seen("SinkBasin"), _seen("Egg",
 EGG_IN_HAND = _frame(_seen("Egg", is_held=True), _seen("DiningTable"))
 FAR = _frame(_seen("Mug", "DiningTable", is_shown=False), _seen("DiningTable"))
 TWO_MUGS = _frame(_seen("Mug", "DiningTable"), _seen("Mug", "Shelf"), _seen("DiningTable"))
-ALL = (MUG_ON_TABLE, MUG_IN_HAND, MUG_IN_SINK, EGG_IN_HAND, FAR, TWO_MUGS)
+TWO_THINGS = _frame(
+    _seen("Mug", "DiningTable"), _seen("Egg", "DiningTable"), _seen("DiningTable"), _seen("Sink")
+)
+ALL = (MUG_ON_TABLE, MUG_IN_HAND, MUG_IN_SINK, EGG_IN_HAND, FAR, TWO_MUGS, TWO_THINGS)
 QUESTIONS = SyntheticQuestions(ALL)
 
 
 def _asked(*frames):
     """Return the answers by text of all questions that can be drawn."""
     answers = {}
+    shown = [objects for _, objects in frames]
     for seed in range(60):
-        for text, answer in QUESTIONS.ask(frames, 20, random.Random(seed)):
+        for text, answer in QUESTIONS.ask(shown, 20, random.Random(seed)):
             assert answers.setdefault(text, answer) == answer
     return answers
 
@@ -50,6 +54,13 @@ def _asked(*frames):
         ([MUG_ON_TABLE], "Is the mug on the dining table?", "yes"),
         ([MUG_ON_TABLE], "Is the fridge open now?", "no"),
         ([MUG_ON_TABLE], "What objects were on the dining table?", "mug"),
+        ([TWO_THINGS], "What objects are on the dining table?", "egg, mug"),
+        (
+            [TWO_THINGS],
+            "Which other things that can be picked up were directly on the dining table when you "
+            "picked up the mug from it?",
+            "egg",
+        ),
         ([MUG_ON_TABLE, MUG_IN_HAND], "Was the fridge open?", "yes"),
         ([MUG_ON_TABLE, MUG_IN_HAND, MUG_IN_SINK], "Where did you move the mug to?", "sink"),
         ([MUG_IN_SINK, EGG_IN_HAND], "Is the mug in the sink?", "yes"),
@@ -79,9 +90,35 @@ def test_what_the_frames_do_not_settle_is_not_asked(frames, text):
     assert text not in _asked(*frames)
 
 
+@pytest.mark.parametrize("frames", [[TWO_THINGS], [MUG_ON_TABLE, MUG_IN_SINK]])
+def test_something_is_said_to_be_elsewhere_as_often_as_where_it_is(frames):
+    shown = [objects for _, objects in frames]
+    answers = [
+        answer
+        for seed in range(300)
+        for text, answer in QUESTIONS.ask(shown, 20, random.Random(seed))
+        if text.startswith("Is the ") and " open" not in text
+    ]
+    assert 0.4 < answers.count("yes") / len(answers) < 0.6
+
+
+def test_fixtures_that_are_closed_are_asked_about_as_often_as_open_ones():
+    closed, opened = _frame(_seen("Fridge", is_open=False)), _frame(_seen("Fridge", is_open=True))
+    frames = [*[closed] * 9, opened]
+    questions = SyntheticQuestions(frames)
+    answers = [
+        answer
+        for seed in range(300)
+        for frame in frames
+        for text, answer in questions.ask([frame.objects], 20, random.Random(seed))
+        if " open" in text
+    ]
+    assert 0.4 < answers.count("yes") / len(answers) < 0.6
+
+
 @settings(deadline=None, max_examples=50)
 @given(st.lists(st.sampled_from(ALL), min_size=1, max_size=6), st.integers(1, 12), st.integers())
 def test_questions_are_distinct_and_never_more_than_asked_for(frames, n, seed):
-    drawn = QUESTIONS.ask(frames, n, random.Random(seed))
+    drawn = QUESTIONS.ask([objects for _, objects in frames], n, random.Random(seed))
     assert len(drawn) <= n
     assert len({text for text, _ in drawn}) == len(drawn)

@@ -1,4 +1,4 @@
-"""Questions on frames as training sequences, of a home as it was recorded or renamed."""
+"""Questions on frames as training sequences, of a home as it was recorded or told otherwise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,8 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import CONTEXTS
 from infthor_eval.nieh.prompts import question_text
 from infthor_eval.training.encoding import Encoder, TrainingSequence, with_branches
-from infthor_eval.training.nano.reading.frame_units import RenamedFrame
+from infthor_eval.training.nano.reading.frame_units import ChangedFrame
+from infthor_eval.training.nano.reading.homes import Home
 from infthor_eval.training.nano.reading.network import FrameEvents
 from model_adapters.hf.prompting.prompt import Frame, Piece
 
@@ -56,7 +57,7 @@ class Asker:
     def ask(
         self,
         frames: Sequence[FrameRef],
-        order: tuple[int, ...] | None,
+        home: Home,
         asked: Sequence[tuple[str, str]],
         events: FrameEvents,
     ) -> ReadingSequence:
@@ -64,19 +65,13 @@ class Asker:
 
         Args:
             frames: the frames, in order.
-            order: order of the types in a renamed home (`RenamedFrame`); None as recorded.
+            home: the home that they show.
             asked: texts and answers, at least one.
             events: what happened before each of the frames.
         """
         head = self._encoder.pieces([*frames, ""])
         head = head[: _n_with_frames(head)]
-        if order is not None:
-            head = [
-                RenamedFrame(one.digest, one.size, one.ids, one.ref, order)
-                if isinstance(one, Frame)
-                else one
-                for one in head
-            ]
+        head = [_in_home(one, home) if isinstance(one, Frame) else one for one in head]
         shown = TrainingSequence("frames", tuple(head), (False,) * len(head))
         tails = [self._tail(text, answer) for text, answer in asked]
         return ReadingSequence(with_branches("questions", shown, tails), events)
@@ -85,6 +80,13 @@ class Asker:
         """Return what follows the last frame."""
         whole = self._encoder.answer("question", [self._any_frame, _prompt(text)], answer)
         return whole.part(slice(_n_with_frames(whole.pieces), None))
+
+
+def _in_home(frame: Frame, home: Home) -> Frame:
+    if home.order is None and not home.turned:
+        return frame
+    units = home.turned_units
+    return ChangedFrame(frame.digest, frame.size, frame.ids, frame.ref, home.order, units)
 
 
 def _n_with_frames(pieces: Sequence[Piece]) -> int:

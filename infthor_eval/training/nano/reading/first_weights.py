@@ -103,10 +103,10 @@ def _heads(grid: int) -> tuple[tuple[_Head, ...], ...]:
 _WORD_NOISE = 0.03
 _NAME_REST = 0.4  # of the part for all else, in the code of a name
 _NAME_NOISE = 0.02
-_WEAK = 0.5  # code as a fixture of what is none
 _FEATURE = 0.25
 _FIXTURE_FEATURE = 0.7
-_HELD_REST, _OPEN_REST = 0.3, 0.5
+_HELD_REST, _OPEN_REST = 0.3, 1.0
+_OPEN_STATE = 1.75  # names of loose things are in two parts, so each is weaker
 _MATCH = 0.8
 _SINK = 2.0
 _HAND_ON = 0.35
@@ -116,6 +116,7 @@ _LOOK_AWAY = 3.2
 _N_FAST = 8  # frequencies by which positions are told apart
 _SLOW = 0.012  # radians a position; slower ones do not change in a few frames
 _QUERY_NOISE, _VALUE_NOISE = 0.15, 0.3
+_MLP = 0.15  # of an MLP's usual scale: by it, its noise would hide what heads hand on
 
 
 def part_width(hidden: int) -> int:
@@ -175,7 +176,7 @@ class _Setter:
             sinks.append(basis[-1])
         return _Codes(*chosen, *sinks)
 
-    def set_words(self, codes: _Codes, loose: Tensor, fixtures: Tensor) -> None:
+    def set_words(self, codes: _Codes, loose: Tensor) -> None:
         """Set the embeddings: of names by the codes, of all else at random."""
         words = self._model.get_input_embeddings().weight
         words.copy_(_WORD_NOISE * self._normal(*words.shape))
@@ -184,8 +185,8 @@ class _Setter:
             for token in self._single_tokens(name):
                 code = _NAME_NOISE * self._normal(self._hidden)
                 code[self._part(Part.THING)] += codes.things[at] * loose[at]
-                strength = 1.0 if fixtures[at] else _WEAK
-                code[self._part(Part.FIXTURE)] += codes.fixtures[at] * strength
+                # What is no fixture can be open, too.
+                code[self._part(Part.FIXTURE)] += codes.fixtures[at]
                 code[self._part(Part.REST)] += _NAME_REST * self._directions(1)[0]
                 words[token] = code
         sink = _WORD_NOISE * self._normal(self._hidden)
@@ -212,7 +213,7 @@ class _Setter:
         ).T
         features[self._part(Part.STATE), Role.HELD] = codes.things.T
         features[self._part(Part.REST), Role.HELD] = _HELD_REST * held[:, None]
-        features[self._part(Part.STATE), Role.OPEN] = codes.fixtures.T
+        features[self._part(Part.STATE), Role.OPEN] = _OPEN_STATE * codes.fixtures.T
         features[self._part(Part.REST), Role.OPEN] = _OPEN_REST * opened[:, None]
         features[self._part(Part.PLACE), Role.AROUND] = codes.fixtures.T
         layer = self._model.model.visual.merger.mlp[2]
@@ -232,7 +233,7 @@ class _Setter:
             attention.o_proj: _VALUE_NOISE * deep,
             mlp.gate_proj: 1.0,
             mlp.up_proj: 1.0,
-            mlp.down_proj: _VALUE_NOISE * deep / math.sqrt(3),
+            mlp.down_proj: _MLP * _VALUE_NOISE * deep / math.sqrt(3),
         }
         for linear, strength in noise.items():
             linear.weight.copy_(strength * scale * self._normal(*linear.weight.shape))
@@ -262,7 +263,7 @@ class _Setter:
         match = _MATCH * torch.eye(self._width) * slow[:, None]
         attention.q_proj.weight[rows, self._part(query)] += match
         attention.k_proj.weight[rows, self._part(key)] += match
-        sink = codes.thing_sink if query is Part.THING else codes.fixture_sink
+        sink = codes.thing_sink if key in (Part.THING, Part.STATE) else codes.fixture_sink
         attention.q_proj.bias[rows] += _SINK * sink * slow
 
     def _look(self, attention: Any, rows: slice, back: int, strength: float) -> None:
@@ -302,7 +303,7 @@ def set_first_weights(
     plans = _heads(grid)
     with torch.no_grad():
         codes = setter.codes(loose, fixtures)
-        setter.set_words(codes, are_loose, are_fixtures)
+        setter.set_words(codes, are_loose)
         setter.set_features(codes, are_loose, are_fixtures)
         layers = loaded.model.get_decoder().layers
         for number, layer in enumerate(layers):

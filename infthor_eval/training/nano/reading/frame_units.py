@@ -13,33 +13,29 @@ from torch import Tensor
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.training.nano.reading.renaming import Renaming
 from infthor_eval.training.nano.seeing.units import Role, Units
 from infthor_eval.training.nano.tower import patch_states, unit_logits
 from model_adapters.hf.prompting.prompt import Frame
 
-__all__ = ["FrameUnits", "RenamedFrame", "read_frame_units", "type_order"]
+__all__ = ["ChangedFrame", "FrameUnits", "read_frame_units"]
 
 _READER_THREADS = 2
 _BATCH = 64  # frames in the tower at once
+_OPEN = 3.0  # of the unit of something that is turned open
 
 
 @dataclass(frozen=True)
-class RenamedFrame(Frame):
-    """A frame of a renamed home.
+class ChangedFrame(Frame):
+    """A frame of a home that is told otherwise (`homes.Home`).
 
     Attributes:
         order: for each type of the units, the index of the type that it is in the frame as it was
-            recorded.
+            recorded; None for all as they are.
+        turned: indices, in the frame as it was recorded, of types that are open where they are not.
     """
 
-    order: tuple[int, ...] = field(default=(), repr=False)
-
-
-def type_order(units: Units, renaming: Renaming) -> tuple[int, ...]:
-    """Return the `order` of the frames of a renamed home."""
-    old = {renaming(name): at for at, name in enumerate(units.types)}
-    return tuple(old[name] for name in units.types)
+    order: tuple[int, ...] | None = field(default=None, repr=False)
+    turned: tuple[int, ...] = field(default=(), repr=False)
 
 
 @dataclass(frozen=True)
@@ -57,9 +53,18 @@ class FrameUnits:
     def of(self, frame: Frame) -> Tensor:
         """Return the units of a frame, (tokens, roles, types), float32."""
         values = self.values[self.index[frame.digest]].float()
-        if isinstance(frame, RenamedFrame):
-            values = values[..., list(frame.order)]
-        return values
+        if not isinstance(frame, ChangedFrame):
+            return values
+        _turn(values, frame.turned)
+        return values if frame.order is None else values[..., list(frame.order)]
+
+
+def _turn(values: Tensor, types: Sequence[int]) -> None:
+    """Open what is closed, and close what is open, where it is shown at all."""
+    columns = list(types)
+    opened = values[:, Role.OPEN, columns]
+    is_shown = values[:, Role.SHOWN, columns] > 0
+    values[:, Role.OPEN, columns] = torch.where(is_shown, (-opened).clamp(max=_OPEN), opened)
 
 
 def read_frame_units(

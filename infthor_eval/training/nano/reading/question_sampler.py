@@ -1,14 +1,13 @@
 """Random questions to learn reading from: on single frames, on clue frames, behind memories, whole.
 
-Most are about renamed homes, so that only the frames can answer. Both questions of a pair of twins
-are in one step, with the same frames by number and the same names: what differs between the two
-worlds is then all that there is to learn from them.
+Most are about homes told otherwise, so that only the frames can answer. Both questions of a pair
+of twins are in one step, with the same frames by number and the same names: what differs between
+the two worlds is then all that there is to learn from them.
 """
 
 import random
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
@@ -16,8 +15,8 @@ from infthor_eval.training.nano.reading.asking import Asker, ReadingSequence
 from infthor_eval.training.nano.reading.episodes import Episode, RecordedQuestion, World
 from infthor_eval.training.nano.reading.event_questions import EventQuestions
 from infthor_eval.training.nano.reading.events import events_in
-from infthor_eval.training.nano.reading.frame_units import type_order
-from infthor_eval.training.nano.reading.renaming import Renaming, Vocabulary
+from infthor_eval.training.nano.reading.homes import Home, Homes
+from infthor_eval.training.nano.reading.renaming import Vocabulary
 from infthor_eval.training.nano.seeing.units import Units
 from infthor_eval.training.nano.seen_objects import SeenFrame
 from infthor_eval.training.nano.settings import ReadingSettings
@@ -25,18 +24,10 @@ from infthor_eval.training.nano.synthetic_questions import AskedText, SyntheticQ
 
 __all__ = ["QuestionSampler"]
 
-_AS_RECORDED = Renaming({})
 _MOST_TOKENS = 2500  # of a sequence
 _MOST_FILLED_FRAMES = 12  # on which synthetic questions are added to recorded ones
 _SLICED = "slice"  # slices are no types of their own, so that they cannot be renamed
 _IN_ANY_ORDER = ("objects", "things that")  # marks of questions whose answers have no order
-
-
-class _Names(NamedTuple):
-    """The names in a sequence: how types are renamed, and their order in the units."""
-
-    renaming: Renaming
-    order: tuple[int, ...] | None
 
 
 class QuestionSampler:
@@ -63,9 +54,9 @@ class QuestionSampler:
         self._asker = asker
         self._episodes = episodes
         self._vocabulary = vocabulary
-        self._units = units
         self._settings = settings
         frames = [*seen]
+        self._homes = Homes(vocabulary, units, frames, episodes, settings)
         self._seen = {one.frame.digest: one for one in frames}
         self._synthetic_questions = SyntheticQuestions(frames)
         self._event_questions = EventQuestions(self._seen)
@@ -90,27 +81,21 @@ class QuestionSampler:
         grown = min(1.0, max(0.0, progress - settings.single) / settings.ramp)
         drawn: list[ReadingSequence] = []
         while sum(one.tokens.n_tokens for one in drawn) < settings.tokens_per_step:
-            names = self._draw_names(rng)
-            found = self._kind(is_single, rng)(rng, grown, names)
+            home = self._homes.draw(rng)
+            found = self._kind(is_single, rng)(rng, grown, home)
             drawn += (one for one in found if one.tokens.n_tokens <= _MOST_TOKENS)
         return drawn
 
     def _kind(
         self, is_single: bool, rng: random.Random
-    ) -> Callable[[random.Random, float, _Names], list[ReadingSequence]]:
+    ) -> Callable[[random.Random, float, Home], list[ReadingSequence]]:
         settings = self._settings
         share = rng.random()
         if is_single or share < settings.synthetic:
             return self._synthetic
         return self._events if share < settings.synthetic + settings.events else self._recorded
 
-    def _draw_names(self, rng: random.Random) -> _Names:
-        if rng.random() >= self._settings.renamed:
-            return _Names(_AS_RECORDED, None)
-        renaming = self._vocabulary.draw(rng)
-        return _Names(renaming, type_order(self._units, renaming))
-
-    def _synthetic(self, rng: random.Random, grown: float, names: _Names) -> list[ReadingSequence]:
+    def _synthetic(self, rng: random.Random, grown: float, home: Home) -> list[ReadingSequence]:
         """Return synthetic questions on some frames of an episode; few frames are the most likely.
 
         There are none if the frames show nothing to ask for.
@@ -122,10 +107,10 @@ class QuestionSampler:
         first = rng.randrange(n_frames - n + 1)
         in_a_row = [*range(first, first + n)]
         places = in_a_row if rng.random() < 0.5 else sorted(rng.sample(range(n_frames), n))
-        asked = self._ask_by_rules(world, places, settings.together, names, rng)
-        return [self._sequence(world, places, asked, names)] if asked else []
+        asked = self._ask_by_rules(world, places, settings.together, home, rng)
+        return [self._sequence(world, places, asked, home)] if asked else []
 
-    def _events(self, rng: random.Random, grown: float, names: _Names) -> list[ReadingSequence]:
+    def _events(self, rng: random.Random, grown: float, home: Home) -> list[ReadingSequence]:
         """Return questions on a few events in a row.
 
         There are none if the frames do not show them.
@@ -135,10 +120,10 @@ class QuestionSampler:
         n = 1 + round(rng.random() * (settings.events_in_a_row - 1) * grown)
         places = self._event_questions.draw_places(world, n, rng)
         found = self._event_questions.ask(world, places, settings.together, rng)
-        asked = self._all_renamed(found, names, in_any_order=False)
-        return [self._sequence(world, places, asked, names)] if asked else []
+        asked = self._all_renamed(found, home, in_any_order=False)
+        return [self._sequence(world, places, asked, home)] if asked else []
 
-    def _recorded(self, rng: random.Random, grown: float, names: _Names) -> list[ReadingSequence]:
+    def _recorded(self, rng: random.Random, grown: float, home: Home) -> list[ReadingSequence]:
         """Return a question and others that its frames answer; of twins, in both worlds."""
         settings = self._settings
         (form,) = rng.choices(self._forms, self._weights)
@@ -146,16 +131,16 @@ class QuestionSampler:
         shown = self._shown(rng, grown, episode, first)
         others = [one for one in episode.answerable(shown) if one is not first and one.clues]
         chosen = [first, *rng.sample(others, min(len(others), settings.together - 1))]
-        if names.order is not None:
+        if home.order is not None:
             chosen = [one for one in chosen if not _is_about_slices(one)]
         places = sorted(shown)
         n_more = min(settings.filled, settings.together - len(chosen))
         sequences = []
         for number, world in enumerate(episode.worlds if chosen else ()):
-            asked = [self._in_words(one.asked[number], names) for one in chosen]
+            asked = [self._in_words(one.asked[number], home) for one in chosen]
             if len(places) <= _MOST_FILLED_FRAMES:
-                asked += self._ask_by_rules(world, places, n_more, names, rng)
-            sequences.append(self._sequence(world, places, asked, names))
+                asked += self._ask_by_rules(world, places, n_more, home, rng)
+            sequences.append(self._sequence(world, places, asked, home))
         return sequences
 
     def _shown(
@@ -174,47 +159,46 @@ class QuestionSampler:
         return shown
 
     def _ask_by_rules(
-        self, world: World, places: Sequence[int], n: int, names: _Names, rng: random.Random
+        self, world: World, places: Sequence[int], n: int, home: Home, rng: random.Random
     ) -> list[AskedText]:
-        seen = [self._seen[world.frames[at].digest] for at in places]
-        asked = self._synthetic_questions.ask(seen, n, rng)
-        return self._all_renamed(asked, names, in_any_order=True)
+        seen = (self._seen[world.frames[at].digest] for at in places)
+        shown = [home.objects(objects) for _, objects in seen]
+        asked = self._synthetic_questions.ask(shown, n, rng)
+        return self._all_renamed(asked, home, in_any_order=True)
 
     def _all_renamed(
-        self, asked: Iterable[AskedText], names: _Names, *, in_any_order: bool
+        self, asked: Iterable[AskedText], home: Home, *, in_any_order: bool
     ) -> list[AskedText]:
         """Return questions in the names of a home; one about slices cannot be renamed."""
         return [
-            self._renamed(text, answer.split(", "), names, in_any_order=in_any_order)
+            self._renamed(text, answer.split(", "), home, in_any_order=in_any_order)
             for text, answer in asked
-            if names.order is None or _SLICED not in text + answer
+            if home.order is None or _SLICED not in text + answer
         ]
 
-    def _in_words(self, question: Question, names: _Names) -> AskedText:
+    def _in_words(self, question: Question, home: Home) -> AskedText:
         in_any_order = any(mark in question.text for mark in _IN_ANY_ORDER)
-        answers = [*map(str, question.answers)]
-        return self._renamed(question.text, answers, names, in_any_order=in_any_order)
+        answers = home.answers(question)
+        return self._renamed(question.text, answers, home, in_any_order=in_any_order)
 
     def _renamed(
-        self, text: str, answers: Sequence[str], names: _Names, *, in_any_order: bool
+        self, text: str, answers: Sequence[str], home: Home, *, in_any_order: bool
     ) -> AskedText:
-        renaming = names.renaming
+        renaming = home.renaming
         new = [self._vocabulary.rename_answer(answer, renaming) for answer in answers]
         return self._vocabulary.rename(text, renaming), ", ".join(
             sorted(new) if in_any_order else new
         )
 
     def _sequence(
-        self, world: World, places: Sequence[int], asked: Sequence[AskedText], names: _Names
+        self, world: World, places: Sequence[int], asked: Sequence[AskedText], home: Home
     ) -> ReadingSequence:
         frames: list[FrameRef] = [world.frames[at] for at in places]
         events = [
-            None
-            if of_frame is None
-            else [(event, names.renaming(name)) for event, name in of_frame]
+            None if of_frame is None else [(event, home.renaming(name)) for event, name in of_frame]
             for of_frame in events_in(world.happenings, places)
         ]
-        return self._asker.ask(frames, names.order, asked, events)
+        return self._asker.ask(frames, home, asked, events)
 
 
 def _is_about_slices(question: RecordedQuestion) -> bool:

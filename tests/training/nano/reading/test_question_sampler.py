@@ -87,6 +87,7 @@ def test_a_question_as_recorded_has_the_prompt_of_evaluation(small_set, make, lo
         "recalled": 0.0,
         "whole": 0.0,
         "renamed": 0.0,
+        "turned": 0.0,
     }
     sampler = make(small_set, **settings, together=1, filled=0)
     task = find_samples({"data": str(small_set), "context": "clues"})
