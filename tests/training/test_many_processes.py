@@ -121,8 +121,8 @@ def test_data_groups_of_cut_sequences_train_as_one_process(
 def _moments(folder: Path) -> dict[str, Tensor]:
     """The optimizer's sums of gradients."""
     (state,) = folder.glob("step-*/optimizer.pt")
-    by_number = torch.load(state, weights_only=True)["state"]
-    return {str(number): moments["exp_avg"] for number, moments in by_number.items()}
+    (optimizer,) = torch.load(state, weights_only=True)
+    return {str(number): moments["exp_avg"] for number, moments in optimizer["state"].items()}
 
 
 def test_nothing_is_left_behind(results: Any) -> None:

@@ -1,16 +1,20 @@
 // What the parts of the browser of samples share. Whatever the data hold is put into the page as text, never as markup.
 const byId = id => document.getElementById(id);
-// A page of an index has its data compressed.
-const dataOf = async ({ dataset, textContent }) => {
-  if (dataset.packed === undefined) return textContent;
-  const packed = new Blob([Uint8Array.from(atob(textContent), letter => letter.charCodeAt(0))]);
-  return new Response(packed.stream().pipeThrough(new DecompressionStream("deflate"))).text();
+// Data of many samples, and of an index, are compressed.
+const dataIn = async id => {
+  const { dataset, textContent } = byId(id);
+  if (dataset.packed === undefined) return JSON.parse(textContent);
+  const letters = atob(textContent);
+  const bytes = new Uint8Array(letters.length);
+  for (let at = 0; at < letters.length; at += 1) bytes[at] = letters.charCodeAt(at); // no function for each letter
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).json();
 };
-const { runs, suites, metrics, samples, details, pictures, large, frames, prompts, tracebacks } = JSON.parse(await dataOf(byId("data")));
+const { runs, suites, metrics, samples, details, large, frames, prompts, tracebacks } = await dataIn("data");
+const pictures = await dataIn("pictures");
 // Why replies got their scores: read when the first one is unfolded, as there may be megabytes of them.
 const explanationsRead = (() => {
   let read = null;
-  return () => (read ??= dataOf(byId("explanations")).then(JSON.parse));
+  return () => (read ??= dataIn("explanations"));
 })();
 const MARKS = { right: "✓", partly: "◐", wrong: "✗", failed: "!", "not asked": "·", excluded: "–" };
 

@@ -34,6 +34,10 @@ _SCRIPTS = (
     "report.js",
 )  # one script on the page, in this order
 
+_PICTURES = "pictures"
+# A browser takes longer to read so many letters from a disk than to unpack them.
+_LONG = 4_000_000
+
 # "</script" and "<!--" would end or twist a script element; line separators end a script's line.
 _ESCAPED = {
     "<": "\\u003c",
@@ -93,7 +97,8 @@ class Page:
         metrics: names of the metrics, those that decide the outcome first.
         pictures: WebP in base64, by their numbers in the samples.
         notes: remarks on the samples.
-        is_packed: whether the data of the samples are compressed, to a sixth of their size.
+        is_packed: whether all data of the samples are compressed, to a sixth of their size; those
+            of many samples are in any case.
         footnote: a remark at the end, on what the numbers are not comparable with; empty for none.
         large: number of the enlarged picture by that of its thumbnail.
         frames: what is known of frames, by their numbers in the samples.
@@ -128,7 +133,7 @@ def write_page(page: Page, path: Path) -> int:
     """
     values = {
         "page": page,
-        "data": {name: _embedded(page, value) for name, value in _data(page).items()},
+        "data": [_embedded(page, name, value) for name, value in _data(page).items()],
         "svg": Markup,
         "csv": lambda table: export_tables([table], "csv"),
     }
@@ -146,8 +151,10 @@ def _read(name: str) -> str:
 
 
 def _data(page: Page) -> dict[str, Any]:
-    """Return the data of the samples' browser by the ids of their script elements: explanations are
-    read when the first one is unfolded, as there may be megabytes of them."""
+    """Return the data of the samples' browser by the ids of their script elements.
+
+    Explanations are read when the first one is unfolded, and pictures are compressed already.
+    """
     samples, facts = _share_details(msgspec.to_builtins(page.samples))
     document = {
         "runs": [run.label for run in page.runs],
@@ -155,23 +162,36 @@ def _data(page: Page) -> dict[str, Any]:
         "metrics": list(page.metrics),
         "samples": samples,
         "details": facts,
-        "pictures": list(page.pictures),
         "large": page.large,
         "frames": msgspec.to_builtins(page.frames),
         "prompts": msgspec.to_builtins(page.prompts),
         "tracebacks": list(page.tracebacks),
     }
-    return {"data": document, "explanations": list(page.explanations)}
+    return {
+        "data": document,
+        _PICTURES: list(page.pictures),
+        "explanations": list(page.explanations),
+    }
 
 
-def _embedded(page: Page, value: Any) -> Markup:
+@dataclass(frozen=True)
+class _Embedded:
+    """Data in a script element: its id, its text, and whether that is compressed."""
+
+    id: str
+    text: Markup
+    is_packed: bool
+
+
+def _embedded(page: Page, name: str, value: Any) -> _Embedded:
     """Return a value as JSON that is safe in a script element."""
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     for letter, escaped in _ESCAPED.items():
         text = text.replace(letter, escaped)
-    if page.is_packed:
+    is_packed = page.is_packed or (name != _PICTURES and len(text) > _LONG)
+    if is_packed:
         text = base64.b64encode(zlib.compress(text.encode("utf-8", "backslashreplace"))).decode()
-    return Markup(text)
+    return _Embedded(name, Markup(text), is_packed)
 
 
 def _share_details(samples: list[Any]) -> tuple[list[Any], list[tuple[str, str]]]:

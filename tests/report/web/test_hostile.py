@@ -90,7 +90,7 @@ def assert_only_text(opened: Opened) -> None:
     tab = opened.tab
     assert tab.evaluate("window.hacked") is None
     assert tab.locator(MARKUP).count() == 0
-    assert tab.evaluate("document.scripts.length") <= 3  # two of data, and the page's own
+    assert tab.evaluate("document.scripts.length") <= 4  # three of data, and the page's own
     assert opened.errors == []
     assert all(url.startswith(("file:", "data:", "blob:")) for url in opened.requests)
     assert not any(url.endswith("/x") for url in opened.requests)
