@@ -24,6 +24,7 @@ __all__ = ["build_house", "read_asset_sizes"]
 
 # All lengths in metres.
 _HEIGHT = 2.6  # of ceilings
+_FARTHEST = 200.0  # of a floor from the origin, metres: beyond it cells take minutes to count
 _BODY = 0.22  # the agent's radius and a margin
 _DOOR_TOP = 2.05
 _FLOORS = {"Kitchen": "tiles", "Bathroom": "tiles", "Bedroom": "carpet", "LivingRoom": "wood"}
@@ -82,9 +83,9 @@ def build_house(
 def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, float]]) -> World:
     floors = []
     for room in house["rooms"]:
-        outline = [(float(point["x"]), float(point["z"])) for point in room["floorPolygon"]]
+        outline = [(_metres(point["x"]), _metres(point["z"])) for point in room["floorPolygon"]]
         floors.append((str(room.get("roomType", "")), polygon_rects(outline)))
-    ids = [str(r.get("id", f"room|{index}")) for index, r in enumerate(house["rooms"])]
+    ids = [_text(r.get("id", f"room|{index}")) for index, r in enumerate(house["rooms"])]
     doors = list(_door_spans(house))
     walls = tuple(_walls(house, doors))
     objects: dict[str, SimObject] = {}
@@ -96,7 +97,7 @@ def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, fl
         objects[item.object_id] = item
     for entry in house.get("windows", ()):
         if "assetPosition" in entry:
-            objects[str(entry["id"])] = _window(entry, house)
+            objects[_text(entry["id"])] = _window(entry, house)
     rooms = tuple(
         RoomShell(*(r[0], r[2], r[1], r[3]), _HEIGHT, 0.0, _FLOORS.get(room_type, "wood"), index,
                   walled=False)
@@ -110,6 +111,21 @@ def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, fl
     return world
 
 
+def _metres(value: Any) -> float:
+    """Return a coordinate of a floor, whose cells are counted one by one."""
+    metres = float(value)
+    if not abs(metres) <= _FARTHEST:
+        raise DataError(f"house: a floor reaches to {metres:g} m; use at most {_FARTHEST:g} m")
+    return metres
+
+
+def _text(value: Any) -> str:
+    """Return a text that a message can carry, which has no half of a pair of code units."""
+    text = str(value)
+    text.encode()
+    return text
+
+
 def _with_children(entries: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
     for entry in entries:
         yield entry
@@ -120,9 +136,9 @@ def _object(
     entry: Mapping[str, Any], assets: Mapping[str, tuple[float, float, float]]
 ) -> SimObject:
     """Return an object; ProcTHOR's position is the middle of the asset's box."""
-    object_id = str(entry["id"])
-    declared = type_named(str(entry.get("objectType") or object_id.split("|", 1)[0]))
-    asset = str(entry.get("assetId", ""))
+    object_id = _text(entry["id"])
+    declared = type_named(_text(entry.get("objectType") or object_id.split("|", 1)[0]))
+    asset = _text(entry.get("assetId", ""))
     size = np.array(assets.get(asset) or declared.size)
     rotation = to_array(entry.get("rotation") or {})
     return SimObject(
@@ -169,12 +185,12 @@ def _window(entry: Mapping[str, Any], house: Mapping[str, Any]) -> SimObject:
     length = math.dist((x0, z0), (x1, z1))
     local = to_array(entry["assetPosition"])
     share = float(local[0]) / max(length, 1e-6)
-    object_id = str(entry["id"])
+    object_id = _text(entry["id"])
     position = np.array([x0 + (x1 - x0) * share, local[1], z0 + (z1 - z0) * share])
     return SimObject(
         object_id, object_id, type_named("Window"), position,
         np.array([0.0, math.degrees(math.atan2(x1 - x0, z1 - z0)) + 90.0, 0.0]), np.zeros(3),
-        np.array([1.0, 1.2, 0.16]), asset_id=str(entry.get("assetId", "")),
+        np.array([1.0, 1.2, 0.16]), asset_id=_text(entry.get("assetId", "")),
     )  # fmt: skip
 
 
