@@ -69,7 +69,7 @@ class MetadataPacker:
 
     def patch(self, outcome: Outcome, agent_id: int) -> bytes:
         """Return the METADATA_PATCH body of one reply, for an action that changed nothing."""
-        packed: bytes = msgpack.packb({**outcome.fields(), "agentId": agent_id})
+        packed = _packed({**outcome.fields(), "agentId": agent_id})
         return packed
 
     def _objects(self, sim: Simulation) -> list[bytes]:
@@ -114,8 +114,13 @@ class MetadataPacker:
 
 def _entries(fields: dict[str, Any]) -> bytes:
     """Return the packed keys and values of a map, without its head."""
-    packed: bytes = msgpack.packb(fields)
-    return packed[len(_map_head(len(fields))) :]
+    return _packed(fields)[len(_map_head(len(fields))) :]
+
+
+def _packed(fields: dict[str, Any]) -> bytes:
+    """Return a packed map; half a pair of code units, which an error may quote, is written out."""
+    packed: bytes = msgpack.packb(fields, unicode_errors="backslashreplace")
+    return packed
 
 
 def _map_head(size: int) -> bytes:

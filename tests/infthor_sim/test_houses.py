@@ -181,3 +181,10 @@ def test_malformed_houses_are_refused(break_it):
     break_it(bad)
     assert "ProcTHOR" in bench.refused("CreateHouse", house=bad)
     bench.ok("CreateHouse", house=house())
+
+
+def test_an_error_may_quote_what_no_message_carries():
+    bench = Bench(size=20)
+    bench.ok("Reset", sceneName="Procedural")
+    bench.ok("Initialize", fastActionEmit=False)
+    assert "\\ud800" in bench.refused("CreateHouse", house="\ud800")
