@@ -69,8 +69,7 @@ class MetadataPacker:
 
     def patch(self, outcome: Outcome, agent_id: int) -> bytes:
         """Return the METADATA_PATCH body of one reply, for an action that changed nothing."""
-        packed = _packed({**outcome.fields(), "agentId": agent_id})
-        return packed
+        return _packed({**outcome.fields(), "agentId": agent_id})
 
     def _objects(self, sim: Simulation) -> list[bytes]:
         if self._scene != sim.n_loaded:

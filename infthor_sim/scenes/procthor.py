@@ -28,6 +28,8 @@ _FARTHEST = 200.0  # of a floor from the origin, metres: beyond it cells take mi
 _BODY = 0.22  # the agent's radius and a margin
 _DOOR_TOP = 2.05
 _FLOORS = {"Kitchen": "tiles", "Bathroom": "tiles", "Bedroom": "carpet", "LivingRoom": "wood"}
+# What reading a document of another form raises.
+_MALFORMED = (LookupError, TypeError, ValueError, OverflowError, AttributeError)
 _ASSETS = Path("procthor/asset-database.json.gz")
 Span = tuple[float, float, float, float]
 
@@ -46,15 +48,7 @@ def read_asset_sizes(root: Path) -> dict[str, tuple[float, float, float]]:
             content = json.load(file)
         listed = [asset for assets in content.values() for asset in assets]
         return {str(asset["assetId"]): _extents(asset["boundingBox"]) for asset in listed}
-    except (
-        OSError,
-        EOFError,
-        LookupError,
-        TypeError,
-        ValueError,
-        OverflowError,
-        AttributeError,
-    ) as error:
+    except (OSError, EOFError, *_MALFORMED) as error:
         raise DataError(f"{path}: not a readable asset database ({error!r})") from error
 
 
@@ -76,7 +70,7 @@ def build_house(
     """
     try:
         return _build(house, assets)
-    except (LookupError, TypeError, ValueError, OverflowError, AttributeError) as error:
+    except _MALFORMED as error:
         raise DataError(f"house: not in ProcTHOR's form ({error!r})") from error
 
 
