@@ -221,7 +221,7 @@ def _building(manifest: Manifest | TwinsManifest, out: Path) -> Iterator[Path]:
     """Yield the hidden folder of a build; what is in its `_SET` at the end is moved to `out`.
 
     Raises:
-        DataError: `out` has other files than those of a build that was stopped.
+        DataError: `out` has a whole set, or other files than those of a build that was stopped.
     """
     recipe = msgspec.to_builtins(msgspec.structs.replace(manifest, files={}))
     work = out / f"{_WORK}{fingerprint(recipe)}"
@@ -230,8 +230,9 @@ def _building(manifest: Manifest | TwinsManifest, out: Path) -> Iterator[Path]:
     if (whole / MANIFEST).is_file():  # stopped while the set was moved
         for name in _top_names(read_json(whole / MANIFEST, _HINT, type(manifest)).files):
             remove(out / name)
-    elif (out / MANIFEST).is_file():  # stopped after that
+    elif (out / MANIFEST).is_file():  # stopped after that, or not at all
         remove(work)
+        raise DataError(f"{out}: has a whole set; give a new folder")
     if any(not path.name.startswith(".") for path in out.iterdir()):
         raise DataError(f"{out}: not empty; give a new folder")
     for other in out.glob(f"{_WORK}*"):

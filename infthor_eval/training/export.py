@@ -83,10 +83,19 @@ def _write(
 ) -> None:
     loaded.tokenizer.chat_template = loaded.template
     with hide_transformers_output():
-        loaded.tokenizer.save_pretrained(folder)
+        _write_tokenizer(loaded, folder)
         loaded.image_processor.save_pretrained(folder)
         own = loaded.model.state_dict() if weights is None else weights
         loaded.model.save_pretrained(folder, state_dict=with_published_names(own))
     for file in folder.glob("*.safetensors"):  # safetensors writes them for their owner alone
         file.chmod((folder / _CONFIG).stat().st_mode)
     (folder / "README.md").write_text(_CARD.format(title=title, words=words), encoding="utf-8")
+
+
+def _write_tokenizer(loaded: LoadedCheckpoint, folder: Path) -> None:
+    try:
+        loaded.tokenizer.save_pretrained(folder)
+    except OSError:
+        raise
+    except Exception as error:  # the library in Rust has no other kind, for a full disk either
+        raise OSError(str(error)) from error

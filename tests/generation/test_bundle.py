@@ -113,7 +113,7 @@ def test_a_build_that_was_killed_at_its_manifest_goes_on(tmp_path, monkeypatch):
         # As if it had been killed before the last of its hidden folder was removed.
         recipe = msgspec.to_builtins(msgspec.structs.replace(built, files={}))
         (tmp_path / f".building-{fingerprint(recipe)}" / "trajectories").mkdir(parents=True)
-        with pytest.raises(DataError, match="not empty; give a new folder"):
+        with pytest.raises(DataError, match="has a whole set; give a new folder"):
             build_bundle(manifest, simulator, tmp_path)
     assert not list(tmp_path.glob(".*"))
 

@@ -24,6 +24,10 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
+def _folders(place):
+    return [path for path in place.iterdir() if path.is_dir()]
+
+
 def _other_process(place):
     code = _HOLD.format("print(folder.path, flush=True); time.sleep(60)")
     process = subprocess.Popen(
@@ -54,7 +58,7 @@ def test_cleaning_up_twice_is_safe(place):
 def test_each_command_removes_what_a_killed_process_left(place, run_cli):
     process = _other_process(place)
     assert run_cli("ls", "models")[0] == 0
-    assert len(list(place.iterdir())) == 1
+    assert len(_folders(place)) == 1
     process.kill()
     process.wait()
     scratch._remove_abandoned.cache_clear()  # as a new process begins
@@ -75,9 +79,9 @@ def test_what_a_killed_process_left_is_removed(place):
     process = _other_process(place)
     process.send_signal(signal.SIGKILL)
     process.wait()
-    assert len(list(place.iterdir())) == 1
+    assert len(_folders(place)) == 1
     with ScratchFolder():
-        assert len(list(place.iterdir())) == 1
+        assert len(_folders(place)) == 1
     assert list(place.iterdir()) == []
 
 
@@ -85,7 +89,7 @@ def test_what_a_living_process_uses_stays(place):
     process = _other_process(place)
     try:
         with ScratchFolder():
-            assert len(list(place.iterdir())) == 2
+            assert len(_folders(place)) == 2
     finally:
         process.kill()
         process.wait()
@@ -98,11 +102,65 @@ def test_it_may_be_hidden_in_a_folder_and_is_removed_there_too(place):
         "folder = ScratchFolder(Path(sys.argv[1])); os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     subprocess.run([sys.executable, "-c", code, str(place)], check=False)
-    (left,) = place.iterdir()
+    (left,) = _folders(place)
     assert left.name.startswith(".infthor-")
     with ScratchFolder(place) as folder:
         assert not left.exists()
         assert folder.is_relative_to(place)
+    assert list(place.iterdir()) == []
+
+
+def test_a_lock_without_a_folder_is_removed(place):
+    (place / "infthor-killed-before.lock").write_bytes(b"")
+    with ScratchFolder():
+        assert len(list(place.iterdir())) == 2
+    assert list(place.iterdir()) == []
+
+
+def test_what_cannot_be_removed_at_first_is_removed_all_the_same(place, monkeypatch):
+    remove = scratch.remove
+    failures = iter([OSError("Input/output error")])
+
+    def fail_once(path):
+        for failure in failures:
+            raise failure
+        remove(path)
+
+    monkeypatch.setattr(scratch, "remove", fail_once)
+    with ScratchFolder() as folder:
+        (folder / "a").write_text("a")
+    assert list(place.iterdir()) == []
+
+
+def test_what_cannot_be_removed_keeps_its_lock_and_goes_with_the_next_command(place, monkeypatch):
+    def fail(path):
+        raise OSError("Input/output error")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(scratch, "remove", fail)
+        with ScratchFolder():
+            pass
+    assert len(list(place.iterdir())) == 2
+    scratch._remove_abandoned.cache_clear()
+    scratch.remove_abandoned()
+    assert list(place.iterdir()) == []
+
+
+def test_a_lock_that_another_process_takes_for_abandoned_is_made_anew(place, monkeypatch):
+    flock = scratch.fcntl.flock
+    taken = []
+
+    def flock_late(file, operation):
+        if not taken:
+            (lock,) = place.iterdir()
+            taken.append(lock)
+            lock.unlink()
+        flock(file, operation)
+
+    monkeypatch.setattr(scratch.fcntl, "flock", flock_late)
+    with ScratchFolder() as folder:
+        assert folder.name != taken[0].stem
+        assert folder.with_name(f"{folder.name}.lock").exists()
     assert list(place.iterdir()) == []
 
 

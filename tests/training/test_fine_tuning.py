@@ -138,14 +138,24 @@ def test_a_full_disk_at_a_checkpoint_is_one_line_and_the_run_goes_on_later(
     assert (tmp_path / "out" / "checkpoint" / "config.json").is_file()
 
 
-def test_a_checkpoint_that_cannot_be_written_is_none(recipe, data, tmp_path, run_cli, monkeypatch):
+@pytest.mark.parametrize(
+    ("written", "error"),
+    [
+        ("PreTrainedModel", SafetensorError("Error while serializing: No space left on device")),
+        # As tokenizers raises it.
+        ("PreTrainedTokenizerBase", Exception("Error while saving: No space left (os error 28)")),
+    ],
+)
+def test_a_checkpoint_that_cannot_be_written_is_none(
+    recipe, data, tmp_path, run_cli, monkeypatch, written, error
+):
     def full(*_, **__):
-        raise SafetensorError("Error while serializing: No space left on device")
+        raise error
 
     words = ["train", "--recipe", recipe, "--data", data, "--out", tmp_path / "out"]
     words += ["--set", "max_steps=1"]
     with monkeypatch.context() as patched:
-        patched.setattr("transformers.PreTrainedModel.save_pretrained", full)
+        patched.setattr(f"transformers.{written}.save_pretrained", full)
         code, _, err = run_cli(*words)
     assert code == 2
     assert "checkpoint: the checkpoint cannot be written (Error while" in err.splitlines()[-1]

@@ -1,6 +1,5 @@
 """A checkpoint's model, and what prepares its prompts, on a device that computes no numbers."""
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,6 +10,7 @@ import torch
 from PIL import Image
 
 from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.storage.scratch import ScratchFolder
 from model_adapters.hf.families.hf_vlm import HfVlm, ProcessorFamily, family_of
 from model_adapters.hf.families.plain import PlainFamily, three_axis_positions
 from model_adapters.hf.family import Family, Pixels, Shape, Size
@@ -112,11 +112,11 @@ def load_shapes(options: CheckpointOptions) -> RehearsedModel:
             "'*.json' '*.jinja' --local-dir DIR` and give pretrained=DIR, or name one of "
             f"{', '.join(known_checkpoints())}"
         )
-    with tempfile.TemporaryDirectory() as folder:
-        known.write(Path(folder))
-        stored = replace(options, pretrained=folder, revision=None, prompt="plain")
+    with ScratchFolder() as folder:
+        known.write(folder)
+        stored = replace(options, pretrained=str(folder), revision=None, prompt="plain")
         loaded = _load(stored, known.source)
-        problem = loaded.problem.replace(folder, options.pretrained)
+        problem = loaded.problem.replace(str(folder), options.pretrained)
         return replace(loaded, options=options, problem=problem)
 
 
