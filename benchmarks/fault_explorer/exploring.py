@@ -18,6 +18,7 @@ from fault_explorer.trees import Tree, difference, read_tree
 __all__ = ["Cut", "Exploration", "explore"]
 
 _BESIDE_S = 3.0  # that another process has, at most, while the first stands still
+_KIND_OF_NAME = 8  # characters of a temporary file's name; those after them are random
 # What does not depend on the call that it comes at: so many calls of each kind, evenly.
 _SPARSE = {
     Fault.READ_ONLY: 10,
@@ -151,7 +152,7 @@ class _Explorer:
 
     def _state(self) -> str:
         """Return a digest of all that the next run finds."""
-        temporary = sorted(path.name[:9] for path in self._place.temporary.iterdir())
+        temporary = sorted(path.name[:_KIND_OF_NAME] for path in self._place.temporary.iterdir())
         tree = read_tree(self._place.out)
         return hashlib.sha256(repr((temporary, sorted(tree.items()))).encode()).hexdigest()
 

@@ -14,6 +14,7 @@ Tree = dict[str, Any]
 
 # lm-eval puts the time of writing into its names.
 _STAMP = re.compile(r"_\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d\.\d+(?=\.jsonl?$)")
+_SCRATCH = re.compile(r"(\.infthor-)\w{8}(?=[./]|$)")  # a temporary folder, and its lock
 # Of a unit's record: its time, how often it was tried, what it survived, what was cached.
 _OF_A_TRY = ("seconds", "attempt", "faults", "cached")
 # Of an export for others: its time, a name that is made of it, hashes of files that have either.
@@ -25,6 +26,7 @@ def read_tree(folder: Path) -> Tree:
     tree: Tree = {}
     for path in sorted(folder.rglob("*")):
         name = _STAMP.sub("_TIME", path.relative_to(folder).as_posix())
+        name = _SCRATCH.sub(r"\1NAME", name)
         tree.setdefault(name, "folder" if path.is_dir() else _content(path))
         if not path.is_dir() and tree[name] != _content(path):  # two of one name but for the time
             tree[f"{name} again"] = _content(path)

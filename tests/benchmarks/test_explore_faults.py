@@ -148,3 +148,9 @@ def test_trees_are_equal_but_for_times_and_differ_by_a_byte_a_name_or_half_a_lin
     more = write("five", 1.0)
     (more / ".left.lock").touch()
     assert trees.difference(one, trees.read_tree(more)) == ".left.lock is too many"
+    left = []
+    for name in ("abcd1234", "e_fgh567"):
+        (write(name, 1.0) / f".infthor-{name}.lock").touch()
+        left.append(trees.read_tree(tmp_path / name))
+    assert trees.difference(*left) is None
+    assert trees.difference(one, left[0]) == ".infthor-NAME.lock is too many"
