@@ -243,6 +243,9 @@ _GEMMA4_TOKENS = {
 }
 
 
+_GEMMA4_IMAGE = 70  # tokens, at most
+
+
 def _gemma4_config(vocabulary: Vocabulary) -> dict[str, Any]:
     """As in the smaller published ones: inputs of each layer, the last layers' keys shared."""
     return {
@@ -256,7 +259,9 @@ def _gemma4_config(vocabulary: Vocabulary) -> dict[str, Any]:
             global_head_dim=2 * HEAD,
             hidden_size_per_layer_input=8,
             vocab_size_per_layer_input=vocabulary.size,
-        ),
+        )
+        # As published; vLLM takes token 0 for an image in the inputs of layers.
+        | {"pad_token_id": 0},
         "vision_config": {
             "hidden_size": 32,
             "intermediate_size": 64,
@@ -266,6 +271,7 @@ def _gemma4_config(vocabulary: Vocabulary) -> dict[str, Any]:
             "head_dim": 16,
             "position_embedding_size": 64,
             "initializer_range": SPREAD,
+            "default_output_length": _GEMMA4_IMAGE,  # of the published configs, for vLLM
         },
     }
 
@@ -367,7 +373,7 @@ GRIDS = {
         named=_GEMMA4_TOKENS,
         special=("<|video|>",),
         config=_gemma4_config,
-        images={"image_processor_type": "Gemma4ImageProcessor", "max_soft_tokens": 70},
+        images={"image_processor_type": "Gemma4ImageProcessor", "max_soft_tokens": _GEMMA4_IMAGE},
         processor={
             "processor_class": "Gemma4Processor",
             "feature_extractor": {"feature_extractor_type": "Gemma4AudioFeatureExtractor"},

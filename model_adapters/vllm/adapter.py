@@ -22,7 +22,7 @@ from model_adapters.hf.loading.checkpoint import (
 )
 from model_adapters.hf.loading.processors import load_processor
 from model_adapters.vllm.arguments import frame_limit, model_arguments, token_limit
-from model_adapters.vllm.cpu import check_head_size, runs_on_cpu
+from model_adapters.vllm.cpu import check_kernels, runs_on_cpu
 from model_adapters.vllm.engine import Engine, import_vllm, require_version
 from model_adapters.vllm.model import VllmModel
 from model_adapters.vllm.options import (
@@ -104,12 +104,12 @@ def _start(
     options: VllmOptions = located.options
     if options.encoder_cache_tokens is not None:
         require_version(name, "0.33", "encoder_cache_tokens")
-    if runs_on_cpu():
-        check_head_size(name, located.config.get_text_config())
     loaded = read_checkpoint(located, family, build_meta_model)
     if processor is not None:
         hint = f"{located.config.model_type} cannot be run in vLLM; use --engine transformers"
         require_same_ids(loaded, processor, options.pretrained, hint)
+    if runs_on_cpu():
+        check_kernels(name, located.config)
     max_tokens = token_limit(options.pretrained, loaded.max_tokens, options)
     with wrap_model_errors(name):
         per_frame = len(loaded.family.frame_ids((options.frame_size, options.frame_size)))

@@ -11,7 +11,7 @@ import torch
 
 from infthor_eval.errors import ModelError
 
-__all__ = ["check_head_size", "prepare", "readable_globals", "runs_on_cpu", "set_threads"]
+__all__ = ["check_kernels", "prepare", "readable_globals", "runs_on_cpu", "set_threads"]
 
 # In one process an engine starts and ends in seconds, also in workers, which may not start
 # processes. Threads that are bound to cores would share one core with those of other workers. The
@@ -73,21 +73,40 @@ def _without_dict(kind: Any) -> Iterator[None]:
         kind.__getattr__ = own
 
 
-def check_head_size(name: str, text_config: Any) -> None:
-    """Refuse a model whose attention heads vLLM has no kernel for on a CPU; it would start and fail
-    at each request.
+def check_kernels(name: str, config: Any) -> None:
+    """Refuse a model whose attention vLLM does not compute on a CPU.
+
+    One with heads of another size would start and fail at each request, and one that looks both
+    ways within a frame would look back alone, without a word.
 
     Raises:
         ModelError: there is no kernel.
     """
-    head = (
-        getattr(text_config, "head_dim", None)
-        or text_config.hidden_size // text_config.num_attention_heads
-    )
+    text_config = config.get_text_config()
     kernels = importlib.import_module("vllm.v1.attention.backends.cpu_attn").CPUAttentionBackend
     known = kernels.get_supported_head_sizes()
-    if head not in known:
-        raise ModelError(
-            f"{name}: its attention heads have {head} numbers, and vLLM on a CPU has kernels for"
-            f" {', '.join(map(str, known))}; run it with --engine transformers"
+    sizes = {_head_size(layer) for layer in text_config.per_layer_config}
+    if unknown := sorted(sizes - {*known}):
+        problem = (
+            f"its attention heads have {unknown[0]} numbers, and vLLM on a CPU has kernels for "
+            f"{', '.join(map(str, known))}"
         )
+    elif not kernels.supports_mm_prefix() and _looks_both_ways(config, text_config):
+        problem = "it looks both ways within a frame, and vLLM on a CPU looks back alone"
+    else:
+        return
+    raise ModelError(f"{name}: {problem}; run it with --engine transformers")
+
+
+def _looks_both_ways(config: Any, text_config: Any) -> bool:
+    """Return whether tokens of a frame attend to those after them, as vLLM has it."""
+    known = importlib.import_module("vllm.transformers_utils.model_arch_config_convertor")
+    convertor = known.MODEL_ARCH_CONFIG_CONVERTORS.get(
+        config.model_type, known.ModelArchConfigConvertorBase
+    )
+    return bool(convertor(config, text_config).is_mm_prefix_lm())
+
+
+def _head_size(config: Any) -> int:
+    size: int | None = getattr(config, "head_dim", None)
+    return size or config.hidden_size // config.num_attention_heads
