@@ -100,7 +100,7 @@ def _remove(lock: Path) -> None:
 def _remove_abandoned(parent: Path, prefix: str) -> None:
     for lock in parent.glob(f"{prefix}*{_LOCK}"):
         try:
-            with lock.open("rb") as file:
+            with lock.open("r+b") as file:  # on NFS only what can be written is locked
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 _remove(lock)
         except OSError:  # in use, another user's, or removed by another process just now
