@@ -18,6 +18,7 @@ from fault_explorer.trees import Tree, difference, read_tree
 __all__ = ["Cut", "Exploration", "explore"]
 
 _BESIDE_S = 3.0  # that another process has, at most, while the first stands still
+_PASSING_S = 0.5  # semaphores of other programs have a name for less
 _KIND_OF_NAME = 8  # characters of a temporary file's name; those after them are random
 # What does not depend on the call that it comes at: so many calls of each kind, evenly.
 _SPARSE = {
@@ -207,7 +208,7 @@ class _Explorer:
         left = sorted(path.name for path in self._place.temporary.iterdir())
         if left:
             raise _LostError(f"left in the temporary folder: {', '.join(left)}")
-        left = sorted(_shared_memory() - self._shared)
+        left = _abandoned(_shared_memory() - self._shared)
         if left:
             raise _LostError(f"left in shared memory: {', '.join(left)}")
 
@@ -229,6 +230,22 @@ class _Explorer:
 
 def _shared_memory() -> set[str]:
     return {path.name for path in Path("/dev/shm").iterdir()}
+
+
+def _abandoned(names: set[str]) -> list[str]:
+    """Return those in shared memory that no process has: what a cut run started has ended, so
+    others are of other programs."""
+    if names:
+        time.sleep(_PASSING_S)
+    used = "".join(_maps(process) for process in Path("/proc").glob("[0-9]*")) if names else ""
+    return sorted(name for name in names & _shared_memory() if f"/dev/shm/{name}" not in used)
+
+
+def _maps(process: Path) -> str:
+    try:
+        return (process / "maps").read_text()
+    except OSError:  # it has ended, or is another user's
+        return ""
 
 
 def _require(ended: Ended, codes: tuple[int, ...]) -> None:

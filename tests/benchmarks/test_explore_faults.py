@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 from typing import Any
 
@@ -154,3 +155,18 @@ def test_trees_are_equal_but_for_times_and_differ_by_a_byte_a_name_or_half_a_lin
         left.append(trees.read_tree(tmp_path / name))
     assert trees.difference(*left) is None
     assert trees.difference(one, left[0]) == ".infthor-NAME.lock is too many"
+
+
+def test_what_another_program_has_in_shared_memory_is_not_left_behind(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    exploring = importlib.import_module("fault_explorer.exploring")
+    before = exploring._shared_memory()
+    shared = SharedMemory(create=True, size=1)
+    try:
+        assert shared.name in exploring._shared_memory() - before
+        assert shared.name not in exploring._abandoned({shared.name})
+        shared.close()
+        assert exploring._abandoned({shared.name}) == [shared.name]
+    finally:
+        shared.unlink()
+    assert exploring._abandoned({shared.name}) == []
