@@ -82,7 +82,7 @@ class _Explorer:
         self._forks = Forks(place, control)
         self._expected: Tree = {}
         self._seen: dict[str, str | _LostError | None] = {}
-        self._shared = _shared_memory()
+        self._shared: set[str] = set()  # before a cut
 
     def prepare(self) -> list[CallKind]:
         """Make the inputs, import what is needed, and return the calls of an uncut run."""
@@ -120,6 +120,7 @@ class _Explorer:
     def cut(self, fault: Fault, at: int) -> Cut:
         """Let one call fail, and run the command again."""
         self._start_anew()
+        self._shared = _shared_memory()
         told = lost = None
         call = ""
         try:
