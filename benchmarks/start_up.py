@@ -84,7 +84,8 @@ class _Stopwatch(MetaPathFinder, Loader):
 
     def leave(self) -> None:
         """Print the times as the last line, and end the process."""
-        print(f"\n{json.dumps(self.times)}", flush=True)
+        # While a model is asked, what is printed goes to standard error.
+        print(f"\n{json.dumps(self.times)}", file=sys.__stdout__, flush=True)
         os._exit(0)
 
 
