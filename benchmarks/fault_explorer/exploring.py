@@ -236,9 +236,10 @@ def _shared_memory() -> set[str]:
 def _abandoned(names: set[str]) -> list[str]:
     """Return those in shared memory that no process has: what a cut run started has ended, so
     others are of other programs."""
-    if names:
-        time.sleep(_PASSING_S)
-    used = "".join(_maps(process) for process in Path("/proc").glob("[0-9]*")) if names else ""
+    if not names:
+        return []
+    time.sleep(_PASSING_S)
+    used = "".join(map(_maps, Path("/proc").glob("[0-9]*")))
     return sorted(name for name in names & _shared_memory() if f"/dev/shm/{name}" not in used)
 
 
