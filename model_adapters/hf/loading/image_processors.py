@@ -5,6 +5,8 @@ pixels, and results must not depend on which packages are installed. Their arith
 one that gives the same bits in less time.
 """
 
+import ctypes
+import platform
 from collections.abc import Collection
 from functools import lru_cache
 from pathlib import Path
@@ -29,7 +31,12 @@ _LEVELS = 256  # of a pixel
 _LEAST = 32  # pixels along a side, below which Pillow itself takes no time
 _MOST = 64  # sizes whose resize is found out; to do so takes longer than to resize once
 _SEED = 0
-_KEPT_BYTES = 2**25 - 2**14  # slightly less than the largest that glibc learns from
+
+_MALLOC_SETTINGS = (  # numbers of <malloc.h>, and bytes
+    (-1, 2**28),  # M_TRIM_THRESHOLD: kept at the end of the heap
+    (-2, 2**26),  # M_TOP_PAD: asked for ahead; a thread's heap is not given back when it is empty
+    (-3, 2**25),  # M_MMAP_THRESHOLD: least that is always asked for anew, at its highest
+)
 
 
 def load_image_processor(
@@ -61,13 +68,14 @@ def load_image_processor(
 
 
 def _keep_freed_memory() -> None:
-    """Have glibc keep up to 64 MiB of freed memory in each thread for the next frame.
+    """Have glibc keep freed memory for the next frame (mallopt(3)).
 
     It gives larger pieces back to the system and asks for them anew, and the system clears every
-    page of them: for a frame that took longer than its arithmetic. The limit is raised whenever a
-    larger piece is freed (mallopt(3), "dynamic mmap threshold").
+    page of them: for a frame of several crops that took as long as half of its arithmetic.
     """
-    np.empty(_KEPT_BYTES, np.uint8)
+    if platform.libc_ver()[0] == "glibc":
+        for setting in _MALLOC_SETTINGS:
+            ctypes.CDLL(None).mallopt(*setting)
 
 
 def image_backend(image_processor: Any) -> str:

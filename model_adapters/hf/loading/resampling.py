@@ -63,7 +63,7 @@ def _resize(
         if not columns_first and down is not None:
             rows = _combined(rows, *down)
         if across is not None:
-            rows = _turned(_combined(_turned(rows), *across))
+            rows = _combined_across(rows, *across)
         if columns_first and down is not None:
             rows = _combined(rows, *down)
         return rows.transpose(1, 0, 2)
@@ -110,11 +110,14 @@ def _combined(
     return new
 
 
-def _turned(rows: Pixels) -> Pixels:
-    """Return the pixels with the first and the last axis exchanged, contiguous in memory."""
-    turned = np.empty(rows.shape[::-1], np.uint8)
-    _turn(rows, turned)
-    return turned
+def _combined_across(
+    rows: Pixels, first: NDArray[np.int64], count: NDArray[np.int64], weights: NDArray[np.int32]
+) -> Pixels:
+    """Return as many columns as there are weights, each the weighted sum of some of these, (height,
+    channels, width)."""
+    new = np.empty((*rows.shape[:2], len(weights)), np.uint8)
+    _combine_across(rows, first, count, weights, new)
+    return new
 
 
 @njit(
@@ -147,13 +150,31 @@ def _combine(
                 out[i] = min(max(sums[i] >> _BITS, 0), 255)
 
 
-@njit("void(uint8[:, :, :], uint8[:, :, ::1])", cache=True, nogil=True)
-def _turn(rows: Pixels, turned: Pixels) -> None:
-    block = 32  # pixels along each side that stay in the fastest cache
+@njit(
+    "void(uint8[:, :, :], int64[::1], int64[::1], int32[:, ::1], uint8[:, :, ::1])",
+    cache=True,
+    nogil=True,
+)
+def _combine_across(
+    rows: Pixels,
+    first: NDArray[np.int64],
+    count: NDArray[np.int64],
+    weights: NDArray[np.int32],
+    new: Pixels,
+) -> None:
     n_rows, n_channels, n_columns = rows.shape
-    for row in range(0, n_rows, block):
-        for column in range(0, n_columns, block):
-            for channel in range(n_channels):
-                for j in range(column, min(column + block, n_columns)):
-                    for i in range(row, min(row + block, n_rows)):
-                        turned[j, channel, i] = rows[i, channel, j]
+    block = 64  # rows that are turned at once, so that they stay in a core's own cache
+    turned = np.zeros((n_columns, block), np.uint8)
+    sums = np.empty((new.shape[2], block), np.uint8)
+    for channel in range(n_channels):
+        for begin in range(0, n_rows, block):
+            end = min(begin + block, n_rows)
+            for i in range(end - begin):
+                row = rows[begin + i, channel]
+                for column in range(n_columns):
+                    turned[column, i] = row[column]
+            _combine(turned, first, count, weights, sums)
+            for i in range(end - begin):
+                row = new[begin + i, channel]
+                for column in range(new.shape[2]):
+                    row[column] = sums[column, i]
