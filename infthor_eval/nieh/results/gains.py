@@ -3,7 +3,7 @@
 Runs are set side by side if they are alike but for their frames.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from msgspec.structs import replace
@@ -15,7 +15,20 @@ from infthor_eval.runs import RunSummary
 from infthor_eval.statistics import MeanEstimate, paired_difference
 from infthor_eval.tables import TableCell, answered_cell, interval_cell
 
-__all__ = ["Gain", "alike_but_for_frames", "find_gains", "frames_of", "gain_cell", "name_of"]
+__all__ = [
+    "Gain",
+    "Scores",
+    "alike_but_for_frames",
+    "difference_cell",
+    "find_gains",
+    "frames_of",
+    "gain_cell",
+    "name_of",
+    "paired_gain",
+]
+
+Scores = Mapping[str, Mapping[str, float]]
+"""Scores by trajectory and sample."""
 
 
 @dataclass(frozen=True)
@@ -40,25 +53,29 @@ class Gain:
     def total(self) -> MeanEstimate | None:
         """Return mean gain and interval over the questions that both runs answered, paired and
         clustered by trajectory; None if there are none."""
-        clusters: list[str] = []
-        ours: list[float] = []
-        theirs: list[float] = []
-        for trajectory, scores in self.seeing.scores[self.metric].items():
-            blind = self.blind.scores[self.metric].get(trajectory, {})
-            shared = [sample for sample in scores if sample in blind]
-            clusters += [trajectory] * len(shared)
-            ours += [scores[sample] for sample in shared]
-            theirs += [blind[sample] for sample in shared]
-        if not clusters:
-            return None
-        # The reference scorer exceeds 1 on repetitions.
-        most = 1.0 if max(*ours, *theirs) <= 1 else None
-        return paired_difference(theirs, ours, clusters, most).estimate
+        return paired_gain(self.seeing.scores[self.metric], self.blind.scores[self.metric])
 
     @property
     def n_all(self) -> int:
         """Number of questions that both runs were to answer."""
         return self.seeing.total.n
+
+
+def paired_gain(ours: Scores, theirs: Scores) -> MeanEstimate | None:
+    """Return by how much our scores are higher, over the samples that both have, paired and
+    clustered by trajectory; None if there are none."""
+    shared = [
+        (trajectory, score, theirs[trajectory][sample])
+        for trajectory, scores in ours.items()
+        for sample, score in scores.items()
+        if sample in theirs.get(trajectory, {})
+    ]
+    if not shared:
+        return None
+    clusters, our, their = zip(*shared, strict=True)
+    # The reference scorer exceeds 1 on repetitions.
+    most = 1.0 if max(*our, *their) <= 1 else None
+    return paired_difference(their, our, clusters, most).estimate
 
 
 def find_gains(runs: Sequence[RunSummary]) -> Iterator[Gain]:
@@ -108,11 +125,15 @@ def _without_frames(run: RunSummary) -> NiehConfig:
 
 def gain_cell(gain: Gain | None) -> TableCell:
     """Return a difference in points with its interval, which one trajectory alone has not."""
-    total = gain.total() if gain is not None else None
-    if gain is None or total is None:
+    return difference_cell(None, 0) if gain is None else difference_cell(gain.total(), gain.n_all)
+
+
+def difference_cell(total: MeanEstimate | None, n_all: int) -> TableCell:
+    """Return a difference in points with its interval, of so many samples if all are answered."""
+    if total is None:
         return TableCell("-", {"": "", "low": "", "high": ""})
     low, high = (None if end is None else 100 * end for end in (total.low, total.high))
     interval = interval_cell(low, high, "+.1f")
-    mean = answered_cell(f"{100 * total.mean:+.1f}", total.n, gain.n_all)
+    mean = answered_cell(f"{100 * total.mean:+.1f}", total.n, n_all)
     numbers = {"": "", **interval.numbers, **mean.numbers}
     return TableCell(mean if low is None else f"{mean} {interval}", numbers)

@@ -8,7 +8,13 @@ from msgspec.structs import replace
 
 from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.results.cells import mean_cell, score_interval
-from infthor_eval.nieh.results.gains import Gain, gain_cell, name_of
+from infthor_eval.nieh.results.gains import (
+    Gain,
+    difference_cell,
+    gain_cell,
+    name_of,
+    paired_gain,
+)
 from infthor_eval.nieh.results.memory_summary import subject_of
 from infthor_eval.nieh.results.summary import SHOWN_CLUES, NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
@@ -32,10 +38,12 @@ _NUMBERS = (
 _NONE = "none"  # the memory that recalls nothing
 _ABOVE_NONE = "above none"
 _ABOVE_GUESSING = "above guessing"
-_FIRST = 3  # numbers before those two
+_PAIRS_ABOVE_NONE = "pairs above none"
+_FIRST = 3  # numbers before those three
 _ABOVE_NONE_NOTE = (
     "above none: accuracy less that of the run that recalls nothing, in points, paired by "
-    "question, with the 95 % interval clustered by trajectory."
+    "question, with the 95 % interval clustered by trajectory; pairs above none: likewise of pairs "
+    "of twins."
 )
 _NOTES = (
     "Accuracy in %, by the main scorer. all clues, some, none: accuracy where all, some and none "
@@ -59,10 +67,14 @@ def memory_tables(runs: Sequence[RunSummary]) -> list[Table]:
         for name, task in run.summary.tasks.items()
         if task.memory is not None
     ]
-    further = [
-        *([_ABOVE_NONE] if any(_is_none(run, name) for run, name in found) else []),
-        *([_ABOVE_GUESSING] if any(_above_guessing(run, name) for run, name in found) else []),
-    ]
+    is_above_none = any(_is_none(run, name) for run, name in found)
+    has_pairs = any(run.summary.tasks[name].pairs is not None for run, name in found)
+    wanted = {
+        _PAIRS_ABOVE_NONE: has_pairs and is_above_none,
+        _ABOVE_NONE: is_above_none,
+        _ABOVE_GUESSING: any(_above_guessing(run, name) for run, name in found),
+    }
+    further = [column for column, is_wanted in wanted.items() if is_wanted]
     keyed = sorted(((_place(*it), _row(*it, runs, further)) for it in found), key=itemgetter(0))
     names = (*_NUMBERS[:_FIRST], *further, *_NUMBERS[_FIRST:])
     columns = (*(Column(name, False) for name in _NAMES), *map(Column, names))
@@ -78,7 +90,11 @@ def _place(run: RunSummary, name: str) -> tuple[str, str, bool, str, int]:
 
 def _row(run: RunSummary, name: str, runs: Sequence[RunSummary], further: Sequence[str]) -> Row:
     cells = _cells(run.summary, name, run.summary.tasks[name])
-    made = {_ABOVE_NONE: _above_none, _ABOVE_GUESSING: _above_guessing_cell}
+    made = {
+        _PAIRS_ABOVE_NONE: _pairs_above_none,
+        _ABOVE_NONE: _above_none,
+        _ABOVE_GUESSING: _above_guessing_cell,
+    }
     more = [made[column](run, name, runs) for column in further]
     at = len(_NAMES) - 2 + _FIRST
     return Row((subject_of(name_of(run)), name, *cells[:at], *more, *cells[at:]))
@@ -88,20 +104,31 @@ def _is_none(run: RunSummary, name: str) -> bool:
     return bool(run.summary.tasks[name].memory.name == _NONE)
 
 
+def _pairs_above_none(run: RunSummary, name: str, runs: Sequence[RunSummary]) -> TableCell:
+    pairs, none = run.summary.tasks[name].pairs, _with_none(run, name, runs)
+    if pairs is None or none is None or none.pairs is None:
+        return difference_cell(None, 0)
+    return difference_cell(paired_gain(pairs.scores, none.pairs.scores), pairs.n_pairs)
+
+
 def _above_none(run: RunSummary, name: str, runs: Sequence[RunSummary]) -> TableCell:
-    """Return the gain over the run that is alike but recalls nothing, if there is one."""
-    alike = [
-        other
+    task, none = run.summary.tasks[name], _with_none(run, name, runs)
+    return gain_cell(None if none is None else Gain(run, name, main_metric(task), task, none))
+
+
+def _with_none(run: RunSummary, name: str, runs: Sequence[RunSummary]) -> TaskSummary | None:
+    """Return the task of the run that is alike but recalls nothing, if there is one."""
+    if _is_none(run, name):
+        return None
+    alike = (
+        other.summary.tasks[name]
         for other in runs
         if name in other.summary.tasks
         and other.summary.tasks[name].memory is not None
         and _is_none(other, name)
         and _without_memory(other, name) == _without_memory(run, name)
-    ]
-    task = run.summary.tasks[name]
-    if not alike or _is_none(run, name):
-        return gain_cell(None)
-    return gain_cell(Gain(run, name, main_metric(task), task, alike[0].summary.tasks[name]))
+    )
+    return next(alike, None)
 
 
 def _without_memory(run: RunSummary, name: str) -> NiehConfig:

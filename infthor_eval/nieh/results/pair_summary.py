@@ -67,6 +67,7 @@ class PairSummary(msgspec.Struct, frozen=True):
         by_difference: accuracy by whether a frame that differs was shown in both worlds.
         by_age: accuracy by frames since the agent last changed what is asked about; "never" where
             it is as at the start.
+        scores: score of each pair, by the trajectory that its worlds were made of.
     """
 
     n_pairs: int
@@ -88,6 +89,7 @@ class PairSummary(msgspec.Struct, frozen=True):
     by_shown: dict[str, Rate]
     by_difference: dict[str, Rate]
     by_age: dict[str, Rate]
+    scores: dict[str, dict[str, float]]
 
 
 @dataclass(frozen=True)
@@ -222,6 +224,7 @@ class _Pairs:
             by_shown=self._by(_shown, N_SHOWN),
             by_difference=self._by(_difference, SHOWN_DIFFERENCE),
             by_age=self._by(_age, (*DISTANCES, NEVER_CHANGED)),
+            scores=_by_trajectory(scores),
         )
 
     def _right(self, pairs: Sequence[TwinRecords]) -> Rate:
@@ -287,6 +290,14 @@ def _scores(pairs: Sequence[TwinRecords], metric: str) -> Iterator[PairScore]:
             repetitions[0].cluster,
             fmean(pair.is_right(metric) for pair in repetitions),
         )
+
+
+def _by_trajectory(scores: Iterable[PairScore]) -> dict[str, dict[str, float]]:
+    found: dict[str, dict[str, float]] = {}
+    for it in scores:
+        name = f"{it.pair} {it.variant}".rstrip()
+        found.setdefault(it.cluster, {})[name] = it.score
+    return found
 
 
 def _by_fact(scores: Sequence[PairScore]) -> Rate:

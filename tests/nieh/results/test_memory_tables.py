@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import pytest
+from msgspec.structs import replace
 
 from infthor_eval.nieh.records import NiehRecall, ShownClues
 from infthor_eval.nieh.results.memory_summary import MemorySummary, MemoryTimes, subject_of
@@ -10,7 +11,7 @@ from infthor_eval.nieh.results.memory_tables import memory_tables
 from infthor_eval.nieh.results.tables import overview, tables
 from infthor_eval.runs import Tokens
 
-from ...helpers.nieh_runs import make_config, make_record, make_run
+from ...helpers.nieh_runs import make_config, make_record, make_run, make_twins
 
 
 def recall(n_frames, build_s=2.0, recall_s=0.5):
@@ -73,6 +74,35 @@ def test_the_table_has_what_was_right_recalled_and_spent():
         "2.500",
         "0.500",
     )
+
+
+def twins_run(memory, n_right):
+    """Three pairs on each of three trajectories, of which so many are right on each."""
+    config = make_config(context="memory")
+    config["tasks"]["nieh_gt"]["sources"] = {
+        "memory": {"name": memory, "options": {}, "privileged": False}
+    }
+    records = [
+        replace(record, payload=replace(record.payload, recall=recall(1)))
+        for base in range(3)
+        for at in range(3)
+        for record in make_twins(
+            3 * base + at, ("bowl", "sofa" if at < n_right[base] else "bowl"), f"t{base}"
+        )
+    ]
+    return make_run(config, records, f"nano (memory={memory})")
+
+
+def test_pairs_are_compared_with_those_of_no_memory():
+    runs = [twins_run("none", (0, 0, 1)), twins_run("uniform", (1, 2, 3))]
+    (table,) = memory_tables(runs)
+    at = [column.name for column in table.columns].index("pairs above none")
+    none, uniform = (row.cells[at] for row in table.rows)
+    assert none == "-"
+    # by trajectory 1, 2 and 2 of 3 more
+    assert uniform.startswith("+55.6 [+")
+    (alone,) = memory_tables(runs[1:])
+    assert "pairs above none" not in [column.name for column in alone.columns]
 
 
 def test_it_is_among_all_tables_only_where_there_is_a_memory():
