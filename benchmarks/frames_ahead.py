@@ -3,7 +3,8 @@
 The way before (transformers' own image processor in the model's thread) and the present one take
 turns, so that the speed of the machine cancels out; each has a process, because the present one
 changes how memory is kept. The model is a null model: it sleeps as long as a GPU would compute.
-Reading, digests and sizes are part of the time.
+Reading, digests and sizes are part of the time:
+idle is what is left of it, waits for frames those that the model had asked for.
 
     python benchmarks/frames_ahead.py
     python benchmarks/frames_ahead.py --models smolvlm2 --frames 60
@@ -106,10 +107,12 @@ class _Way:
 
 @dataclass
 class _Turns:
-    """What the turns of a way took: seconds, and seconds of processor time, of each."""
+    """What the turns of a way took: seconds, seconds of processor time, and seconds in which the
+    model waited for frames that it had asked for, of each."""
 
     wall: list[float] = field(default_factory=list)
     cpu: list[float] = field(default_factory=list)
+    waited: list[float] = field(default_factory=list)
 
 
 def main() -> None:
@@ -133,10 +136,11 @@ def main() -> None:
                 for turn in range(options.repeat + 1):
                     for title, way in ways.items():
                         work = processes[way.backend].submit(_feed, name, way, n_frames, null_rate)
-                        wall, cpu = work.result()
+                        wall, cpu, waited = work.result()
                         if turn:  # the first one warms up
                             turns[title].wall.append(wall)
                             turns[title].cpu.append(cpu)
+                            turns[title].waited.append(waited)
                 console.print(table(name, n_frames, rate, turns))
 
 
@@ -183,9 +187,9 @@ def _image_processor(name: str, backend: str) -> Any:
         return load_image_processor(Path(folder), FrameScaling(image_backend=backend))
 
 
-def _feed(name: str, way: _Way, n_frames: int, null_rate: int | None) -> tuple[float, float]:
+def _feed(name: str, way: _Way, n_frames: int, null_rate: int | None) -> tuple[float, float, float]:
     """Prepare frames in chunks, and compute on each in between, at the null model's rate or in no
-    time; return seconds of it all, and seconds of processor time."""
+    time; return seconds of it all, seconds of processor time, and seconds of waiting for frames."""
     torch.set_num_threads(1)
     process = _image_processor(name, way.backend)
 
@@ -201,16 +205,19 @@ def _feed(name: str, way: _Way, n_frames: int, null_rate: int | None) -> tuple[f
         start, start_cpu = time.perf_counter(), time.process_time()
         frames = _frames(paths)
         ahead.expect(frames)
+        waited = 0.0
         for at in range(0, n_frames, per_chunk):
             chunk = frames[at : at + per_chunk]
+            asked = time.perf_counter()
             if way.batch > 1:
                 process(images=[frame.ref.load() for frame in chunk], return_tensors="pt")
             else:
                 for frame in chunk:
                     ahead.take(frame)
+            waited += time.perf_counter() - asked
             if null_rate is not None:
                 time.sleep(len(chunk) / null_rate)
-        return time.perf_counter() - start, time.process_time() - start_cpu
+        return time.perf_counter() - start, time.process_time() - start_cpu, waited
     finally:
         ahead.close()
 
@@ -240,11 +247,13 @@ def _rate_table(name: str, n_frames: int, _: int, turns: dict[str, _Turns]) -> T
 
 def _idle_table(name: str, n_frames: int, rate: int, turns: dict[str, _Turns]) -> Table:
     table = Table(f"{name}, {n_frames} frames, null model of {rate} frames/s")
-    for head in ("waits (% of the time)", "least", "most"):
+    for head in ("idle (% of the time)", "least", "most", "waits for frames (%)"):
         table.add_column(head)
     for title, took in turns.items():
-        waits = [100 * (1 - n_frames / rate / wall) for wall in took.wall]
-        table.add_row(title, *(f"{each(waits):.1f}" for each in (median, min, max)))
+        idle = [100 * (1 - n_frames / rate / wall) for wall in took.wall]
+        waits = [100 * waited / wall for waited, wall in zip(took.waited, took.wall, strict=True)]
+        cells = [*(each(idle) for each in (median, min, max)), median(waits)]
+        table.add_row(title, *(f"{cell:.1f}" for cell in cells))
     return table
 
 

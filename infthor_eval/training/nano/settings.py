@@ -255,6 +255,7 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         acting: histories and plans in each of its steps.
         event_weight: weight of the loss of what happened between frames.
         lr: highest learning rate of the second stage.
+        layer_lr: that of the decoder's layers, whose first weights a higher one would undo.
         weight_decay: weight decay of both.
         words: words of plans and actions.
         threads: torch threads; another number rounds differently.
@@ -273,6 +274,7 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     acting: ActingSettings = ActingSettings()
     event_weight: float = 0.3
     lr: float = 1e-3
+    layer_lr: float = 3e-4
     weight_decay: float = 0.05
     words: Words = Words.PUBLISHED
     threads: int = 2

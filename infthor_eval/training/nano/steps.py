@@ -1,7 +1,7 @@
 """The steps of a stage of the small model's training."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,9 +21,16 @@ _BETAS = (0.9, 0.98)
 _STEPS_PER_STATE = 100  # a state is written, from which a stopped training continues
 
 
-def adamw(parameters: Sequence[Parameter], lr: float, weight_decay: float) -> torch.optim.AdamW:
-    """Return the optimizer of what Muon does not train."""
-    return torch.optim.AdamW(decay_groups(parameters, weight_decay), lr=lr, betas=_BETAS)
+def adamw(
+    trained: Iterable[tuple[Sequence[Parameter], float]], weight_decay: float
+) -> torch.optim.AdamW:
+    """Return the optimizer of what Muon does not train, and of its highest learning rates."""
+    groups = [
+        {**group, "lr": lr}
+        for parameters, lr in trained
+        for group in decay_groups(parameters, weight_decay)
+    ]
+    return torch.optim.AdamW(groups, betas=_BETAS)
 
 
 @dataclass(frozen=True)

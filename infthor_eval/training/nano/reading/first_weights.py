@@ -99,23 +99,25 @@ def _heads(grid: int) -> tuple[tuple[_Head, ...], ...]:
     )
 
 
-# Scales of the first weights, chosen in the trials of docs/training.md.
-_WORD_NOISE = 0.03
+# Scales of the first weights, chosen by how well an untrained decoder finds what happened and where
+# things are (docs/training.md, "First weights that hold").
+_WORD_NOISE = 0.01
 _NAME_REST = 0.4  # of the part for all else, in the code of a name
 _NAME_NOISE = 0.02
-_FEATURE = 0.25
+_FEATURE = 0.4
+_CONTENT = 0.25  # of every part of a frame; one that shows nothing would be noise, made large
 _FIXTURE_FEATURE = 0.7
 _HELD_REST, _OPEN_REST = 0.3, 1.0
 _OPEN_STATE = 1.75  # names of loose things are in two parts, so each is weaker
 _MATCH = 0.8
-_SINK = 2.0
-_HAND_ON = 0.35
-_LOOK = 2.7
-_LOOK_AND_MATCH = 0.8  # of a look's scale, for heads that also compare
+_SINK = 3.0
+_HAND_ON = 0.7
+_LOOK = 3.4
+_LOOK_AND_MATCH = 0.6  # of a look's scale, for heads that also compare
 _LOOK_AWAY = 3.2
 _N_FAST = 8  # frequencies by which positions are told apart
 _SLOW = 0.012  # radians a position; slower ones do not change in a few frames
-_QUERY_NOISE, _VALUE_NOISE = 0.15, 0.3
+_QUERY_NOISE, _VALUE_NOISE = 0.05, 0.03
 _MLP = 0.15  # of an MLP's usual scale: by it, its noise would hide what heads hand on
 
 
@@ -135,6 +137,10 @@ class _Codes:
     fixtures: Tensor
     thing_sink: Tensor
     fixture_sink: Tensor
+
+
+def _sink(part: Part, codes: _Codes) -> Tensor:
+    return codes.thing_sink if part in (Part.THING, Part.STATE) else codes.fixture_sink
 
 
 class _Setter:
@@ -220,6 +226,7 @@ class _Setter:
         layer.weight.zero_()
         layer.weight[:, : len(self._units)] = _FEATURE * features.flatten(1)
         layer.bias.zero_()
+        layer.bias[self._part(Part.REST)] = _CONTENT * self._directions(1)[0]
 
     def set_layer(self, layer: Any, heads: Sequence[_Head], codes: _Codes, n_layers: int) -> None:
         """Set a layer's attention to what its heads do, and its MLP at random."""
@@ -249,8 +256,16 @@ class _Setter:
             elif head.query is head.key:  # the token itself is most like itself
                 self._look(attention, rows, 0, -_LOOK_AWAY)
             identity = _HAND_ON * torch.eye(self._width)
-            attention.v_proj.weight[rows, self._part(head.value)] += identity
             attention.o_proj.weight[self._part(head.to), rows] += identity
+            attention.v_proj.weight[rows, self._part(head.value)] += identity
+            self._keep_sink(attention.v_proj.weight[rows, self._part(head.value)], head, codes)
+
+    def _keep_sink(self, handed_on: Tensor, head: _Head, codes: _Codes) -> None:
+        """Have a head not hand on the sink: tokens that got it would be looked at for one."""
+        if head.value is Part.REST:
+            return
+        sink = _sink(head.value, codes)
+        handed_on -= torch.outer(handed_on @ sink, sink)
 
     def _frequencies(self) -> Tensor:
         """Return the head's frequencies, radians a position, the fastest first."""
@@ -263,8 +278,7 @@ class _Setter:
         match = _MATCH * torch.eye(self._width) * slow[:, None]
         attention.q_proj.weight[rows, self._part(query)] += match
         attention.k_proj.weight[rows, self._part(key)] += match
-        sink = codes.thing_sink if key in (Part.THING, Part.STATE) else codes.fixture_sink
-        attention.q_proj.bias[rows] += _SINK * sink * slow
+        attention.q_proj.bias[rows] += _SINK * _sink(key, codes) * slow
 
     def _look(self, attention: Any, rows: slice, back: int, strength: float) -> None:
         """Look so many positions back by the fast frequencies, which turn keys against queries.

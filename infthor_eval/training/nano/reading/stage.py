@@ -40,7 +40,10 @@ def reading_stage(
         questions: draws questions.
         actions: draws histories and plans.
     """
-    optimizer = adamw(network.trained_parameters(), recipe.lr, recipe.weight_decay)
+    layers = [*network.decoder.layers.parameters()]
+    in_layers = {*map(id, layers)}
+    others = [one for one in network.trained_parameters() if id(one) not in in_layers]
+    optimizer = adamw([(layers, recipe.layer_lr), (others, recipe.lr)], recipe.weight_decay)
     told = network.frames
 
     def compute(number: int) -> Tensor:

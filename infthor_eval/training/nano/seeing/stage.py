@@ -32,7 +32,7 @@ def seeing_stage(recipe: NanoRecipe, network: SeeingNetwork, views: ViewDataset)
     others = [parameter for parameter in network.parameters() if id(parameter) not in chosen]
     optimizers = (
         Muon(matrices, lr=vision.matrix_lr, weight_decay=recipe.weight_decay),
-        adamw(others, vision.lr, recipe.weight_decay),
+        adamw([(others, vision.lr)], recipe.weight_decay),
     )
 
     def compute(number: int) -> Tensor:
