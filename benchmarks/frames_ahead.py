@@ -3,8 +3,8 @@
 The way before (transformers' own image processor in the model's thread) and the present one take
 turns, so that the speed of the machine cancels out; each has a process, because the present one
 changes how memory is kept. The model is a null model: it sleeps as long as a GPU would compute.
-Reading, digests and sizes are part of the time:
-idle is what is left of it, waits for frames those that the model had asked for.
+Reading, digests and sizes are part of the time. The model is idle whenever it does not sleep, and
+waits for frames from when it asks for one until it has it.
 
     python benchmarks/frames_ahead.py
     python benchmarks/frames_ahead.py --models smolvlm2 --frames 60
