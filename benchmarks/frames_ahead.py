@@ -34,6 +34,7 @@ from rich.console import Console
 from rich.table import Table
 from tiny_families.trial import PEERS, torchvision_path
 
+from infthor_eval.cli.main import collecting_seldom
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.storage.folders import packaged_folder
 from model_adapters.hf.family import Pixels
@@ -191,6 +192,13 @@ def _feed(name: str, way: _Way, n_frames: int, null_rate: int | None) -> tuple[f
     """Prepare frames in chunks, and compute on each in between, at the null model's rate or in no
     time; return seconds of it all, seconds of processor time, and seconds of waiting for frames."""
     torch.set_num_threads(1)
+    with collecting_seldom():  # as the command does
+        return _feed_in_chunks(name, way, n_frames, null_rate)
+
+
+def _feed_in_chunks(
+    name: str, way: _Way, n_frames: int, null_rate: int | None
+) -> tuple[float, float, float]:
     process = _image_processor(name, way.backend)
 
     def prepare(piece: Frame | Clip) -> Pixels:

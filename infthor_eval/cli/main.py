@@ -29,7 +29,7 @@ from infthor_eval.plugins import import_target
 from infthor_eval.storage.scratch import remove_abandoned
 from infthor_eval.terminal import error_console, print_error
 
-__all__ = ["main"]
+__all__ = ["collecting_seldom", "main"]
 
 # By group: the name of each command and its line in the overview.
 _COMMANDS = {
@@ -175,7 +175,7 @@ def main(args: list[str] | None = None) -> None:
             handle_signal(signal.SIGTERM, _raise_terminated),
             handle_signal(signal.SIGINT, signal.default_int_handler),
             answer_ctrl_c(_tell_patience, _end),
-            _collecting_seldom(),
+            collecting_seldom(),
         ):
             remove_abandoned()
             code = _infthor_eval.main(args, prog_name="infthor-eval", standalone_mode=False)
@@ -214,7 +214,7 @@ def main(args: list[str] | None = None) -> None:
 
 
 @contextmanager
-def _collecting_seldom() -> Iterator[None]:
+def collecting_seldom() -> Iterator[None]:
     """Collect garbage seldom within the context.
 
     Importing torch and transformers makes a million objects, and collections look at them again and
