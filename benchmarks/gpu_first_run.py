@@ -139,7 +139,7 @@ def run_steps(
 def _earlier(folder: Path, machine: Machine) -> StepResult:
     """Return the result of an earlier call on this machine, or that there is none."""
     result = read_result(folder)
-    if result is None or result.machine != machine.identity:
+    if result is None or not machine.continues(result.machine):
         return StepResult(state="not run", text="not yet")
     return result
 

@@ -1,10 +1,10 @@
 """What a first run finds: the device, the weights, the data set, and libraries of others."""
 
 import importlib.util
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import torch
 
@@ -54,12 +54,23 @@ class Machine:
         return ("sdpa", "flash_attention_2") if self.flash else ("sdpa",)
 
     @property
-    def identity(self) -> dict[str, Any]:
-        """What a step's result depends on; a step that is done under another is done again."""
+    def identity(self) -> dict[str, str | None]:
+        """What a step's result depends on, as it is written beside it."""
+        own = asdict(self).items()
         return {
-            **{name: str(value) for name, value in asdict(self).items()},
+            **{name: None if value is None else str(value) for name, value in own},
             **{name: version(name) for name in ("torch", "transformers", "infthor-eval")},
         }
+
+    def continues(self, earlier: Mapping[str, str | None]) -> bool:
+        """Return whether what is done under an earlier identity need not be done again.
+
+        Weights or data that were not there then are for the steps that needed them.
+        """
+        own = self.identity
+        return own.keys() == earlier.keys() and all(
+            earlier[name] in (value, None) for name, value in own.items()
+        )
 
 
 def find_machine(

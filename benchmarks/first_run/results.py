@@ -30,7 +30,7 @@ class StepResult(msgspec.Struct, frozen=True, kw_only=True):
     right: bool | None = None
     seconds: float = 0.0
     figures: dict[str, Any] = {}
-    machine: dict[str, Any] = {}
+    machine: dict[str, str | None] = {}
 
 
 def read_result(folder: Path) -> StepResult | None:

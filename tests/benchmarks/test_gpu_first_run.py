@@ -117,6 +117,18 @@ def test_results_of_another_machine_do_not_count(script, machine, steps, tmp_pat
     assert steps.called == ["first", "first"]
 
 
+def test_what_is_given_later_undoes_nothing(script, machine, steps, tmp_path):
+    script.run_steps(machine, tmp_path, 60, chosen={1}, steps=steps.all)
+    later = replace(machine, checkpoint="Q", old_libraries="old")
+    script.run_steps(later, tmp_path, 60, chosen={1}, steps=steps.all)
+    assert steps.called == ["first"]
+    other = replace(machine, checkpoint="R")
+    script.run_steps(later, tmp_path, 60, chosen={2}, steps=steps.all)
+    script.run_steps(later, tmp_path, 60, chosen={2}, steps=steps.all)  # it failed before
+    script.run_steps(other, tmp_path, 60, chosen={1, 2}, steps=steps.all)
+    assert steps.called == ["first", "breaks", "breaks", "breaks"], "the last had other weights"
+
+
 def test_no_step_begins_when_the_time_is_up(script, machine, steps, tmp_path):
     results = script.run_steps(machine, tmp_path, 0, steps=steps.all)
     assert steps.called == []
