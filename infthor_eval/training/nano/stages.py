@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 import torch
 
+from infthor_eval.freed_memory import keep_freed_memory
 from infthor_eval.reasons import count_reasons
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.training.checkpoints import Checkpoints
@@ -78,6 +79,7 @@ def train_small_model(
             or cannot be written.
         UsageError: the states are of another recipe or other data.
     """
+    keep_freed_memory()
     torch.set_num_threads(recipe.threads)
     torch.manual_seed(recipe.seed)
     training = _prepare(recipe, data)
@@ -162,7 +164,7 @@ def _reading(training: _Training, print_note: Callable[[str], None]) -> Stage:
     )
     print_note(f"{len(frames):,} frames: computing what the tower tells of them")
     told = read_frame_units(frames, image_processor(), tower, units)
-    labelled = label_units(seen, units, views.loose, GRID, recipe.seed)
+    labelled = label_units(seen, told, units, views.loose, GRID, recipe.seed)
     network = ReadingNetwork(loaded, told, units)
     return reading_stage(recipe, network, labelled, questions, actions)
 

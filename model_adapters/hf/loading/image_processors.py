@@ -5,8 +5,6 @@ pixels, and results must not depend on which packages are installed. Their arith
 one that gives the same bits in less time.
 """
 
-import ctypes
-import platform
 from collections.abc import Collection
 from functools import lru_cache
 from pathlib import Path
@@ -20,6 +18,7 @@ from numpy.typing import NDArray
 from transformers.image_processing_backends import PilBackend
 
 from infthor_eval.errors import ModelError
+from infthor_eval.freed_memory import keep_freed_memory
 from model_adapters.hf.loading.resampling import FILTERS, Resize, find_resize
 from model_adapters.options.checkpoints import FrameScaling
 
@@ -31,12 +30,6 @@ _LEVELS = 256  # of a pixel
 _LEAST = 32  # pixels along a side, below which Pillow itself takes no time
 _MOST = 64  # sizes whose resize is found out; to do so takes longer than to resize once
 _SEED = 0
-
-_MALLOC_SETTINGS = (  # numbers of <malloc.h>, and bytes
-    (-1, 2**28),  # M_TRIM_THRESHOLD: kept at the end of the heap
-    (-2, 2**26),  # M_TOP_PAD: asked for ahead; a thread's heap is not given back when it is empty
-    (-3, 2**25),  # M_MMAP_THRESHOLD: least that is always asked for anew, at its highest
-)
 
 
 def load_image_processor(
@@ -55,7 +48,7 @@ def load_image_processor(
     Raises:
         ModelError: the image processor cannot split frames, and should.
     """
-    _keep_freed_memory()
+    keep_freed_memory()
     scaling = options if isinstance(options, FrameScaling) else FrameScaling()
     processor = cast(Any, transformers).AutoImageProcessor.from_pretrained(
         folder, backend=scaling.image_backend, trust_remote_code=trust_remote_code, **settings
@@ -65,17 +58,6 @@ def load_image_processor(
     if scaling.image_splitting is not None:
         setattr(processor, splitting_setting(processor), scaling.image_splitting)
     return processor
-
-
-def _keep_freed_memory() -> None:
-    """Have glibc keep freed memory for the next frame (mallopt(3)).
-
-    It gives larger pieces back to the system and asks for them anew, and the system clears every
-    page of them: for a frame of several crops that took as long as half of its arithmetic.
-    """
-    if platform.libc_ver()[0] == "glibc":
-        for setting in _MALLOC_SETTINGS:
-            ctypes.CDLL(None).mallopt(*setting)
 
 
 def image_backend(image_processor: Any) -> str:
