@@ -3,7 +3,6 @@
 | array | what it is |
 |---|---|
 | `frames` | uint8, [views, side, side, 3], RGB, top row first |
-| `ahead` | int8, [views], how many steps ahead the agent could walk, at most 8; -1 where unknown |
 | `names` | names of object types, sorted |
 | `view` | int32, [things], the view that shows a thing |
 | `type` | int16, [things], index of its type in `names` |
@@ -35,7 +34,6 @@ _MALFORMED = (*DAMAGED_ZIP, ValueError, TypeError, MemoryError)
 # Kinds of numpy's types, and dimensions; those of things have one row a thing.
 _FORMS = {
     "frames": ("u", 4),
-    "ahead": ("i", 1),
     "names": ("U", 1),
     "view": ("i", 1),
     "type": ("i", 1),
@@ -74,7 +72,6 @@ class LabelledViews:
     """Views with labels, as arrays; see the module."""
 
     frames: NDArray[np.uint8]
-    ahead: NDArray[np.int8]
     names: NDArray[np.str_]
     view: NDArray[np.int32]
     type: NDArray[np.int16]
@@ -85,9 +82,7 @@ class LabelledViews:
     pixels: NDArray[np.uint16]
 
 
-def views_of(
-    frames: Sequence[NDArray[np.uint8]], ahead: Sequence[int], things: Sequence[ThingInView]
-) -> LabelledViews:
+def views_of(frames: Sequence[NDArray[np.uint8]], things: Sequence[ThingInView]) -> LabelledViews:
     """Return views of one size, at least one of which shows something."""
     types = {thing.type for thing in things} | {thing.receptacle for thing in things}
     names = sorted(name for name in types if name is not None)
@@ -95,7 +90,6 @@ def views_of(
     index[None] = _NONE
     return LabelledViews(
         frames=np.stack(frames),
-        ahead=np.array(ahead, np.int8),
         names=np.array(names),
         view=np.array([thing.view for thing in things], np.int32),
         type=np.array([index[thing.type] for thing in things], np.int16),
@@ -148,8 +142,6 @@ def _problem(views: LabelledViews) -> str | None:
             return f"its {name} are {array.dtype} of {array.ndim} dimensions"
     if views.frames.shape[3] != _COLOURS:
         return f"its frames have {views.frames.shape[3]} colours"
-    if len(views.ahead) != len(views.frames):
-        return "its columns have different lengths"
     n_things = len(views.view)
     columns = (
         *(views.type, views.receptacle, views.loose),

@@ -12,7 +12,7 @@ from typing import Any
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector
 
-__all__ = ["arrange", "choose_pose", "steps_ahead"]
+__all__ = ["arrange", "choose_pose"]
 
 # State changes, what they need, and the share of the things that could be changed and are.
 _CHANGES: tuple[tuple[str, str, float, dict[str, str]], ...] = (
@@ -37,11 +37,6 @@ _HORIZONS = (-30.0, 0.0, 30.0, 60.0)
 _HORIZON_WEIGHTS = (3, 37, 40, 20)  # of poses that look at nothing in particular
 _LEVEL_SHARE = 0.8  # of the horizons are those nearest to the object
 _EYES_M = 1.575  # height of the camera
-
-_STEP_M = 0.25  # of MoveAhead
-_MOST_STEPS = 8
-_UNKNOWN = -1
-_PER_M = 1000  # positions that differ by less are the same
 
 
 def arrange(simulator: Simulator, rng: random.Random) -> int:
@@ -90,30 +85,6 @@ def choose_pose(
         return _pose(view, rng.choice(positions), heading, horizon)
     (pool,) = rng.choices([pool for pool, _ in filled], [weight for _, weight in filled])
     return _pose_at(view, rng.choice(pool).position, positions, rng)
-
-
-def steps_ahead(pose: AgentPose, positions: Sequence[tuple[float, float]]) -> int:
-    """Return how many steps of 0.25 m ahead the agent can walk, at most 8; -1 if its heading is not
-    square to the room.
-
-    Args:
-        pose: where it stands.
-        positions: x and z of the positions that it can reach, metres.
-    """
-    if pose.rotation % 90:
-        return _UNKNOWN
-    free = {_rounded(*position) for position in positions}
-    heading = math.radians(pose.rotation)
-    across, along = _STEP_M * math.sin(heading), _STEP_M * math.cos(heading)
-    for n in range(_MOST_STEPS):
-        x, z = pose.position.x + (n + 1) * across, pose.position.z + (n + 1) * along
-        if _rounded(x, z) not in free:
-            return n
-    return _MOST_STEPS
-
-
-def _rounded(x: float, z: float) -> tuple[int, int]:
-    return round(_PER_M * x), round(_PER_M * z)
 
 
 def _loose(view: SimulatorView) -> list[ThorObject]:

@@ -25,7 +25,7 @@ from infthor_eval.generation.simulator_jobs import (
     collect_outcomes,
     freeze_existing_objects,
 )
-from infthor_eval.generation.views.arranging import arrange, choose_pose, steps_ahead
+from infthor_eval.generation.views.arranging import arrange, choose_pose
 from infthor_eval.storage.files import file_name, is_written
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
@@ -129,62 +129,48 @@ def _views_of_room(job: ViewJob, simulator: Simulator, out: Path) -> _RoomOutcom
         if is_written(path):
             return _RoomOutcome(path, len(read_views(path).frames), is_resumed=True)
         with freeze_existing_objects():
-            seen = _look_about(job, simulator)
-        if not seen.things:
+            frames, things, n_refused = _look_about(job, simulator)
+        if not things:
             raise SimulatorError(f"{job.scene}: no view shows anything; give another scene")
     except InfthorError as error:
         return _RoomOutcome(failure=str(error))
     # Outside of `try`: if this file has no room, the views of other rooms would be wasted.
-    write_views(path, views_of(seen.frames, seen.ahead, seen.things))
-    return _RoomOutcome(path, len(seen.frames), seen.n_refused)
+    write_views(path, views_of(frames, things))
+    return _RoomOutcome(path, len(frames), n_refused)
 
 
-@dataclass
-class _Seen:
-    """Views of a room.
-
-    Attributes:
-        frames: the pictures.
-        ahead: how many steps ahead are free in each.
-        things: what they show.
-        n_refused: number of actions that were refused while things were put about.
-    """
-
-    frames: list[NDArray[np.uint8]] = field(default_factory=list)
-    ahead: list[int] = field(default_factory=list)
-    things: list[ThingInView] = field(default_factory=list)
-    n_refused: int = 0
-
-
-def _look_about(job: ViewJob, simulator: Simulator) -> _Seen:
+def _look_about(
+    job: ViewJob, simulator: Simulator
+) -> tuple[list[NDArray[np.uint8]], list[ThingInView], int]:
+    """Return views of a room, what they show, and the number of refused actions."""
     rng = random.Random(f"{job.scene}/{job.seed}")
-    seen = _Seen()
+    frames: list[NDArray[np.uint8]] = []
+    things: list[ThingInView] = []
+    n_refused = 0
     simulator.reset(job.scene)
     empty = simulator.mark()
     for _ in range(job.arrangements):
         simulator.rewind(empty, exactly=True)
-        seen.n_refused += arrange(simulator, rng)
+        n_refused += arrange(simulator, rng)
         views = _views(job.per_arrangement, simulator, rng)
-        for number, (view, _) in enumerate(views):
-            seen.things += _things(view, len(seen.frames) + number, job.grid)
-        pictures = [Image.fromarray(view.frame) for view, _ in views if view.frame is not None]
+        for number, view in enumerate(views):
+            things += _things(view, len(frames) + number, job.grid)
+        pictures = [Image.fromarray(view.frame) for view in views if view.frame is not None]
         if pictures and rng.random() < _FEW_COLORS_SHARE:
             pictures = _in_few_colors(pictures, rng.choice(_N_COLORS))
-        seen.frames += (_resized(picture, job.side) for picture in pictures)
-        seen.ahead += (ahead for view, ahead in views if view.frame is not None)
-    return seen
+        frames += (_resized(picture, job.side) for picture in pictures)
+    return frames, things, n_refused
 
 
-def _views(n: int, simulator: Simulator, rng: random.Random) -> list[tuple[SimulatorView, int]]:
-    """Return views from random poses, and how many steps ahead are free in each."""
+def _views(n: int, simulator: Simulator, rng: random.Random) -> list[SimulatorView]:
     reply = simulator.query("GetReachablePositions", renderImage=False)
     positions = [(position["x"], position["z"]) for position in reply.result or ()]
-    views: list[tuple[SimulatorView, int]] = []
+    views: list[SimulatorView] = []
     for _ in range(_TRIES * n if positions else 0):
         pose = choose_pose(simulator.view, positions, rng)
         view = simulator.query(**teleport_call(pose, force=False))
         if view.success:
-            views.append((view, steps_ahead(pose, positions)))
+            views.append(view)
         if len(views) == n:
             break
     return views

@@ -164,7 +164,7 @@ def _reading(training: _Training, print_note: Callable[[str], None]) -> Stage:
     )
     print_note(f"{len(frames):,} frames: computing what the tower tells of them")
     told = read_frame_units(frames, image_processor(), tower, units)
-    labelled = label_units(seen, told, units, views.loose, GRID, recipe.seed)
+    labelled = label_units(seen, units, views.loose, GRID, recipe.seed)
     network = ReadingNetwork(loaded, told, units)
     return reading_stage(recipe, network, labelled, questions, actions)
 

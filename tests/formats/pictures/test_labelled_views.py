@@ -20,7 +20,7 @@ def some_views():
         ThingInView(1, "Mug", None, True, True, False, cells[::-1]),
         ThingInView(1, "Fridge", None, False, False, True, cells.T),
     ]
-    return views_of(frames, [3, -1], things)
+    return views_of(frames, things)
 
 
 def test_written_views_are_read_as_they_were(tmp_path):
@@ -28,7 +28,6 @@ def test_written_views_are_read_as_they_were(tmp_path):
     write_views(path, some_views())
     views = read_views(path)
     assert views.frames[:, 0, 0, 0].tolist() == [10, 20]
-    assert views.ahead.tolist() == [3, -1]
     assert [views.names[at] for at in views.type] == ["Mug", "Mug", "Fridge"]
     assert [at < 0 or views.names[at] for at in views.receptacle] == ["CounterTop", True, True]
     assert views.view.tolist() == [0, 1, 1]
@@ -45,7 +44,6 @@ def test_written_views_are_read_as_they_were(tmp_path):
     [
         ("view", np.array([0, 1, 2], np.int32), "it names a view or a type that it does not have"),
         ("type", np.array([0, 1, 9], np.int16), "it names a view or a type that it does not have"),
-        ("ahead", np.array([3], np.int8), "its columns have different lengths"),
         ("held", np.array([True]), "its columns have different lengths"),
         ("held", np.array([1.0, 0.0, 1.0]), "its held are float64 of 1 dimensions"),
         ("pixels", np.zeros(3, np.uint16), "its pixels are uint16 of 1 dimensions"),

@@ -158,7 +158,7 @@ def _read_plan_log(folder: Path) -> None:
 def _make_views(folder: Path) -> Path:
     cells = np.arange(9).reshape(3, 3)
     things = [ThingInView(0, "Mug", "CounterTop", True, False, False, cells)]
-    write_views(folder / "a.npz", views_of([np.zeros((4, 4, 3), np.uint8)], [2], things))
+    write_views(folder / "a.npz", views_of([np.zeros((4, 4, 3), np.uint8)], things))
     return folder / "a.npz"
 
 

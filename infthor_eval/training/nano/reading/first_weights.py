@@ -18,7 +18,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from infthor_eval.training.nano.seeing.units import FREE_STEPS, Role, Units
+from infthor_eval.training.nano.seeing.units import Role, Units
 from infthor_eval.training.nano.spelling import spellings
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
@@ -108,7 +108,6 @@ _FEATURE = 0.4
 _CONTENT = 0.25  # of every part of a frame; one that shows nothing would be noise, made large
 _FIXTURE_FEATURE = 0.7
 _HELD_REST, _OPEN_REST = 0.3, 1.0
-_FREE_REST = 0.15  # of a free way: every part of a frame has it
 _OPEN_STATE = 1.75  # names of loose things are in two parts, so each is weaker
 _MATCH = 0.8
 _SINK = 3.0
@@ -225,16 +224,9 @@ class _Setter:
         features[self._part(Part.PLACE), Role.AROUND] = codes.fixtures.T
         layer = self._model.model.visual.merger.mlp[2]
         layer.weight.zero_()
-        layer.weight[:, : self._units.n_of_types] = _FEATURE * features.flatten(1)
+        layer.weight[:, : len(self._units)] = _FEATURE * features.flatten(1)
         layer.bias.zero_()
         layer.bias[self._part(Part.REST)] = _CONTENT * self._directions(1)[0]
-
-    def set_free_way(self) -> None:
-        """Set the same layer for what tells how far the way ahead is free."""
-        columns = slice(self._units.n_of_types, len(self._units))
-        weight = self._model.model.visual.merger.mlp[2].weight
-        directions = self._directions(len(FREE_STEPS))
-        weight[self._part(Part.REST), columns] = _FEATURE * _FREE_REST * directions.T
 
     def set_layer(self, layer: Any, heads: Sequence[_Head], codes: _Codes, n_layers: int) -> None:
         """Set a layer's attention to what its heads do, and its MLP at random."""
@@ -330,4 +322,3 @@ def set_first_weights(
         layers = loaded.model.get_decoder().layers
         for number, layer in enumerate(layers):
             setter.set_layer(layer, plans[min(number, len(plans) - 1)], codes, len(layers))
-        setter.set_free_way()

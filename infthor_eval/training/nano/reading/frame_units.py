@@ -13,7 +13,7 @@ from torch import Tensor
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.training.nano.seeing.units import FREE_STEPS, Role, Units
+from infthor_eval.training.nano.seeing.units import Role, Units
 from infthor_eval.training.nano.tower import patch_states, unit_logits
 from model_adapters.hf.prompting.prompt import Frame
 
@@ -43,7 +43,7 @@ class FrameUnits:
     """Units of frames before their nonlinearity.
 
     Attributes:
-        values: (frames, tokens, units), float16.
+        values: (frames, tokens, roles, types), float16.
         index: place of each frame by the digest of its file.
     """
 
@@ -51,23 +51,16 @@ class FrameUnits:
     index: dict[str, int]
 
     def of(self, frame: Frame) -> Tensor:
-        """Return the units of a frame, (tokens, units), float32."""
+        """Return the units of a frame, (tokens, roles, types), float32."""
         values = self.values[self.index[frame.digest]].float()
-        if isinstance(frame, ChangedFrame):
-            of_types = values[:, : -len(FREE_STEPS)].unflatten(-1, (len(Role), -1))
-            _turn(of_types, frame.turned)
-            if frame.order is not None:
-                of_types.copy_(of_types[..., list(frame.order)])
-        return values
+        if not isinstance(frame, ChangedFrame):
+            return values
+        _turn(values, frame.turned)
+        return values if frame.order is None else values[..., list(frame.order)]
 
 
 def _turn(values: Tensor, types: Sequence[int]) -> None:
-    """Open what is closed, and close what is open, where it is shown at all.
-
-    Args:
-        values: (tokens, roles, types).
-        types: indices of what is turned.
-    """
+    """Open what is closed, and close what is open, where it is shown at all."""
     columns = list(types)
     opened = values[:, Role.OPEN, columns]
     is_shown = values[:, Role.SHOWN, columns] > 0
@@ -96,7 +89,8 @@ def read_frame_units(
     with ThreadPoolExecutor(_READER_THREADS) as readers, torch.no_grad():
         for batch in _batches(frames):
             states = patch_states(tower, torch.stack([*readers.map(patches, batch)]))
-            parts.append(unit_logits(tower, states, len(units)).half())
+            logits = unit_logits(tower, states, len(units))
+            parts.append(logits.reshape(len(batch), -1, len(Role), len(units.types)).half())
     return FrameUnits(torch.cat(parts), {frame.digest: at for at, frame in enumerate(frames)})
 
 

@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from infthor_eval.training.nano.reading.frame_units import FrameUnits
-from infthor_eval.training.nano.seeing.units import FREE_STEPS, Role, Units
+from infthor_eval.training.nano.seeing.units import Role, Units
 from infthor_eval.training.nano.seen_objects import SeenFrame, SeenObject
 
 __all__ = ["label_units"]
@@ -27,19 +27,12 @@ _ON = (2.4, 4.0)
 
 
 def label_units(
-    seen: Sequence[SeenFrame],
-    told: FrameUnits,
-    units: Units,
-    loose: NDArray[np.bool_],
-    grid: int,
-    seed: int,
+    seen: Sequence[SeenFrame], units: Units, loose: NDArray[np.bool_], grid: int, seed: int
 ) -> FrameUnits:
     """Return the units of frames by what they show.
 
     Args:
         seen: the frames, each once, with what they show.
-        told: what the tower tells of them, in this order; so how far the way ahead is free, of
-            which sets have no record.
         units: names of the units.
         loose: [types], True for the types of things that can be picked up.
         grid: tokens along each side of a frame.
@@ -60,8 +53,8 @@ def label_units(
     for role, of_role in _types_by_role([one for _, one in shown], units, loose).items():
         thing, token = np.nonzero(is_in & (of_role >= 0)[:, None])
         values[frame[thing], token, role, of_role[thing]] = rng.uniform(*_ON, len(thing))
-    free = told.values[..., -len(FREE_STEPS) :]
-    return FrameUnits(torch.cat([torch.from_numpy(values).flatten(2), free], -1), told.index)
+    places = {one.frame.digest: at for at, one in enumerate(seen)}
+    return FrameUnits(torch.from_numpy(values), places)
 
 
 def _area(one: SeenObject) -> int:

@@ -55,7 +55,7 @@ class ReadingNetwork(SequenceModel):
             return []
         values = torch.stack([self.frames.of(frame) for frame in frames])
         layer = self._merger_layer
-        on = gelu(values)
+        on = gelu(values.flatten(2))
         features = torch.nn.functional.linear(on, layer.weight[:, : len(self._units)], layer.bias)
         return [*features]
 

@@ -7,17 +7,16 @@ from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits, log_softmax
 
 from infthor_eval.training.nano.seeing.labels import cell_shares, token_labels
-from infthor_eval.training.nano.seeing.units import FREE_STEPS, Role
+from infthor_eval.training.nano.seeing.units import Role
 from infthor_eval.training.nano.seeing.view_dataset import ViewBatch, ViewDataset
 from infthor_eval.training.nano.tower import patch_states, unit_logits
 
 __all__ = ["SeeingNetwork"]
 
 _ROLE_WEIGHTS = {Role.SHOWN: 1.0, Role.HELD: 2.0, Role.OPEN: 2.0, Role.AROUND: 1.0}
-_FREE_WEIGHT = 0.5  # of each of the units of the way ahead
 _PATCH_WEIGHT = 3.0  # of the loss of patches' names
 _LOOSE_WEIGHT = 3.0  # more, of patches that show something loose
-_BIAS = -4.0  # of the units of types at first: hardly any is on
+_BIAS = -4.0  # of the units at first: hardly any is on
 _SCALE = 2.0  # of their weights
 
 
@@ -39,12 +38,12 @@ class SeeingNetwork(torch.nn.Module):
         width = tower.patch_embed.proj.out_channels
         self.norm = torch.nn.RMSNorm(width)
         self.names = torch.nn.Linear(width, len(views.units.types) + 1)
-        layer, units = tower.merger.mlp[0], views.units
+        layer, n_units = tower.merger.mlp[0], len(views.units)
         with torch.no_grad():
-            layer.weight[: len(units)] *= _SCALE
-            layer.weight[len(units) :] = 0.0
+            layer.weight[:n_units] *= _SCALE
+            layer.weight[n_units:] = 0.0
             layer.bias.zero_()
-            layer.bias[: units.n_of_types] = _BIAS
+            layer.bias[:n_units] = _BIAS
 
     def inputs(self, batch: ViewBatch) -> Tensor:
         """Return the patches of a batch as the image processor makes them, (pictures, patches,
@@ -55,19 +54,14 @@ class SeeingNetwork(torch.nn.Module):
 
     def loss(self, batch: ViewBatch) -> Tensor:
         """Return the loss of a batch, a scalar."""
-        units = self._views.units
         states = patch_states(self.tower, self.inputs(batch))
-        of_types, free = unit_logits(self.tower, states, len(units)).tensor_split(
-            [units.n_of_types], -1
-        )
-        loss = self._type_loss(of_types, batch) + _FREE_WEIGHT * self._free_loss(free, batch)
-        return loss + _PATCH_WEIGHT * self._name_loss(states, batch)
+        return self._unit_loss(states, batch) + _PATCH_WEIGHT * self._name_loss(states, batch)
 
-    def _type_loss(self, logits: Tensor, batch: ViewBatch) -> Tensor:
-        """Return the loss of the units of types, summed over them, averaged over tokens."""
-        block, n_types = self.tower.spatial_merge_size, len(self._views.units.types)
-        labels, unclear = token_labels(batch, block, self._views.cell_pixels, n_types)
-        logits = logits.reshape(labels.shape)
+    def _unit_loss(self, states: Tensor, batch: ViewBatch) -> Tensor:
+        """Return the loss of the units, summed over them, averaged over tokens."""
+        units, block = self._views.units, self.tower.spatial_merge_size
+        labels, unclear = token_labels(batch, block, self._views.cell_pixels, len(units.types))
+        logits = unit_logits(self.tower, states, len(units)).reshape(labels.shape)
         losses = binary_cross_entropy_with_logits(
             logits, torch.from_numpy(labels).float(), reduction="none"
         )
@@ -75,16 +69,6 @@ class SeeingNetwork(torch.nn.Module):
         is_ignored = torch.zeros(labels.shape, dtype=torch.bool)
         is_ignored[:, :, Role.SHOWN] = torch.from_numpy(unclear)
         return (losses * weights).masked_fill(is_ignored, 0.0).sum((2, 3)).mean()
-
-    def _free_loss(self, logits: Tensor, batch: ViewBatch) -> Tensor:
-        """Return the loss of the units of the way ahead, summed over them, averaged over the tokens
-        of all pictures; those where the way is not known have none."""
-        ahead = torch.from_numpy(batch.ahead)
-        labels = (ahead[:, None] >= torch.tensor(FREE_STEPS)).float()
-        losses = binary_cross_entropy_with_logits(
-            logits, labels[:, None].expand_as(logits), reduction="none"
-        )
-        return losses[ahead >= 0].sum() / (len(ahead) * logits.shape[1])
 
     def _name_loss(self, states: Tensor, batch: ViewBatch) -> Tensor:
         """Return the cross entropy of the patches' names, averaged over patches."""

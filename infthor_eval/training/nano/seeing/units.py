@@ -1,5 +1,4 @@
-"""What the vision tower tells of each part of a frame: a unit for each role and type, and some for
-how far the way ahead is free.
+"""What the vision tower tells of each part of a frame: a unit for each role and type.
 
 The first layer of the tower's merger has these units, and the second one turns them into features.
 So a label has one place: a type can be taken for another by exchanging units, and what is seen is
@@ -11,11 +10,7 @@ from enum import IntEnum
 
 from infthor_eval.household.wording import canonical_type
 
-__all__ = ["FREE_STEPS", "Role", "Units"]
-
-FREE_STEPS = (1, 2, 3, 5)
-"""A unit for each tells whether the agent can walk so many steps ahead: who does not know walks
-into things."""
+__all__ = ["Role", "Units"]
 
 
 class Role(IntEnum):
@@ -43,11 +38,6 @@ class Units:
 
     def __len__(self) -> int:
         """Return the number of units."""
-        return self.n_of_types + len(FREE_STEPS)
-
-    @property
-    def n_of_types(self) -> int:
-        """Number of the units of roles and types, which come first."""
         return len(Role) * len(self.types)
 
     def index(self, object_type: str) -> int:

@@ -26,7 +26,6 @@ _FLOOR = "Floor"  # what lies there is in no receptacle that anybody would name
 _FIXTURE_SHARE = 0.04  # weight of a crop around a fixture, of the mean weight around loose things
 _SMALL_PIXELS = 200  # what has less is taken half as often
 _SMALL_SHARE = 0.5
-_UNKNOWN = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +34,6 @@ class ViewBatch:
 
     Attributes:
         patches: uint8, [pictures, cells, values], blocks of a token's cells after each other.
-        ahead: [pictures], how many steps ahead are free, -1 where unknown: in crops it is.
         picture: [things], the picture that shows a thing.
         type: [things], index of its type.
         receptacle: [things], index of the type of its receptacle, or -1.
@@ -47,7 +45,6 @@ class ViewBatch:
     """
 
     patches: NDArray[np.uint8]
-    ahead: NDArray[np.int64]
     picture: NDArray[np.int64]
     type: NDArray[np.int64]
     receptacle: NDArray[np.int64]
@@ -93,7 +90,6 @@ class ViewDataset:
         self.units = Units(name for room in rooms for name in room.names.tolist())
         self._starts = starts = np.cumsum([0, *(len(room.frames) for room in rooms)])
         self._frames = [room.frames for room in rooms]
-        self._ahead = np.concatenate([room.ahead for room in rooms]).astype(np.int64)
         self._view = np.concatenate(
             [room.view + start for room, start in zip(rooms, starts[:-1], strict=True)]
         )
@@ -226,7 +222,6 @@ class ViewDataset:
         thing, picture, pixels = thing[seen], picture[seen], pixels[seen]
         return ViewBatch(
             patches=in_merge_order(patches, self._block),
-            ahead=self._ahead[views] if side == self._grid else np.full(len(views), _UNKNOWN),
             picture=picture,
             type=self._type[thing],
             receptacle=self._receptacle[thing],

@@ -6,7 +6,7 @@ from torch.nn.functional import gelu
 
 from infthor_eval.training.nano.architecture import GRID, build_untrained
 from infthor_eval.training.nano.reading.first_weights import set_first_weights
-from infthor_eval.training.nano.seeing.units import FREE_STEPS, Role, Units
+from infthor_eval.training.nano.seeing.units import Role, Units
 from infthor_eval.training.nano.settings import NanoRecipe
 from infthor_eval.training.nano.spelling import spellings
 
@@ -40,8 +40,7 @@ def looks(loaded, shown, word, layer, head):
     merger = model.model.visual.merger.mlp[2]
     with torch.no_grad():
         weight = merger.weight[:, : len(UNITS)]
-        told = torch.cat([values.flatten(2), torch.full((1, GRID**2, len(FREE_STEPS)), 4.0)], -1)
-        features = torch.nn.functional.linear(gelu(told), weight, merger.bias)[0]
+        features = torch.nn.functional.linear(gelu(values.flatten(2)), weight, merger.bias)[0]
     names = ("vision_start", "image_pad", "vision_end")
     start, pad, end = (tokenizer.convert_tokens_to_ids(f"<|{name}|>") for name in names)
     (token,) = tokenizer(word, add_special_tokens=False)["input_ids"]

@@ -4,9 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import torch
 
-from infthor_eval.training.nano.reading.frame_units import FrameUnits
 from infthor_eval.training.nano.reading.label_units import label_units
 from infthor_eval.training.nano.seeing.units import Role, Units
 from infthor_eval.training.nano.seen_objects import SeenFrame, SeenObject, read_seen_frames
@@ -15,19 +13,11 @@ UNITS = Units(("Apple", "Fridge", "Knife", "Plate"))
 LOOSE = np.array([True, False, True, True])
 
 
-def by_tower(digests, units):
-    """What a tower tells that sees nothing but a free way."""
-    values = torch.full((len(digests), 9, len(units)), -9.0, dtype=torch.float16)
-    values[..., units.n_of_types :] = 2.5
-    return FrameUnits(values, {digest: at for at, digest in enumerate(digests)})
-
-
 def told(*objects, size=(300, 300)):
     """What is on, as (token, role, type)."""
     frame = SimpleNamespace(size=size, digest="x")
-    found = label_units([SeenFrame(frame, objects)], by_tower("x", UNITS), UNITS, LOOSE, 3, 0)
-    assert (found.values[..., UNITS.n_of_types :] == 2.5).all()
-    on = found.values[0, :, : UNITS.n_of_types].unflatten(-1, (len(Role), -1)) > 0
+    found = label_units([SeenFrame(frame, objects)], UNITS, LOOSE, 3, 0)
+    on = found.values[0] > 0
     return {(token, Role(role), UNITS.types[index]) for token, role, index in on.nonzero().tolist()}
 
 
@@ -77,12 +67,10 @@ def test_all_frames_of_a_set_are_known_by_their_digests(small_set):
     seen = read_seen_frames([small_set])
     names = {one.type for _, objects in seen for one in objects}
     units = Units(names)
-    tower = by_tower([frame.digest for frame, _ in seen], units)
-    found = label_units(seen, tower, units, np.ones(len(units.types), bool), 3, 0)
-    assert found.values.shape == (len(seen), 9, len(units))
+    found = label_units(seen, units, np.ones(len(units.types), bool), 3, 0)
+    assert found.values.shape == (len(seen), 9, len(Role), len(units.types))
     for frame, objects in seen:
         values = found.values[found.index[frame.digest]]
         for one in objects:
             if one.is_held:
-                held = Role.HELD * len(units.types) + units.index(one.type)
-                assert (values[:, held] > 0).any()
+                assert (values[:, Role.HELD, units.index(one.type)] > 0).any()

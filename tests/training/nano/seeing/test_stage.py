@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import torch
 
 from infthor_eval.training.nano.seeing.stage import lower_thresholds, raise_units
-from infthor_eval.training.nano.seeing.units import FREE_STEPS, Role, Units
+from infthor_eval.training.nano.seeing.units import Role, Units
 
 UNITS = Units(["Mug", "Sink"])
 BEYOND = 3  # features of the layer that are no units
@@ -18,20 +18,18 @@ def tower():
 
 
 def bias_by_role(changed):
-    of_types, free, beyond = changed.merger.mlp[0].bias.tensor_split([UNITS.n_of_types, len(UNITS)])
-    assert not beyond.any()
-    return of_types.reshape(len(Role), -1).tolist(), free.tolist()
+    bias = changed.merger.mlp[0].bias
+    assert not bias[len(UNITS) :].any()
+    return bias[: len(UNITS)].reshape(len(Role), len(UNITS.types)).tolist()
 
 
 def test_all_units_are_on_earlier_for_the_decoder():
     changed = tower()
     lower_thresholds(changed, UNITS)
-    assert bias_by_role(changed) == ([[2.0, 2.0]] * len(Role), [2.0] * len(FREE_STEPS))
+    assert bias_by_role(changed) == [[2.0, 2.0]] * len(Role)
 
 
 def test_what_is_shown_counts_for_more_when_the_decoder_is_trained():
     changed = tower()
     raise_units(changed, UNITS)
-    of_types, free = bias_by_role(changed)
-    assert of_types == [[2.0, 2.0], [0.0, 0.0], [0.0, 0.0], [1.0, 1.0]]
-    assert not any(free)
+    assert bias_by_role(changed) == [[2.0, 2.0], [0.0, 0.0], [0.0, 0.0], [1.0, 1.0]]

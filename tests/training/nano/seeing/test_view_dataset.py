@@ -31,10 +31,8 @@ def two_rooms(tmp_path):
             thing(1, "Mug", big, "CounterTop"),
             thing(0, "SinkBasin", cells((3, 3), pixels=90), loose=False),
         ],
-        ahead=[3, -1],
     )
-    pillow = thing(0, "Pillow", cells((0, 0), pixels=100))
-    bedroom = write(tmp_path, "bedroom-1", 1, [pillow], 1, ahead=[8])
+    bedroom = write(tmp_path, "bedroom-1", 1, [thing(0, "Pillow", cells((0, 0), pixels=100))], 1)
     frames = np.concatenate([kitchen[1], bedroom[1]])
     return ViewDataset([kitchen[0], bedroom[0]], BLOCK), frames
 
@@ -79,13 +77,6 @@ def test_crops_are_parts_of_frames_with_something_in_them(two_rooms):
     assert set(batch.picture.tolist()) == set(range(64))
     # A fixture is the centre of few crops.
     assert sum(view == 0 for view, _ in found) < 16
-
-
-def test_the_way_ahead_is_known_of_whole_frames_alone(two_rooms):
-    dataset, _ = two_rooms
-    mirrored = np.array([True, False, True])
-    assert dataset.frames(np.array([0, 1, 2]), mirrored).ahead.tolist() == [3, -1, 8]
-    assert set(dataset.crops(8, np.random.default_rng(0)).ahead.tolist()) == {-1}
 
 
 def test_things_keep_the_pixels_that_they_have_in_the_whole_frame(two_rooms):

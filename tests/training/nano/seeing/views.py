@@ -19,10 +19,10 @@ def thing(view, name, pixels, receptacle=None, *, loose=True, held=False, opened
     return ThingInView(view, name, receptacle, loose, held, opened, pixels)
 
 
-def write(folder, name, n_views, things, seed=0, ahead=None):
-    """Write views of random pixels, with no step free ahead unless it is said."""
+def write(folder, name, n_views, things, seed=0):
+    """Write views of random pixels."""
     rng = np.random.default_rng(seed)
     frames = [*rng.integers(0, 256, (n_views, 2 * GRID, 2 * GRID, 3), dtype=np.uint8)]
     path = folder / f"{name}.npz"
-    write_views(path, views_of(frames, ahead or [0] * n_views, things))
+    write_views(path, views_of(frames, things))
     return path, np.stack(frames)
