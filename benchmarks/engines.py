@@ -164,8 +164,8 @@ def _row(way: str, one: Cost, whole: Cost, expected: Mapping[str, str]) -> str:
         tokens = f"{whole.n_read - whole.n_cached:>9,}{whole.n_cached / whole.n_read:>8.1%}"
     return (
         f"{way:22}{one.processor:9.1f} ({one.wall:6.1f}){whole.processor:11.1f} ({whole.wall:6.1f})"
-        f"{len(whole.replies):6}{each[0]:9.2f} ({each[1]:6.2f}){tokens}  {equal} of "
-        f"{len(whole.replies)}"
+        f"{len(whole.replies):6}{each[0]:9.2f} ({each[1]:6.2f}){tokens}  "
+        f"{f'{equal} of {len(whole.replies)}' if expected else '-'}"  # or nothing to compare with
     )
 
 
