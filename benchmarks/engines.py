@@ -159,13 +159,13 @@ def _row(way: str, one: Cost, whole: Cost, expected: Mapping[str, str]) -> str:
     equal = sum(
         whole.replies[key] == reply for key, reply in expected.items() if key in whole.replies
     )
+    compared = f"{equal} of {len(whole.replies)}" if expected else "-"
     tokens = f"{'?':>9}{'?':>8}"
     if whole.n_read is not None and whole.n_cached is not None:
         tokens = f"{whole.n_read - whole.n_cached:>9,}{whole.n_cached / whole.n_read:>8.1%}"
     return (
         f"{way:22}{one.processor:9.1f} ({one.wall:6.1f}){whole.processor:11.1f} ({whole.wall:6.1f})"
-        f"{len(whole.replies):6}{each[0]:9.2f} ({each[1]:6.2f}){tokens}  "
-        f"{f'{equal} of {len(whole.replies)}' if expected else '-'}"  # or nothing to compare with
+        f"{len(whole.replies):6}{each[0]:9.2f} ({each[1]:6.2f}){tokens}  {compared}"
     )
 
 

@@ -188,17 +188,11 @@ def _image_processor(name: str, backend: str) -> Any:
         return load_image_processor(Path(folder), FrameScaling(image_backend=backend))
 
 
+@collecting_seldom()  # as the command does
 def _feed(name: str, way: _Way, n_frames: int, null_rate: int | None) -> tuple[float, float, float]:
     """Prepare frames in chunks, and compute on each in between, at the null model's rate or in no
     time; return seconds of it all, seconds of processor time, and seconds of waiting for frames."""
     torch.set_num_threads(1)
-    with collecting_seldom():  # as the command does
-        return _feed_in_chunks(name, way, n_frames, null_rate)
-
-
-def _feed_in_chunks(
-    name: str, way: _Way, n_frames: int, null_rate: int | None
-) -> tuple[float, float, float]:
     process = _image_processor(name, way.backend)
 
     def prepare(piece: Frame | Clip) -> Pixels:

@@ -117,16 +117,19 @@ def test_results_of_another_machine_do_not_count(script, machine, steps, tmp_pat
     assert steps.called == ["first", "first"]
 
 
-def test_what_is_given_later_undoes_nothing(script, machine, steps, tmp_path):
+def test_data_that_are_given_later_undo_nothing_and_weights_do(script, machine, steps, tmp_path):
     script.run_steps(machine, tmp_path, 60, chosen={1}, steps=steps.all)
-    later = replace(machine, checkpoint="Q", old_libraries="old")
+    later = replace(machine, data=Path("set"), old_libraries="old")
     script.run_steps(later, tmp_path, 60, chosen={1}, steps=steps.all)
     assert steps.called == ["first"]
-    other = replace(machine, checkpoint="R")
+    other = replace(machine, data=Path("other"), old_libraries="old")
     script.run_steps(later, tmp_path, 60, chosen={2}, steps=steps.all)
     script.run_steps(later, tmp_path, 60, chosen={2}, steps=steps.all)  # it failed before
     script.run_steps(other, tmp_path, 60, chosen={1, 2}, steps=steps.all)
-    assert steps.called == ["first", "breaks", "breaks", "breaks"], "the last had other weights"
+    assert steps.called == ["first", "breaks", "breaks", "breaks"], "the last had other data"
+    weights = replace(machine, checkpoint="Q")
+    script.run_steps(weights, tmp_path, 60, chosen={1}, steps=steps.all)
+    assert steps.called[4:] == ["first"], "some steps take real weights where there are any"
 
 
 def test_no_step_begins_when_the_time_is_up(script, machine, steps, tmp_path):
