@@ -159,6 +159,8 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
         ramp: share of the steps, from there on, in which the numbers of frames grow.
         synthetic: share of the frames with synthetic questions, by rules from what they show.
         synthetic_frames: most frames of these.
+        sought: share of these whose frames are sought for what few frames can be asked about:
+            what is open, what is in a receptacle, and whether something is.
         events: share of the frames with synthetic questions on a few events in a row.
         events_in_a_row: most events of these.
         filled: most synthetic questions that are added to recorded ones.
@@ -177,6 +179,7 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     ramp: float = 0.3
     synthetic: float = 0.25
     synthetic_frames: int = 6
+    sought: float = 0.7
     events: float = 0.3
     events_in_a_row: int = 6
     filled: int = 4
@@ -199,6 +202,7 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
             "turned",
             "single",
             "synthetic",
+            "sought",
             "events",
             "recalled",
             "whole",

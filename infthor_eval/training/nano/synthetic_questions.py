@@ -9,6 +9,7 @@ import random
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 
 from infthor_eval.household.wording import (
     answer_of,
@@ -20,7 +21,7 @@ from infthor_eval.household.wording import (
 )
 from infthor_eval.training.nano.seen_objects import SeenFrame, SeenObject
 
-__all__ = ["AskedText", "SyntheticQuestions"]
+__all__ = ["AskedText", "Kind", "SyntheticQuestions"]
 
 _PRESENCE = ("Have you seen {0}?", "Is there any {1} in this room?")
 _OPENNESS = ("Is {} open now?", "Was {} open?")
@@ -35,6 +36,18 @@ _OTHERS = "Which other things that can be picked up were directly {} when you pi
 
 AskedText = tuple[str, str]
 """Text of a question, and its answer."""
+
+
+class Kind(IntEnum):
+    """What a question is about."""
+
+    PRESENCE = 0
+    ABSENCE = 1
+    PLACE = 2
+    WHETHER_THERE = 3
+    CONTENTS = 4
+    OPENNESS = 5
+    HELD = 6
 
 
 @dataclass
@@ -112,7 +125,11 @@ class SyntheticQuestions:
         return one.is_shown and canonical_type(one.type) not in self._movable
 
     def ask(
-        self, shown: Sequence[Sequence[SeenObject]], n: int, rng: random.Random
+        self,
+        shown: Sequence[Sequence[SeenObject]],
+        n: int,
+        rng: random.Random,
+        sought: Kind | None = None,
     ) -> list[AskedText]:
         """Return up to `n` distinct questions on what frames show, in random order; each kind of
         question is as likely as another.
@@ -121,21 +138,25 @@ class SyntheticQuestions:
             shown: what each of the frames shows.
             n: most questions.
             rng: source of all random choices.
+            sought: kind that comes first; there are no questions if there are none of it.
         """
         sight = _Sight()
         for objects in shown:
             sight.add(objects)
-        kinds = (
-            self._presence,
-            self._absence,
-            self._places,
-            self._whether_there,
-            self._contents,
-            self._openness,
-            self._held,
-        )
-        drawn = [rng.sample(asked, len(asked)) for asked in ([*kind(sight, rng)] for kind in kinds)]
-        asked: dict[AskedText, None] = {}
+        kinds = {
+            Kind.PRESENCE: self._presence,
+            Kind.ABSENCE: self._absence,
+            Kind.PLACE: self._places,
+            Kind.WHETHER_THERE: self._whether_there,
+            Kind.CONTENTS: self._contents,
+            Kind.OPENNESS: self._openness,
+            Kind.HELD: self._held,
+        }
+        found = [[*kinds[kind](sight, rng)] for kind in Kind]
+        drawn = [rng.sample(asked, len(asked)) for asked in found]
+        if sought is not None and not drawn[sought]:
+            return []
+        asked = dict.fromkeys(drawn[sought][:n] if sought is not None else ())
         while len(asked) < n and any(drawn):
             asked.setdefault(rng.choice([one for one in drawn if one]).pop())
         return [*asked]

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from infthor_eval.training.nano.seen_objects import SeenFrame, SeenObject
-from infthor_eval.training.nano.synthetic_questions import SyntheticQuestions
+from infthor_eval.training.nano.synthetic_questions import Kind, SyntheticQuestions
 
 BOX = (0, 0, 9, 9)
 
@@ -114,6 +114,22 @@ def test_fixtures_that_are_closed_are_asked_about_as_often_as_open_ones():
         if " open" in text
     ]
     assert 0.4 < answers.count("yes") / len(answers) < 0.6
+
+
+@pytest.mark.parametrize(
+    ("kind", "start"),
+    [
+        (Kind.OPENNESS, ("Is the fridge open", "Was the fridge open")),
+        (Kind.WHETHER_THERE, ("Is the mug ", "Is the egg ")),
+        (Kind.CONTENTS, ("What objects", "Which other things")),
+    ],
+)
+def test_a_kind_that_is_sought_comes_first_or_nothing_is_asked(kind, start):
+    shown = [objects for _, objects in (MUG_ON_TABLE, TWO_THINGS)]
+    for seed in range(20):
+        (first, *_) = QUESTIONS.ask(shown, 5, random.Random(seed), kind)
+        assert first[0].startswith(start)
+        assert QUESTIONS.ask([FAR.objects], 5, random.Random(seed), kind) == []
 
 
 @settings(deadline=None, max_examples=50)

@@ -45,6 +45,9 @@ class _Head:
         query: part of the token that looks, which is compared; None if a look is by position alone.
         key: part of the token that is looked at.
         back: number of positions that it looks back; 0 for anywhere.
+        at_names: True if it looks at all names alike.
+        tells_open: True if it hands on nothing but whether it looks at something open.
+        strength: of what it compares.
     """
 
     value: Part
@@ -52,6 +55,12 @@ class _Head:
     query: Part | None = None
     key: Part | None = None
     back: int = 0
+    at_names: bool = False
+    tells_open: bool = False
+    strength: float = 1.0
+
+
+_OPEN_LOOK = 1.5  # strength of the comparison of names with what is open
 
 
 def _heads(grid: int) -> tuple[tuple[_Head, ...], ...]:
@@ -72,11 +81,12 @@ def _heads(grid: int) -> tuple[tuple[_Head, ...], ...]:
         _Head(fixture, fixture, back=2),
         _Head(rest, rest, back=1),
     )
-    compared = (  # whether two names in the question, or a name and a frame, are of one thing
-        _Head(rest, rest, thing, thing),
+    is_there = _Head(rest, rest, thing, thing)
+    named = (
+        is_there,
         where,
         _Head(thing, thing, back=2),
-        _Head(rest, rest, fixture, fixture),
+        _Head(rest, rest, at_names=True),
         _Head(rest, rest, back=1),
     )
     return (
@@ -85,17 +95,18 @@ def _heads(grid: int) -> tuple[tuple[_Head, ...], ...]:
             contents,
             _Head(state, state, back=own),
             held_before,
-            _Head(rest, rest, thing, thing),
+            # First of all, as `where` makes a name like that of the place, too.
+            _Head(rest, rest, fixture, state, tells_open=True, strength=_OPEN_LOOK),
         ),
         (
             _Head(place, place, thing, thing, back=own),
             _Head(rest, rest, thing, state),
-            _Head(rest, rest, fixture, state),
+            is_there,
             held_before,
             contents,
         ),
         answers,
-        compared,
+        named,
     )
 
 
@@ -108,6 +119,10 @@ _FEATURE = 0.4
 _CONTENT = 0.25  # of every part of a frame; one that shows nothing would be noise, made large
 _FIXTURE_FEATURE = 0.7
 _HELD_REST, _OPEN_REST = 0.3, 1.0
+_NAMED = 1.0  # of the mark of names
+_AT_NAMES = 80.0
+_ALOUD = 3.0  # what is open is handed on so much stronger from a name to the answer
+_YES = 0.7  # of the mark of what is open, in "yes", and its opposite in "no"
 _OPEN_STATE = 1.75  # names of loose things are in two parts, so each is weaker
 _MATCH = 0.8
 _SINK = 3.0
@@ -128,15 +143,25 @@ def part_width(hidden: int) -> int:
 
 @dataclass(frozen=True)
 class _Codes:
-    """Codes of the types, [types, part width], and of the sinks, [part width].
+    """Codes of the types, [types, part width], of the sinks and of marks, [part width].
 
-    A sink is looked at by a head that finds nothing; the token before each frame has it.
+    A sink is looked at by a head that finds nothing; the token before each frame has it. Marks are
+    in the part for all else: of names, of what a frame shows open, and of a name whose thing is
+    open. Nothing else has the first and the last, so that they can be told from all else.
     """
 
     things: Tensor
     fixtures: Tensor
     thing_sink: Tensor
     fixture_sink: Tensor
+    named: Tensor
+    shown_open: Tensor
+    is_open: Tensor
+
+    def without_marks(self, rest: Tensor) -> Tensor:
+        """Return vectors of the part for all else, [n, part width], without those two marks."""
+        marks = torch.stack([self.named, self.is_open])
+        return rest - (rest @ marks.T) @ marks
 
 
 def _sink(part: Part, codes: _Codes) -> Tensor:
@@ -180,21 +205,28 @@ class _Setter:
             vectors[places] = basis[: len(places)]
             chosen.append(vectors)
             sinks.append(basis[-1])
-        return _Codes(*chosen, *sinks)
+        marks = torch.empty(self._width, self._width)
+        torch.nn.init.orthogonal_(marks, generator=self._random)
+        return _Codes(*chosen, *sinks, *marks[:3])
 
     def set_words(self, codes: _Codes, loose: Tensor) -> None:
         """Set the embeddings: of names by the codes, of all else at random."""
         words = self._model.get_input_embeddings().weight
         words.copy_(_WORD_NOISE * self._normal(*words.shape))
-        words[:, self._part(Part.REST)] = self._directions(len(words))
+        rest = self._part(Part.REST)
+        words[:, rest] = codes.without_marks(self._directions(len(words)))
         for at, name in enumerate(self._units.types):
-            for token in self._single_tokens(name):
+            for token in self._single_tokens(*spellings(name)):
                 code = _NAME_NOISE * self._normal(self._hidden)
                 code[self._part(Part.THING)] += codes.things[at] * loose[at]
                 # What is no fixture can be open, too.
                 code[self._part(Part.FIXTURE)] += codes.fixtures[at]
-                code[self._part(Part.REST)] += _NAME_REST * self._directions(1)[0]
+                code[rest] += _NAME_REST * self._directions(1)[0]
+                code[rest] = codes.without_marks(code[None, rest])[0] + _NAMED * codes.named
                 words[token] = code
+        for word, sign in (("yes", 1), ("no", -1)):
+            for token in self._single_tokens(word):
+                words[token, rest] += sign * _YES * codes.is_open
         sink = _WORD_NOISE * self._normal(self._hidden)
         for part in (Part.THING, Part.STATE):
             sink[self._part(part)] = codes.thing_sink
@@ -202,17 +234,16 @@ class _Setter:
             sink[self._part(part)] = codes.fixture_sink
         words[self._model.config.vision_start_token_id] = sink
 
-    def _single_tokens(self, name: str) -> list[int]:
-        spelled = [
-            self._tokenizer(text, add_special_tokens=False)["input_ids"] for text in spellings(name)
-        ]
+    def _single_tokens(self, *texts: str) -> list[int]:
+        """Return the tokens of those texts that have one."""
+        spelled = [self._tokenizer(text, add_special_tokens=False)["input_ids"] for text in texts]
         return [ids[0] for ids in spelled if len(ids) == 1]
 
     def set_features(self, codes: _Codes, loose: Tensor, fixtures: Tensor) -> None:
         """Set the merger's second layer, which turns units into features."""
         n_types = len(self._units.types)
         features = torch.zeros(self._hidden, len(Role), n_types)
-        held, opened = self._directions(2)
+        held, content = codes.without_marks(self._directions(2))
         features[self._part(Part.THING), Role.SHOWN] = (codes.things * loose[:, None]).T
         features[self._part(Part.FIXTURE), Role.SHOWN] = (
             _FIXTURE_FEATURE * codes.fixtures * fixtures[:, None]
@@ -220,17 +251,18 @@ class _Setter:
         features[self._part(Part.STATE), Role.HELD] = codes.things.T
         features[self._part(Part.REST), Role.HELD] = _HELD_REST * held[:, None]
         features[self._part(Part.STATE), Role.OPEN] = _OPEN_STATE * codes.fixtures.T
-        features[self._part(Part.REST), Role.OPEN] = _OPEN_REST * opened[:, None]
+        features[self._part(Part.REST), Role.OPEN] = _OPEN_REST * codes.shown_open[:, None]
         features[self._part(Part.PLACE), Role.AROUND] = codes.fixtures.T
         layer = self._model.model.visual.merger.mlp[2]
         layer.weight.zero_()
         layer.weight[:, : len(self._units)] = _FEATURE * features.flatten(1)
         layer.bias.zero_()
-        layer.bias[self._part(Part.REST)] = _CONTENT * self._directions(1)[0]
+        layer.bias[self._part(Part.REST)] = _CONTENT * content
 
     def set_layer(self, layer: Any, heads: Sequence[_Head], codes: _Codes, n_layers: int) -> None:
         """Set a layer's attention to what its heads do, and its MLP at random."""
         attention, mlp = layer.self_attn, layer.mlp
+        rest = self._part(Part.REST)
         scale = self._hidden**-0.5
         deep = (2 * n_layers) ** -0.5
         noise = {
@@ -246,19 +278,42 @@ class _Setter:
             linear.weight.copy_(strength * scale * self._normal(*linear.weight.shape))
             if linear.bias is not None:
                 linear.bias.zero_()
+        for linear in (attention.o_proj, mlp.down_proj):
+            linear.weight[rest] = codes.without_marks(linear.weight[rest].T).T
         for number, head in enumerate(heads):
             rows = slice(number * self._width, (number + 1) * self._width)
-            if head.query is not None and head.key is not None:
-                self._compare(attention, rows, head.query, head.key, codes)
-            if head.back:
-                share = 1.0 if head.query is None else _LOOK_AND_MATCH
-                self._look(attention, rows, head.back, _LOOK * share)
-            elif head.query is head.key:  # the token itself is most like itself
-                self._look(attention, rows, 0, -_LOOK_AWAY)
-            identity = _HAND_ON * torch.eye(self._width)
-            attention.o_proj.weight[self._part(head.to), rows] += identity
-            attention.v_proj.weight[rows, self._part(head.value)] += identity
-            self._keep_sink(attention.v_proj.weight[rows, self._part(head.value)], head, codes)
+            self._set_query(attention, rows, head, codes)
+            self._set_value(attention, rows, head, codes)
+
+    def _set_query(self, attention: Any, rows: slice, head: _Head, codes: _Codes) -> None:
+        """Set what a head looks at."""
+        self._compare(attention, rows, head, codes)
+        if head.back:
+            share = 1.0 if head.query is None else _LOOK_AND_MATCH
+            self._look(attention, rows, head.back, _LOOK * share)
+        elif head.at_names:
+            slowest = rows.stop - 1
+            attention.q_proj.bias[slowest] += _AT_NAMES
+            attention.k_proj.weight[slowest, self._part(Part.REST)] += codes.named
+        elif head.query is head.key:  # the token itself is most like itself
+            self._look(attention, rows, 0, -_LOOK_AWAY)
+
+    def _set_value(self, attention: Any, rows: slice, head: _Head, codes: _Codes) -> None:
+        """Set what a head hands on."""
+        rest = self._part(Part.REST)
+        if head.tells_open:
+            attention.v_proj.weight[rows.start, rest] += codes.shown_open
+            attention.o_proj.weight[rest, rows.start] += codes.is_open
+            return
+        identity = _HAND_ON * torch.eye(self._width)
+        attention.o_proj.weight[self._part(head.to), rows] += identity
+        attention.v_proj.weight[rows, self._part(head.value)] += identity
+        self._keep_sink(attention.v_proj.weight[rows, self._part(head.value)], head, codes)
+        values = attention.v_proj.weight[rows, rest]
+        told = torch.outer(values @ codes.is_open, codes.is_open)
+        values.copy_(codes.without_marks(values))
+        if head.at_names:
+            values += _ALOUD * told
 
     def _keep_sink(self, handed_on: Tensor, head: _Head, codes: _Codes) -> None:
         """Have a head not hand on the sink: tokens that got it would be looked at for one."""
@@ -272,13 +327,15 @@ class _Setter:
         half = self._width // 2
         return self._theta ** (-torch.arange(half) / half)
 
-    def _compare(self, attention: Any, rows: slice, query: Part, key: Part, codes: _Codes) -> None:
+    def _compare(self, attention: Any, rows: slice, head: _Head, codes: _Codes) -> None:
         """Compare parts by the slow frequencies, which a few frames do not turn."""
+        if head.query is None or head.key is None:
+            return
         slow = (self._frequencies() < _SLOW).float().repeat(2)
-        match = _MATCH * torch.eye(self._width) * slow[:, None]
-        attention.q_proj.weight[rows, self._part(query)] += match
-        attention.k_proj.weight[rows, self._part(key)] += match
-        attention.q_proj.bias[rows] += _SINK * _sink(key, codes) * slow
+        match = head.strength * _MATCH * torch.eye(self._width) * slow[:, None]
+        attention.q_proj.weight[rows, self._part(head.query)] += match
+        attention.k_proj.weight[rows, self._part(head.key)] += match
+        attention.q_proj.bias[rows] += head.strength * _SINK * _sink(head.key, codes) * slow
 
     def _look(self, attention: Any, rows: slice, back: int, strength: float) -> None:
         """Look so many positions back by the fast frequencies, which turn keys against queries.

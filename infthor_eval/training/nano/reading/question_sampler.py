@@ -20,11 +20,14 @@ from infthor_eval.training.nano.reading.renaming import Vocabulary
 from infthor_eval.training.nano.seeing.units import Units
 from infthor_eval.training.nano.seen_objects import SeenFrame
 from infthor_eval.training.nano.settings import ReadingSettings
-from infthor_eval.training.nano.synthetic_questions import AskedText, SyntheticQuestions
+from infthor_eval.training.nano.synthetic_questions import AskedText, Kind, SyntheticQuestions
 
 __all__ = ["QuestionSampler"]
 
 _MOST_TOKENS = 2500  # of a sequence
+# Kinds of questions that few frames are good for, and how often frames are sought for each.
+_SOUGHT = {Kind.OPENNESS: 3, Kind.WHETHER_THERE: 2, Kind.CONTENTS: 2}
+_TRIES = 8  # choices of frames for such a kind
 _MOST_FILLED_FRAMES = 12  # on which synthetic questions are added to recorded ones
 _SLICED = "slice"  # slices are no types of their own, so that they cannot be renamed
 _IN_ANY_ORDER = ("objects", "things that")  # marks of questions whose answers have no order
@@ -101,14 +104,24 @@ class QuestionSampler:
         There are none if the frames show nothing to ask for.
         """
         settings = self._settings
-        world = rng.choice(rng.choice(self._episodes).worlds)
-        n_frames = len(world.frames)
-        n = min(1 + round(rng.random() ** 2 * (settings.synthetic_frames - 1) * grown), n_frames)
+        sought = None
+        if rng.random() < settings.sought:
+            (sought,) = rng.choices([*_SOUGHT], [*_SOUGHT.values()])
+        for _ in range(1 if sought is None else _TRIES):
+            world = rng.choice(rng.choice(self._episodes).worlds)
+            places = self._some_places(len(world.frames), grown, rng)
+            asked = self._ask_by_rules(world, places, settings.together, home, rng, sought)
+            if asked:
+                return [self._sequence(world, places, asked, home)]
+        return []
+
+    def _some_places(self, n_frames: int, grown: float, rng: random.Random) -> list[int]:
+        """Return the places of some frames of an episode, in a row or anywhere."""
+        most = 1 + (self._settings.synthetic_frames - 1) * grown * rng.random() ** 2
+        n = min(round(most), n_frames)
         first = rng.randrange(n_frames - n + 1)
         in_a_row = [*range(first, first + n)]
-        places = in_a_row if rng.random() < 0.5 else sorted(rng.sample(range(n_frames), n))
-        asked = self._ask_by_rules(world, places, settings.together, home, rng)
-        return [self._sequence(world, places, asked, home)] if asked else []
+        return in_a_row if rng.random() < 0.5 else sorted(rng.sample(range(n_frames), n))
 
     def _events(self, rng: random.Random, grown: float, home: Home) -> list[ReadingSequence]:
         """Return questions on a few events in a row.
@@ -159,11 +172,17 @@ class QuestionSampler:
         return shown
 
     def _ask_by_rules(
-        self, world: World, places: Sequence[int], n: int, home: Home, rng: random.Random
+        self,
+        world: World,
+        places: Sequence[int],
+        n: int,
+        home: Home,
+        rng: random.Random,
+        sought: Kind | None = None,
     ) -> list[AskedText]:
         seen = (self._seen[world.frames[at].digest] for at in places)
         shown = [home.objects(objects) for _, objects in seen]
-        asked = self._synthetic_questions.ask(shown, n, rng)
+        asked = self._synthetic_questions.ask(shown, n, rng, sought)
         return self._all_renamed(asked, home, in_any_order=True)
 
     def _all_renamed(
