@@ -18,7 +18,7 @@ __all__ = ["lower_thresholds", "raise_units", "seeing_stage"]
 
 _WHITENED_FRAMES = 600
 _SHIFT = 2.0  # logits by which units are raised when the tower is trained
-_RAISED = {Role.SHOWN: 2.0, Role.AROUND: 1.0}  # once more, when the decoder is
+_RAISED = 1.0  # logits by which those of what is shown are once more, when the decoder is
 
 
 def seeing_stage(recipe: NanoRecipe, network: SeeingNetwork, views: ViewDataset) -> Stage:
@@ -63,10 +63,9 @@ def lower_thresholds(tower: Any, units: Units) -> None:
 def raise_units(tower: Any, units: Units) -> None:
     """Let the decoder take more for shown than when it was trained.
 
-    What is asked of twins is smaller than most of what it learned from: of the pairs on whether
-    something is there that it had wrong, it said no to both in eight of nine.
+    What is asked of twins is smaller than most of what it learned from.
     """
     n_types = len(units.types)
+    shown = slice(Role.SHOWN * n_types, (Role.SHOWN + 1) * n_types)
     with torch.no_grad():
-        for role, shift in _RAISED.items():
-            tower.merger.mlp[0].bias[role * n_types : (role + 1) * n_types] += shift
+        tower.merger.mlp[0].bias[shown] += _RAISED
