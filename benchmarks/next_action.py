@@ -4,7 +4,8 @@ baselines without frames.
     python benchmarks/next_action.py --data SET [--model qwen2.5-vl-nano] [--model-args k=v,...]
     [--frames shown,blank]
 
-SET is a replayed set (`infthor-eval replay`). At every action the model gets the true history up to
+SET is a replayed set (`infthor-eval replay`) with questions (`questions SET --out
+SET/qa_set.csv`), which are not asked. At every action the model gets the true history up to
 it (teacher forcing) and replies greedily. `history` predicts what experts did next in other scenes
 after the same action in a plan of the same words (infthor_eval/plans/actors/habits.py). `most
 frequent` always predicts the most frequent action.
