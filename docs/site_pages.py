@@ -30,6 +30,7 @@ _OUTSIDE = {  # where a file lies in the repository: where its page stands in th
     "benchmarks/memories.md": "benchmarks/memories.md",
     "benchmarks/families.md": "benchmarks/families.md",
     "benchmarks/faults.md": "benchmarks/faults.md",
+    "benchmarks/first_afternoon.md": "benchmarks/first_afternoon.md",
     "benchmarks/plans.md": "benchmarks/plans.md",
     "benchmarks/rehearsal.md": "benchmarks/rehearsal.md",
     "benchmarks/simulator.md": "benchmarks/simulator.md",
