@@ -60,9 +60,6 @@ class _Head:
     strength: float = 1.0
 
 
-_OPEN_LOOK = 1.5  # strength of the comparison of names with what is open
-
-
 def _heads(grid: int) -> tuple[tuple[_Head, ...], ...]:
     """Return the heads of each layer, for frames of as many tokens along each side; further layers
     are like the last.
@@ -125,6 +122,7 @@ _ALOUD = 3.0  # what is open is handed on so much stronger from a name to the an
 _YES = 0.7  # of the mark of what is open, in "yes", and its opposite in "no"
 _OPEN_STATE = 1.75  # names of loose things are in two parts, so each is weaker
 _MATCH = 0.8
+_OPEN_LOOK = 1.5  # strength of the comparison of names with what is open
 _SINK = 3.0
 _HAND_ON = 0.7
 _LOOK = 3.4

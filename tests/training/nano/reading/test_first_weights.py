@@ -14,8 +14,6 @@ LOOSE = ("Apple", "Book", "Knife", "Mug", "Plate")
 FIXTURES = ("CounterTop", "Fridge", "Sink")
 UNITS = Units([*LOOSE, *FIXTURES])
 PLACE = 4  # the token in the middle of a frame
-
-
 PHRASES = (" Is the", " open now?")
 
 
