@@ -19,6 +19,7 @@ __all__ = ["overview_table", "result_tables"]
 
 _PATH_WEIGHTED = "path-weighted"
 _COUNTS = ("plans", "tried", "trajectories", "excluded", "skipped", "failed", "not asked")
+_DRAW_NOTHING = {"baseline", "reader"}  # in the identities of baselines and of people
 _NEVER = "*"  # marks published cells that cannot be other than 0
 _AFTER_FAILURE = {
     "continue": "After a failed plan the next one is tried, as in the published script "
@@ -44,7 +45,8 @@ def overview_table(runs: Sequence[RunSummary]) -> Table:
         rows.append(Row((*names, success, second, *_sizes(task)[:3])))
     second_column = PAIRS_RIGHT if has_twins else "reward, % of the most"
     columns = (*NAME_COLUMNS, *map(Column, ("completed, %", second_column, *_COUNTS[:3])))
-    return Table("Plans, 95 % interval in brackets", columns, tuple(rows), result_notes(runs))
+    notes = (*result_notes(runs), *_decoding_notes(runs))
+    return Table("Plans, 95 % interval in brackets", columns, tuple(rows), notes)
 
 
 def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
@@ -69,7 +71,7 @@ def _success_table(
         success = [format_percent(task.success.get(column)) for column in FINAL_COLUMNS[:-1]]
         success.append(format_percent(task.success.get("total"), task.n_plans))
         rows.append(Row((*names, *success, format_percent(task.path_weighted), *_sizes(task))))
-    notes = [*result_notes(runs), *_conduct_notes(runs)]
+    notes = [*result_notes(runs), *_decoding_notes(runs), *_conduct_notes(runs)]
     if any(_is_comparable(run) for run in runs):
         for table in published_tables("plans"):
             for row in table.rows:
@@ -127,6 +129,24 @@ def _conduct_notes(runs: Sequence[RunSummary]) -> list[str]:
     """Return how runs went on after a failed plan; the paper's Algorithm 2 and script differ."""
     ways = {task.after_failure for run in runs for task in run.header.config.tasks.values()}
     return [text for way, text in _AFTER_FAILURE.items() if way in ways]
+
+
+def _decoding_notes(runs: Sequence[RunSummary]) -> list[str]:
+    """Return whose actions were drawn: greedy ones can be right far more often."""
+    drawn: dict[float, list[str]] = {}
+    for run in runs:
+        for task in run.header.config.tasks.values():
+            temperature = task.decoding.get("temperature", 0)
+            names = drawn.setdefault(temperature, [])
+            is_drawn = _DRAW_NOTHING.isdisjoint(run.header.config.model)
+            if is_drawn and run.header.name not in names:
+                names.append(run.header.name)
+    return [
+        f"Drawn at temperature {temperature:g}, not the likeliest actions (--greedy): "
+        f"{', '.join(names)}."
+        for temperature, names in drawn.items()
+        if temperature and names
+    ]
 
 
 def _reward_table(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:

@@ -6,9 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_eval.plans.records import StepRecord
+from infthor_eval.plans.suite import PlansSuite
 from infthor_eval.plans.summary import summarise_plans
+from infthor_eval.runs import RunSummary
 
-from ..helpers.plan_runs import TASK, make_plan_record, make_plans_config
+from ..helpers.plan_runs import TASK, make_plan_record, make_plans_config, make_plans_run
 
 
 def done_in(n_agent, n_expert, ended="done", index=0):
@@ -47,3 +49,31 @@ def test_it_is_never_above_the_share_of_completed_plans(plans):
     ]
     task = summarise_plans(make_plans_config(["t"]), records).tasks[TASK]
     assert 0 <= task.path_weighted.mean <= task.success["total"].mean + 1e-12
+
+
+def test_tables_say_whose_actions_were_drawn():
+    def run(label, temperature, **model):
+        records = [make_plan_record("t", 0, (0, 3))]
+        header = make_plans_run(label, records, model={"name": label, **model}).header
+        task = msgspec.structs.replace(
+            header.config.tasks[TASK], decoding={"temperature": temperature}
+        )
+        config = msgspec.structs.replace(header.config, tasks={TASK: task})
+        header = msgspec.structs.replace(header, config=config)
+        return RunSummary(header, summarise_plans(config, records))
+
+    runs = [
+        run("hot", 1.0),
+        run("greedy", 0.0),
+        run("warm", 0.5),
+        run("warmer", 0.5),
+        run("planner", 1.0, baseline="planner"),
+        run("a person", 1.0, reader="terminal"),
+    ]
+    for tables in (PlansSuite().overview(runs), PlansSuite().tables(runs)):
+        assert [note for table in tables for note in table.notes if "Drawn" in note] == [
+            "Drawn at temperature 1, not the likeliest actions (--greedy): hot.",
+            "Drawn at temperature 0.5, not the likeliest actions (--greedy): warm, warmer.",
+        ]
+    (overview,) = PlansSuite().overview(runs[1:2])
+    assert not any("Drawn" in note for note in overview.notes)
