@@ -6,7 +6,13 @@ from typing import Any
 from msgspec import UNSET
 
 from infthor_eval.distances import DISTANCES, LENGTHS
-from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes
+from infthor_eval.episodes.tables import (
+    NAME_COLUMNS,
+    endings_table,
+    named_tasks,
+    result_notes,
+    run_name,
+)
 from infthor_eval.formats.published import published_tables
 from infthor_eval.plans.config import PlansTaskConfig
 from infthor_eval.plans.summary import FINAL_COLUMNS, NEVER, PlanTaskSummary
@@ -133,19 +139,17 @@ def _conduct_notes(runs: Sequence[RunSummary]) -> list[str]:
 
 def _decoding_notes(runs: Sequence[RunSummary]) -> list[str]:
     """Return whose actions were drawn: greedy ones can be right far more often."""
-    drawn: dict[float, list[str]] = {}
+    drawn: dict[float, dict[str, None]] = {}  # names by temperature, each once and in order
     for run in runs:
-        for task in run.header.config.tasks.values():
-            temperature = task.decoding.get("temperature", 0)
-            names = drawn.setdefault(temperature, [])
-            is_drawn = _DRAW_NOTHING.isdisjoint(run.header.config.model)
-            if is_drawn and run.header.name not in names:
-                names.append(run.header.name)
+        if _DRAW_NOTHING.isdisjoint(run.header.config.model):
+            for task in run.header.config.tasks.values():
+                names = drawn.setdefault(task.decoding.get("temperature", 0), {})
+                names[run_name(run.header)] = None
     return [
         f"Drawn at temperature {temperature:g}, not the likeliest actions (--greedy): "
         f"{', '.join(names)}."
         for temperature, names in drawn.items()
-        if temperature and names
+        if temperature
     ]
 
 
