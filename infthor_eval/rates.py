@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Hashable, Sequence
+from statistics import fmean
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -20,6 +21,7 @@ __all__ = [
     "format_percent",
     "paired_rate",
     "rate_over_clusters",
+    "resampled_rate",
 ]
 
 
@@ -27,6 +29,7 @@ class Rate(msgspec.Struct, frozen=True, omit_defaults=True):
     """The mean of n values and its 95 % interval by trajectory (None with fewer than two).
 
     `n_all` is the number of units that were to have a value; None if all of them have one.
+    `all_equal`: all trajectories have this mean, so resampling them finds no interval.
     """
 
     mean: float
@@ -34,6 +37,7 @@ class Rate(msgspec.Struct, frozen=True, omit_defaults=True):
     high: float | None
     n: int
     n_all: int | None = None
+    all_equal: bool = False
 
     def out_of(self, n_all: int) -> "Rate":
         """Return the same mean as that of some of `n_all` units."""
@@ -66,6 +70,20 @@ def paired_rate(
     return _rate(paired_difference(first, second, clusters, most).estimate) if first else None
 
 
+def resampled_rate(values: Sequence[float], clusters: Sequence[Hashable]) -> Rate | None:
+    """Return the mean with the bootstrap interval over clusters (see `bootstrap_interval`).
+
+    Of values of any sign, such as differences. None without any.
+    """
+    from infthor_eval.statistics import bootstrap_interval
+
+    if not values:
+        return None
+    low, high = bootstrap_interval(values, clusters) or (None, None)
+    all_equal = low is None and len(set(clusters)) > 1
+    return Rate(fmean(values), low, high, len(values), all_equal=all_equal)
+
+
 def format_percent(rate: Rate | None, n_all: int = 0) -> TableCell:
     """Return a share as a table cell, in percent; `n_all` units were to have a value."""
     return _format(rate, 100.0, n_all)
@@ -91,4 +109,5 @@ def _format(rate: Rate | None, factor: float, n_all: int) -> TableCell:
     low, high = (None if end is None else factor * end for end in (rate.low, rate.high))
     interval = interval_cell(low, high)
     numbers = {"": mean.numbers[""], **interval.numbers, **mean.numbers}
-    return TableCell(mean if low is None else f"{mean} {interval}", numbers)
+    shown = "[all equal]" if rate.all_equal else "" if low is None else interval
+    return TableCell(f"{mean} {shown}".rstrip(), numbers)

@@ -27,6 +27,7 @@ __all__ = [
 ]
 
 _LEVEL = 0.95
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -152,14 +153,14 @@ def bootstrap_interval(
 ) -> tuple[float, float] | None:
     """Return the 95 % percentile interval of the mean over resampled clusters.
 
-    It is None where resampling has nothing to vary: with fewer than two clusters, or if all scores
-    are equal. The same seed and the same order of clusters give the same interval.
+    It is None where resampling has nothing to vary: with fewer than two clusters, or if all have
+    one mean. The same seed and the same order of clusters give the same interval.
 
     Raises:
         DataError: as in `clustered_mean`.
     """
     totals, sizes = _partition(scores, clusters)
-    if len(sizes) < 2 or min(scores) == max(scores):
+    if len(sizes) < 2 or np.ptp(totals / sizes) < _ROUNDING:
         return None
     picks = np.random.default_rng(seed).integers(len(sizes), size=(n_resamples, len(sizes)))
     means = totals[picks].sum(axis=1) / sizes[picks].sum(axis=1)

@@ -125,7 +125,10 @@ def _groups(run: PresentedRun, task: str, records: Sequence[Record]) -> Iterator
     for it in run.presenter.group_scores(records):
         by_metric.setdefault(it.metric, []).append(Scored(it.group, it.cluster, it.score))
     for number, (metric, samples) in enumerate(by_metric.items()):
-        yield _measure(run, task, metric, samples, is_primary=number == 0)
+        # As in our tables: the interval of a difference is over resampled clusters.
+        resampled = run.presenter.bounds(metric)[0] < 0
+        is_primary = number == 0
+        yield _measure(run, task, metric, samples, is_primary=is_primary, resampled=resampled)
 
 
 def _metrics(run: PresentedRun, task: str, records: Sequence[Record]) -> Iterator[Measure]:

@@ -6,12 +6,14 @@ A request is a question. The functions are those of our own runs, in lm-eval's f
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from statistics import fmean
+from typing import Any, NamedTuple
 
 from PIL import Image
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.question import Answer
 from infthor_eval.harness.registration import model_takes_references, register
 from infthor_eval.harness.requests import Doc
 from infthor_eval.nieh.asking.recalling import recall_all
@@ -21,6 +23,7 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.nieh.scoring import scores
 from infthor_eval.nieh.task import PreparedTask
+from infthor_eval.pairs import PAIR_BOUNDS, PairShares
 from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.runs.generation_kwargs import decoding_of
 
@@ -30,7 +33,9 @@ __all__ = [
     "doc_to_image",
     "doc_to_target",
     "doc_to_text",
+    "net_pairs",
     "pair_accuracy",
+    "pairs_exchanged",
     "process_pair",
     "process_results",
 ]
@@ -90,24 +95,57 @@ def process_results(doc: Doc, results: list[str]) -> dict[str, float]:
     return scores(results[0], json.loads(doc["answers"]))
 
 
+class _Side(NamedTuple):
+    """One world's question of a pair, with the reply to it."""
+
+    pair: str
+    variant: str
+    reply: str
+    answers: list[Answer]
+
+    def is_right(self, answers: Sequence[Answer]) -> bool:
+        """Return True if the reply has full marks for these answers, of either world."""
+        return scores(self.reply, answers)["strict"] >= 1
+
+
 def process_pair(doc: Doc, results: list[str]) -> dict[str, Any]:
-    """Return both scores of a response, and what `pair_accuracy` needs of one world's."""
-    by_scorer = process_results(doc, results)
-    side = doc["pair"], doc["variant"], by_scorer["strict"] >= 1
-    return {**by_scorer, "pair_accuracy": side}
+    """Return both scores of a response, and what the metrics of pairs need of one world's."""
+    side = _Side(doc["pair"], doc["variant"], results[0], json.loads(doc["answers"]))
+    return process_results(doc, results) | dict.fromkeys(PAIR_BOUNDS, side)
 
 
-def pair_accuracy(sides: Sequence[tuple[str, str, bool]]) -> float:
-    """Return the share of pairs that are right in both worlds (aggregation of `nieh_twins`).
+def net_pairs(sides: Sequence[_Side]) -> float:
+    """Return pairs right less pairs exchanged (aggregation of `nieh_twins`).
 
     Questions whose twin was not asked are in no pair; without any pair it is 0.
     """
-    pairs: dict[tuple[str, str], list[bool]] = {}
-    for pair, variant, is_right in sides:
-        if pair:
-            pairs.setdefault((pair, variant), []).append(is_right)
-    whole = [rights for rights in pairs.values() if len(rights) == 2]
-    return sum(map(all, whole)) / len(whole) if whole else 0.0
+    return _mean(sides, "net_pairs")
+
+
+def pair_accuracy(sides: Sequence[_Side]) -> float:
+    """Return the share of pairs that are right in both worlds; see `net_pairs`."""
+    return _mean(sides, "pair_accuracy")
+
+
+def pairs_exchanged(sides: Sequence[_Side]) -> float:
+    """Return the share of pairs with both replies right in the other world; see `net_pairs`."""
+    return _mean(sides, "pairs_exchanged")
+
+
+def _mean(sides: Sequence[_Side], metric: str) -> float:
+    pairs: dict[tuple[str, str], list[_Side]] = {}
+    for side in sides:
+        if side.pair:
+            pairs.setdefault((side.pair, side.variant), []).append(side)
+    scores = [_shares(*both).by_metric[metric] for both in pairs.values() if len(both) == 2]
+    return fmean(scores) if scores else 0.0
+
+
+def _shares(one: _Side, two: _Side) -> PairShares:
+    return PairShares(
+        right=float(one.is_right(one.answers) and two.is_right(two.answers)),
+        exchanged=float(one.is_right(two.answers) and two.is_right(one.answers)),
+    )
 
 
 class NiehRequests:

@@ -18,6 +18,7 @@ from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import Doc, doc_of
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.scoring import SCORERS, STRICT_RULES, scores
+from infthor_eval.pairs import PAIR_BOUNDS
 from infthor_eval.quantities import require_number
 from infthor_eval.runs.catalog import TaskFile
 from infthor_eval.storage.deadlines import limit_by
@@ -30,7 +31,6 @@ _OURS = (
     "infthor_eval.harness.nieh_task.process_results",
     "infthor_eval.harness.nieh_task.process_pair",
 )
-_PAIRS = "pair_accuracy"  # of two samples, so no metric of one: summaries have it wherever it is
 ProcessResults = Callable[[Doc, list[str]], Mapping[str, Any]]
 
 
@@ -99,7 +99,12 @@ def metrics_of(task: TaskFile) -> Metrics:
     name = task.settings["process_results"]
     listed = task.settings.get("metric_list") or []
     if name in _OURS:
-        listed = [it for it in listed if not isinstance(it, Mapping) or it.get("metric") != _PAIRS]
+        # Those of pairs are of two samples, so no metrics of one: summaries have them anyway.
+        listed = [
+            it
+            for it in listed
+            if not isinstance(it, Mapping) or it.get("metric") not in PAIR_BOUNDS
+        ]
     for entry in listed:
         _check(entry, f"{task.path}: metric_list: ")
     if name in _OURS:

@@ -61,7 +61,7 @@ class ShownClues(msgspec.Struct, frozen=True, kw_only=True):
     n_after: Count | None = None
 
 
-class TwinSide(msgspec.Struct, frozen=True, kw_only=True):
+class TwinSide(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """One question of a pair of twins: what it is paired with, and how much of the change it shows.
 
     Attributes:
@@ -76,6 +76,8 @@ class TwinSide(msgspec.Struct, frozen=True, kw_only=True):
         n_after_clues: number of shown frames after the last clue; likewise.
         n_since_change: number of frames of the trajectory since the changed objects were last
             changed by the agent; None if it left them as they were at the start.
+        scores: what the reply scores in the other world, by the task's own metrics; empty for ours,
+            which `answers` tell.
     """
 
     pair: str
@@ -87,6 +89,7 @@ class TwinSide(msgspec.Struct, frozen=True, kw_only=True):
     n_differing: Count | None
     n_after_clues: Count | None
     n_since_change: Count | None
+    scores: dict[str, Number] = {}
 
 
 class NiehRecall(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="nieh_recall"):

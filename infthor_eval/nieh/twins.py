@@ -1,6 +1,6 @@
 """Questions of twins in a set: what each is paired with, and how long ago that last changed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 
 from infthor_eval.errors import DataError
@@ -10,8 +10,15 @@ from infthor_eval.formats.step_log import ObjectState, iter_object_states, read_
 from infthor_eval.nieh.contexts.base import Sample
 from infthor_eval.nieh.records import TwinSide
 from infthor_eval.nieh.samples import TaskSamples
+from infthor_eval.storage.digests import seed_of
 
-__all__ = ["twin_of_reply", "twin_side"]
+__all__ = ["first_world", "twin_of_reply", "twin_side"]
+
+
+def first_world(traj_ids: Iterable[str]) -> str:
+    """Return which of the trajectories of a pair of worlds is asked about first, drawn by both."""
+    ordered = sorted(traj_ids)
+    return ordered[seed_of("\n".join(ordered)) % len(ordered)]
 
 
 def twin_side(task_samples: TaskSamples, sample: Sample) -> TwinSide | None:

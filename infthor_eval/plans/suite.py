@@ -66,7 +66,7 @@ class PlansSuite:
         return {"success": float(payload.done), **reward, **first_place_score(payload)}
 
     def primary_metrics(self, summary: PlansSummary) -> Mapping[str, Rate]:
-        """See `Suite.primary_metrics`: pair accuracy of twins, else share of completed plans."""
+        """See `Suite.primary_metrics`: net pairs of twins, else share of completed plans."""
         rates = {name: _primary_rate(task) for name, task in summary.tasks.items()}
         return {name: rate for name, rate in rates.items() if rate is not None}
 
@@ -80,4 +80,4 @@ class PlansSuite:
 
 
 def _primary_rate(task: PlanTaskSummary) -> Rate | None:
-    return task.success.get("total") if task.twins is UNSET else task.twins.pair_accuracy
+    return task.success.get("total") if task.twins is UNSET else task.twins.net_pairs

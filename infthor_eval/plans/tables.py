@@ -16,7 +16,7 @@ from infthor_eval.episodes.tables import (
 from infthor_eval.formats.published import published_tables
 from infthor_eval.plans.config import PlansTaskConfig
 from infthor_eval.plans.summary import FINAL_COLUMNS, NEVER, PlanTaskSummary
-from infthor_eval.plans.twins.tables import PAIRS_RIGHT, format_pairs, twin_tables
+from infthor_eval.plans.twins.tables import NET_PAIRS, format_pairs, twin_tables
 from infthor_eval.rates import Rate, format_number, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
@@ -49,7 +49,7 @@ def overview_table(runs: Sequence[RunSummary]) -> Table:
         success = format_percent(task.success.get("total"), task.n_plans)
         second = format_pairs(task.twins) if has_twins else format_percent(task.reward_share)
         rows.append(Row((*names, success, second, *_sizes(task)[:3])))
-    second_column = PAIRS_RIGHT if has_twins else "reward, % of the most"
+    second_column = NET_PAIRS if has_twins else "reward, % of the most"
     columns = (*NAME_COLUMNS, *map(Column, ("completed, %", second_column, *_COUNTS[:3])))
     notes = (*result_notes(runs), *_decoding_notes(runs))
     return Table("Plans, 95 % interval in brackets", columns, tuple(rows), notes)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as MatplotlibFigure
 
 __all__ = [
+    "NET_PAIRS",
     "PAIRS_FINDING",
     "THOUGHT",
     "Description",
@@ -44,7 +45,9 @@ __all__ = [
 ]
 
 Record = UnitRecord[Any]
-PAIRS_FINDING = "gets {} of the pairs right"  # of twins, in any suite
+# Of twins, in any suite.
+NET_PAIRS = "net pairs"
+PAIRS_FINDING = "has {} net pairs"
 THOUGHT = "thought"  # name of the detail of a record that a model thought before its reply
 FindFrames = Callable[[Record], Sequence[FrameRef]]
 

@@ -6,6 +6,8 @@ from statistics import fmean
 from infthor_eval.exports.subjects import engine_of
 from infthor_eval.formats.published import published_tables
 from infthor_eval.nieh.results.above_guessing import above_guessing
+from infthor_eval.nieh.results.pair_summary import find_pairs
+from infthor_eval.pairs import PairShares, net_pairs
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.report.leaderboard.page import LeaderboardRow
 from infthor_eval.submissions.checking import Verdict
@@ -63,16 +65,19 @@ def _row(statement: Statement, task: Expected, remarks: Sequence[str]) -> Leader
 
 
 def _pairs(task: Expected) -> Rate | None:
-    """Return the pairs with both answers right; one without both replies is wrong."""
-    found: dict[tuple[str, str, int], list[float]] = {}
+    """Return the net pairs; one without both replies is neither right nor exchanged."""
+    shares: dict[tuple[str, str, int], PairShares] = {}
     clusters = {}
     for record in task.graded:
         if record.payload.twin is not None:
             key = record.payload.twin.pair, record.variant, record.repeat
-            found.setdefault(key, []).append(record.payload.scores.get(_SCORER, 0.0))
+            shares[key] = PairShares(0.0, 0.0)
             clusters[key] = record.cluster
-    rights = [float(min(scores) >= 1) for scores in found.values()]
-    return clustered_rate(rights, list(clusters.values()))
+    for pair in find_pairs(task.graded)[0]:
+        side = pair.sides[0]
+        key = side.twin.pair, side.record.variant, side.record.repeat
+        shares[key] = pair.shares(_SCORER)
+    return net_pairs(list(shares.values()), list(clusters.values()))
 
 
 def _above(task: Expected) -> Rate | None:

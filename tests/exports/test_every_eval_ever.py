@@ -98,8 +98,15 @@ def test_the_mean_of_the_samples_is_the_score(runs, export, suite):
 def test_numbers_of_the_summary_and_their_intervals(questions_run, export):
     _, aggregate, _ = read(export(questions_run, "every-eval-ever"))
     results = results_of(aggregate)
-    assert next(iter(results)) == "nieh_gt/pair_accuracy"
+    assert list(results)[:3] == [
+        f"nieh_gt/{name}" for name in ("net_pairs", "pair_accuracy", "pairs_exchanged")
+    ]
     summary = json.loads((questions_run / "results.json").read_text())["summary"]["tasks"]
+    for name in ("net_pairs", "pair_accuracy", "pairs_exchanged"):
+        told = results[f"nieh_gt/{name}"]["score_details"]
+        assert told["score"] == pytest.approx(summary["nieh_gt"]["pairs"][name]["mean"])
+    config = results["nieh_gt/net_pairs"]["metric_config"]
+    assert (config["min_score"], config["max_score"]) == (-1.0, 1.0)
     strict = summary["nieh_gt"]["by_clues"]["total"]["scores"]["strict"]
     details = results["nieh_gt/strict"]["score_details"]
     interval = details["uncertainty"]["confidence_interval"]
@@ -133,7 +140,7 @@ def test_a_line_has_request_reply_and_all_else(questions_run, export):
         row["output"]["raw"][0],
         row["input"]["reference"][0],
     )
-    pair = next(row for row in rows if row["evaluation_result_id"] == "nieh_gt/pair_accuracy")
+    pair = next(row for row in rows if row["evaluation_result_id"] == "nieh_gt/net_pairs")
     assert len(json.loads(pair["metadata"]["members"])) == len(pair["output"]["raw"]) == 4
 
 

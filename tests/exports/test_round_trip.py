@@ -54,7 +54,7 @@ def test_replies_and_scores_are_equal(questions_run, export, bring_back, file_fo
     ]
     assert said[0] == said[1]
     (_, before), (_, after) = results(questions_run), results(back)
-    assert after["pairs"]["pair_accuracy"] == before["pairs"]["pair_accuracy"]
+    assert after["pairs"]["net_pairs"] == before["pairs"]["net_pairs"]
     assert after["pairs"]["single"] == before["pairs"]["single"]
     assert after["by_clues"]["total"]["scores"] == before["by_clues"]["total"]["scores"]
     assert after["above_guessing"] == before["above_guessing"]

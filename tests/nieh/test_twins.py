@@ -5,7 +5,7 @@ import json
 import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.harness.nieh_task import pair_accuracy, process_pair
+from infthor_eval.harness.nieh_task import net_pairs, pair_accuracy, pairs_exchanged, process_pair
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.nieh.twins import twin_side
 
@@ -66,10 +66,10 @@ def test_the_oracle_has_all_pairs_and_blind_none(twins, tmp_path, run_cli):
             "run", "--model", model, "--tasks", "nieh_twins", "--data", twins, "--output", out
         )
         assert code == 0
-        assert "Twins: pairs right, %" in printed
+        assert "Twins: net pairs, %" in printed
         found = results(out)
         assert found["primary_metrics"]["nieh_twins"]["mean"] == expected
-        assert found["summary"]["tasks"]["nieh_twins"]["pairs"]["pair_accuracy"]["mean"] == expected
+        assert found["summary"]["tasks"]["nieh_twins"]["pairs"]["net_pairs"]["mean"] == expected
         assert found["summary"]["tasks"]["nieh_twins"]["pairs"]["n_trajectories"] == 2
 
 
@@ -107,8 +107,9 @@ def test_a_set_without_its_pairs_is_named(twins, tmp_path, run_cli):
     assert "twins.jsonl" in err
 
 
-def test_the_metric_of_lm_eval_is_the_same(twins):
+def test_the_metrics_of_lm_eval_are_the_same(twins):
     data = NiehSet(twins)
+    answers = {(it.pair, it.traj_id): it.answers for it in data.questions}
     sides = []
     for question in data.questions:
         doc = {
@@ -116,7 +117,13 @@ def test_the_metric_of_lm_eval_is_the_same(twins):
             "pair": question.pair,
             "variant": "",
         }
-        reply = question.answers[0] if question.pair == "swap-1/1" else "bowl"
-        sides.append(process_pair(doc, [reply])["pair_accuracy"])
-    assert pair_accuracy(sides) == 1 / 4
-    assert pair_accuracy(sides[:1]) == 0.0
+        (other,) = (
+            answer
+            for (pair, traj_id), answer in answers.items()
+            if pair == question.pair and traj_id != question.traj_id
+        )
+        said = {"swap-1/1": question.answers[0], "swap-1/2": other[0]}
+        sides.append(process_pair(doc, [said.get(question.pair, "bowl")])["net_pairs"])
+    assert pair_accuracy(sides) == pairs_exchanged(sides) == 1 / 4
+    assert net_pairs(sides) == 0.0
+    assert net_pairs(sides[:1]) == pair_accuracy(sides[:1]) == 0.0

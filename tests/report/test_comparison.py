@@ -134,27 +134,33 @@ def test_runs_are_compared_on_pairs_of_twins_clustered_by_what_they_were_made_of
         for of_run in ((SAME, SAME, BOTH, SWAPPED), (BOTH, BOTH, BOTH, SAME))
     )
     comparisons = compared(first, second)
-    assert list(comparisons) == ["pair_accuracy", "reference", "strict"]
-    pairs = comparisons["pair_accuracy"]
-    assert (pairs.first, pairs.second) == (0.25, 0.75)
+    assert list(comparisons) == [
+        *("net_pairs", "pair_accuracy", "pairs_exchanged", "reference", "strict")
+    ]
+    pairs = comparisons["net_pairs"]
+    assert (pairs.first, pairs.second) == (0.0, 0.75)  # the first exchanges the worlds of one pair
+    assert (comparisons["pair_accuracy"].first, comparisons["pairs_exchanged"].first) == (
+        0.25,
+        0.25,
+    )
     assert (pairs.difference.estimate.n, pairs.difference.estimate.n_clusters) == (4, 3)
-    assert pairs.difference.estimate.mean == pytest.approx(0.5)
+    assert pairs.difference.estimate.mean == pytest.approx(0.75)
     assert (pairs.is_share, pairs.n_unshared, pairs.drawing) == (True, 0, None)
     # Single answers alone hide it: half of them are right where a pair is answered the same.
     strict = comparisons["strict"]
     assert (strict.first, strict.second, strict.difference.estimate.n) == (0.5, 0.875, 8)
-    assert "pair_accuracy" not in compared(first, second, PlainPresenter())
+    assert "net_pairs" not in compared(first, second, PlainPresenter())
 
 
 def test_a_pair_that_one_run_has_not_is_counted_and_repetitions_are_one_pair():
     first = [*make_twins(0, BOTH, "t"), *make_twins(1, SAME, "u")]
     again = [replace(record, repeat=2) for record in make_twins(0, SAME, "t")]
     second = [*make_twins(0, BOTH, "t"), *again, *make_twins(1, BOTH, "u")[:1]]
-    pairs = compared(first, second)["pair_accuracy"]
+    pairs = compared(first, second)["net_pairs"]
     assert (pairs.first, pairs.second, pairs.difference.estimate.n) == (1.0, 0.5, 1)
     assert pairs.n_unshared == 1
     row = comparison_table([pairs], "a", "b").rows[0].cells
-    assert row[:6] == ("nieh_gt", "pair_accuracy", "%", "100.00", "50.00", "-50.00")
+    assert row[:6] == ("nieh_gt", "net_pairs", "%", "100.00", "50.00", "-50.00")
 
 
 def test_pairs_of_a_task_without_the_strict_scorer_are_compared_in_its_own():

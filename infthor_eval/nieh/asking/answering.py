@@ -26,7 +26,7 @@ from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.metrics import MetricError
 from infthor_eval.nieh.records import NiehAnswer, NiehRecall
 from infthor_eval.nieh.task import PreparedTask
-from infthor_eval.nieh.twins import twin_side
+from infthor_eval.nieh.twins import first_world, twin_side
 from infthor_eval.nieh.units import NiehUnit, shown_clues
 from infthor_eval.runs import NOTHING, ReadHashes, Session, Tokens, UnitRecord, Usage
 from infthor_eval.storage.digests import fingerprint
@@ -83,18 +83,19 @@ class _UnitRequest:
     ) -> UnitRecord[NiehAnswer]:
         """Return the record of a reply; failed, with the reply, if the metrics fail on it."""
         scores = {}
+        twin = self.unit.payload.twin
         failure = None
         thinking, answer = answer_of(reply)
         answer = self.prepared.cut(answer)
         try:
-            scores = self.prepared.metrics.scores(
-                self.prepared.task_samples, self.unit.sample, answer
-            )
+            scores = self._scores(answer, self.unit.payload.answers)
+            if twin is not None and self.prepared.metrics.process is not None:
+                twin = replace_fields(twin, scores=self._scores(answer, twin.answers))
         except MetricError as error:
             failure = session.describe_failure(self.unit, error)
         return self.unit.record(
             self.fingerprint,
-            self._answered(reply, answer, scores, thinking),
+            replace_fields(self._answered(reply, answer, scores, thinking), twin=twin),
             failure=failure,
             faults=(*faults, *reply.faults),
             seconds=round(seconds, 4),
@@ -102,6 +103,12 @@ class _UnitRequest:
             usage=usage,
             read=ReadHashes(reply.context_hash, reply.frames_hash),
         )
+
+    def _scores(self, answer: str, answers: Sequence[Answer]) -> dict[str, float]:
+        """Return what an answer scores against gold answers, those of the other world included."""
+        sample = self.unit.sample
+        asked = replace(sample, question=replace(sample.question, answers=tuple(answers)))
+        return self.prepared.metrics.scores(self.prepared.task_samples, asked, answer)
 
     def _answered(
         self, reply: Reply, answer: str, scores: dict[str, float], thinking: str | None
@@ -199,7 +206,7 @@ class OpenModel:
 
 
 class OpenBaseline:
-    """A baseline, which reads no context and has no memory."""
+    """A baseline, which has no memory."""
 
     batch_size = 1
     batch_contexts = False
@@ -214,7 +221,7 @@ class OpenBaseline:
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
         """See `OpenAnswerer`."""
-        return [Reply(self._predict(request.unit.sample)) for request in requests]
+        return [Reply(self._predict(request.unit.sample, request.context)) for request in requests]
 
     def usage(self, reply: Reply) -> Usage:
         """See `OpenAnswerer`."""
@@ -231,8 +238,9 @@ def answer_units(
 
     Those with one context are answered together, and all of them if the answerer batches contexts.
     Neighbours share as long a prefix as there is, which a model's conversation encodes once; so do
-    the repetitions of a question. The order depends on the units alone, so it is the same when a
-    run is resumed.
+    the repetitions of a question. Of two worlds the one that is drawn comes first, so that their
+    order tells nothing. The order depends on the units alone, so it is the same when a run is
+    resumed.
     """
     requests = []
     for unit, recalled in _recall_all(units, prepared, answerer, session):
@@ -243,7 +251,7 @@ def answer_units(
         except (DataError, ModelError, UserCodeError) as error:
             yield unit.record_failure(session.describe_failure(unit, error), asked=_is_asked(error))
     waiting: list[_UnitRequest] = []
-    for _, in_one_context in groupby(sorted(requests, key=_names), key=_names):
+    for _, in_one_context in groupby(_in_order(requests), key=_names):
         waiting += in_one_context
         if not answerer.batch_contexts:
             yield from _answer_in_batches(waiting, answerer, session)
@@ -270,6 +278,30 @@ def _content(part: Part) -> Any:
     if isinstance(part, Video):
         return {"video": [frame.digest for frame in part.frames], "fps": part.fps}
     return [part.digest] if isinstance(part, FrameRef) else part
+
+
+def _in_order(requests: Sequence[_UnitRequest]) -> list[_UnitRequest]:
+    """Return requests by their contexts; of a pair, the other world's after the first one's."""
+    worlds: dict[tuple[str, str, int], dict[str, list[str]]] = {}
+    for request in requests:
+        worlds.setdefault(_pair(request), {})[_world(request)] = _names(request)
+
+    def place(request: _UnitRequest) -> tuple[list[str], bool, list[str]]:
+        names = worlds[_pair(request)]
+        first = first_world(names)
+        return names[first], _world(request) != first, names[_world(request)]
+
+    return sorted(requests, key=place)
+
+
+def _pair(request: _UnitRequest) -> tuple[str, str, int]:
+    """Return what the questions of a pair have in common; of another question what tells it."""
+    key = request.unit.key
+    return request.unit.sample.question.pair or key.id, key.variant, key.repeat
+
+
+def _world(request: _UnitRequest) -> str:
+    return request.unit.sample.question.traj_id
 
 
 def _names(request: _UnitRequest) -> list[str]:

@@ -29,8 +29,8 @@ _ON_CLUES = (
     "what is of this home there is shown minus other."
 )
 _PAIRS = (
-    "pairs: both worlds' answers right, %. Who sees the same in both worlds has none, whatever it "
-    "knows of homes."
+    "net pairs: pairs right less pairs exchanged, %. Who sees the same in both worlds has 0, "
+    "whatever it knows of homes."
 )
 
 _Controls = Mapping[str, RunSummary]  # runs that are alike but for the frames, by these
@@ -46,7 +46,7 @@ def control_tables(runs: Sequence[RunSummary]) -> list[Table]:
     columns = (
         *(Column(name, False) for name in ("model", "task", "context")),
         *map(Column, _FRAMES),
-        *(Column(f"pairs, {name}") for name in _FRAMES if with_pairs),
+        *(Column(f"net pairs, {name}") for name in _FRAMES if with_pairs),
         *map(Column, ("of which memory", "knowledge of homes", "n")),
     )
     rows = tuple(Row(tuple(_cells(group, task, with_pairs))) for group, task in found)
@@ -96,7 +96,7 @@ def _cells(group: _Controls, task: str, with_pairs: bool) -> Iterator[str]:
         yield mean_cell(tasks[frames].total if frames in tasks else None, metric, 1)
     for frames in _FRAMES if with_pairs else ():
         pairs = tasks[frames].pairs if frames in tasks else None
-        yield format_percent(pairs.pair_accuracy if pairs else None)
+        yield format_percent(pairs.net_pairs if pairs else None)
     for frames, without in _DIFFERENCES:
         is_known = frames in group and without in group
         yield gain_cell(

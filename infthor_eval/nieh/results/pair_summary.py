@@ -1,8 +1,7 @@
-"""How pairs of twins were answered: both right or nothing (docs/reference/metrics.md).
+"""How pairs of twins were answered (docs/reference/metrics.md).
 
-A pair is one question in two worlds that differ in one thing. Who answers without seeing that says
-the same in both worlds, and has no pair right. Intervals are clustered by the trajectory that both
-worlds were made of, so pairs of one edit, and of one fact, are within one cluster.
+Intervals are clustered by the trajectory that both worlds were made of, so pairs of one edit, and
+of one fact, are within one cluster.
 """
 
 from collections import Counter
@@ -10,14 +9,16 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from statistics import fmean
+from typing import NamedTuple
 
 import msgspec
 
 from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
 from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.records import NiehAnswer, TwinSide
-from infthor_eval.nieh.scoring import plain_form, score
-from infthor_eval.rates import Rate, clustered_rate
+from infthor_eval.nieh.scoring import SCORERS, plain_form, scores
+from infthor_eval.pairs import PAIR_BOUNDS, PairShares
+from infthor_eval.rates import Rate, clustered_rate, resampled_rate
 from infthor_eval.runs import UnitRecord
 
 __all__ = [
@@ -49,39 +50,42 @@ class PairSummary(msgspec.Struct, frozen=True):
         n_trajectories: number of trajectories that their worlds were made of.
         n_incomplete: number of questions that have no answer, or whose twin has none; they are in
             no pair.
-        pair_accuracy: both answers right, with full marks: the primary metric.
-        by_fact: mean over facts of the accuracy of their pairs.
+        net_pairs: pairs right less pairs exchanged: the primary metric, -1 to 1, with the
+            bootstrap interval of that difference.
+        pair_accuracy: both answers right, with full marks.
+        pairs_exchanged: both answers right in the other world, with full marks there.
+        by_fact: mean over facts of their net pairs.
         single: single answers right, with full marks.
         flipped: the reply to the twin is another.
         right_when_flipped: of these pairs, both right; None if no reply differs.
         one_right: exactly one of both is right.
         one_is_commoner: of these pairs, the right one has the commoner gold answer of its form
             (a half where both are as common): prior knowledge, not memory; None if there are none.
-        wrong_twin: single answers that are wrong, and right in the other world.
-        by_kind: accuracy by kind of edit.
-        by_question_type: accuracy by type of question.
-        by_distance: accuracy by frames between the last clue and the end of the trajectory.
-        by_tokens: accuracy by thousand tokens of the frames shown after the last clue, where the
+        by_kind: net pairs by kind of edit.
+        by_question_type: net pairs by type of question.
+        by_distance: net pairs by frames between the last clue and the end of the trajectory.
+        by_tokens: net pairs by thousand tokens of the frames shown after the last clue, where the
             model counts tokens.
-        by_shown: accuracy by the number of frames shown.
-        by_difference: accuracy by whether a frame that differs was shown in both worlds.
-        by_age: accuracy by frames since the agent last changed what is asked about; "never" where
+        by_shown: net pairs by the number of frames shown.
+        by_difference: net pairs by whether a frame that differs was shown in both worlds.
+        by_age: net pairs by frames since the agent last changed what is asked about; "never" where
             it is as at the start.
-        scores: score of each pair, by the trajectory that its worlds were made of.
+        scores: net score of each pair, by the trajectory that its worlds were made of.
     """
 
     n_pairs: int
     n_facts: int
     n_trajectories: int
     n_incomplete: int
+    net_pairs: Rate
     pair_accuracy: Rate
+    pairs_exchanged: Rate
     by_fact: Rate
     single: Rate
     flipped: Rate
     right_when_flipped: Rate | None
     one_right: Rate
     one_is_commoner: Rate | None
-    wrong_twin: Rate
     by_kind: dict[str, Rate]
     by_question_type: dict[str, Rate]
     by_distance: dict[str, Rate]
@@ -120,6 +124,14 @@ class TwinRecords:
         """Return True if both answers have full marks."""
         return all(self.rights(metric))
 
+    def is_exchanged(self, metric: str) -> bool:
+        """Return True if both answers have full marks in the other world."""
+        return all(_is_right_in_twin(side, metric) for side in self.sides)
+
+    def shares(self, metric: str) -> PairShares:
+        """Return whether it is right, and whether it is exchanged."""
+        return PairShares(float(self.is_right(metric)), float(self.is_exchanged(metric)))
+
     @property
     def is_flipped(self) -> bool:
         """True if both were answered, and not the same."""
@@ -127,14 +139,14 @@ class TwinRecords:
         return first is not None and second is not None and first != second
 
 
-class PairScore(msgspec.Struct, frozen=True):
-    """A pair's score, 0 to 1: the share of its repetitions in which both answers are right."""
+class PairScore(NamedTuple):
+    """The score of a pair over its repetitions."""
 
     pair: str
     variant: str
     fact: str
     cluster: str
-    score: float
+    shares: PairShares
 
 
 def find_pairs(records: Iterable[Record]) -> tuple[list[TwinRecords], int]:
@@ -164,6 +176,8 @@ def summarise_pairs(
 ) -> PairSummary | None:
     """Return how the pairs of a task were answered under its main metric; None without any.
 
+    A pair that lacks an answer is in no rate, and in the number of those that were to be answered.
+
     Args:
         n_missing: number of questions that a stopped run did not come to.
     """
@@ -172,8 +186,8 @@ def summarise_pairs(
         return None
     summary = _Pairs(pairs, metric).summary(n_incomplete)
     n_lost = _n_lost(records, n_missing)
-    accuracy = summary.pair_accuracy.out_of(summary.n_pairs + n_lost)
-    return msgspec.structs.replace(summary, pair_accuracy=accuracy)
+    of_all = {name: getattr(summary, name).out_of(summary.n_pairs + n_lost) for name in PAIR_BOUNDS}
+    return msgspec.structs.replace(summary, **of_all)
 
 
 def _n_lost(records: Sequence[Record], n_missing: int) -> int:
@@ -202,6 +216,7 @@ class _Pairs:
     def summary(self, n_incomplete: int) -> PairSummary:
         """Return the summary."""
         scores = list(_scores(self.pairs, self.metric))
+        clusters = [it.cluster for it in scores]
         flipped = [pair for pair in self.pairs if pair.is_flipped]
         one_right = [pair for pair in self.pairs if sum(pair.rights(self.metric)) == 1]
         return PairSummary(
@@ -209,14 +224,15 @@ class _Pairs:
             n_facts=len({it.fact for it in scores}),
             n_trajectories=len({it.cluster for it in scores}),
             n_incomplete=n_incomplete,
-            pair_accuracy=_certain([it.score for it in scores], [it.cluster for it in scores]),
+            net_pairs=_net([it.shares.net for it in scores], clusters),
+            pair_accuracy=_certain([it.shares.right for it in scores], clusters),
+            pairs_exchanged=_certain([it.shares.exchanged for it in scores], clusters),
             by_fact=_by_fact(scores),
             single=self._of_sides(lambda side: _is_right(side.record, self.metric)),
             flipped=_mean(self.pairs, lambda pair: pair.is_flipped),
             right_when_flipped=self._right(flipped) if flipped else None,
             one_right=_mean(self.pairs, lambda pair: sum(pair.rights(self.metric)) == 1),
             one_is_commoner=self._commoner(one_right) if one_right else None,
-            wrong_twin=self._of_sides(self._is_wrong_twin),
             by_kind=self._by(lambda pair: pair.sides[0].twin.kind),
             by_question_type=self._by(lambda pair: pair.sides[0].record.payload.question_type),
             by_distance=self._by(_distance, DISTANCES),
@@ -238,22 +254,17 @@ class _Pairs:
     def _by(
         self, name_of: Callable[[TwinRecords], str | None], order: Sequence[str] = ()
     ) -> dict[str, Rate]:
-        """Return the accuracy of groups of pairs, in this order, else by name."""
+        """Return the net pairs of groups of pairs, in this order, else by name."""
         groups: dict[str, list[TwinRecords]] = {}
         for pair in self.pairs:
             name = name_of(pair)
             if name is not None:
                 groups.setdefault(name, []).append(pair)
         return {
-            name: self._right(groups[name]) for name in order or sorted(groups) if name in groups
+            name: _net([it.shares(self.metric).net for it in same], [it.cluster for it in same])
+            for name, same in ((name, groups.get(name)) for name in order or sorted(groups))
+            if same
         }
-
-    def _is_wrong_twin(self, side: _Side) -> bool:
-        """Return True for an answer that is right in the other world alone: the wrong memory."""
-        reply = side.record.payload.reply
-        if reply is None or _is_right(side.record, self.metric):
-            return False
-        return score(last_line(reply), side.twin.answers, "strict") >= 1
 
     def _commoner(self, pairs: Sequence[TwinRecords]) -> Rate:
         """Return how often the answer that was got right is the commoner one of its form."""
@@ -288,7 +299,10 @@ def _scores(pairs: Sequence[TwinRecords], metric: str) -> Iterator[PairScore]:
             variant,
             repetitions[0].sides[0].twin.fact,
             repetitions[0].cluster,
-            fmean(pair.is_right(metric) for pair in repetitions),
+            PairShares(
+                right=fmean(pair.is_right(metric) for pair in repetitions),
+                exchanged=fmean(pair.is_exchanged(metric) for pair in repetitions),
+            ),
         )
 
 
@@ -296,7 +310,7 @@ def _by_trajectory(scores: Iterable[PairScore]) -> dict[str, dict[str, float]]:
     found: dict[str, dict[str, float]] = {}
     for it in scores:
         name = f"{it.pair} {it.variant}".rstrip()
-        found.setdefault(it.cluster, {})[name] = it.score
+        found.setdefault(it.cluster, {})[name] = it.shares.net
     return found
 
 
@@ -304,8 +318,14 @@ def _by_fact(scores: Sequence[PairScore]) -> Rate:
     """Return the mean over facts, of which each is one observation."""
     facts: dict[tuple[str, str], list[float]] = {}
     for it in scores:
-        facts.setdefault((it.cluster, it.fact), []).append(it.score)
-    return _certain([fmean(values) for values in facts.values()], [key[0] for key in facts])
+        facts.setdefault((it.cluster, it.fact), []).append(it.shares.net)
+    return _net([fmean(values) for values in facts.values()], [key[0] for key in facts])
+
+
+def _net(values: Sequence[float], clusters: Sequence[str]) -> Rate:
+    rate = resampled_rate(values, clusters)
+    assert rate is not None  # there are values
+    return rate
 
 
 def _mean(pairs: Sequence[TwinRecords], value: Callable[[TwinRecords], float]) -> Rate:
@@ -320,6 +340,13 @@ def _certain(values: Sequence[float], clusters: Sequence[str]) -> Rate:
 
 def _is_right(record: Record, metric: str) -> bool:
     return record.payload.scores.get(metric, 0.0) >= 1
+
+
+def _is_right_in_twin(side: _Side, metric: str) -> bool:
+    reply = side.record.payload.reply
+    if metric in SCORERS and reply is not None:
+        return scores(reply, side.twin.answers)[metric] >= 1
+    return side.twin.scores.get(metric, 0.0) >= 1
 
 
 def _said(record: Record) -> str | None:

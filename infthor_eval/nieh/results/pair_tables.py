@@ -1,4 +1,4 @@
-"""Tables of pairs of twins: both right, what the replies to twins were, and the memory curves."""
+"""Tables of pairs of twins: net pairs, what the replies to twins were, and the memory curves."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -20,23 +20,24 @@ __all__ = ["MEMORY_CURVES", "PairCurve", "pair_overview", "pair_tables"]
 
 _HEADS = (Column("model", False), Column("task", False), Column("context", False))
 _NOTES = (
-    "pairs: both worlds' answers right, %, with the interval clustered by trajectory. Who sees "
-    "neither world, or does not remember, says the same in both and has 0; who draws one of two "
-    "answers anew for each world has 25 at most.",
-    "by fact: mean over changed facts, which several pairs may be about. flipped: the reply to the "
-    "twin is another one; right then: both right, of these. one right: of both, and how often it "
-    "is the commoner answer of its form (prior knowledge). single: answers with full marks, while "
-    "the task's accuracy counts lists that are right in part, too. wrong twin: single replies that "
-    "are right in the other world. bases: trajectories that the worlds were made of.",
+    "net pairs: pairs right (both worlds' answers) less pairs exchanged (each answer right in the "
+    "other world), %. Who does not know which world is which has 0 on average, whatever it says. "
+    "In brackets: 95 % bootstrap interval over the trajectories that the worlds were made of; all "
+    "equal: each of them has this value, so resampling them finds no interval.",
+    "by fact: mean over changed facts, which several pairs may be about, of net pairs. flipped: "
+    "the reply to the twin is another one; right then: both right, of these. one right: of both, "
+    "and how often it is the commoner answer of its form (prior knowledge). single: answers with "
+    "full marks, while the task's accuracy counts lists that are right in part, too. bases: "
+    "trajectories that the worlds were made of.",
 )
 
 
 class PairCurve(NamedTuple):
-    """Accuracy of pairs over classes.
+    """Net pairs over classes.
 
     Attributes:
         title: what the classes are of, in words.
-        rates: returns the accuracy by class.
+        rates: returns the net pairs by class.
         classes: all classes in their order; none for that of their names.
     """
 
@@ -84,11 +85,11 @@ def pair_overview(runs: Sequence[RunSummary]) -> list[Table]:
         Row((run, task, context, *_cells(pairs))) for run, task, context, pairs in _find(runs)
     )
     names = (
-        *("pairs", "by fact", "single", "flipped", "right then"),
-        *("one right", "commoner", "wrong twin", "n", "facts", "bases"),
+        *("net pairs", "right", "exchanged", "by fact", "single", "flipped", "right then"),
+        *("one right", "commoner", "n", "facts", "bases"),
     )
     columns = (*_HEADS, *map(Column, names))
-    return [Table("Twins: pairs right, %, strict scorer", columns, rows, _NOTES)] if rows else []
+    return [Table("Twins: net pairs, %, strict scorer", columns, rows, _NOTES)] if rows else []
 
 
 def pair_tables(runs: Sequence[RunSummary]) -> list[Table]:
@@ -110,16 +111,17 @@ def _find(runs: Sequence[RunSummary]) -> Iterator[_Found]:
 def _cells(pairs: PairSummary) -> tuple[TableCell | str, ...]:
     """Return the numbers of a row; the intervals of all but the first are in files alone."""
     rates = (
+        pairs.pair_accuracy,
+        pairs.pairs_exchanged,
         pairs.by_fact,
         pairs.single,
         pairs.flipped,
         pairs.right_when_flipped,
         pairs.one_right,
         pairs.one_is_commoner,
-        pairs.wrong_twin,
     )
     numbers = (pairs.n_pairs, pairs.n_facts, pairs.n_trajectories)
-    return (format_percent(pairs.pair_accuracy), *map(_mean_cell, rates), *map(str, numbers))
+    return (format_percent(pairs.net_pairs), *map(_mean_cell, rates), *map(str, numbers))
 
 
 def _mean_cell(rate: Rate | None) -> TableCell:
@@ -134,8 +136,8 @@ def _grouped(curve: PairCurve, found: Sequence[_Found]) -> Table:
     for run, task, context, pairs in found:
         rates = curve.rates(pairs)
         rows.append(Row((run, task, context, *(_grouped_cell(rates.get(name)) for name in names))))
-    note = "In brackets: 95 % interval, clustered by trajectory; in parentheses: pairs."
-    title = f"Twins: pairs right, % by {curve.title} (pairs)"
+    note = "In brackets: 95 % bootstrap interval over trajectories; in parentheses: pairs."
+    title = f"Twins: net pairs, % by {curve.title} (pairs)"
     return Table(title, (*_HEADS, *map(Column, names)), tuple(rows), (note,))
 
 

@@ -187,11 +187,11 @@ def _main_metric(metrics: Sequence[str]) -> str:
 
 
 def primary_metrics(summary: NiehSummary) -> dict[str, Rate]:
-    """Return the main metric of each task with any answer: of twins the pairs', else the mean."""
+    """Return the main metric of each task with any answer: of twins net pairs, else the mean."""
     rates = {}
     for name, task in summary.tasks.items():
         if task.pairs is not None:
-            rates[name] = task.pairs.pair_accuracy
+            rates[name] = task.pairs.net_pairs
             continue
         score = task.total.scores.get(main_metric(task))
         if score is not None:

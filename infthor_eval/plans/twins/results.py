@@ -1,4 +1,4 @@
-"""Results of pairs of twins: a pair counts only if both worlds are right."""
+"""Results of pairs of twins: pairs with both worlds right, less those with both exchanged."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -7,6 +7,7 @@ import msgspec
 from msgspec import UNSET, UnsetType
 
 from infthor_eval.household.first_place import FirstPlace
+from infthor_eval.pairs import PairShares, net_pairs
 from infthor_eval.plans.records import PlanRecord, TwinRecord
 from infthor_eval.rates import Rate, clustered_rate, paired_rate
 from infthor_eval.runs import UnitRecord
@@ -23,7 +24,10 @@ class TwinResults(msgspec.Struct, frozen=True):
     Attributes:
         n_pairs: pairs of which both worlds count.
         n_incomplete: pairs of which one does not, as it is excluded or left out, or has no result.
+        net_pairs: pairs right less pairs exchanged, -1 to 1, with the bootstrap interval of that
+            difference: 0 on average for whoever does not know which world is which.
         pair_accuracy: share of pairs in which the place looked at first is right in both worlds.
+        pairs_exchanged: share of pairs in which it is in both worlds the place of the other one.
         pair_success: share of pairs whose final task was carried out in both worlds.
         accuracy: share of worlds in which the place looked at first is right.
         one_of_two: share of pairs in which it is right in one world alone.
@@ -37,7 +41,9 @@ class TwinResults(msgspec.Struct, frozen=True):
 
     n_pairs: int
     n_incomplete: int
+    net_pairs: Rate | None
     pair_accuracy: Rate | None
+    pairs_exchanged: Rate | None
     pair_success: Rate | None
     accuracy: Rate | None
     one_of_two: Rate | None
@@ -55,17 +61,17 @@ def first_place_score(plan: PlanRecord) -> dict[str, float]:
 
 
 class PairScore(NamedTuple):
-    """Whether the place looked at first is right in both worlds of a pair; see `TwinResults`."""
+    """The score of a pair."""
 
     pair: str
     base: str
-    is_right: bool
+    shares: PairShares
 
 
 def score_pairs(records: Sequence[Record]) -> list[PairScore]:
     """Return the scores of the pairs of a task of which both worlds count."""
     return [
-        PairScore(_twin(one).pair, _base(one), _is_right(one) and _is_right(other))
+        PairScore(_twin(one).pair, _base(one), _shares(one, other))
         for one, other in _whole_pairs(_worlds_of_pairs(records)[0])
     ]
 
@@ -111,7 +117,9 @@ class _Pairs:
         return TwinResults(
             n_pairs=len(self._pairs),
             n_incomplete=n_incomplete,
-            pair_accuracy=self._share(lambda one, other: _is_right(one) and _is_right(other)),
+            net_pairs=self._net_pairs(),
+            pair_accuracy=self._share(_are_right),
+            pairs_exchanged=self._share(_are_exchanged),
             pair_success=self._share(lambda one, other: _is_done(one) and _is_done(other)),
             accuracy=self._share_of_worlds(_is_right),
             one_of_two=self._share(lambda one, other: _is_right(one) != _is_right(other)),
@@ -120,6 +128,11 @@ class _Pairs:
             opened=self._mean_opened(),
             excess=self._mean_excess(),
         )
+
+    def _net_pairs(self) -> Rate | None:
+        shares = [_shares(one, other) for one, other in self._pairs]
+        rate = net_pairs(shares, [_base(one) for one, _ in self._pairs])
+        return None if rate is None else rate.out_of(self._n_all)
 
     def _share(self, holds: Callable[[_World, _World], bool]) -> Rate | None:
         values = [float(holds(one, other)) for one, other in self._pairs]
@@ -162,6 +175,18 @@ def _first(world: _World) -> FirstPlace | None:
 
 def _is_right(world: _World) -> bool:
     return _first(world) == FirstPlace.OWN
+
+
+def _are_right(one: _World, other: _World) -> bool:
+    return _is_right(one) and _is_right(other)
+
+
+def _are_exchanged(one: _World, other: _World) -> bool:
+    return _first(one) == _first(other) == FirstPlace.TWIN
+
+
+def _shares(one: _World, other: _World) -> PairShares:
+    return PairShares(float(_are_right(one, other)), float(_are_exchanged(one, other)))
 
 
 def _is_done(world: _World) -> bool:

@@ -20,7 +20,7 @@ class LeaderboardRow:
         task: task, or column of a published table.
         shown: what the model saw: context, memory and budget.
         frames: what rendered the frames.
-        pairs: pairs of twins with both answers right, 0 to 1; None if there are none.
+        pairs: net pairs of twins, -1 to 1; None if there are none.
         singles: single answers, 0 to 1.
         above: score above guessing, at most 1; None if it is not known.
         scorer: scorer of the single answers.

@@ -11,8 +11,10 @@ from infthor_eval.nieh.results.above_guessing import score_above_guessing, score
 from infthor_eval.nieh.results.pair_summary import score_pairs
 from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.nieh.scoring import SCORERS
+from infthor_eval.pairs import PAIR_BOUNDS
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
+    NET_PAIRS,
     PAIRS_FINDING,
     THOUGHT,
     Description,
@@ -34,13 +36,12 @@ from infthor_eval.runs import UnitKey, UnitRecord
 __all__ = ["NiehPresenter"]
 
 Record = UnitRecord[NiehAnswer]
-_PAIR_ACCURACY = "pair_accuracy"
 _ABOVE_GUESSING = ", above guessing"
 _BOUNDS = {
     "strict": (0.0, 1.0),
     "reference": (0.0, math.inf),
     JUDGED: (0.0, 1.0),
-    _PAIR_ACCURACY: (0.0, 1.0),
+    **PAIR_BOUNDS,
 }
 
 
@@ -63,21 +64,21 @@ class NiehPresenter(PlainPresenter):
     columns = NIEH_COLUMNS
     figures: Mapping[str, Figure] = {
         "pairs": Figure(
-            "pairs of twins right by distance, frames shown and age", _build_pairs_figure, False
+            "net pairs of twins by distance, frames shown and age", _build_pairs_figure, False
         )
     }
 
     def measure_of(self, task: str, summary: NiehSummary) -> str:
         """See `Presenter.measure_of`: of twins, pairs count."""
-        return self.measure if summary.tasks[task].pairs is None else "pairs right"
+        return self.measure if summary.tasks[task].pairs is None else NET_PAIRS
 
     def finding_of(self, task: str, summary: NiehSummary) -> str:
         """See `Presenter.finding_of`."""
         return self.finding if summary.tasks[task].pairs is None else PAIRS_FINDING
 
     def chance(self, task: str, summary: NiehSummary, records: Sequence[Record]) -> float | None:
-        """See `Presenter.chance`: of questions by the best guesser of each form; who does not see
-        a pair's difference says the same in both worlds, and has none right."""
+        """See `Presenter.chance`: of questions by the best guesser of each form; who does not
+        know which world of a pair is which has 0 net pairs on average."""
         of_task = summary.tasks[task]
         if of_task.pairs is not None:
             return 0.0
@@ -132,12 +133,13 @@ class NiehPresenter(PlainPresenter):
         return "" if twin is None else twin.pair
 
     def group_scores(self, records: Sequence[Record]) -> Iterator[GroupScore]:
-        """See `Presenter.group_scores`: whether both replies to a pair of twins are right."""
+        """See `Presenter.group_scores`: net pairs of twins."""
         metrics = dict.fromkeys(name for record in records for name in record.payload.scores)
         metric = self.main_metric if self.main_metric in metrics else next(iter(metrics), "")
         for pair in score_pairs(records, metric):
-            name = " ".join(filter(None, (pair.pair, pair.variant)))
-            yield GroupScore(_PAIR_ACCURACY, name, pair.cluster, pair.score)
+            group = " ".join(filter(None, (pair.pair, pair.variant)))
+            for name, score in pair.shares.by_metric.items():
+                yield GroupScore(name, group, pair.cluster, score)
 
     def opening(self, runs: Sequence[ReportRun]) -> Section | None:
         """See `Presenter.opening`: pairs of twins, if there are any."""

@@ -1,4 +1,4 @@
-"""Charts of pairs of twins: the memory curves, pairs right by distance, frames shown and age."""
+"""Charts of pairs of twins: the memory curves, net pairs by distance, frames shown and age."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -117,12 +117,12 @@ def _chart(task: str, curve: PairCurve, names: Sequence[str], lines: Sequence[_L
         rows.append(class_row(name, dots))
     return dots_chart(
         DotsChart(
-            title=f"{task}: pairs of twins right, by {curve.title}",
+            title=f"{task}: net pairs of twins, by {curve.title}",
             caption=(
                 "A row is a class of pairs, with their number in parentheses; a dot is a run, its "
-                "line the 95 % interval; who does not see the difference has 0."
+                "line the 95 % interval; who does not know which world is which has 0 on average."
             ),
-            axis="pairs right (%)",
+            axis="net pairs (%)",
             label=curve.title,
             series=[line.series for line in lines],
             rows=rows,
@@ -141,8 +141,8 @@ def _draw(axes: Axes, curve: PairCurve, names: Sequence[str], lines: Sequence[_L
     axes.set_xticks(
         range(len(names)), [f"{name}\n({n})" for name, n in zip(names, counts, strict=True)]
     )
-    axes.set_ylim(-3, 103)
-    axes.set_ylabel("pairs right (%)")
+    axes.set_ylim(min(-3.0, axes.get_ylim()[0]), 103)
+    axes.set_ylabel("net pairs (%)")
     axes.set_xlabel(f"{curve.title} (pairs)")
     axes.grid(axis="x", visible=False)
 
@@ -173,8 +173,8 @@ def _pairs_figure(task: str, lines: Sequence[_Line]) -> Figure:
     add_legend(panels[-1], [(line.label, line.look) for line in lines])
     first = lines[0].pairs
     heading = (
-        f"Pairs of twins right on {task}: {first.n_pairs} pairs of {first.n_trajectories} "
-        "trajectories, with 95 % intervals clustered by trajectory"
+        f"Net pairs of twins on {task}: {first.n_pairs} pairs of {first.n_trajectories} "
+        "trajectories, with 95 % bootstrap intervals over trajectories"
     )
     add_words(figure, [heading], [f"In parentheses: pairs of {lines[0].label}."], width)
     return figure
@@ -189,5 +189,5 @@ def _table(task: str, lines: Sequence[_Line]) -> Table:
                 cells = (line.label, curve.title, name, format_percent(rate), str(rate.n))
                 rows.append(Row(cells))
     names = (Column("run", False), Column("by", False), Column("class", False))
-    columns = (*names, Column("pairs right, %"), Column("pairs"))
-    return Table(f"{task}: pairs of twins right", columns, tuple(rows))
+    columns = (*names, Column("net pairs, %"), Column("pairs"))
+    return Table(f"{task}: net pairs of twins", columns, tuple(rows))

@@ -10,6 +10,7 @@ from msgspec import UNSET
 from PIL import Image
 
 from infthor_eval.errors import UsageError
+from infthor_eval.pairs import PAIR_BOUNDS
 from infthor_eval.plans.recorded.curves import plan_curves
 from infthor_eval.plans.recorded.runs import PlansRun
 from infthor_eval.plans.records import PlanRecord
@@ -17,6 +18,7 @@ from infthor_eval.plans.summary import PlansSummary
 from infthor_eval.plans.twins.results import score_pairs
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
+    NET_PAIRS,
     PAIRS_FINDING,
     Description,
     EpisodeSelection,
@@ -116,25 +118,25 @@ class PlansPresenter(PlainPresenter):
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`."""
-        return metric == self.main_metric
+        return metric == self.main_metric or metric in PAIR_BOUNDS
 
     def bounds(self, metric: str) -> tuple[float, float]:
         """See `Presenter.bounds`: only rewards have none."""
-        return (-math.inf, math.inf) if metric == "reward" else (0.0, 1.0)
+        return (-math.inf, math.inf) if metric == "reward" else PAIR_BOUNDS.get(metric, (0.0, 1.0))
 
     def measure_of(self, task: str, summary: PlansSummary) -> str:
         """See `Presenter.measure_of`: of twins, pairs count."""
-        return self.measure if summary.tasks[task].twins is UNSET else "pairs right"
+        return self.measure if summary.tasks[task].twins is UNSET else NET_PAIRS
 
     def finding_of(self, task: str, summary: PlansSummary) -> str:
         """See `Presenter.finding_of`."""
         return self.finding if summary.tasks[task].twins is UNSET else PAIRS_FINDING
 
     def group_scores(self, records: Sequence[Record]) -> Iterator[GroupScore]:
-        """See `Presenter.group_scores`: whether the place looked at first is right in both
-        worlds of a pair."""
+        """See `Presenter.group_scores`: net pairs of twins."""
         for pair in score_pairs(records):
-            yield GroupScore("pair_accuracy", pair.pair, pair.base, float(pair.is_right))
+            for name, score in pair.shares.by_metric.items():
+                yield GroupScore(name, pair.pair, pair.base, score)
 
     def sections(self, runs: Sequence[ReportRun]) -> Iterator[Section]:
         """See `Presenter.sections`: curves of reward for each task that all runs have."""

@@ -83,12 +83,12 @@ class PairsWithSingles:
             pairs = summarise_pairs(twins.graded, "strict")
             if singles is None or pairs is None or pairs.n_pairs < _LEAST_PAIRS:
                 continue
-            if singles.mean >= _SINGLES and pairs.pair_accuracy.mean < _PAIRS:
+            if singles.mean >= _SINGLES and pairs.net_pairs.mean < _PAIRS:
                 yield Problem(
                     self.name,
                     f"{plain.name}: {100 * singles.mean:.1f} % of single answers, and "
-                    f"{100 * pairs.pair_accuracy.mean:.1f} % of the pairs of {twins.name}, in the "
-                    "same context; one of the two was not answered from frames",
+                    f"{100 * pairs.net_pairs.mean:.1f} % net pairs of {twins.name}, in the same "
+                    "context; one of the two was not answered from frames",
                 )
 
 

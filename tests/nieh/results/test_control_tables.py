@@ -99,9 +99,9 @@ def test_twins_have_the_accuracy_of_their_pairs_too():
     assert [cells[name][:5].strip() for name in ("shown", "no-clue", "other", "blank")] == [
         *("100.0", "50.0", "50.0", "-")
     ]
-    assert cells["pairs, shown"].startswith("100.0")
-    assert cells["pairs, no-clue"].startswith("0.0")
-    assert cells["pairs, blank"] == "-"
+    assert cells["net pairs, shown"].startswith("100.0")
+    assert cells["net pairs, no-clue"].startswith("0.0")
+    assert cells["net pairs, blank"] == "-"
     assert cells["of which memory"].startswith("+50.0")
 
 

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 from infthor_eval.nieh.records import NiehAnswer, ShownClues, TwinSide
 from infthor_eval.nieh.results.pair_summary import NEVER_CHANGED, score_pairs, summarise_pairs
 from infthor_eval.nieh.scoring import scores
+from infthor_eval.rates import format_percent
 from infthor_eval.runs import UnitRecord
 
 PLACES = ("bowl", "drawer", "sofa", "desk")
@@ -84,7 +85,60 @@ def test_a_pair_counts_only_if_both_are_right():
     assert found.flipped.mean == pytest.approx(2 / 3)
     assert found.right_when_flipped.mean == pytest.approx(1 / 2)
     assert found.one_right.mean == pytest.approx(1 / 3)
-    assert found.wrong_twin.mean == pytest.approx(2 / 6)  # "bowl" in the world of the sofa, twice
+    assert found.net_pairs.mean == pytest.approx(1 / 3)
+    assert found.pairs_exchanged.mean == 0.0
+
+
+def test_pairs_whose_answers_are_exchanged_are_taken_off():
+    found = summary(
+        [
+            *pair("bowl", "sofa", "a/1", base="t"),
+            *pair("sofa", "bowl", "b/1", base="u"),  # each right in the other world
+            *pair("sofa", "bowl", "c/1", base="u"),
+            *pair("sofa", "sofa", "d/1", base="v"),  # one of them is
+        ]
+    )
+    assert found.pair_accuracy.mean == 1 / 4
+    assert found.pairs_exchanged.mean == 2 / 4
+    assert found.net_pairs.mean == -1 / 4
+    assert found.net_pairs.low == -1.0  # all drawn bases are u: the interval is of a difference
+    assert found.by_kind["swap"].mean == -1 / 4
+    assert found.scores == {"t": {"a/1": 1.0}, "u": {"b/1": -1.0, "c/1": -1.0}, "v": {"d/1": 0.0}}
+
+
+def test_where_all_bases_are_equal_there_is_no_interval_and_it_is_said():
+    found = summary([*pair("bowl", "sofa", "a/1"), *pair("bowl", "sofa", "b/1", base="u")])
+    assert (found.net_pairs.mean, found.net_pairs.low, found.net_pairs.all_equal) == (1, None, True)
+    assert format_percent(found.net_pairs) == "100.0 [all equal]"
+    alone = summary(pair("bowl", "sofa"))
+    assert (alone.net_pairs.low, alone.net_pairs.all_equal) == (None, False)
+    assert format_percent(alone.net_pairs) == "100.0"
+
+
+def test_lists_are_exchanged_with_full_marks_alone():
+    def exchanged(reply):
+        one = side("a/1", "one", "bowl", "sofa", reply)
+        twin = replace(one.payload.twin, answers=("sofa", "desk"))
+        one = replace(one, payload=replace(one.payload, twin=twin))
+        return summary([one, side("a/1", "two", "sofa", "bowl", "bowl")]).pairs_exchanged.mean
+
+    assert (exchanged("sofa, desk"), exchanged("sofa")) == (1.0, 0.0)
+
+
+@given(st.lists(st.lists(st.sampled_from(PLACES), min_size=2, max_size=2), min_size=1))
+def test_exchanging_all_worlds_exchanges_the_sign(replies):
+    """Who gives each world's reply to the other has as many net pairs, with the other sign."""
+
+    def net(turned):
+        return summary(
+            [
+                record
+                for number, both in enumerate(replies)
+                for record in pair(*(both[::-1] if turned else both), f"p{number}/1")
+            ]
+        ).net_pairs.mean
+
+    assert net(turned=True) == pytest.approx(-net(turned=False))
 
 
 def test_who_says_the_same_in_both_worlds_has_no_pair():
@@ -112,7 +166,8 @@ def test_a_pair_with_a_failed_reply_has_no_result_and_the_score_says_so():
     assert summary(pair("bowl", None)) is None
     found = summary([*pair("bowl", None), *pair("bowl", "sofa", "b/9")])
     assert (found.n_pairs, found.n_incomplete) == (1, 2)
-    assert (found.pair_accuracy.mean, found.pair_accuracy.n, found.pair_accuracy.n_all) == (1, 1, 2)
+    for rate in (found.net_pairs, found.pair_accuracy):
+        assert (rate.mean, rate.n, rate.n_all) == (1, 1, 2)
 
 
 def test_a_question_without_its_twin_is_counted_and_in_no_pair():
@@ -135,7 +190,7 @@ def test_facts_count_once_however_many_pairs_they_have():
     ]
     found = summary([*pair("bowl", "sofa"), *same, *pair("desk", "desk", "b/1")])
     assert (found.n_pairs, found.n_facts) == (3, 2)
-    assert found.pair_accuracy.mean == pytest.approx(2 / 3)
+    assert found.net_pairs.mean == pytest.approx(2 / 3)
     assert found.by_fact.mean == pytest.approx(1 / 2)
 
 
@@ -170,7 +225,8 @@ def test_rates_of_any_replies_agree_with_one_another(replies):
     assert both <= found.single.mean
     assert found.single.mean == pytest.approx(both + found.one_right.mean / 2)
     assert both <= found.flipped.mean  # both answers differ
-    assert [it.score for it in score_pairs(records, "strict")].count(1.0) == round(
+    assert [it.shares.right for it in score_pairs(records, "strict")].count(1.0) == round(
         both * len(replies)
     )
+    assert found.net_pairs.mean == pytest.approx(both - found.pairs_exchanged.mean)
     assert found == summary(records[::-1])

@@ -60,6 +60,17 @@ def test_a_pair_is_right_if_both_worlds_are():
     assert twins.same_place.mean == 0.25
     assert twins.nowhere.mean == 1 / 8
     assert twins.pair_accuracy.low is not None
+    assert (twins.pairs_exchanged.mean, twins.net_pairs.mean) == (0.0, 0.5)
+
+
+def test_who_goes_to_the_other_worlds_place_in_both_has_a_pair_less():
+    twins = results(
+        *(world("a1", side, OWN) for side in (0, 1)),
+        *(world(pair, side, TWIN) for pair in ("b1", "c1") for side in (0, 1)),
+    )
+    assert (twins.pair_accuracy.mean, twins.pairs_exchanged.mean) == (1 / 3, 2 / 3)
+    assert twins.net_pairs.mean == pytest.approx(-1 / 3)
+    assert twins.net_pairs.low == -1.0  # of a difference, over bases
 
 
 def test_the_scores_of_pairs_have_the_mean_of_the_results():
@@ -74,8 +85,12 @@ def test_the_scores_of_pairs_have_the_mean_of_the_results():
     records = [record for plans in worlds for record in plans]
     scores = list(PlansPresenter().group_scores(records))
     assert scores == [
+        ("net_pairs", "a1", "a", 1.0),
         ("pair_accuracy", "a1", "a", 1.0),
+        ("pairs_exchanged", "a1", "a", 0.0),
+        ("net_pairs", "a2", "a", 0.0),
         ("pair_accuracy", "a2", "a", 0.0),
+        ("pairs_exchanged", "a2", "a", 0.0),
     ]
     assert twin_results(records).pair_accuracy.mean == 0.5
 
@@ -141,7 +156,7 @@ def test_pairs_are_the_primary_metric_and_a_column_only_where_there_are_twins():
         assert suite.primary_metrics(summary)[TASK].mean == rate
         runs = [RunSummary(run.header, summary)]
         (overview,) = suite.overview(runs)
-        has_pairs = "pairs right, %" in [column.name for column in overview.columns]
+        has_pairs = "net pairs, %" in [column.name for column in overview.columns]
         titles = [table.title for table in suite.tables(runs)]
         assert has_pairs == ("Twins: the place looked at first" in titles) == (records is twins)
     assert suite.scores(twins[0])["first_place"] == 1.0

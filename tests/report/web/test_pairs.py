@@ -77,13 +77,13 @@ def test_the_page_opens_with_pairs(page):
     assert keys.index("pairs") == keys.index("nieh") - 1 == 1
     sections = {section.key: section for section in page.sections}
     titles = [table.title for table in sections["pairs"].tables]
-    assert titles[0].startswith("Twins: pairs right")
+    assert titles[0].startswith("Twins: net pairs")
     assert not set(titles) & {table.title for table in sections["nieh"].tables}
     measures = {row.cells[:3]: row.cells[3] for row in page.sections[0].tables[0].rows}
-    assert measures["oracle", "nieh_twins", "pairs right"] == "100.0"
-    assert measures["blind", "nieh_twins", "pairs right"] == "0.0"
+    assert measures["oracle", "nieh_twins", "net pairs"] == "100.0"
+    assert measures["blind", "nieh_twins", "net pairs"] == "0.0"
     (compared,) = sections["comparison"].tables
-    assert compared.rows[0].cells[1] == "pair_accuracy"
+    assert compared.rows[0].cells[1] == "net_pairs"
 
 
 def test_without_its_set_a_pair_has_no_frames_and_it_is_said(
@@ -250,7 +250,7 @@ def test_equal_pictures_of_different_steps_have_their_own_facts(page):
 
 
 def test_the_page_on_a_run_as_it_goes_says_that_pairs_count(twin_runs):
-    assert LiveRun(twin_runs[0]).state().measure == "pairs right"
+    assert LiveRun(twin_runs[0]).state().measure == "net pairs"
 
 
 def test_rows_of_samples_name_their_pair(twin_runs):
