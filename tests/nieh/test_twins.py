@@ -6,8 +6,10 @@ import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.harness.nieh_task import net_pairs, pair_accuracy, pairs_exchanged, process_pair
+from infthor_eval.nieh.records import RECORDS
 from infthor_eval.nieh.samples import find_samples
-from infthor_eval.nieh.twins import twin_side
+from infthor_eval.nieh.twins import first_world, twin_side
+from infthor_eval.runs import read_run
 
 from ..helpers.command_line import run_cli
 from ..helpers.twin_sets import CLUES, DIFFERING, write_twin_set
@@ -71,6 +73,67 @@ def test_the_oracle_has_all_pairs_and_blind_none(twins, tmp_path, run_cli):
         assert found["primary_metrics"]["nieh_twins"]["mean"] == expected
         assert found["summary"]["tasks"]["nieh_twins"]["pairs"]["net_pairs"]["mean"] == expected
         assert found["summary"]["tasks"]["nieh_twins"]["pairs"]["n_trajectories"] == 2
+
+
+@pytest.mark.parametrize("context", ["clues", "trajectory"])
+def test_of_two_worlds_the_one_that_is_drawn_is_asked_about_first(
+    twins, tmp_path, run_cli, context
+):
+    words = ("--tasks", "nieh_twins", "--data", twins, "--context", context)
+    assert run_cli("run", "--model", "flip", *words, "--output", tmp_path)[0] == 0
+    (journal,) = tmp_path.rglob("worker-*.jsonl")
+    asked = {}
+    for line in journal.read_text().splitlines():
+        payload = json.loads(line).get("payload", {})
+        if "twin" in payload:
+            asked.setdefault(payload["twin"]["pair"], []).append(payload)
+    assert len(asked) == 4
+    for first, second in asked.values():
+        worlds = [payload["twin"]["traj_id"] for payload in (first, second)]
+        assert worlds[0] == first_world(worlds)
+        assert first["reply"] != second["reply"]
+
+
+def test_the_world_that_comes_first_is_drawn():
+    pairs = [(f"{number:x}", f"{number + 1:x}") for number in range(0, 2000, 2)]
+    assert 450 < sum(first_world(pair) == pair[0] for pair in pairs) < 550
+    assert all(first_world(pair) == first_world(pair[::-1]) for pair in pairs)
+
+
+def test_hash_says_the_same_where_the_frames_are_the_same(twins, tmp_path, run_cli):
+    words = ("run", "--model", "hash", "--tasks", "nieh_twins", "--data", twins)
+    assert run_cli(*words, "--controls", "--output", tmp_path)[0] == 0
+    flipped = {}
+    for file in tmp_path.rglob("results.json"):
+        found = json.loads(file.read_text())
+        pairs = found["summary"]["tasks"]["nieh_twins"]["pairs"]
+        flipped[found["config"]["frames"]] = pairs["flipped"]["mean"]
+    assert flipped["other"] == flipped["blank"] == 0.0 < flipped["shown"]
+
+
+def test_a_metric_of_ones_own_scores_the_reply_in_the_other_world_too(
+    twins, tmp_path, run_cli, task_files
+):
+    (task_files / "nieh" / "own.py").write_text(
+        "import json\n\n"
+        "def measure(doc, results):\n"
+        "    return {'begins': float(results[0][:2] in doc['answers'])}\n"
+    )
+    (task_files / "nieh" / "own_twins.yaml").write_text(
+        "include: _nieh.yaml\ntask: own_twins\ndataset_kwargs: {context: clues}\n"
+        "process_results: !function own.measure\nmetric_list: [{metric: begins}]\n"
+    )
+    words = ("run", "--model", "flip", "--tasks", "own_twins", "--data", twins)
+    code, _, err = run_cli(*words, "--output", tmp_path / "out")
+    assert code == 0, err
+    pairs = results(tmp_path / "out")["summary"]["tasks"]["own_twins"]["pairs"]
+    (folder,) = (path.parent for path in tmp_path.rglob("results.json"))
+    for side in (record.payload for record in read_run(folder, RECORDS)[1]):
+        elsewhere = side.reply[:2] in json.dumps(side.twin.answers)
+        assert side.twin.scores == {"begins": float(elsewhere)}
+    assert pairs["net_pairs"]["mean"] == pytest.approx(
+        pairs["pair_accuracy"]["mean"] - pairs["pairs_exchanged"]["mean"]
+    )
 
 
 def test_a_run_with_each_context(twins, tmp_path, run_cli):

@@ -160,5 +160,5 @@ def test_only_random_depends_on_the_seed() -> None:
 
 
 def test_no_model_has_the_name_of_a_baseline() -> None:
-    assert set(BASELINES) == {"oracle", "blind", "blind-count", "random"}
+    assert set(BASELINES) == {"oracle", "blind", "blind-count", "random", "flip", "hash"}
     assert not set(BASELINES) & set(names())
