@@ -5,11 +5,15 @@ One run measures, with the same Qwen2.5-VL with random weights and the same fram
   batched  the same with all questions passed at once and answered --batch-size at a time;
   plain    as shared with share_prefix=false: everything is encoded for every question, as in a
            plain loop;
-  floor    transformers alone: one chunked prefill of the frames into its own cache, then per
-           question the tokens of the question and the reply. Nothing can be faster with the same
-           model.
+  limit    the arithmetic alone: the products of matrices and attention of one prefill of the
+           frames and, per question, of the tokens of the question and the reply, each at the rate
+           of this machine for its shapes (arithmetic.py). Nothing can be faster with the same model
+           and kernels.
 
     python benchmarks/prefix_sharing.py --frames 120 --questions 24
+
+The share of the limit in the time of a way tells how near it is, and --parts where the time of ours
+goes.
 
 With --margins it says, where replies differ, how near a tie the tokens were at which they part.
 
@@ -33,6 +37,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from arithmetic import least_seconds, parts_of, record_products
 from noise_set import question_texts, write_frames
 from prefix_ways import (
     Replies,
@@ -54,8 +59,14 @@ from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 from model_adapters.tiny.twin import TinyAdapter
 
-WAYS = ("shared", "batched", "plain", "floor")
-FACTORS = ("plain / batched", "plain / shared", "shared / floor")
+WAYS = ("shared", "batched", "plain", "limit")
+FACTORS = (
+    "plain / batched",
+    "plain / shared",
+    "limit / batched",
+    "limit / shared",
+    "limit / plain",
+)
 
 
 def main() -> None:
@@ -71,6 +82,11 @@ def main() -> None:
         # Warms up imports, threads and kernels.
         answer_one_by_one(model, frames[:1], questions[:1], 2)
         measured = measure(model, options, frames, questions)
+        parts = {}
+        if options.parts:
+            clear_cache(model)
+            run = partial(answer_one_by_one, model, frames, questions, options.new_tokens)
+            parts = parts_of(model._loaded.model.model.visual, run)
         machine = {}
         if options.machine:
             for chunk_tokens in options.chunk_tokens:
@@ -80,6 +96,8 @@ def main() -> None:
         print(json.dumps({**figures(measured), "machine": machine}))
         return
     report(measured, options)
+    for name, share in parts.items():
+        print(f"{name:16s}{100 * share:7.1f} % of shared")
     for chunk_tokens, found in machine.items():
         report_machine(chunk_tokens, found)
 
@@ -94,7 +112,6 @@ def measure(
     work = frames, questions, options.new_tokens
     ways: dict[str, tuple[TransformersModel, Callable[..., Replies]]] = {
         "shared": (model, answer_one_by_one),
-        "floor": (model, answer_with_transformers),
     }
     for batch_size in options.batch_size:
         name = "batched" if len(options.batch_size) == 1 else f"batched by {batch_size}"
@@ -110,6 +127,10 @@ def measure(
     if "plain" in options.ways:
         not_sharing = _with_options(model, share_prefix=False)
         measured["plain"] = [timed(partial(answer_one_by_one, not_sharing, *work))]
+    if "limit" in options.ways:
+        replies: list[Replies] = []
+        products = record_products(lambda: replies.append(answer_with_transformers(model, *work)))
+        measured["limit"] = [(least_seconds(products), replies[0])]
     return measured
 
 
@@ -154,6 +175,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--margins", action="store_true", help="record how near a tie each token was"
     )
+    parser.add_argument("--parts", action="store_true", help="say where the time of ours goes")
     parser.add_argument("--machine", action="store_true", help="measure speeds and memory as well")
     parser.add_argument("--largest", action="store_true", help="find the largest context that fits")
     parser.add_argument(
