@@ -5,7 +5,7 @@ from typing import Any
 
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import Sample
-from infthor_eval.nieh.guessing.guesses import sample_on_clues
+from infthor_eval.nieh.guessing.blind import sample_on_clues
 
 __all__ = ["make_question", "make_samples_on_clues"]
 

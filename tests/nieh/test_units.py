@@ -5,14 +5,14 @@ import pytest
 
 from infthor_eval.nieh import units
 from infthor_eval.nieh.asking.answering import OpenBaseline
-from infthor_eval.nieh.records import Guess
+from infthor_eval.nieh.records import BlindGuess
 from infthor_eval.runs import Unit, execute
 from infthor_eval.runs.work.binding import bind_run
 
 
 class _Guesses(dict):
     def get(self, key, default=None):
-        return Guess(form=key, scores={}, form_scores={})
+        return BlindGuess(form=key, scores={}, form_scores={})
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def events(monkeypatch):
     """What happens, in order: a question is "asked", guesses are "learned"."""
     happened = []
     answer = OpenBaseline.answer
-    monkeypatch.setattr(units, "find_guesses", lambda *_: happened.append("learned") or _Guesses())
+    monkeypatch.setattr(units, "find_floor", lambda *_: happened.append("learned") or _Guesses())
     monkeypatch.setattr(
         OpenBaseline,
         "answer",
@@ -32,14 +32,14 @@ def events(monkeypatch):
 def test_a_question_is_asked_before_guesses_are_learned(prepare_run, events):
     outcome = execute(prepare_run())
     assert events[0] == "asked"
-    assert [record.payload.guess.form for record in outcome.records] == [
+    assert [record.payload.blind.form for record in outcome.records] == [
         record.id for record in outcome.records
     ]
 
 
 def test_every_record_of_a_unit_has_its_guess(prepare_run, events):
     unit = bind_run(prepare_run()).evaluation.workload.groups[0].units[0]
-    assert unit.payload.guess is None
+    assert unit.payload.blind is None
     assert events == []
     elsewhere = unit.without_inputs()
     assert type(elsewhere) is Unit
@@ -49,5 +49,5 @@ def test_every_record_of_a_unit_has_its_guess(prepare_run, events):
         unit.record_exclusion("a reason", ""),
         elsewhere.record_failure("a lost worker"),
     ]
-    assert {record.payload.guess.form for record in records} == {unit.key.id}
+    assert {record.payload.blind.form for record in records} == {unit.key.id}
     assert records[1].payload == records[3].payload

@@ -1,24 +1,19 @@
-"""Baselines without frames: the answer key, the best guess from the question alone, and chance.
+"""Baselines without frames: the answer key, what is had from the question alone, and chance.
 
 To add a baseline of NIEH: a class in `BASELINES` here, and its name in `infthor_eval/suites.py`.
 """
 
 import random
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol, runtime_checkable
 
-from infthor_eval.errors import ModelError
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
-from infthor_eval.nieh.guessing.chains import (
-    Chain,
-    Guesser,
-    chains_of_words,
-    chains_of_words_and_count,
-    question_type,
-)
+from infthor_eval.nieh.guessing.blind import find_blind, sample_on_clues, visible_knowledge
+from infthor_eval.nieh.guessing.chains import question_type
+from infthor_eval.nieh.guessing.folds import held_out
 from infthor_eval.runs.suite import BaselineSubject
 from infthor_eval.storage.digests import seed_of
 from model_adapters import Subject
@@ -26,14 +21,15 @@ from model_adapters import Subject
 __all__ = ["BASELINES", "Baseline", "Predict"]
 
 Predict = Callable[[Sample], str]
+_RULES = 2  # of `blind` and `random`: with another number earlier replies are not taken again
 
 
 @runtime_checkable
 class Baseline(Subject, Protocol):
     """A subject that answers from the answer key, without frames; the data's hash covers it."""
 
-    def fit(self, samples: Sequence[Sample]) -> Predict:
-        """Read the whole answer key of one task, and return a function that answers its samples."""
+    def fit(self, data: NiehSet, context: str) -> Predict:
+        """Return a function that answers samples of a set in a context of that name."""
 
 
 class Oracle(BaselineSubject):
@@ -41,66 +37,56 @@ class Oracle(BaselineSubject):
 
     name = "oracle"
 
-    def fit(self, samples: Sequence[Sample]) -> Predict:
+    def fit(self, data: NiehSet, context: str) -> Predict:
         """See `Baseline`; every question carries its key."""
         return lambda sample: doc_target(sample.question)
 
 
 class Blind(BaselineSubject):
-    """The best guess from the question's words, learned on the other trajectories."""
+    """What is had without a frame: a question's words are known, and other trajectories."""
 
     name = "blind"
-    _chains: Callable[[Sample], list[Chain]] = staticmethod(chains_of_words)
 
-    def fit(self, samples: Sequence[Sample]) -> Predict:
-        """See `Guesser`; each file of a set is learned alone, as the published scripts ask."""
-        by_file: dict[str, list[Sample]] = defaultdict(list)
-        for sample in samples:
-            by_file[sample.question.file].append(sample)
-        guessers = {file: Guesser(of_file, self._chains) for file, of_file in by_file.items()}
-        return lambda sample: guessers[sample.question.file].guess(sample)
+    def identity(self) -> dict[str, Any]:
+        """Return name and number of the rules."""
+        return {"baseline": self.name, "rules": _RULES}
 
-
-class BlindCount(Blind):
-    """`Blind` that also knows the number of shown frames."""
-
-    name = "blind-count"
-    _chains = staticmethod(chains_of_words_and_count)
+    def fit(self, data: NiehSet, context: str) -> Predict:
+        """See `Baseline`; it is learned when the first question is asked (`find_blind`)."""
+        knowledge = visible_knowledge(context)
+        return lambda sample: find_blind(data, knowledge)[sample.question.id].reply
 
 
 class Random(BaselineSubject):
-    """An answer drawn from those of the question's type, each as likely as it is frequent."""
+    """An answer drawn from those to questions of the type on other trajectories, each as likely as
+    it is frequent there; empty if there are none."""
 
     name = "random"
 
     def identity(self) -> dict[str, Any]:
-        """Return name and seed."""
-        return {"baseline": self.name, "seed": self._seed}
+        """Return name, number of the rules and seed."""
+        return {"baseline": self.name, "rules": _RULES, "seed": self._seed}
 
-    def fit(self, samples: Sequence[Sample]) -> Predict:
+    def fit(self, data: NiehSet, context: str) -> Predict:
         """See `Baseline`; a draw depends on seed and question alone, not on the order of asking."""
+        hold_out = held_out([sample_on_clues(question) for question in data.questions])
         seen: dict[str, Counter[str]] = defaultdict(Counter)
-        for question in {sample.question.id: sample.question for sample in samples}.values():
-            seen[question_type(question)][doc_target(question)] += 1
+        own: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+        for question in {question.id: question for question in data.questions}.values():
+            kind, answer = question_type(question), doc_target(question)
+            seen[kind][answer] += 1
+            own[kind, hold_out(sample_on_clues(question))][answer] += 1
 
         def predict(sample: Sample) -> str:
-            counts = _counts(seen, sample.question)
+            kind = question_type(sample.question)
+            counts = seen[kind] - own[kind, hold_out(sample)]
             draw = random.Random(seed_of(f"{self._seed}\n{sample.question.id}"))
-            answers = sorted(counts)
-            return draw.choices(answers, weights=[counts[text] for text in answers])[0]
+            answers = sorted(counts) or [""]
+            return draw.choices(answers, weights=[counts[text] or 1 for text in answers])[0]
 
         return predict
 
 
-def _counts(seen: Mapping[str, Counter[str]], question: Question) -> Counter[str]:
-    kind = question_type(question)
-    if kind not in seen:
-        raise ModelError(
-            f"no question of type {kind!r} was in the answer key; fit the baseline to the whole key"
-        )
-    return seen[kind]
-
-
 BASELINES: Mapping[str, Callable[[int], Baseline]] = {
-    kind.name: kind for kind in (Oracle, Blind, BlindCount, Random)
+    kind.name: kind for kind in (Oracle, Blind, Random)
 }
