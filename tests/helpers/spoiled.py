@@ -149,7 +149,7 @@ def _nieh() -> tuple[RunHeader, UnitRecord[NiehAnswer]]:
     record = make_record(
         0,
         "the mug",
-        guess=BlindGuess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.25}),
+        blind=BlindGuess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.25}),
         shown_clues=ShownClues(n_shown=1, n_clues=1, n_after=3),
         twin=twin,
         recall=NiehRecall(recalled=(0, "a text"), build_s=0.5, recall_s=0.1),

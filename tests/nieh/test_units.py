@@ -1,4 +1,4 @@
-"""The units of NIEH: what can be guessed of a question is learned for its record, and no question
+"""The units of NIEH: what `blind` says to a question is learned for its record, and no question
 waits for it."""
 
 import pytest
@@ -17,7 +17,7 @@ class _Guesses(dict):
 
 @pytest.fixture
 def events(monkeypatch):
-    """What happens, in order: a question is "asked", guesses are "learned"."""
+    """What happens, in order: a question is "asked", what `blind` says is "learned"."""
     happened = []
     answer = OpenBaseline.answer
     monkeypatch.setattr(units, "find_floor", lambda *_: happened.append("learned") or _Guesses())
@@ -29,7 +29,7 @@ def events(monkeypatch):
     return happened
 
 
-def test_a_question_is_asked_before_guesses_are_learned(prepare_run, events):
+def test_a_question_is_asked_before_blind_is_learned(prepare_run, events):
     outcome = execute(prepare_run())
     assert events[0] == "asked"
     assert [record.payload.blind.form for record in outcome.records] == [
@@ -37,7 +37,7 @@ def test_a_question_is_asked_before_guesses_are_learned(prepare_run, events):
     ]
 
 
-def test_every_record_of_a_unit_has_its_guess(prepare_run, events):
+def test_every_record_of_a_unit_has_what_blind_says(prepare_run, events):
     unit = bind_run(prepare_run()).evaluation.workload.groups[0].units[0]
     assert unit.payload.blind is None
     assert events == []

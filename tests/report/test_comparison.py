@@ -19,7 +19,7 @@ def make_guessed_record(number, reply, score=0.5, mean=0.5):
     return make_record(
         number,
         reply,
-        guess=BlindGuess(form="f", scores={"strict": score}, form_scores={"strict": mean}),
+        blind=BlindGuess(form="f", scores={"strict": score}, form_scores={"strict": mean}),
     )
 
 

@@ -10,7 +10,6 @@ from threading import Lock
 from types import MappingProxyType
 
 import msgspec
-from msgspec.structs import replace
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
@@ -18,7 +17,6 @@ from infthor_eval.formats.reading import NOT_JSON
 from infthor_eval.nieh import scoring
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.guessing.chains import form_of
-from infthor_eval.nieh.guessing.folds import held_out
 from infthor_eval.nieh.guessing.guessers import (
     GUESSERS,
     Knowledge,
@@ -54,6 +52,7 @@ def visible_knowledge(context: str) -> Knowledge:
 _LEARNING = Lock()
 
 
+@lru_cache(maxsize=8)
 def find_floor(data: NiehSet, knowledge: Knowledge) -> Mapping[str, BlindGuess]:
     """Return `find_blind`, by which runs are measured; nothing of a set of one trajectory, whose
     other questions alone say too little."""
@@ -96,21 +95,19 @@ def _learn(data: NiehSet, knowledge: Knowledge) -> dict[str, BlindGuess]:
     guesses: dict[str, BlindGuess] = {}
     for questions in questions_by_file(data).values():
         replies = blind_guesser(knowledge).guess(list(map(sample_on_clues, questions)))
-        by_form: dict[str, list[BlindGuess]] = {}
-        for question, reply in zip(questions, replies, strict=True):
-            scored = scores(reply, question.answers)
-            guess = BlindGuess(
-                form=form_of(question), reply=reply, scores=scored, form_scores=scored
-            )
-            guesses[question.id] = guess
-            by_form.setdefault(guess.form, []).append(guess)
+        scored = [scores(*it) for it in zip(replies, (it.answers for it in questions), strict=True)]
+        by_form: dict[str, list[dict[str, float]]] = {}
+        for question, of_question in zip(questions, scored, strict=True):
+            by_form.setdefault(form_of(question), []).append(of_question)
         means = {
-            form: {name: fmean(it.scores[name] for it in of_form) for name in of_form[0].scores}
+            form: {name: fmean(it[name] for it in of_form) for name in of_form[0]}
             for form, of_form in by_form.items()
         }
-        for question in questions:
-            guess = guesses[question.id]
-            guesses[question.id] = replace(guess, form_scores=means[guess.form])
+        for question, reply, of_question in zip(questions, replies, scored, strict=True):
+            form = form_of(question)
+            guesses[question.id] = BlindGuess(
+                form=form, reply=reply, scores=of_question, form_scores=means[form]
+            )
     return guesses
 
 
@@ -135,8 +132,7 @@ def score_guesses(
         scenes: scene by id of the trajectory, to guess without the question's whole scene.
     """
     samples = [sample_on_clues(question) for question in questions]
-    hold_out = held_out(samples, scenes)
-    by_guesser = [guesser.guess(samples, hold_out) for guesser in guessers]
+    by_guesser = [guesser.guess(samples, scenes) for guesser in guessers]
     by_question = zip(*by_guesser, strict=True)
     rows = []
     for question, guesses in zip(questions, by_question, strict=True):

@@ -16,7 +16,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import find_form
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
-from infthor_eval.nieh.guessing.folds import Fit, Folds
+from infthor_eval.nieh.guessing.folds import Fit, Folds, split
 
 __all__ = [
     "chains_of_words",
@@ -73,9 +73,9 @@ def guess_by_chains(
     chains_of = list(map(chains, samples))
 
     def fit(out: frozenset[int]) -> dict[int, str]:
-        known = [position for position, fold in enumerate(folds) if fold not in out]
+        known, unknown = split(folds, out)
         counts = _Counts([targets[at] for at in known], [chains_of[at] for at in known])
-        return {at: counts.guess(chains_of[at]) for at, fold in enumerate(folds) if fold in out}
+        return {at: counts.guess(chains_of[at]) for at in unknown}
 
     return fit
 

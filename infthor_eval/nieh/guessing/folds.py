@@ -5,20 +5,20 @@ from types import MappingProxyType
 
 from infthor_eval.nieh.contexts import Sample
 
-__all__ = ["Fit", "Folds", "HoldOut", "folds_of", "guess_held_out", "held_out"]
+__all__ = ["Fit", "Folds", "folds_of", "held_out", "split"]
 
 Folds = Sequence[int]  # the fold of each sample
 Fit = Callable[[frozenset[int]], Mapping[int, str]]
 """Learns on all samples but those of some folds, and guesses these, by their positions."""
-HoldOut = Callable[[Sample], str]  # the name of what a sample is held out with
 
 _MOST = 6  # each fold, and each two, are guessed from the others
 
 
 def held_out(
     samples: Sequence[Sample], scenes: Mapping[str, str] = MappingProxyType({})
-) -> HoldOut:
-    """Return what a sample is left out with: its trajectory, or itself if there is one alone.
+) -> Callable[[Sample], str]:
+    """Return the name of what a sample is left out with: its trajectory, or itself if all are on
+    one.
 
     Twins are left out with all twins of their trajectory.
 
@@ -34,16 +34,17 @@ def held_out(
     return (lambda sample: sample.question.draw_name) if is_alone else group
 
 
-def folds_of(samples: Sequence[Sample], hold_out: HoldOut) -> Folds:
-    """Return the fold of each sample: what is held out together is dealt out by its name."""
-    groups = list(map(hold_out, samples))
+def folds_of(samples: Sequence[Sample], scenes: Mapping[str, str]) -> Folds:
+    """Return the fold of each sample: what is held out together (`held_out`) is dealt by name."""
+    groups = list(map(held_out(samples, scenes), samples))
     fold = {group: place % _MOST for place, group in enumerate(sorted(set(groups)))}
     return [fold[group] for group in groups]
 
 
-def guess_held_out(fit: Fit, folds: Folds) -> list[str]:
-    """Return a guess for each sample, learned on the other folds; an empty text for none."""
-    guesses: dict[int, str] = {}
-    for fold in sorted(set(folds)):
-        guesses |= fit(frozenset({fold}))
-    return [guesses[position] for position in range(len(folds))]
+def split(folds: Folds, out: frozenset[int]) -> tuple[list[int], list[int]]:
+    """Return the positions of the samples that are not in some folds, and of those that are."""
+    known: list[int] = []
+    unknown: list[int] = []
+    for position, fold in enumerate(folds):
+        (unknown if fold in out else known).append(position)
+    return known, unknown

@@ -3,11 +3,15 @@
 `blind` is one of them, which chooses among the others.
 """
 
+import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Flag, auto
 from functools import cache, partial
+from types import MappingProxyType
+
+import numpy as np
 
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
@@ -19,14 +23,7 @@ from infthor_eval.nieh.guessing.chains import (
     guess_by_chains,
 )
 from infthor_eval.nieh.guessing.clue_facts import ClueFacts
-from infthor_eval.nieh.guessing.folds import (
-    Fit,
-    Folds,
-    HoldOut,
-    folds_of,
-    guess_held_out,
-    held_out,
-)
+from infthor_eval.nieh.guessing.folds import Fit, Folds, folds_of, split
 from infthor_eval.nieh.guessing.learner import guess_by_learning
 from infthor_eval.nieh.scoring import score
 
@@ -57,74 +54,83 @@ class NamedGuesser:
     knows: Knowledge
     rule: Callable[[Sequence[Sample], Folds], Fit]
 
-    def guess(self, samples: Sequence[Sample], hold_out: HoldOut | None = None) -> list[str]:
+    def guess(
+        self, samples: Sequence[Sample], scenes: Mapping[str, str] = MappingProxyType({})
+    ) -> list[str]:
         """Return a guess for each sample of a file (on the clue frames); an empty text for none.
 
-        A sample is guessed without those that are held out with it; by default see `held_out`.
+        A sample is guessed without those of its fold (`folds_of`), which has its trajectory, or its
+        whole scene where scenes are given by trajectory.
         """
-        folds = folds_of(samples, hold_out or held_out(samples))
-        return guess_held_out(self.rule(samples, folds), folds)
+        folds = folds_of(samples, scenes)
+        fit = self.rule(samples, folds)
+        guesses: dict[int, str] = {}
+        for fold in set(folds):
+            guesses |= fit(frozenset({fold}))
+        return [guesses[position] for position in range(len(samples))]
 
 
 def _guess_constant(
     samples: Sequence[Sample], folds: Folds, group_of: Callable[[Sample], str]
 ) -> Fit:
-    """BlindGuess the commonest answer of a group; of equals the first by name."""
+    """Guess the constant of a group (`_constant`); of a group without answers that of all."""
     groups = list(map(group_of, samples))
     answers = [doc_target(sample.question) for sample in samples]
 
     def fit(out: frozenset[int]) -> dict[int, str]:
+        known, unknown = split(folds, out)
+        everywhere = Counter(answers[at] for at in known)
         counts: dict[str, Counter[str]] = defaultdict(Counter)
-        for group, answer, fold in zip(groups, answers, folds, strict=True):
-            if fold not in out:
-                counts[group][answer] += 1
-        return {at: _commonest(counts[groups[at]]) for at, fold in enumerate(folds) if fold in out}
+        for at in known:
+            counts[groups[at]][answers[at]] += 1
+        constants = {group: _constant(of_group, everywhere) for group, of_group in counts.items()}
+        other = _constant(everywhere, everywhere)
+        return {at: constants.get(groups[at], other) for at in unknown}
 
     return fit
 
 
-def _commonest(counts: Counter[str], everywhere: Mapping[str, int] = Counter()) -> str:
-    """Return the commonest answer; of equals the commoner one everywhere, then the first."""
-    return min(
-        counts, key=lambda answer: (-counts[answer], -everywhere[answer], answer), default=""
-    )
+def _constant(counts: Counter[str], everywhere: Mapping[str, int]) -> str:
+    """Return the commonest answer, or one that is rarer by a standard error at most.
+
+    Where answers are balanced, the commonest on other trajectories is the rarer one on the own, so
+    the choice among near equals must not hang on counts: it is yes, else the commonest everywhere.
+    """
+    most = max(counts.values(), default=0)
+    near = [answer for answer, n in counts.items() if most - n <= math.sqrt(most + n)]
+    return min(near, key=lambda it: (it.lower() != "yes", -everywhere[it], it), default="")
 
 
 def _choose(samples: Sequence[Sample], folds: Folds, guessers: Sequence[NamedGuesser]) -> Fit:
-    """BlindGuess each form as is best on the other folds: by its commonest answer, or by a guesser.
+    """Guess each form by the guesser that is chosen on the other folds, by its strict scores there.
 
-    That is chosen by strict scores; guessers are scored on questions held out from them in turn,
-    and of equals the first is taken. A form that is in no other fold has the file's commonest
-    answer.
+    For these it is held out from each fold in turn. The first guesser is left for the one that is
+    best over all forms, and that for the one that is best in a form, where they are better by more
+    than a standard error.
     """
     fits = [cache(guesser.rule(samples, folds)) for guesser in guessers]
-    targets = [doc_target(sample.question) for sample in samples]
-    by_form: dict[str, list[int]] = {}
-    for position, sample in enumerate(samples):
-        by_form.setdefault(form_of(sample.question), []).append(position)
-
-    @cache
-    def score_at(position: int, guess: str) -> float:
-        return score(guess, samples[position].question.answers, "strict")
+    forms = [form_of(sample.question) for sample in samples]
+    score_of = cache(partial(score, scorer="strict"))
 
     def fit(out: frozenset[int]) -> dict[int, str]:
-        # Of two folds that are held out, one is guessed as the other will be: without either.
-        nested = {fold: [learned(out | {fold}) for learned in fits] for fold in set(folds) - out}
-        everywhere = Counter(
-            target for target, fold in zip(targets, folds, strict=True) if fold not in out
-        )
-        guesses: dict[int, str] = {}
-        for of_form in by_form.values():
-            known = [at for at in of_form if folds[at] not in out]
-            constant = _commonest(Counter(targets[at] for at in known) or everywhere, everywhere)
-            best = sum(score_at(at, constant) for at in known)
-            chosen: Mapping[int, str] = dict.fromkeys(of_form, constant)
+        known, unknown = split(folds, out)
+        right = np.zeros((len(fits), len(samples)))
+        by_form: dict[str, list[int]] = {forms[at]: [] for at in unknown}
+        for at in known:
+            by_form.setdefault(forms[at], []).append(at)
             for number, learned in enumerate(fits):
-                total = sum(score_at(at, nested[folds[at]][number][at]) for at in known)
-                if total > best:
-                    best, chosen = total, learned(out)
-            guesses |= {at: chosen[at] for at in of_form if folds[at] in out}
-        return guesses
+                guess = learned(out | {folds[at]})[at]
+                right[number, at] = score_of(guess, samples[at].question.answers)
+
+        def best(than: int, positions: Sequence[int]) -> int:
+            of_each = right[:, positions]
+            first = int(of_each.sum(axis=1).argmax())
+            gains = of_each[first] - of_each[than]
+            return first if gains.sum() > np.linalg.norm(gains) else than
+
+        overall = best(0, known)
+        chosen = {form: fits[best(overall, of_form)](out) for form, of_form in by_form.items()}
+        return {at: chosen[forms[at]][at] for at in unknown}
 
     return fit
 
@@ -132,7 +138,7 @@ def _choose(samples: Sequence[Sample], folds: Folds, guessers: Sequence[NamedGue
 _WORDS = Knowledge.WORDS
 _NUMBER = Knowledge.NUMBER
 _PLACE = Knowledge.PLACE
-_CONSTANTS = (
+GUESSERS = (
     NamedGuesser(
         "one answer a file", Knowledge.FILE, partial(_guess_constant, group_of=lambda _: "")
     ),
@@ -141,8 +147,6 @@ _CONSTANTS = (
         _WORDS,
         partial(_guess_constant, group_of=lambda sample: form_of(sample.question)),
     ),
-)
-_FURTHER = (
     NamedGuesser("words", _WORDS, partial(guess_by_chains, chains=chains_of_words)),
     NamedGuesser(
         "words, number of frames",
@@ -166,7 +170,6 @@ _FURTHER = (
         partial(guess_by_learning, number=True, place=True),
     ),
 )
-GUESSERS = (*_CONSTANTS, *_FURTHER)
 
 
 def facts_guesser(facts: Mapping[str, Sequence[ClueFacts]]) -> NamedGuesser:
@@ -179,6 +182,6 @@ def facts_guesser(facts: Mapping[str, Sequence[ClueFacts]]) -> NamedGuesser:
 
 
 def blind_guesser(knowledge: Knowledge) -> NamedGuesser:
-    """Return `blind`: of each form the best guesser that knows no more than that, or a constant."""
-    guessers = [guesser for guesser in _FURTHER if guesser.knows in knowledge]
+    """Return `blind`, which chooses among a constant a form and guessers that know no more."""
+    guessers = [it for it in GUESSERS if it.knows and it.knows in knowledge]
     return NamedGuesser("blind", knowledge, partial(_choose, guessers=guessers))

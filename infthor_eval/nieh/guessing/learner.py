@@ -17,7 +17,7 @@ from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.chains import form_of, words_of
 from infthor_eval.nieh.guessing.clue_facts import ClueFacts
-from infthor_eval.nieh.guessing.folds import Fit, Folds
+from infthor_eval.nieh.guessing.folds import Fit, Folds, split
 
 __all__ = ["guess_by_learning"]
 
@@ -54,10 +54,9 @@ def guess_by_learning(
     answers = np.array([doc_target(sample.question) for sample in samples], dtype=object)
 
     def fit(out: frozenset[int]) -> dict[int, str]:
-        is_out = np.isin(folds, list(out))
-        unknown = np.flatnonzero(is_out)
-        guesses = _learn(features[~is_out], answers[~is_out], features[unknown])
-        return dict(zip(unknown.tolist(), guesses, strict=True))
+        known, unknown = split(folds, out)
+        guesses = _learn(features[known], answers[known], features[unknown])
+        return dict(zip(unknown, guesses, strict=True))
 
     return fit
 

@@ -1,4 +1,4 @@
-"""The best guess at each question of a set."""
+"""What `blind` says to the questions of a set."""
 
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -8,7 +8,7 @@ import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
-from infthor_eval.nieh.guessing import guesses
+from infthor_eval.nieh.guessing import blind
 from infthor_eval.nieh.guessing.blind import (
     find_floor,
     questions_by_file,
@@ -66,11 +66,11 @@ def test_guesses_are_learned_once_for_the_same_questions(make_set, monkeypatch):
     questions = [*constant(PRESENCE, ("yes",) * 4 + ("no",)), *constant(OPEN, ("yes", "yes"))]
     first = find_floor(make_set(test=questions), Knowledge.WORDS)
     with monkeypatch.context() as patch:
-        patch.setattr(guesses, "GUESSERS", ())  # nobody left to learn from
+        patch.setattr(blind, "blind_guesser", None)  # nobody left to learn from
         assert find_floor(make_set(test=questions), Knowledge.WORDS) == first
     others = make_set(test=questions[:-1])
     assert len(find_floor(others, Knowledge.WORDS)) == len(first) - 1
-    for path in user_cache("guesses").iterdir():
+    for path in user_cache("blind").iterdir():
         path.write_text("{")
     assert find_floor(make_set(test=questions), Knowledge.WORDS) == first
 
@@ -116,7 +116,7 @@ def test_no_guesser_is_above_blind_and_the_best_is_there(make_set):
     for guesser in GUESSERS:
         replies = zip(questions, guesser.guess(make_samples_on_clues(*questions)), strict=True)
         records = [
-            make_record(i, reply, question.answers, guess=guesses[question.id])
+            make_record(i, reply, question.answers, blind=guesses[question.id])
             for i, (question, reply) in enumerate(replies)
         ]
         scores.append(above_blind(records, "strict").mean)
@@ -136,7 +136,7 @@ def test_questions_that_are_asked_at_once_wait_for_the_one_that_learns(make_set,
             started.wait(0.2)  # a second one that learned too would be here meanwhile
         return {}
 
-    monkeypatch.setattr(guesses, "_learn_guesses", learn)
+    monkeypatch.setattr(blind, "_learn", learn)
     with ThreadPoolExecutor(2) as pool:
         list(pool.map(lambda _: find_floor(data, Knowledge.WORDS), range(2)))
     assert len(n_learned) == 1

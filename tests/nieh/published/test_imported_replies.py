@@ -194,12 +194,12 @@ def test_frames_asked_about_in_the_words_of_main_are_no_published_row(imported):
     )
 
 
-def test_records_have_the_guesses_that_suit_the_mode(imported, monkeypatch):
-    guess = BlindGuess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.5})
-    known = {visible_knowledge("trajectory"): {"q0": guess}}
+def test_records_have_what_blind_says_that_suits_the_mode(imported, monkeypatch):
+    blind = BlindGuess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.5})
+    known = {visible_knowledge("trajectory"): {"q0": blind}}
     monkeypatch.setattr(imported_replies, "find_floor", lambda _, knowledge: known[knowledge])
     (run,) = imported(full_traj=[row(0), row(1)])
-    assert {record.id: record.payload.blind for record in run.records} == {"q0": guess, "q1": None}
+    assert {record.id: record.payload.blind for record in run.records} == {"q0": blind, "q1": None}
 
 
 @pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published logs are not at ../shared/data")

@@ -90,7 +90,7 @@ def test_whole_trajectories_are_in_bins_of_their_length():
 
 def test_the_same_rule_holds_above_blind():
     guess = BlindGuess(form="a", scores={"strict": 0.5}, form_scores={"strict": 0.5})
-    base, far = (of_share(share, guess=guess) for share in (1.0, 0.9))
+    base, far = (of_share(share, blind=guess) for share in (1.0, 0.9))
     runs = [
         make_run(make_config(), base),
         make_run(make_config(context="haystack", ctx_size=8), far),

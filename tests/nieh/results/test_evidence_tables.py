@@ -84,7 +84,7 @@ def guessed(number, reply, score, mean=0.5, form="f"):
     return make_record(
         number,
         reply,
-        guess=BlindGuess(form=form, scores={"strict": score}, form_scores={"strict": mean}),
+        blind=BlindGuess(form=form, scores={"strict": score}, form_scores={"strict": mean}),
     )
 
 

@@ -238,7 +238,7 @@ def test_lengths_have_their_own_scores_above_blind():
     guess = BlindGuess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.5})
     lengths = (("mug", 500), ("cup", 500), ("mug", 70_000), ("mug", 3000))
     records = [
-        make_record(i, reply, tokens=Tokens(context=n), guess=guess)
+        make_record(i, reply, tokens=Tokens(context=n), blind=guess)
         for i, (reply, n) in enumerate(lengths[:3])
     ]
     summary = task_of([*records, make_record(3, "mug", tokens=Tokens(context=3000))])
