@@ -48,7 +48,7 @@ def main() -> None:
     data = NiehSet(options.data)
     pictures = {
         "guessing": lambda: draw_guessing(data, tasks),
-        "above_guessing": lambda: draw_above_guessing(tasks),
+        "above_blind": lambda: draw_above_blind(tasks),
         "evidence": lambda: draw_evidence(tasks),
         "distance": lambda: draw_distance(tasks),
     }
@@ -123,19 +123,19 @@ def draw_guessing(data: NiehSet, tasks: Mapping[str, TaskSummary]) -> Figure:
     return figure
 
 
-def draw_above_guessing(tasks: Mapping[str, TaskSummary]) -> Figure:
-    """Draw the score above guessing of each run."""
+def draw_above_blind(tasks: Mapping[str, TaskSummary]) -> Figure:
+    """Draw the score above blind of each run."""
     figure = Figure(figsize=(6.2, 1.7), layout="constrained")
     axes = figure.subplots()
     axes.axvline(0, color="#444444", lw=0.8)
     for at, (name, task) in enumerate(reversed(tasks.items())):
-        score, colour = task.above_guessing["strict"], LOOKS[name].colour
+        score, colour = task.above_blind["strict"], LOOKS[name].colour
         axes.plot(100 * (score.mean or 0), at, "o", ms=5, color=colour)
         axes.hlines(at, 100 * (score.low or 0), 100 * (score.high or 0), color=colour, lw=1.3)
     axes.set_yticks(range(len(tasks)), [MODES[name] for name in reversed(tasks)])
     axes.set_ylim(-0.6, len(tasks) - 0.4)
     axes.set_xlim(-35, 105)
-    axes.set_xlabel("above guessing, %: 0 is the best guesser, 100 all right")
+    axes.set_xlabel("above blind, %: 0 is the best guesser, 100 all right")
     axes.grid(axis="y", visible=False)
     return figure
 

@@ -50,7 +50,7 @@ def main() -> None:
     )
     samples = [Sample(question, question.clues) for question in generated.questions]
     yes_no = [item for item in samples if item.question.answers[0] in _YES_NO]
-    for name in ("oracle", "blind", "blind-count"):
+    for name in ("oracle", "blind"):
         predict = BASELINES[name](0).fit(samples)
         print(
             f"{name}, strict: {mean(predict, samples):.3f}; yes/no alone "

@@ -1,4 +1,4 @@
-"""Guess which world of a pair of twins is the original, with a learner that sees both.
+"""BlindGuess which world of a pair of twins is the original, with a learner that sees both.
 
 python benchmarks/twins_original.py SET [SET ...] [--flips 60]
 

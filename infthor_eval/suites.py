@@ -67,7 +67,7 @@ _BUILT_IN = {
         "infthor_eval.nieh.options:NiehOptions",
         "infthor_eval.report.suites.nieh:NiehPresenter",
         "infthor_eval.harness.nieh_task:NiehRequests",
-        ("oracle", "blind", "blind-count", "random", "flip", "hash"),
+        ("oracle", "blind", "random", "flip", "hash"),
     ),
     "manipulation": _BuiltIn(
         "infthor_eval.manipulation.suite:ManipulationSuite",

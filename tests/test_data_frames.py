@@ -78,13 +78,13 @@ def test_every_column_is_documented() -> None:
     documented = page[page.index("## Samples as a table") :]
     names = {column.name for columns in (ENVELOPE, *COLUMNS.values()) for column in columns}
     # One for each scorer.
-    guesses = {name for name in names if name.startswith(("guess_", "above_guessing_"))}
+    guesses = {name for name in names if name.startswith(("blind_", "above_blind_"))}
     wanted = {
         "run",
         "suite",
         "score_METRIC",
-        "guess_SCORER",
-        "above_guessing_SCORER",
+        "blind_SCORER",
+        "above_blind_SCORER",
         *(names - guesses),
     }
     assert sorted(name for name in wanted if f"`{name}`" not in documented) == []

@@ -7,9 +7,11 @@ table?").
 
 import re
 from dataclasses import dataclass
+from functools import cached_property
 
 __all__ = ["FORMS", "FURTHER_FORMS", "QuestionForm", "find_form", "type_of"]
 
+_LONGEST = 1000  # characters of a question of a form: to look for one takes up to their square
 _ONE_TYPE = r"(?:(?:a|an|the) )?[^?]+"
 
 
@@ -27,11 +29,14 @@ class QuestionForm:
     question_type: str
     words: str
 
+    @cached_property
+    def _pattern(self) -> re.Pattern[str]:
+        pattern = re.sub(r"(\w+(?:/\w+)+)", _either, re.escape(self.words))
+        return re.compile(pattern.replace(r"\{\}", _ONE_TYPE), re.IGNORECASE)
+
     def matches(self, text: str) -> bool:
         """Return True if a question is of this form."""
-        pattern = re.sub(r"(\w+(?:/\w+)+)", _either, re.escape(self.words))
-        pattern = pattern.replace(r"\{\}", _ONE_TYPE)
-        return re.fullmatch(pattern, text.strip(), flags=re.IGNORECASE) is not None
+        return len(text) <= _LONGEST and self._pattern.fullmatch(text.strip()) is not None
 
 
 def _either(words: re.Match[str]) -> str:

@@ -1,7 +1,7 @@
 """NIEH set up for a run: the questions of its tasks, answered a trajectory at a time."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import groupby
 from typing import Any
 
@@ -60,9 +60,7 @@ class NiehEvaluation:
         tasks = {task.name: task for task in self._tasks}
         prepared = {name: task.prepare(tokens) for name, task in tasks.items()}
         _refuse_empty([ready.task_samples for ready in prepared.values()], self._tasks)
-        answerer.fit(
-            {name: partial(task.answer_key, prepared[name], tokens) for name, task in tasks.items()}
-        )
+        answerer.fit({name: ready.task_samples for name, ready in prepared.items()})
         costs = {name: answerer.cost(ready) for name, ready in prepared.items()}
         workload = Workload(
             groups=_groups(prepared, self._options.repeats),

@@ -13,7 +13,7 @@ from infthor_eval.runs.journals.records import RecordTypes
 
 __all__ = [
     "RECORDS",
-    "Guess",
+    "BlindGuess",
     "NiehAnswer",
     "NiehNote",
     "NiehRecall",
@@ -25,24 +25,25 @@ __all__ = [
 _Answers = tuple[str | Whole | Number, ...]
 
 
-class Guess(msgspec.Struct, frozen=True, kw_only=True):
-    """What can be guessed of a question without a frame (`infthor_eval.nieh.guessing`).
+class BlindGuess(msgspec.Struct, frozen=True, kw_only=True):
+    """What `blind` says to a question without a frame (`infthor_eval.nieh.guessing.blind`).
 
     Attributes:
         form: the question's form.
-        scores: scores by scorer of the guess at this question; of the guesser that is best at its
-            form.
+        reply: what it says.
+        scores: scores of that by scorer.
         form_scores: means of these scores over the questions of that form in its file.
     """
 
     form: str
+    reply: str = ""
     scores: dict[str, Number]
     form_scores: dict[str, Number]
 
     def __post_init__(self) -> None:
         """Check that both have the same scorers; msgspec turns the error into its own."""
         if self.scores.keys() != self.form_scores.keys():
-            raise ValueError("`scores` and `form_scores` of a guess are of different scorers")
+            raise ValueError("`scores` and `form_scores` of `blind` are of different scorers")
 
 
 class ShownClues(msgspec.Struct, frozen=True, kw_only=True):
@@ -130,7 +131,7 @@ class NiehAnswer(
         clue_column: column in the tables by number of clues (`Question.clue_column`).
         answers: the gold answers.
         file: name of its file, in a set of several; empty elsewhere.
-        guess: what can be guessed of the question; None if it is not known.
+        blind: what `blind` says to the question; None if it is not known.
         shown_clues: clue frames among the shown ones; None if they are not known, or if no frame is
             evidence.
         twin: what it is paired with; None for a question that is no twin.
@@ -151,7 +152,7 @@ class NiehAnswer(
     clue_column: str
     answers: Annotated[_Answers, Meta(min_length=1)]
     file: str = ""
-    guess: Guess | None = None
+    blind: BlindGuess | None = None
     shown_clues: ShownClues | None = None
     twin: TwinSide | None = None
     recall: NiehRecall | None = None
@@ -166,7 +167,7 @@ class NiehAnswer(
     def of(
         cls,
         question: Question,
-        guess: Guess | None = None,
+        blind: BlindGuess | None = None,
         shown_clues: ShownClues | None = None,
         twin: TwinSide | None = None,
     ) -> "NiehAnswer":
@@ -178,7 +179,7 @@ class NiehAnswer(
             clue_column=question.clue_column,
             answers=question.answers,
             file=question.file,
-            guess=guess,
+            blind=blind,
             shown_clues=shown_clues,
             twin=twin,
         )

@@ -1,7 +1,7 @@
 """A task of NIEH: its file, its samples, and how their replies become records."""
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -15,7 +15,6 @@ from infthor_eval.nieh.contexts import (
     DEFAULT_CONTEXT,
     MEMORY,
     ContextSettings,
-    Sample,
     check_prompt,
 )
 from infthor_eval.nieh.metrics import PUBLISHED, Metrics, metrics_of
@@ -127,12 +126,6 @@ class NiehTask:
         decoding = replace(self.decoding, max_new_tokens=n_tokens, stop=())
         settings = {**self._generation_kwargs, "max_gen_toks": n_tokens}
         return PreparedTask(samples, decoding, settings, self.metrics, self.decoding.stop)
-
-    def answer_key(self, prepared: PreparedTask, tokens_per_frame: int | None) -> Sequence[Sample]:
-        """Return the samples without a limit: the answer key that a baseline is fitted to."""
-        if self._limit is None:
-            return prepared.task_samples.samples
-        return find_samples(self._config | {"tokens_per_frame": tokens_per_frame}).samples
 
     def config(self, prepared: PreparedTask, video_input: bool | None) -> NiehTaskConfig:
         """Return everything that the numbers of the task depend on.

@@ -7,8 +7,8 @@ from typing import Any
 from msgspec.structs import replace as replace_fields
 
 from infthor_eval.nieh.contexts.base import Sample
-from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
-from infthor_eval.nieh.records import Guess, NiehAnswer, ShownClues
+from infthor_eval.nieh.guessing.blind import find_floor, visible_knowledge
+from infthor_eval.nieh.records import BlindGuess, NiehAnswer, ShownClues
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.twins import twin_side
 from infthor_eval.runs import Unit, UnitKey, UnitRecord
@@ -20,16 +20,16 @@ __all__ = ["NiehUnit", "shown_clues"]
 class NiehUnit(Unit[NiehAnswer]):
     """A unit that asks the question of a sample.
 
-    What can be guessed of the question is in its records, and not in `payload`: no question waits
+    What `blind` says to the question is in its records, and not in `payload`: no question waits
     until it is learned.
 
     Attributes:
         sample: the sample.
-        find_guess: returns what can be guessed of the question, or None.
+        find_blind: returns what `blind` says to the question, or None.
     """
 
     sample: Sample
-    find_guess: Callable[[], Guess | None] = field(repr=False, compare=False)
+    find_blind: Callable[[], BlindGuess | None] = field(repr=False, compare=False)
 
     @classmethod
     def of(
@@ -47,21 +47,21 @@ class NiehUnit(Unit[NiehAnswer]):
                 twin=twin_side(task_samples, sample),
             ),
             sample,
-            lambda: find_guesses(task_samples.data, knowledge).get(question.id),
+            lambda: find_floor(task_samples.data, knowledge).get(question.id),
         )
 
     def record(
         self, fingerprint: str, payload: NiehAnswer, **envelope: Any
     ) -> UnitRecord[NiehAnswer]:
         """See `Unit.record`."""
-        return super().record(fingerprint, self._with_guess(payload), **envelope)
+        return super().record(fingerprint, self._with_blind(payload), **envelope)
 
     def without_inputs(self) -> Unit[NiehAnswer]:
         """See `Unit.without_inputs`."""
-        return Unit(self.key, self.cluster, self._with_guess(self.payload))
+        return Unit(self.key, self.cluster, self._with_blind(self.payload))
 
-    def _with_guess(self, payload: NiehAnswer) -> NiehAnswer:
-        return replace_fields(payload, guess=self.find_guess())
+    def _with_blind(self, payload: NiehAnswer) -> NiehAnswer:
+        return replace_fields(payload, blind=self.find_blind())
 
 
 def shown_clues(task_samples: TaskSamples, sample: Sample) -> ShownClues | None:

@@ -290,7 +290,7 @@ class Presenter(Protocol):
         """Return `finding`, as `measure_of` returns `measure`."""
 
     def chance(self, task: str, summary: Any, records: Sequence[Record]) -> float | None:
-        """Return what guessing without a frame scores in the primary metric of a task, on its
+        """Return what `blind`, which sees no frame, scores in the primary metric of a task, on its
         answered records, 0 to 1; None if that is not known."""
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:

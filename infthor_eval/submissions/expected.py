@@ -13,7 +13,7 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.replies.answer_key import AnswerKey, read_key
 from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig
-from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
+from infthor_eval.nieh.guessing.blind import find_floor, visible_knowledge
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.rescoring.keyed import keyed_payload
@@ -83,7 +83,7 @@ class Expected:
             unit,
             cluster=question.cluster,
             payload=keyed_payload(unit.payload, unit.key.id, key, unit.sample.frames),
-            find_guess=lambda: find_guesses(key.data, knowledge).get(question.id),
+            find_blind=lambda: find_floor(key.data, knowledge).get(question.id),
         )
 
 

@@ -5,7 +5,7 @@ from statistics import fmean
 
 from infthor_eval.exports.subjects import engine_of
 from infthor_eval.formats.published import published_tables
-from infthor_eval.nieh.results.above_guessing import above_guessing
+from infthor_eval.nieh.results.above_blind import above_blind
 from infthor_eval.nieh.results.pair_summary import find_pairs
 from infthor_eval.pairs import PairShares, net_pairs
 from infthor_eval.rates import Rate, clustered_rate
@@ -81,7 +81,7 @@ def _pairs(task: Expected) -> Rate | None:
 
 
 def _above(task: Expected) -> Rate | None:
-    above = above_guessing(task.graded, _SCORER)
+    above = above_blind(task.graded, _SCORER)
     return None if above.mean is None else Rate(above.mean, above.low, above.high, above.n)
 
 

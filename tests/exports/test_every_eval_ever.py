@@ -115,8 +115,8 @@ def test_numbers_of_the_summary_and_their_intervals(questions_run, export):
         strict["low"],
         strict["high"],
     )
-    above = summary["nieh_gt"]["above_guessing"]["strict"]
-    details = results["nieh_gt/strict, above guessing"]["score_details"]
+    above = summary["nieh_gt"]["above_blind"]["strict"]
+    details = results["nieh_gt/strict, above blind"]["score_details"]
     interval = details["uncertainty"]["confidence_interval"]
     assert (details["score"], interval["lower"], interval["upper"]) == (
         above["mean"],

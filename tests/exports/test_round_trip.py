@@ -57,7 +57,7 @@ def test_replies_and_scores_are_equal(questions_run, export, bring_back, file_fo
     assert after["pairs"]["net_pairs"] == before["pairs"]["net_pairs"]
     assert after["pairs"]["single"] == before["pairs"]["single"]
     assert after["by_clues"]["total"]["scores"] == before["by_clues"]["total"]["scores"]
-    assert after["above_guessing"] == before["above_guessing"]
+    assert after["above_blind"] == before["above_blind"]
 
 
 @pytest.mark.parametrize("file_format", ["every-eval-ever", "inspect"])

@@ -11,7 +11,7 @@ from infthor_eval.nieh.results.summary import summarise
 from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.runs import RunHeader, RunSummary, Tokens, UnitRecord
 
-_PAYLOAD = ("question", "question_type", "file", "guess", "shown_clues", "twin", "recall")
+_PAYLOAD = ("question", "question_type", "file", "blind", "shown_clues", "twin", "recall")
 
 
 def make_record(

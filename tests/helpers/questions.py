@@ -1,13 +1,16 @@
 """Questions of small sets."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import Sample
-from infthor_eval.nieh.guessing.guesses import sample_on_clues
+from infthor_eval.nieh.guessing.blind import sample_on_clues
+from infthor_eval.nieh.guessing.folds import Fit
+from infthor_eval.nieh.guessing.guessers import Knowledge, NamedGuesser
 
-__all__ = ["make_question", "make_samples_on_clues"]
+__all__ = ["guess_with", "make_question", "make_samples_on_clues"]
 
 
 def make_question(
@@ -24,3 +27,14 @@ def make_question(
 def make_samples_on_clues(*questions: Question) -> list[Sample]:
     """A sample of each question, whose window is its clues."""
     return [sample_on_clues(question) for question in questions]
+
+
+def guess_with(
+    rule: Callable[..., Fit],
+    samples: Sequence[Sample],
+    scenes: Mapping[str, str] | None = None,
+    **knowledge: Any,
+) -> list[str]:
+    """What a guesser of that rule says to samples, held out in folds."""
+    guesser = NamedGuesser("", Knowledge.WORDS, partial(rule, **knowledge))
+    return guesser.guess(samples, scenes or {})

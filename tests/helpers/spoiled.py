@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from infthor_eval.manipulation.records import ArmRecord, ArmStep
-from infthor_eval.nieh.records import Guess, NiehAnswer, NiehRecall, ShownClues, TwinSide
+from infthor_eval.nieh.records import BlindGuess, NiehAnswer, NiehRecall, ShownClues, TwinSide
 from infthor_eval.plans.records import PlanRecord, StepRecord, TwinRecord
 from infthor_eval.runs import RunHeader, Tokens, UnitRecord, Usage
 
@@ -149,7 +149,7 @@ def _nieh() -> tuple[RunHeader, UnitRecord[NiehAnswer]]:
     record = make_record(
         0,
         "the mug",
-        guess=Guess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.25}),
+        blind=BlindGuess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.25}),
         shown_clues=ShownClues(n_shown=1, n_clues=1, n_after=3),
         twin=twin,
         recall=NiehRecall(recalled=(0, "a text"), build_s=0.5, recall_s=0.1),

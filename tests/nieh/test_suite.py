@@ -14,6 +14,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh import samples
 from infthor_eval.nieh.records import RECORDS
+from infthor_eval.nieh.results.evidence_tables import above_blind_notes
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.runs import execute, prepare_all, read_run
 
@@ -44,14 +45,21 @@ def test_oracle_is_right_everywhere_and_lm_eval_agrees(prepare_run):
     assert len(list(outcome.folder.glob("lm_eval/*/samples_nieh_*.jsonl"))) == 2
 
 
-@pytest.mark.parametrize("model", ["blind", "blind-count"])
-def test_a_guesser_with_one_trajectory_is_said_to_be_no_measure(model, make_nieh_set, prepare_run):
+def test_blind_with_one_trajectory_is_said_to_be_no_measure_and_nothing_is_above_it(
+    make_nieh_set, prepare_run
+):
     alone = make_nieh_set(
         [make_question(text="Is there a mug?"), make_question(text="Is there a pan?")], name="alone"
     )
     watcher = Watcher()
-    execute(prepare_run(model=model, data=alone, tasks=("nieh_gt",)), watcher)
+    outcome = execute(prepare_run(model="blind", data=alone, tasks=("nieh_gt",)), watcher)
     assert [cost.description.partition(":")[0] for cost in watcher.work.costs] == ["one trajectory"]
+    assert {record.payload.reply for record in outcome.records} == {"yes"}
+    assert {record.payload.blind for record in outcome.records} == {None}
+    (note,) = above_blind_notes([outcome.summary])
+    assert (
+        note == "above blind: not given, as beside one trajectory there is no other to learn from."
+    )
 
 
 def test_runs_of_one_command_read_a_set_once_and_the_next_command_anew(data, tmp_path, monkeypatch):
@@ -216,7 +224,7 @@ def test_baselines_answer_the_same_whatever_runs_beside_them(
             f"task: nieh_{name}\n"
             f"dataset_kwargs: {{context: clues, data: {root}}}\n"
         )
-    for model in ("blind", "blind-count", "random"):
+    for model in ("blind", "random"):
         alone = [execute(prepare_run(model, tasks=(f"nieh_{name}",))) for name in key]
         together = execute(prepare_run(model, tasks=("nieh_one", "nieh_two")))
         assert replies(together) == replies(alone[0]) | replies(alone[1])
@@ -224,7 +232,7 @@ def test_baselines_answer_the_same_whatever_runs_beside_them(
 
 
 def test_a_baseline_reads_the_whole_key_whatever_is_asked_of_it(prepare_run):
-    for model in ("blind", "blind-count", "random"):
+    for model in ("blind", "random"):
         whole, few = (replies(execute(prepare_run(model, limit=limit))) for limit in (None, 2))
         assert len(few) == 4
         assert few.items() <= whole.items()

@@ -4,7 +4,7 @@ import pytest
 from msgspec.structs import replace
 
 from infthor_eval.errors import DataError
-from infthor_eval.nieh.records import Guess
+from infthor_eval.nieh.records import BlindGuess
 from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.report.comparison import compare, comparison_table
 from infthor_eval.report.plain import PlainPresenter
@@ -12,12 +12,14 @@ from infthor_eval.report.suites.nieh import NiehPresenter
 
 from ..helpers.nieh_runs import make_record, make_twins
 
-ABOVE = "strict, above guessing"
+ABOVE = "strict, above blind"
 
 
 def make_guessed_record(number, reply, score=0.5, mean=0.5):
     return make_record(
-        number, reply, guess=Guess(form="f", scores={"strict": score}, form_scores={"strict": mean})
+        number,
+        reply,
+        blind=BlindGuess(form="f", scores={"strict": score}, form_scores={"strict": mean}),
     )
 
 
@@ -27,7 +29,7 @@ def compared(first, second, presenter=None):
     }
 
 
-def test_further_scores_are_those_above_guessing_where_guessing_does_not_solve_the_form():
+def test_further_scores_are_those_above_blind_where_guessing_does_not_solve_the_form():
     presenter = NiehPresenter()
     assert presenter.further_scores(make_guessed_record(0, "mug", 0.0)) == {ABOVE: 2.0}
     assert presenter.further_scores(make_guessed_record(0, "cup", 1.0)) == {ABOVE: -2.0}
@@ -37,7 +39,7 @@ def test_further_scores_are_those_above_guessing_where_guessing_does_not_solve_t
     assert PlainPresenter().further_scores(make_guessed_record(0, "mug")) == {}
 
 
-def test_runs_are_compared_above_guessing_on_the_questions_that_have_it():
+def test_runs_are_compared_above_blind_on_the_questions_that_have_it():
     # Question 0 has no guess and 1 is solved by guessing; the others count, of one form with a
     # guess of 0.5 each.
     replies = (

@@ -84,6 +84,6 @@ def _read_summary(folder: Path) -> "RunSummary":
     run = read_run_results(folder)[0].summary
     if not isinstance(run.summary, NiehSummary):
         raise UsageError(
-            f"{folder}: a run of {run.header.suite}; only runs of nieh can stand beside guesses"
+            f"{folder}: a run of {run.header.suite}; only runs of nieh can stand beside blind"
         )
     return run

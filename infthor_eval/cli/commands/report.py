@@ -69,8 +69,8 @@ _FOLDER = Path("results/figures")
     "--figure",
     metavar="WHICH",
     help="Draw a figure instead: 6 (reward of arms along trajectories), 7 (reward of plans over "
-    "steps and context tokens), radius (success of arms by the hand's radius), pairs (net pairs of twins "
-    "by distance, frames shown and age).",
+    "steps and context tokens), radius (success of arms by the hand's radius), pairs (net pairs of "
+    "twins by distance, frames shown and age).",
 )
 @click.option(
     "--panels",

@@ -1,6 +1,6 @@
 """What answers the questions of a run: a model by its conversations, or a baseline."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Protocol
 
 from infthor_eval.errors import UsageError
@@ -8,8 +8,8 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.asking.answering import OpenAnswerer, OpenBaseline, OpenModel
 from infthor_eval.nieh.asking.baselines import Baseline, Blind, Predict
 from infthor_eval.nieh.asking.budget import budget_of
-from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import Session
 from model_adapters import Model, Subject
@@ -41,8 +41,8 @@ class Answerer(Protocol):
     def cost(self, prepared: PreparedTask) -> str | None:
         """Return the cost of a task in words, or None where it is not known."""
 
-    def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
-        """Fit the subject to each task's answer key, which a function finds; models need no key."""
+    def fit(self, tasks: Mapping[str, TaskSamples]) -> None:
+        """Fit the subject to the answer key of each task's set; models need no key."""
 
     def open(self, task: str, session: Session[NiehAnswer]) -> OpenAnswerer:
         """Return what answers the questions of a task on one trajectory."""
@@ -76,7 +76,7 @@ class _ModelAnswerer:
             )
         return "; ".join(lines) or None
 
-    def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
+    def fit(self, tasks: Mapping[str, TaskSamples]) -> None:
         pass
 
     def open(self, task: str, session: Session[NiehAnswer]) -> OpenAnswerer:
@@ -100,14 +100,13 @@ class _BaselineAnswerer:
         if len({question.cluster for question in questions}) > 1:
             return None
         return (
-            f"one trajectory: {self._baseline.name} learns from its other questions alone, and may "
-            "be worse than a guess"
+            f"one trajectory: {self._baseline.name} learns from its other questions alone, which "
+            "say too little to measure others by it"
         )
 
-    def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
-        # Each task on its own: the questions of one task must be no clue to another.
-        for task, find_key in keys.items():
-            self._predictions[task] = self._baseline.fit(find_key())
+    def fit(self, tasks: Mapping[str, TaskSamples]) -> None:
+        for name, samples in tasks.items():
+            self._predictions[name] = self._baseline.fit(samples.data, samples.context_name)
 
     def open(self, task: str, session: Session[NiehAnswer]) -> OpenAnswerer:
         return OpenBaseline(self._predictions[task])

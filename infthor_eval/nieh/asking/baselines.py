@@ -1,4 +1,4 @@
-"""Baselines: the answer key, the best guess from the question alone, chance, and two of twins.
+"""Baselines: the answer key, what is had from the question alone, chance, and two of twins.
 
 `flip` and `hash` do not know which world they are asked about, and say something else in each all
 the same: what they have of pairs right is no memory.
@@ -11,19 +11,15 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
-from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import ContextPart, Sample
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.docs import doc_target
-from infthor_eval.nieh.guessing.chains import (
-    Chain,
-    Guesser,
-    chains_of_words,
-    chains_of_words_and_count,
-    question_type,
-)
+from infthor_eval.nieh.guessing.blind import find_blind, sample_on_clues, visible_knowledge
+from infthor_eval.nieh.guessing.chains import question_type
+from infthor_eval.nieh.guessing.folds import held_out
 from infthor_eval.nieh.twins import first_world
 from infthor_eval.runs.suite import BaselineSubject
 from infthor_eval.storage.digests import seed_of
@@ -31,9 +27,11 @@ from model_adapters import Subject
 
 __all__ = ["BASELINES", "Baseline", "Predict"]
 
+_RULES = 2  # of `blind` and `random`: with another number earlier replies are not taken again
+
 
 class Predict(Protocol):
-    """Answers a sample of the key, given what is shown of it."""
+    """Answers a sample of a set, given what is shown of it."""
 
     def __call__(self, sample: Sample, shown: Sequence[ContextPart] = (), /) -> str:
         """Return the answer."""
@@ -43,8 +41,8 @@ class Predict(Protocol):
 class Baseline(Subject, Protocol):
     """A subject that answers from the answer key and sees no picture; the data's hash covers it."""
 
-    def fit(self, samples: Sequence[Sample]) -> Predict:
-        """Read the whole answer key of one task, and return a function that answers its samples."""
+    def fit(self, data: NiehSet, context: str) -> Predict:
+        """Return a function that answers samples of a set in a context of that name."""
 
 
 class Oracle(BaselineSubject):
@@ -52,31 +50,24 @@ class Oracle(BaselineSubject):
 
     name = "oracle"
 
-    def fit(self, samples: Sequence[Sample]) -> Predict:
+    def fit(self, data: NiehSet, context: str) -> Predict:
         """See `Baseline`; every question carries its key."""
         return lambda sample, _shown=(): doc_target(sample.question)
 
 
 class Blind(BaselineSubject):
-    """The best guess from the question's words, learned on the other trajectories."""
+    """What is had without a frame: a question's words are known, and other trajectories."""
 
     name = "blind"
-    _chains: Callable[[Sample], list[Chain]] = staticmethod(chains_of_words)
 
-    def fit(self, samples: Sequence[Sample]) -> Predict:
-        """See `Guesser`; each file of a set is learned alone, as the published scripts ask."""
-        by_file: dict[str, list[Sample]] = defaultdict(list)
-        for sample in samples:
-            by_file[sample.question.file].append(sample)
-        guessers = {file: Guesser(of_file, self._chains) for file, of_file in by_file.items()}
-        return lambda sample, _shown=(): guessers[sample.question.file].guess(sample)
+    def identity(self) -> dict[str, Any]:
+        """Return name and number of the rules."""
+        return {"baseline": self.name, "rules": _RULES}
 
-
-class BlindCount(Blind):
-    """`Blind` that also knows the number of shown frames."""
-
-    name = "blind-count"
-    _chains = staticmethod(chains_of_words_and_count)
+    def fit(self, data: NiehSet, context: str) -> Predict:
+        """See `Baseline`; it is learned when the first question is asked (`find_blind`)."""
+        knowledge = visible_knowledge(context)
+        return lambda sample, _shown=(): find_blind(data, knowledge)[sample.question.id].reply
 
 
 class Random(BaselineSubject):
@@ -85,54 +76,37 @@ class Random(BaselineSubject):
     name = "random"
 
     def identity(self) -> dict[str, Any]:
-        """Return name and seed."""
-        return {"baseline": self.name, "seed": self._seed}
+        """Return name, number of the rules and seed."""
+        return {"baseline": self.name, "rules": _RULES, "seed": self._seed}
 
-    def fit(self, samples: Sequence[Sample]) -> Predict:
+    def fit(self, data: NiehSet, context: str) -> Predict:
         """See `Baseline`; a draw depends on seed and question alone, not on the order of asking."""
-        seen: dict[str, Counter[str]] = defaultdict(Counter)
-        for question in {sample.question.id: sample.question for sample in samples}.values():
-            seen[question_type(question)][doc_target(question)] += 1
+        counts_for = _answers_elsewhere(data)
 
         def predict(sample: Sample, _shown: Sequence[ContextPart] = ()) -> str:
-            counts = _counts(seen, sample.question)
+            counts = counts_for(sample)
             draw = random.Random(seed_of(f"{self._seed}\n{sample.question.id}"))
-            answers = sorted(counts)
-            return draw.choices(answers, weights=[counts[text] for text in answers])[0]
+            answers = sorted(counts) or [""]
+            return draw.choices(answers, weights=[counts[text] or 1 for text in answers])[0]
 
         return predict
 
 
-def _counts(seen: Mapping[str, Counter[str]], question: Question) -> Counter[str]:
-    kind = question_type(question)
-    if kind not in seen:
-        raise ModelError(
-            f"no question of type {kind!r} was in the answer key; fit the baseline to the whole key"
-        )
-    return seen[kind]
-
-
 class _OneOfTwo(BaselineSubject):
-    """One of the two answers that are commonest for the question's type on other trajectories."""
+    """One of the two answers that are commonest for the question's type."""
 
-    def fit(self, samples: Sequence[Sample]) -> Predict:
+    def fit(self, data: NiehSet, context: str) -> Predict:
         """See `Baseline`."""
-        seen: dict[str, Counter[str]] = defaultdict(Counter)
-        own: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+        counts_for = _answers_elsewhere(data)
         worlds: dict[str, set[str]] = defaultdict(set)
-        for question in {sample.question.id: sample.question for sample in samples}.values():
-            kind = question_type(question)
-            seen[kind][doc_target(question)] += 1
-            own[kind, question.cluster][doc_target(question)] += 1
+        for question in data.questions:
             worlds[question.pair].add(question.traj_id)
 
         def predict(sample: Sample, shown: Sequence[ContextPart] = ()) -> str:
-            question = sample.question
-            kind = question_type(question)
-            counts = seen[kind] - own[kind, question.cluster] or seen[kind]
-            two = sorted(counts, key=lambda text: (-counts[text], text))[:2]
-            takes_second = self._takes_second(question, shown, worlds[question.pair])
-            return two[-1 if takes_second else 0] if two else ""
+            counts = counts_for(sample)
+            two = sorted(counts, key=lambda text: (-counts[text], text))[:2] or [""]
+            pair = sample.question.pair
+            return two[-1 if self._takes_second(sample.question, shown, worlds[pair]) else 0]
 
         return predict
 
@@ -165,6 +139,23 @@ class Hash(_OneOfTwo):
         return bool(seed_of("\n".join([question.text, *frames])) % 2)
 
 
+def _answers_elsewhere(data: NiehSet) -> Callable[[Sample], Counter[str]]:
+    """Return what counts the answers to a question's type, without those of its own fold."""
+    hold_out = held_out([sample_on_clues(question) for question in data.questions])
+    seen: dict[str, Counter[str]] = defaultdict(Counter)
+    own: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+    for question in {question.id: question for question in data.questions}.values():
+        kind, answer = question_type(question), doc_target(question)
+        seen[kind][answer] += 1
+        own[kind, hold_out(sample_on_clues(question))][answer] += 1
+
+    def counts_for(sample: Sample) -> Counter[str]:
+        kind = question_type(sample.question)
+        return seen[kind] - own[kind, hold_out(sample)]
+
+    return counts_for
+
+
 BASELINES: Mapping[str, Callable[[int], Baseline]] = {
-    kind.name: kind for kind in (Oracle, Blind, BlindCount, Random, Flip, Hash)
+    kind.name: kind for kind in (Oracle, Blind, Random, Flip, Hash)
 }

@@ -1,4 +1,4 @@
-"""The audit of a set: what guessers that see no frame get in each group of its questions.
+"""The audit of a set: what guessers that see no frame, `blind` one of them, get of its questions.
 
 Each question is guessed twice: without its trajectory, and without all trajectories of its scene,
 as a model that is tuned on other homes would know them.
@@ -8,15 +8,22 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, partial
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
 from infthor_eval.nieh.docs import doc_target
+from infthor_eval.nieh.guessing.blind import (
+    questions_by_file,
+    sample_on_clues,
+    score_guesses,
+    visible_knowledge,
+)
 from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.clue_facts import read_clue_facts, read_scenes
-from infthor_eval.nieh.guessing.guessers import GUESSERS, facts_guesser
-from infthor_eval.nieh.guessing.guesses import questions_by_file, score_guesses
+from infthor_eval.nieh.guessing.folds import held_out
+from infthor_eval.nieh.guessing.guessers import GUESSERS, blind_guesser, facts_guesser
 from infthor_eval.nieh.scoring import score
 
 __all__ = ["BY", "Audit", "AuditedQuestion", "Group", "audit", "chance_of"]
@@ -76,7 +83,7 @@ class Group:
 
     @property
     def chance(self) -> float:
-        """Mean score of an answer that is drawn from those that a question's form has here."""
+        """Mean score of an answer that is drawn from those of a question's form (`chance_of`)."""
         by_form: dict[str, list[Question]] = {}
         for audited in self.questions:
             by_form.setdefault(form_of(audited.question), []).append(audited.question)
@@ -103,6 +110,11 @@ class Group:
                 rows.append(tuple(float(min(sides) >= 1) for sides in both))
         return _means(rows)
 
+    @property
+    def blind(self) -> float:
+        """The mean score of `blind`."""
+        return dict(zip(self.guessers, self.means(), strict=True))["blind"]
+
     def best(self) -> tuple[str, float]:
         """Return the name of the best guesser, the simplest of equals, and its score."""
         means = self.means()
@@ -121,14 +133,22 @@ def _means(rows: Sequence[tuple[float, ...]]) -> tuple[float, ...]:
 def chance_of(questions: Sequence[Question]) -> float:
     """Return the mean strict score of an answer that is drawn from those to questions of one form.
 
-    A list that is drawn has partial credit, so for lists this is more than one over their number.
+    It is drawn from the different answers on other trajectories, or to other questions if all are
+    on one; of none it is 0. A list that is drawn has partial credit, so for lists this is more than
+    one over their number.
     """
-    answers = {doc_target(question).lower() for question in questions}
-    golds = Counter(question.answers for question in questions)
-    total = sum(
-        n * sum(score(answer, gold, "strict") for answer in answers) for gold, n in golds.items()
-    )
-    return total / len(answers) / len(questions)
+    samples = list(map(sample_on_clues, questions))
+    groups = list(map(held_out(samples), samples))
+    holders: dict[str, set[str]] = {}  # of each answer, those who have it
+    for question, group in zip(questions, groups, strict=True):
+        holders.setdefault(doc_target(question).lower(), set()).add(group)
+    total = 0.0
+    golds = Counter((it.answers, group) for it, group in zip(questions, groups, strict=True))
+    scored = cache(partial(score, scorer="strict"))
+    for (gold, group), n in golds.items():
+        others = [answer for answer, has in holders.items() if has != {group}]
+        total += n * sum(scored(answer, gold) for answer in others) / max(1, len(others))
+    return total / len(questions)
 
 
 def _yes_no(question: Question) -> str:
@@ -149,7 +169,7 @@ class Audit:
     """What can be guessed of a set.
 
     Attributes:
-        guessers: names of the guessers, from the simplest on.
+        guessers: names of the guessers, from the simplest on; the last is `blind`.
         questions: the questions that can be asked, file by file.
     """
 
@@ -179,8 +199,7 @@ class Audit:
             if len(group.questions) >= _MANY:
                 yield from _sentences_on_form(group)
         for group in self.groups("file"):
-            name, mean = group.best()
-            yield f"{group.name}: {100 * mean:.2f} % can be had without a frame ({name})."
+            yield f"{group.name}: blind has {100 * group.blind:.2f} % without a frame."
 
 
 def _sentences_on_form(group: Group) -> Iterator[str]:
@@ -193,10 +212,11 @@ def _sentences_on_form(group: Group) -> Iterator[str]:
 
 
 def audit(data: NiehSet) -> Audit:
-    """Guess each question of a set that can be asked, in all ways that the set allows."""
+    """BlindGuess each question of a set that can be asked, in all ways that the set allows."""
     facts = read_clue_facts(data)
     scenes = read_scenes(data)
-    guessers = (*GUESSERS, facts_guesser(facts)) if facts else GUESSERS
+    blind = blind_guesser(visible_knowledge("clues"))
+    guessers = (*GUESSERS, *([facts_guesser(facts)] if facts else []), blind)
     audited: list[AuditedQuestion] = []
     for questions in questions_by_file(data).values():
         scores = score_guesses(questions, guessers)

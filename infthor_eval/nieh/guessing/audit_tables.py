@@ -1,10 +1,10 @@
-"""Audit tables: what guessers get by file, form, type and clues, and what runs get above it."""
+"""Audit tables: what guessers get by file, form, type and clues, and runs above `blind`."""
 
 from collections.abc import Mapping, Sequence
 
 from infthor_eval.nieh.guessing.audit import Audit, Group
 from infthor_eval.nieh.guessing.balancing import MARGIN, Balanced
-from infthor_eval.nieh.results.above_guessing import FormScore
+from infthor_eval.nieh.results.above_blind import FormScore
 from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.runs import RunSummary
@@ -33,8 +33,9 @@ def guessers_table(audited: Audit) -> Table:
         for number, name in enumerate(audited.guessers)
     )
     note = (
-        "Each question is guessed from questions on other trajectories in its file; nobody sees a "
-        "frame."
+        "Each question is guessed from questions on other trajectories in its file (of a single "
+        "trajectory, from its other questions); nobody sees a frame. blind: of each form a "
+        "constant or a guesser by words and number of frames, chosen on other trajectories, too."
     )
     title = "What can be guessed, % by guesser and file (strict scorer)"
     return Table(title, (Column("guesser", False), *map(Column, means)), rows, (note,))
@@ -50,11 +51,12 @@ def audit_tables(audited: Audit) -> list[Table]:
         "yes, %",
         "chance, %",
         "other scenes, %",
-        "best guess, %",
+        "blind, %",
+        "best guesser, %",
     )
     note = (
-        "chance: an answer drawn from those of the form; other scenes: the best guess from "
-        "questions in other scenes alone."
+        "chance: an answer drawn from those of the form; other scenes: the best guesser, "
+        "from questions in other scenes alone. best guesser: the highest on these very questions."
     )
     for by, head in _HEADS.items():
         rows = tuple(Row(_cells(group)) for group in audited.groups(by))
@@ -73,6 +75,7 @@ def _cells(group: Group) -> tuple[str, ...]:
         _percent(group.share_yes),
         _percent(group.chance),
         _percent(group.best_without_scene()),
+        _percent(group.blind),
         _percent(mean),
         name,
     )
@@ -83,18 +86,18 @@ def _percent(share: float | None) -> str:
 
 
 def runs_table(runs: Sequence[RunSummary]) -> Table:
-    """Return the scores of runs by form beside the guess; forms that guessing solves are marked."""
+    """Return the scores of runs by form beside that of `blind`; forms that it solves are marked."""
     rows = []
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():
-            above = task.above_guessing.get(main_metric(task))
+            above = task.above_blind.get(main_metric(task))
             forms: Mapping[str, FormScore] = above.forms if above else {}
             for number, (form, score) in enumerate(forms.items(), 1):
                 assert above is not None
                 mark = " (solved)" if form in above.solved_forms else ""
-                cells = (f"{100 * score.score:.1f}", f"{100 * score.guess:.1f}{mark}")
-                points = f"{100 * (score.score - score.guess):+.1f}"
+                cells = (f"{100 * score.score:.1f}", f"{100 * score.blind:.1f}{mark}")
+                points = f"{100 * (score.score - score.blind):+.1f}"
                 rows.append(
                     Row(
                         (name_of(run), name, form, str(score.n), *cells, points),
@@ -102,9 +105,9 @@ def runs_table(runs: Sequence[RunSummary]) -> Table:
                     )
                 )
     heads = [Column(name, False) for name in ("model", "task", "form of question")]
-    note = "solved: guessing gets nearly all of it, so it is not in the score above guessing."
-    columns = (*heads, *map(Column, ("questions", "score, %", "best guess, %", "points above")))
-    return Table("Runs beside the best guess, by form", columns, tuple(rows), (note,))
+    note = "solved: blind gets nearly all of it, so it is not in the score above blind."
+    columns = (*heads, *map(Column, ("questions", "score, %", "blind, %", "points above")))
+    return Table("Runs beside blind, by form", columns, tuple(rows), (note,))
 
 
 def balanced_table(balanced: Balanced) -> Table:

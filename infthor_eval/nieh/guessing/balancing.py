@@ -22,9 +22,9 @@ from dataclasses import dataclass, replace
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.audit import chance_of
+from infthor_eval.nieh.guessing.blind import score_guesses
 from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS
-from infthor_eval.nieh.guessing.guesses import score_guesses
 
 __all__ = ["MARGIN", "Balanced", "balance"]
 

@@ -3,14 +3,12 @@
 Answers are counted after contexts from the general to the particular ("how", "how many", "how many
 mugs"). Each is mixed with the one before it, and counts less the more different answers it has
 (Witten and Bell's interpolation). The evidence of several such chains is multiplied. Nothing is
-tuned, and nothing is drawn. Questions on a trajectory are guessed from the other trajectories
-alone, so that a right guess is no memory of the answer key.
+tuned, and nothing is drawn.
 """
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Hashable, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Callable, Hashable, Sequence
 
 import numpy as np
 
@@ -18,23 +16,22 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import find_form
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
+from infthor_eval.nieh.guessing.folds import Fit, Folds, split
 
 __all__ = [
-    "Guesser",
-    "HoldOut",
     "chains_of_words",
     "chains_of_words_and_count",
     "chains_of_words_and_place",
     "form_of",
-    "held_out",
+    "guess_by_chains",
     "question_type",
     "words_of",
 ]
 
 Chain = Sequence[Hashable]
-HoldOut = Callable[[Sample], str]  # the name of what is left out when a sample is guessed
 _LEADING_WORDS = 2  # the type of a question whose file names none
 _STEM = 3  # leading words that tell the forms of questions apart
+_LONGEST = 64  # words of the longest leading chain: all of a text's would grow with its square
 _PLACE = 100  # frames that count as one place
 # of a log probability; what is beyond is rounding, which must not decide between equal answers
 _DIGITS = 9
@@ -44,7 +41,7 @@ def chains_of_words(sample: Sample) -> list[Chain]:
     """Return chains of words: the leading ones, each later one, alone and after the first two."""
     words = words_of(sample.question)
     later = sorted(set(words[2:]))
-    leading = [("leading", *words[:n]) for n in range(1, len(words) + 1)]
+    leading = [("leading", *words[:n]) for n in range(1, min(len(words), _LONGEST) + 1)]
     return [leading, *([("word", word), ("word", *words[:2], word)] for word in later)]
 
 
@@ -68,80 +65,48 @@ def words_of(question: Question) -> list[str]:
     return re.findall(r"\w+", question.text.lower())
 
 
-def held_out(
-    samples: Sequence[Sample], scenes: Mapping[str, str] = MappingProxyType({})
-) -> HoldOut:
-    """Return what a sample is left out with: its trajectory, or itself if there is one alone.
+def guess_by_chains(
+    samples: Sequence[Sample], folds: Folds, chains: Callable[[Sample], list[Chain]]
+) -> Fit:
+    """Return the guesser by some chains: the likeliest answer (of equals, the first by name)."""
+    targets = [doc_target(sample.question) for sample in samples]
+    chains_of = list(map(chains, samples))
 
-    Twins are left out with all twins of their trajectory.
+    def fit(out: frozenset[int]) -> dict[int, str]:
+        known, unknown = split(folds, out)
+        counts = _Counts([targets[at] for at in known], [chains_of[at] for at in known])
+        return {at: counts.guess(chains_of[at]) for at in unknown}
 
-    Args:
-        samples: all samples that are guessed.
-        scenes: scene by id of the trajectory, to leave out whole scenes.
-    """
-
-    def group(sample: Sample) -> str:
-        return scenes.get(sample.question.traj_id, sample.question.cluster)
-
-    is_alone = len(set(map(group, samples))) == 1
-    return (lambda sample: sample.question.draw_name) if is_alone else group
+    return fit
 
 
-class Guesser:
-    """Guesses at samples from the answers to others."""
+class _Counts:
+    """The answers to some samples, counted after their contexts."""
 
-    def __init__(
-        self,
-        samples: Sequence[Sample],
-        chains: Callable[[Sample], list[Chain]],
-        hold_out: HoldOut | None = None,
-    ) -> None:
-        """Count the answer key; a sample is guessed without those held out, by `held_out`."""
-        self._chains = chains
-        self._held_out = hold_out or held_out(samples)
-        self._answers = sorted({doc_target(sample.question) for sample in samples})
-        self._number = {answer: number for number, answer in enumerate(self._answers)}
+    def __init__(self, targets: Sequence[str], chains_of: Sequence[Sequence[Chain]]) -> None:
+        self._answers = sorted(set(targets))
+        number = {answer: number for number, answer in enumerate(self._answers)}
         self._seen: dict[Hashable, Counter[int]] = defaultdict(Counter)
-        self._own: dict[tuple[str, Hashable], Counter[int]] = defaultdict(Counter)
-        for sample in samples:
-            self._count(sample)
+        for target, chains in zip(targets, chains_of, strict=True):
+            for context in {(), *(context for chain in chains for context in chain)}:
+                self._seen[context][number[target]] += 1
 
-    def guess(self, sample: Sample) -> str:
-        """Return the likeliest answer (of equals, the first by name); empty if none was learned."""
-        group = self._held_out(sample)
-        counts = self._vector(self._others((), group))
-        if not counts.any():
+    def guess(self, chains: Sequence[Chain]) -> str:
+        """Return the likeliest answer after some chains; empty if none was learned."""
+        if not self._answers:
             return ""
-        with np.errstate(divide="ignore"):
-            prior = np.log(counts / counts.sum())
-            evidence = [
-                np.log(self._probability(chain, counts, group)) for chain in self._chains(sample)
-            ]
-        known = np.flatnonzero(counts)
-        total = prior[known] + sum(logs[known] - prior[known] for logs in evidence)
-        return self._answers[known[np.argmax(np.round(total, _DIGITS))]]
+        counts = self._vector(self._seen[()])
+        prior = np.log(counts / counts.sum())
+        evidence = (np.log(self._probability(chain, counts)) - prior for chain in chains)
+        total = prior + sum(evidence)
+        return self._answers[np.argmax(np.round(total, _DIGITS))]
 
-    def _count(self, sample: Sample) -> None:
-        answer = self._number[doc_target(sample.question)]
-        group = self._held_out(sample)
-        for context in {(), *(context for chain in self._chains(sample) for context in chain)}:
-            self._seen[context][answer] += 1
-            self._own[group, context][answer] += 1
-
-    def _others(self, context: Hashable, group: str) -> Counter[int]:
-        """Return the answers after a context, without those that are left out with a question."""
-        return self._seen.get(context, Counter()) - self._own.get((group, context), Counter())
-
-    def _probability(self, chain: Chain, counts: np.ndarray, group: str) -> np.ndarray:
+    def _probability(self, chain: Chain, counts: np.ndarray) -> np.ndarray:
         mixed = counts / counts.sum()
         for context in chain:
-            seen = self._others(context, group)
-            n_different = len(seen)
-            mixed = (
-                (self._vector(seen) + n_different * mixed) / (seen.total() + n_different)
-                if seen
-                else mixed
-            )
+            seen = self._seen.get(context)
+            if seen:
+                mixed = (self._vector(seen) + len(seen) * mixed) / (seen.total() + len(seen))
         return mixed
 
     def _vector(self, counts: Counter[int]) -> np.ndarray:

@@ -1,27 +1,33 @@
-"""Guessers without frames: each guesses the questions of a file from other trajectories."""
+"""Guessers without frames: each guesses the questions of a file from other trajectories.
 
+`blind` is one of them, which chooses among the others.
+"""
+
+import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Flag, auto
-from functools import partial
+from functools import cache, partial
+from types import MappingProxyType
+
+import numpy as np
 
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.chains import (
-    Chain,
-    Guesser,
-    HoldOut,
     chains_of_words,
     chains_of_words_and_count,
     chains_of_words_and_place,
     form_of,
-    held_out,
+    guess_by_chains,
 )
 from infthor_eval.nieh.guessing.clue_facts import ClueFacts
+from infthor_eval.nieh.guessing.folds import Fit, Folds, folds_of, split
 from infthor_eval.nieh.guessing.learner import guess_by_learning
+from infthor_eval.nieh.scoring import score
 
-__all__ = ["GUESSERS", "Knowledge", "NamedGuesser", "facts_guesser"]
+__all__ = ["GUESSERS", "Knowledge", "NamedGuesser", "blind_guesser", "facts_guesser"]
 
 
 class Knowledge(Flag):
@@ -41,45 +47,92 @@ class NamedGuesser:
     Attributes:
         name: its name in tables.
         knows: what it knows.
-        rule: how it guesses samples from those that are not held out with them.
+        rule: learns of samples and their folds.
     """
 
     name: str
     knows: Knowledge
-    rule: Callable[[Sequence[Sample], HoldOut], list[str]]
+    rule: Callable[[Sequence[Sample], Folds], Fit]
 
-    def guess(self, samples: Sequence[Sample], hold_out: HoldOut | None = None) -> list[str]:
+    def guess(
+        self, samples: Sequence[Sample], scenes: Mapping[str, str] = MappingProxyType({})
+    ) -> list[str]:
         """Return a guess for each sample of a file (on the clue frames); an empty text for none.
 
-        A sample is guessed without those that are held out with it; by default see `held_out`.
+        A sample is guessed without those of its fold (`folds_of`), which has its trajectory, or its
+        whole scene where scenes are given by trajectory.
         """
-        return self.rule(samples, hold_out or held_out(samples))
+        folds = folds_of(samples, scenes)
+        fit = self.rule(samples, folds)
+        guesses: dict[int, str] = {}
+        for fold in set(folds):
+            guesses |= fit(frozenset({fold}))
+        return [guesses[position] for position in range(len(samples))]
 
 
 def _guess_constant(
-    samples: Sequence[Sample], own_of: HoldOut, group_of: Callable[[Sample], str]
-) -> list[str]:
-    """Guess the commonest answer of a group on other trajectories; of equals the first by name."""
-    everywhere: dict[str, Counter[str]] = defaultdict(Counter)
-    own: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
-    for sample in samples:
-        group = group_of(sample)
-        answer = doc_target(sample.question)
-        everywhere[group][answer] += 1
-        own[group, own_of(sample)][answer] += 1
-    guesses = []
-    for sample in samples:
-        group = group_of(sample)
-        counts = everywhere[group] - own[group, own_of(sample)]
-        guesses.append(min(counts, key=lambda answer: (-counts[answer], answer), default=""))
-    return guesses
+    samples: Sequence[Sample], folds: Folds, group_of: Callable[[Sample], str]
+) -> Fit:
+    """Guess the constant of a group (`_constant`); of a group without answers that of all."""
+    groups = list(map(group_of, samples))
+    answers = [doc_target(sample.question) for sample in samples]
+
+    def fit(out: frozenset[int]) -> dict[int, str]:
+        known, unknown = split(folds, out)
+        everywhere = Counter(answers[at] for at in known)
+        counts: dict[str, Counter[str]] = defaultdict(Counter)
+        for at in known:
+            counts[groups[at]][answers[at]] += 1
+        constants = {group: _constant(of_group, everywhere) for group, of_group in counts.items()}
+        other = _constant(everywhere, everywhere)
+        return {at: constants.get(groups[at], other) for at in unknown}
+
+    return fit
 
 
-def _guess_by_chains(
-    samples: Sequence[Sample], hold_out: HoldOut, chains: Callable[[Sample], list[Chain]]
-) -> list[str]:
-    guesser = Guesser(samples, chains, hold_out)
-    return [guesser.guess(sample) for sample in samples]
+def _constant(counts: Counter[str], everywhere: Mapping[str, int]) -> str:
+    """Return the commonest answer, or one that is rarer by a standard error at most.
+
+    Where answers are balanced, the commonest on other trajectories is the rarer one on the own, so
+    the choice among near equals must not hang on counts: it is yes, else the commonest everywhere.
+    """
+    most = max(counts.values(), default=0)
+    near = [answer for answer, n in counts.items() if most - n <= math.sqrt(most + n)]
+    return min(near, key=lambda it: (it.lower() != "yes", -everywhere[it], it), default="")
+
+
+def _choose(samples: Sequence[Sample], folds: Folds, guessers: Sequence[NamedGuesser]) -> Fit:
+    """Guess each form by the guesser that is chosen on the other folds, by its strict scores there.
+
+    For these it is held out from each fold in turn. The first guesser is left for the one that is
+    best over all forms, and that for the one that is best in a form, where they are better by more
+    than a standard error.
+    """
+    fits = [cache(guesser.rule(samples, folds)) for guesser in guessers]
+    forms = [form_of(sample.question) for sample in samples]
+    score_of = cache(partial(score, scorer="strict"))
+
+    def fit(out: frozenset[int]) -> dict[int, str]:
+        known, unknown = split(folds, out)
+        right = np.zeros((len(fits), len(samples)))
+        by_form: dict[str, list[int]] = {forms[at]: [] for at in unknown}
+        for at in known:
+            by_form.setdefault(forms[at], []).append(at)
+            for number, learned in enumerate(fits):
+                guess = learned(out | {folds[at]})[at]
+                right[number, at] = score_of(guess, samples[at].question.answers)
+
+        def best(than: int, positions: Sequence[int]) -> int:
+            of_each = right[:, positions]
+            first = int(of_each.sum(axis=1).argmax())
+            gains = of_each[first] - of_each[than]
+            return first if gains.sum() > np.linalg.norm(gains) else than
+
+        overall = best(0, known)
+        chosen = {form: fits[best(overall, of_form)](out) for form, of_form in by_form.items()}
+        return {at: chosen[forms[at]][at] for at in unknown}
+
+    return fit
 
 
 _WORDS = Knowledge.WORDS
@@ -94,16 +147,16 @@ GUESSERS = (
         _WORDS,
         partial(_guess_constant, group_of=lambda sample: form_of(sample.question)),
     ),
-    NamedGuesser("words (blind)", _WORDS, partial(_guess_by_chains, chains=chains_of_words)),
+    NamedGuesser("words", _WORDS, partial(guess_by_chains, chains=chains_of_words)),
     NamedGuesser(
-        "words, number of frames (blind-count)",
+        "words, number of frames",
         _WORDS | _NUMBER,
-        partial(_guess_by_chains, chains=chains_of_words_and_count),
+        partial(guess_by_chains, chains=chains_of_words_and_count),
     ),
     NamedGuesser(
         "words, place of the clues",
         _WORDS | _PLACE,
-        partial(_guess_by_chains, chains=chains_of_words_and_place),
+        partial(guess_by_chains, chains=chains_of_words_and_place),
     ),
     NamedGuesser("learner: words", _WORDS, partial(guess_by_learning, number=False, place=False)),
     NamedGuesser(
@@ -126,3 +179,9 @@ def facts_guesser(facts: Mapping[str, Sequence[ClueFacts]]) -> NamedGuesser:
         _WORDS | _NUMBER | _PLACE | Knowledge.FACTS,
         partial(guess_by_learning, number=True, place=True, facts=facts),
     )
+
+
+def blind_guesser(knowledge: Knowledge) -> NamedGuesser:
+    """Return `blind`, which chooses among a constant a form and guessers that know no more."""
+    guessers = [it for it in GUESSERS if it.knows and it.knows in knowledge]
+    return NamedGuesser("blind", knowledge, partial(_choose, guessers=guessers))

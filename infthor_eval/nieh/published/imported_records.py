@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.replies.logged import LoggedReply
-from infthor_eval.nieh.records import Guess, NiehAnswer, ShownClues
+from infthor_eval.nieh.records import BlindGuess, NiehAnswer, ShownClues
 from infthor_eval.nieh.scoring import scores
 from infthor_eval.nieh.twins import twin_of_reply
 from infthor_eval.runs import Tokens, Unit, UnitKey, UnitRecord
@@ -19,11 +19,11 @@ WHOLE = (None, "full_traj")  # published modes that show all frames; early logs 
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of the questions: their set, guesses by question, and numbers of frames by
-    trajectory."""
+    """What is known of the questions: their set, what `blind` says to them by id, and numbers of
+    frames by trajectory."""
 
     data: NiehSet
-    guesses: Mapping[str, Guess]
+    blind: Mapping[str, BlindGuess]
     n_frames: Mapping[str, int]
 
     def length(self, traj_id: str) -> int | None:
@@ -39,7 +39,7 @@ def imported_record(
     """Return the record of a reply, or of why there is none, as the log says it."""
     payload = NiehAnswer.of(
         question,
-        known.guesses.get(question.id),
+        known.blind.get(question.id),
         _shown_clues(question, reply, known),
         twin_of_reply(known.data, question, reply.frames),
     )

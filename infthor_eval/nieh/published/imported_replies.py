@@ -14,7 +14,7 @@ from infthor_eval.formats.replies.logged import LoggedReply, UnreadRow
 from infthor_eval.formats.replies.logs import read_reply_log
 from infthor_eval.nieh.config import MetricsConfig, NiehConfig, NiehTaskConfig
 from infthor_eval.nieh.contexts import CONTEXTS
-from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
+from infthor_eval.nieh.guessing.blind import find_floor, visible_knowledge
 from infthor_eval.nieh.options import FRAMES, SHOWN
 from infthor_eval.nieh.published.asked_prompt import asked_prompt
 from infthor_eval.nieh.published.imported_records import WHOLE, Known, imported_record
@@ -151,8 +151,8 @@ def import_logs(
                 (of_model, task, repr(settings), frames),
                 ImportedRun(of_model, task, settings, frames if frames in FRAMES else SHOWN),
             )
-            guesses = find_guesses(data, visible_knowledge(settings["context"]))
-            known = Known(data, guesses, n_frames)
+            blind = find_floor(data, visible_knowledge(settings["context"]))
+            known = Known(data, blind, n_frames)
             _add_log(run, log, part, _questions_of(data, name), known)
     return list(runs.values())
 

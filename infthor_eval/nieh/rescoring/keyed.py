@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.replies.answer_key import AnswerKey
-from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
+from infthor_eval.nieh.guessing.blind import find_floor, visible_knowledge
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.rescoring.rescore import Source
 from infthor_eval.nieh.twins import twin_of_reply
@@ -40,12 +40,12 @@ def with_key(source: Source, key: AnswerKey) -> Source:
 
 def _keyed(record: UnitRecord[NiehAnswer], key: AnswerKey, context: str) -> UnitRecord[NiehAnswer]:
     payload = keyed_payload(record.payload, record.id, key, None)
-    guesses = find_guesses(key.data, visible_knowledge(context))
+    blind = find_floor(key.data, visible_knowledge(context))
     question = key.question(record.id)
     return replace(
         record,
         cluster=question.cluster,
-        payload=replace(payload, guess=guesses.get(question.id)),
+        payload=replace(payload, blind=blind.get(question.id)),
     )
 
 

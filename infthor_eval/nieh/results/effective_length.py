@@ -3,7 +3,7 @@
 The rule is NoLiMa's (Modarressi et al. 2025), with the model's own score on the clue frames alone
 as its base. It is applied to windows of growing size around the evidence (`nieh_haystack`), to the
 last frames (`nieh_truncate_head`) and to whole trajectories by their length (`nieh_full`); to plain
-scores and to those above guessing.
+scores and to those above blind.
 """
 
 import math
@@ -62,7 +62,7 @@ def effective_lengths(runs: Sequence[RunSummary]) -> list[Table]:
         )
     if not rows:
         return []
-    names = ("base", "effective length", "base above guessing", "effective length above guessing")
+    names = ("base", "effective length", "base above blind", "effective length above blind")
     heads = [Column(name, False) for name in ("model", "context", "scorer")]
     note = (
         f"Effective length: the longest context, in thousand tokens, up to which {KEPT:.0%} of the "
@@ -151,12 +151,12 @@ def _points(sized: tuple[float, TaskSummary], scorer: str) -> Iterator[_Point]:
         if name in task.by_length:
             at = task.by_length[name]
             score = at.cell.scores.get(scorer)
-            yield _Point(name, score.mean if score else None, at.above_guessing.get(scorer))
+            yield _Point(name, score.mean if score else None, at.above_blind.get(scorer))
 
 
 def _point(length: str, task: TaskSummary, scorer: str) -> _Point:
     score = task.total.scores.get(scorer)
-    above = task.above_guessing.get(scorer)
+    above = task.above_blind.get(scorer)
     return _Point(length, score.mean if score else None, above.mean if above else None)
 
 

@@ -1,9 +1,9 @@
-"""Tables on the evidence: how much was shown, how far from the end, and scores above guessing."""
+"""Tables on the evidence: how much was shown, how far from the end, and scores above blind."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from infthor_eval.distances import DISTANCES
-from infthor_eval.nieh.results.above_guessing import SOLVED, AboveGuessing
+from infthor_eval.nieh.results.above_blind import SOLVED, AboveBlind
 from infthor_eval.nieh.results.cells import Cell, mean_cell, score_interval
 from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.summary import (
@@ -15,8 +15,9 @@ from infthor_eval.nieh.results.summary import (
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, TableCell
 
-__all__ = ["above_guessing_cell", "above_guessing_notes", "evidence_tables", "short_name"]
+__all__ = ["above_blind_cell", "above_blind_notes", "evidence_tables", "short_name"]
 
+_ALONE = "above blind: not given, as beside one trajectory there is no other to learn from."
 _WITH_INTERVAL = "In brackets: 95 % interval, clustered by trajectory; in parentheses: questions."
 
 
@@ -50,29 +51,31 @@ def short_name(file: str) -> str:
     return file.removeprefix("qa_set_")
 
 
-def above_guessing_cell(above: AboveGuessing | None) -> TableCell:
-    """Return the score above guessing in percent, with its interval; `-` if there is none."""
+def above_blind_cell(above: AboveBlind | None) -> TableCell:
+    """Return the score above blind in percent, with its interval; `-` if there is none."""
     if above is None or above.mean is None:
         return _score_cell(None, None, None)
     return _score_cell(above.mean, above.low, above.high)
 
 
-def above_guessing_notes(runs: Sequence[RunSummary]) -> list[str]:
+def above_blind_notes(runs: Sequence[RunSummary]) -> list[str]:
     """Return what the column says, and what it leaves out."""
-    scores = [score for _, _, task in _tasks(runs) for score in task.above_guessing.values()]
+    scores = [score for _, _, task in _tasks(runs) for score in task.above_blind.values()]
     if not any(score.n for score in scores):
-        return []
+        is_alone = any(len(of) == 1 for *_, task in _tasks(runs) for of in task.scores.values())
+        is_unknown = any(score.n_unknown for score in scores)
+        return [_ALONE] if is_alone and is_unknown else []
     solved = sorted(
         {(score.n_solved, len(score.solved_forms)) for score in scores if score.n_solved}
     )
     counts = "; ".join(f"{n} questions of {n_forms} forms" for n, n_forms in solved)
     left_out = (
-        f" Not counted, as guessing solves their forms (above {SOLVED:.0%}): {counts}."
+        f" Not counted, as blind solves their forms (above {SOLVED:.0%}): {counts}."
         if solved
         else ""
     )
     return [
-        "above guessing: % of what cannot be guessed that was got, 0 for the best guesser and 100 "
+        "above blind: % of what the baseline blind has not that was got, 0 for blind and 100 "
         f"for all right, with its interval over resampled trajectories.{left_out}"
     ]
 

@@ -39,21 +39,21 @@ class Gain:
     task: str
     metric: str
     seeing: TaskSummary
-    blind: TaskSummary
+    blank: TaskSummary
 
     def in_column(self, column: str) -> float | None:
         """Return the gain for a number of clues, -1 to 1; None unless both runs answered all
         questions, of which there are some."""
         seeing = self.seeing.by_clues[column]
-        blind = self.blind.by_clues[column]
-        if not (seeing.n_answered == seeing.n == blind.n_answered == blind.n > 0):
+        blank = self.blank.by_clues[column]
+        if not (seeing.n_answered == seeing.n == blank.n_answered == blank.n > 0):
             return None
-        return seeing.scores[self.metric].mean - blind.scores[self.metric].mean
+        return seeing.scores[self.metric].mean - blank.scores[self.metric].mean
 
     def total(self) -> MeanEstimate | None:
         """Return mean gain and interval over the questions that both runs answered, paired and
         clustered by trajectory; None if there are none."""
-        return paired_gain(self.seeing.scores[self.metric], self.blind.scores[self.metric])
+        return paired_gain(self.seeing.scores[self.metric], self.blank.scores[self.metric])
 
     @property
     def n_all(self) -> int:
@@ -81,12 +81,12 @@ def paired_gain(ours: Scores, theirs: Scores) -> MeanEstimate | None:
 def find_gains(runs: Sequence[RunSummary]) -> Iterator[Gain]:
     """Yield the gain of every run that has a run on blank frames, equal but for that, beside it."""
     for run in runs:
-        for blind in runs:
-            is_pair = frames_of(run) != BLANK and frames_of(blind) == BLANK
-            if is_pair and _without_frames(run) == _without_frames(blind):
+        for blank in runs:
+            is_pair = frames_of(run) != BLANK and frames_of(blank) == BLANK
+            if is_pair and _without_frames(run) == _without_frames(blank):
                 for name, task in run.summary.tasks.items():
                     yield from (
-                        Gain(run, name, m, task, blind.summary.tasks[name]) for m in task.metrics
+                        Gain(run, name, m, task, blank.summary.tasks[name]) for m in task.metrics
                     )
 
 

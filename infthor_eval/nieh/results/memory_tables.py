@@ -37,7 +37,7 @@ _NUMBERS = (
 )
 _NONE = "none"  # the memory that recalls nothing
 _ABOVE_NONE = "above none"
-_ABOVE_GUESSING = "above guessing"
+_ABOVE_BLIND = "above blind"
 _PAIRS_ABOVE_NONE = "pairs above none"
 _FIRST = 3  # numbers before those three
 _ABOVE_NONE_NOTE = (
@@ -59,7 +59,7 @@ _NOTES = (
 def memory_tables(runs: Sequence[RunSummary]) -> list[Table]:
     """Return the table of the tasks that have a memory, if there are any.
 
-    It compares with no memory, and with guessing, where a run has none and a guess is known.
+    It compares with no memory, and with `blind`, where a run has none and that is known.
     """
     found = [
         (run, name)
@@ -72,7 +72,7 @@ def memory_tables(runs: Sequence[RunSummary]) -> list[Table]:
     wanted = {
         _PAIRS_ABOVE_NONE: has_pairs and is_above_none,
         _ABOVE_NONE: is_above_none,
-        _ABOVE_GUESSING: any(_above_guessing(run, name) for run, name in found),
+        _ABOVE_BLIND: any(_above_blind(run, name) for run, name in found),
     }
     further = [column for column, is_wanted in wanted.items() if is_wanted]
     keyed = sorted(((_place(*it), _row(*it, runs, further)) for it in found), key=itemgetter(0))
@@ -93,7 +93,7 @@ def _row(run: RunSummary, name: str, runs: Sequence[RunSummary], further: Sequen
     made = {
         _PAIRS_ABOVE_NONE: _pairs_above_none,
         _ABOVE_NONE: _above_none,
-        _ABOVE_GUESSING: _above_guessing_cell,
+        _ABOVE_BLIND: _above_blind_cell,
     }
     more = [made[column](run, name, runs) for column in further]
     at = len(_NAMES) - 2 + _FIRST
@@ -145,14 +145,14 @@ def _without_options(settings: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in settings.items() if key not in ("memory", "budget")}
 
 
-def _above_guessing(run: RunSummary, name: str) -> float | None:
+def _above_blind(run: RunSummary, name: str) -> float | None:
     task = run.summary.tasks[name]
-    above = task.above_guessing.get(main_metric(task))
+    above = task.above_blind.get(main_metric(task))
     return None if above is None else above.mean
 
 
-def _above_guessing_cell(run: RunSummary, name: str, _: Sequence[RunSummary]) -> str:
-    above = _above_guessing(run, name)
+def _above_blind_cell(run: RunSummary, name: str, _: Sequence[RunSummary]) -> str:
+    above = _above_blind(run, name)
     return "-" if above is None else f"{100 * above:.1f}"
 
 

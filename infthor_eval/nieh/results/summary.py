@@ -14,7 +14,7 @@ from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_cl
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig, SkippedSample
 from infthor_eval.nieh.records import NiehAnswer
-from infthor_eval.nieh.results.above_guessing import AboveGuessing, above_guessing
+from infthor_eval.nieh.results.above_blind import AboveBlind, above_blind
 from infthor_eval.nieh.results.answer_form import YesNo, format_failures, yes_no
 from infthor_eval.nieh.results.cells import Cell, make_cell, score_of, with_missing
 from infthor_eval.nieh.results.memory_summary import (
@@ -72,10 +72,10 @@ class EvidenceCells(msgspec.Struct, frozen=True):
 
 
 class LengthCell(msgspec.Struct, frozen=True):
-    """Scores of samples with contexts of about one length, and those above guessing by scorer."""
+    """Scores of samples with contexts of about one length, and those above blind by scorer."""
 
     cell: Cell
-    above_guessing: dict[str, float | None]
+    above_blind: dict[str, float | None]
 
 
 class SkippedSummary(msgspec.Struct, frozen=True):
@@ -105,7 +105,7 @@ class TaskSummary(msgspec.Struct, frozen=True):
         evidence: cells by what was shown of the evidence: of all samples ("total"), and of each
             file.
         by_length: cells by thousand tokens of the context ("32-64").
-        above_guessing: the share of what cannot be guessed that the replies got, by scorer.
+        above_blind: the share of what `blind` has not that the replies got, by scorer.
         format_failures: number of replies that are not of the form asked for, by reason.
         n_thought: number of replies behind thoughts.
         tokens_per_right: tokens of all replies, thoughts included, for each right answer under the
@@ -126,7 +126,7 @@ class TaskSummary(msgspec.Struct, frozen=True):
     by_file: dict[str, Cell]
     evidence: dict[str, EvidenceCells]
     by_length: dict[str, LengthCell]
-    above_guessing: dict[str, AboveGuessing]
+    above_blind: dict[str, AboveBlind]
     skipped: SkippedSummary
     yes_no: YesNo
     format_failures: dict[str, int]
@@ -219,7 +219,7 @@ def _task(replies: Sequence[Record], task: NiehTaskConfig, config: NiehConfig) -
             name: _evidence(chosen, metrics) for name, chosen in {"total": records, **files}.items()
         },
         by_length=_by_length(records, metrics),
-        above_guessing=_above_guessing(answered, metrics),
+        above_blind=_above_blind(answered, metrics),
         skipped=_summarise_skipped(records, n_missing, metrics, task.skipped),
         yes_no=yes_no(replies),
         format_failures=format_failures(replies, task.decoding["max_new_tokens"]),
@@ -328,13 +328,13 @@ def _by_length(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, L
         chosen = [
             record for record in records if _length(record) == name and record.state == "answered"
         ]
-        shares = _above_guessing(chosen, metrics)
+        shares = _above_blind(chosen, metrics)
         cells[name] = LengthCell(cell, {metric: share.mean for metric, share in shares.items()})
     return cells
 
 
-def _above_guessing(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, AboveGuessing]:
-    return {name: above_guessing(records, name) for name in metrics if name in SCORERS}
+def _above_blind(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, AboveBlind]:
+    return {name: above_blind(records, name) for name in metrics if name in SCORERS}
 
 
 def _share_shown(record: Record) -> str | None:

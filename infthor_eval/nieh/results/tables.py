@@ -11,8 +11,8 @@ from infthor_eval.nieh.results.cells import Cell, both_intervals, mean_cell
 from infthor_eval.nieh.results.control_tables import control_tables, without_alike_notes
 from infthor_eval.nieh.results.effective_length import effective_lengths
 from infthor_eval.nieh.results.evidence_tables import (
-    above_guessing_cell,
-    above_guessing_notes,
+    above_blind_cell,
+    above_blind_notes,
     evidence_tables,
     short_name,
 )
@@ -165,15 +165,13 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
 
 def clues_table(runs: Sequence[RunSummary]) -> Table:
     """Return accuracy by clues: a row per run, task and metric, then the published rows."""
-    is_guessed = any(
-        score.mean is not None
-        for *_, task in _tasks(runs)
-        for score in task.above_guessing.values()
+    has_blind = any(
+        score.mean is not None for *_, task in _tasks(runs) for score in task.above_blind.values()
     )
-    apart = (OPEN_ENDED, ABSENCE, *(("above guessing",) if is_guessed else ()))
+    apart = (OPEN_ENDED, ABSENCE, *(("above blind",) if has_blind else ()))
     numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", *apart, "n", *_LEFT_OUT)
-    rows = [row for run in runs for row in _rows_of(run, is_guessed=is_guessed)]
-    notes = [*_LEGEND, *above_guessing_notes(runs)]
+    rows = [row for run in runs for row in _rows_of(run, has_blind=has_blind)]
+    notes = [*_LEGEND, *above_blind_notes(runs)]
     for table in filter(_is_by_clues, published_tables("nieh")):
         rows += _published_rows(table, runs)
         notes += table.notes
@@ -204,28 +202,28 @@ def _notes(runs: Sequence[RunSummary]) -> list[str]:
     ]
 
 
-def _rows_of(run: RunSummary, *, is_guessed: bool) -> list[Row]:
+def _rows_of(run: RunSummary, *, has_blind: bool) -> list[Row]:
     lines = [(name, task, metric) for _, name, task in _tasks([run]) for metric in task.metrics]
     return [
         Row(
-            (name_of(run), name, metric, *_cells(task, metric, is_guessed=is_guessed)),
+            (name_of(run), name, metric, *_cells(task, metric, has_blind=has_blind)),
             ends_section=number == len(lines),
         )
         for number, (name, task, metric) in enumerate(lines, 1)
     ]
 
 
-def _cells(task: TaskSummary, metric: str, *, is_guessed: bool) -> list[str]:
+def _cells(task: TaskSummary, metric: str, *, has_blind: bool) -> list[str]:
     total = task.total
     by_clues = [_mean_of(task.by_clues[name], metric) for name in CLUE_COLUMNS[:-1]]
     apart = [_mean_of(task.by_clues[name], metric) for name in (OPEN_ENDED, ABSENCE)]
-    above = above_guessing_cell(task.above_guessing.get(metric))
+    above = above_blind_cell(task.above_blind.get(metric))
     return [
         *by_clues,
         mean_cell(total, metric),
         *both_intervals(total, metric),
         *apart,
-        *([above] if is_guessed else []),
+        *([above] if has_blind else []),
         str(total.n),
         *_left_out(task),
     ]

@@ -36,7 +36,7 @@ class _PlanBaseline(BaselineSubject):
         return self._actor()
 
 
-class _BlindActor:
+class _BaselineActor:
     """An actor that knows the plan and its own actions so far."""
 
     def begin(self, situation: PlanSituation) -> None:
@@ -49,13 +49,13 @@ class _BlindActor:
         self._view = outcome.observation.view
 
 
-class _ExpertActor(_BlindActor):
+class _ExpertActor(_BaselineActor):
     def act(self) -> Act:
         actions = self._situation.environment.expert_actions(self._situation.plan.index)
         return Act(actions[len(self._done)].call if len(self._done) < len(actions) else "NoOp")
 
 
-class _RandomPlanActor(_BlindActor):
+class _RandomPlanActor(_BaselineActor):
     def begin(self, situation: PlanSituation) -> None:
         super().begin(situation)
         self._random = random.Random(situation.seed)
@@ -65,12 +65,12 @@ class _RandomPlanActor(_BlindActor):
         return Act(self._random.choice(applicable_calls(self._view, look_degrees)))
 
 
-class _ScriptedActor(_BlindActor):
+class _ScriptedActor(_BaselineActor):
     def act(self) -> Act:
         return Act(scripted_action(self._situation.plan.text, self._done))
 
 
-class _HabitualActor(_BlindActor):
+class _HabitualActor(_BaselineActor):
     def __init__(self, habits: Habits) -> None:
         self._habits = habits
 
@@ -78,7 +78,7 @@ class _HabitualActor(_BlindActor):
         return Act(self._habits.next_action(self._situation.plan.text, self._done))
 
 
-class _RecallingActor(_BlindActor):
+class _RecallingActor(_BaselineActor):
     def begin(self, situation: PlanSituation) -> None:
         super().begin(situation)
         environment = situation.environment

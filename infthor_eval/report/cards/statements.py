@@ -126,10 +126,9 @@ def _limitations(facts: SetFacts) -> Iterator[str]:
 
 
 def _biases(facts: SetFacts) -> Iterator[str]:
-    name, accuracy = facts.best_guess()
     yield (
-        f"Without a frame, {accuracy:.1f} % of the answers can be guessed from questions on other "
-        f"trajectories (guesser: {name})."
+        f"Without a frame, the baseline blind has {facts.blind:.1f} % of the answers, guessed from "
+        "questions on other trajectories."
     )
     whole = facts.audited.groups("file")
     if facts.kinds:

@@ -21,7 +21,7 @@ class TaskResult:
         measure: what the score measures ("questions right").
         finding: the score as the predicate of a sentence ("gets {} of the questions right").
         rate: the score; None if no unit was answered.
-        chance: what guessing scores on the same units; None if it is not known.
+        chance: what `blind` scores on the same units; None if it is not known.
         is_baseline: whether the subject is a baseline.
         units: numbers of units by state.
         n_tokens: mean tokens of what is read for a unit; None if they are not counted.

@@ -20,8 +20,8 @@ def headline(results: Sequence[TaskResult]) -> str:
 
 
 def _sentence(by_task: dict[str, list[TaskResult]]) -> str:
-    # The tasks of most runs come first, and of these the ones that guessing never gets right.
-    tasks = sorted(by_task, key=lambda task: (-len(by_task[task]), _may_guess(by_task[task])))
+    # The tasks of most runs come first, and of these the ones that `blind` never gets right.
+    tasks = sorted(by_task, key=lambda task: (-len(by_task[task]), _may_be_blind(by_task[task])))
     clauses = [_clause(task, by_task[task]) for task in tasks[:_MOST_TASKS]]
     n_more = len(tasks) - _MOST_TASKS
     if n_more > 0:
@@ -30,7 +30,7 @@ def _sentence(by_task: dict[str, list[TaskResult]]) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def _may_guess(results: Sequence[TaskResult]) -> bool:
+def _may_be_blind(results: Sequence[TaskResult]) -> bool:
     return any(result.chance != 0.0 for result in results)
 
 
@@ -45,7 +45,7 @@ def _clause(task: str, results: Sequence[TaskResult]) -> str:
 
 
 def _groups(scored: Sequence[TaskResult]) -> Iterator[str]:
-    """Yield the scores of models, then of baselines, then of guessing."""
+    """Yield the scores of models, then of baselines, then of `blind` if it was not run."""
     models = [result for result in scored if not result.is_baseline]
     baselines = [result for result in scored if result.is_baseline]
     first = models or baselines
@@ -57,11 +57,12 @@ def _groups(scored: Sequence[TaskResult]) -> Iterator[str]:
     if models and baselines:
         named += _named(baselines, "the baseline ", "{}", has_interval=False)
     chances = sorted({round(100 * one.chance, 1) for one in scored if one.chance is not None})
-    if chances and all(one.chance is not None for one in scored):
+    is_run = any(one.run == "blind" for one in baselines)
+    if chances and not is_run and all(one.chance is not None for one in scored):
         ends = f"{chances[0]:.1f}\u00a0%"
         if len(chances) > 1:
             ends = f"{chances[0]:.1f} to {chances[-1]:.1f}\u00a0%, by the questions answered"
-        named.append(f"guessing {ends}")
+        named.append(f"blind {ends}")
     *rest, last = named
     if rest:
         # What has a comma within is closed by one.

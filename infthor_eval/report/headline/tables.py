@@ -15,11 +15,11 @@ _MOST_ROWS = 24  # of the chart; the table has all
 
 
 def results_table(results: Sequence[TaskResult]) -> Table:
-    """Return the score of each run and task, with what guessing scores and what it cost."""
+    """Return the score of each run and task, with what `blind` scores and what it cost."""
     names = ("run", "task", "measure")
-    numbers = ("%", "95 % interval", "guessing, %", "samples", "tokens", "seconds", "cost, $")
+    numbers = ("%", "95 % interval", "blind, %", "samples", "tokens", "seconds", "cost, $")
     columns = (*(Column(name, False) for name in names), *map(Column, numbers))
-    note = "guessing: the best that is known without a frame, on the same samples. tokens and "
+    note = "blind: what is had without a frame, on the same samples. tokens and "
     note += "seconds: read for a sample, and spent on it, on average. cost: of all samples."
     return Table("", columns, tuple(map(_row, results)), (note,))
 
@@ -64,7 +64,7 @@ def results_chart(results: Sequence[TaskResult]) -> Chart | None:
     if not any(row.dots[0] for row in rows):
         return None
     few = "" if len(rows) == len(results) else f" The {len(rows)} highest of {len(results)}."
-    dashed = "; the dashed line is guessing" if any(row.chance is not None for row in rows) else ""
+    dashed = "; the dashed line is blind" if any(row.chance is not None for row in rows) else ""
     caption = (
         "Further right is better: a dot is a run's score, its line the 95 % interval over "
         f"trajectories{dashed}.{few}"

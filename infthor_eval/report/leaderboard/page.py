@@ -22,7 +22,7 @@ class LeaderboardRow:
         frames: what rendered the frames.
         pairs: net pairs of twins, -1 to 1; None if there are none.
         singles: single answers, 0 to 1.
-        above: score above guessing, at most 1; None if it is not known.
+        above: score above `blind`, at most 1; None if it is not known.
         scorer: scorer of the single answers.
         n: number of questions.
         failed: number of them without a reply, which count as wrong.

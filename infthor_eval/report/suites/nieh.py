@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from statistics import fmean
 
-from infthor_eval.nieh.records import Guess, NiehAnswer
+from infthor_eval.nieh.records import BlindGuess, NiehAnswer
 from infthor_eval.nieh.rescoring.judging import JUDGED
-from infthor_eval.nieh.results.above_guessing import score_above_guessing, score_range
+from infthor_eval.nieh.results.above_blind import score_above_blind, score_range
 from infthor_eval.nieh.results.pair_summary import score_pairs
 from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.nieh.scoring import SCORERS
@@ -36,7 +36,7 @@ from infthor_eval.runs import UnitKey, UnitRecord
 __all__ = ["NiehPresenter"]
 
 Record = UnitRecord[NiehAnswer]
-_ABOVE_GUESSING = ", above guessing"
+_ABOVE_BLIND = ", above blind"
 _BOUNDS = {
     "strict": (0.0, 1.0),
     "reference": (0.0, math.inf),
@@ -77,19 +77,19 @@ class NiehPresenter(PlainPresenter):
         return self.finding if summary.tasks[task].pairs is None else PAIRS_FINDING
 
     def chance(self, task: str, summary: NiehSummary, records: Sequence[Record]) -> float | None:
-        """See `Presenter.chance`: of questions by the best guesser of each form; who does not
-        know which world of a pair is which has 0 net pairs on average."""
+        """See `Presenter.chance`: of questions that of `blind`; who does not know which world of
+        a pair is which has 0 net pairs on average."""
         of_task = summary.tasks[task]
         if of_task.pairs is not None:
             return 0.0
         metric = main_metric(of_task)
-        guesses = [
-            None if record.payload.guess is None else record.payload.guess.scores.get(metric)
+        scores = [
+            None if record.payload.blind is None else record.payload.blind.scores.get(metric)
             for record in records
             if record.state == "answered"
         ]
-        known = [guess for guess in guesses if guess is not None]
-        return fmean(known) if known and len(known) == len(guesses) else None
+        known = [score for score in scores if score is not None]
+        return fmean(known) if known and len(known) == len(scores) else None
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`: all of them, although the reference scorer can exceed 1."""
@@ -97,14 +97,14 @@ class NiehPresenter(PlainPresenter):
 
     def bounds(self, metric: str) -> tuple[float, float]:
         """See `Presenter.bounds`: the reference scorer exceeds 1 on repetitions; scores above
-        guessing, of a part of a set, can be anything, and so can a task's own metrics."""
+        `blind`, of a part of a set, can be anything, and so can a task's own metrics."""
         return _BOUNDS.get(metric, (-math.inf, math.inf))
 
     def further_scores(self, record: Record) -> Mapping[str, float]:
-        """See `Presenter.further_scores`: scores above guessing, where guessing is not right."""
-        scores = {scorer: score_above_guessing(record.payload, scorer) for scorer in SCORERS}
+        """See `Presenter.further_scores`: scores above `blind` where that does not solve all."""
+        scores = {scorer: score_above_blind(record.payload, scorer) for scorer in SCORERS}
         return {
-            f"{scorer}{_ABOVE_GUESSING}": score
+            f"{scorer}{_ABOVE_BLIND}": score
             for scorer, score in scores.items()
             if score is not None
         }
@@ -112,11 +112,9 @@ class NiehPresenter(PlainPresenter):
     def further_ranges(self, record: Record) -> Mapping[str, tuple[float, float]]:
         """See `Presenter.further_ranges`."""
         counted = [
-            scorer
-            for scorer in SCORERS
-            if f"{scorer}{_ABOVE_GUESSING}" in self.further_scores(record)
+            scorer for scorer in SCORERS if f"{scorer}{_ABOVE_BLIND}" in self.further_scores(record)
         ]
-        return {f"{scorer}{_ABOVE_GUESSING}": score_range([record], scorer) for scorer in counted}
+        return {f"{scorer}{_ABOVE_BLIND}": score_range([record], scorer) for scorer in counted}
 
     def explain(self, record: Record) -> list[str]:
         """See `Presenter.explain`: what each of our scorers finds in the reply."""
@@ -171,15 +169,15 @@ class NiehPresenter(PlainPresenter):
         return ReplyTokens(payload.reply_ids, payload.margins) if payload.margins else None
 
     def details(self, record: Record) -> Mapping[str, str]:
-        """See `Presenter.details`: evidence, guessing and thoughts; the rest is elsewhere."""
+        """See `Presenter.details`: evidence, `blind` and thoughts; the rest is elsewhere."""
         payload = record.payload
         details: dict[str, str] = {}
         if payload.shown_clues is not None:
             details["clue frames shown"] = (
                 f"{payload.shown_clues.n_shown} of {payload.shown_clues.n_clues}"
             )
-        if payload.guess is not None:
-            details["guessing"] = _guessing(payload.guess)
+        if payload.blind is not None:
+            details["blind"] = _blind(payload.blind)
             details |= {
                 name: f"{score:+.2f}" for name, score in self.further_scores(record).items()
             }
@@ -213,8 +211,8 @@ class NiehPresenter(PlainPresenter):
         return find_timelines(runs, data, thumbnails)
 
 
-def _guessing(guess: Guess) -> str:
-    """Return what the best guesser of a question's form scores, in words."""
-    means = guess.form_scores.items()
-    scores = [f"{name} {guess.scores[name]:.2f}, in its form {mean:.2f}" for name, mean in means]
-    return f"{'; '.join(scores)} ({guess.form})"
+def _blind(blind: BlindGuess) -> str:
+    """Return what `blind` says to a question and scores in its form, in words."""
+    means = blind.form_scores.items()
+    scores = [f"{name} {blind.scores[name]:.2f}, in its form {mean:.2f}" for name, mean in means]
+    return f'"{blind.reply}": {"; ".join(scores)} ({blind.form})'

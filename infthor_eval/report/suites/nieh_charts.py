@@ -1,4 +1,4 @@
-"""Charts of NIEH: accuracy by clues, type, evidence and depth, gains over frames and guessing."""
+"""Charts of NIEH: accuracy by clues, type, evidence and depth, and gains."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from infthor_eval.distances import DISTANCES, LENGTHS
 from infthor_eval.formats.question import ABSENCE
-from infthor_eval.nieh.results.above_guessing import AboveGuessing, FormScore
+from infthor_eval.nieh.results.above_blind import AboveBlind, FormScore
 from infthor_eval.nieh.results.cells import Cell, mean_cell
 from infthor_eval.nieh.results.evidence_tables import short_name
 from infthor_eval.nieh.results.gains import find_gains, name_of
@@ -53,7 +53,7 @@ def nieh_charts(runs: Sequence[ReportRun]) -> list[Chart]:
         ]
         if lines:
             charts += _charts_of_task(task, lines)
-    summaries = [_gains_chart(runs), _above_guessing_chart(runs)]
+    summaries = [_gains_chart(runs), _above_blind_chart(runs)]
     heat_maps = [_heat_map(run) for run in runs]
     drawn = [chart for chart in (*summaries, *heat_maps) if chart is not None]
     return [*charts, *memory_charts(runs), *drawn]
@@ -151,25 +151,25 @@ def _dot(cell: Cell | None, line: _Line) -> Dot | None:
 
 
 def _forms(line: _Line) -> Mapping[str, FormScore]:
-    above = line.task.above_guessing.get(line.metric)
+    above = line.task.above_blind.get(line.metric)
     return {} if above is None else above.forms
 
 
 def _by_form(task: str, lines: Sequence[_Line]) -> Chart:
-    """Draw a row per form of question, with what guessing scores in it."""
+    """Draw a row per form of question, with what `blind` scores in it."""
     forms = [_forms(line) for line in lines]
     rows = []
     for name in sorted(set().union(*forms)):
         known = [of_line.get(name) for of_line in forms]
         first = next(form for form in known if form is not None)
         dots = [None if form is None else Dot(100 * form.score, n=form.n) for form in known]
-        rows.append(class_row(name, dots, 100 * first.guess))
+        rows.append(class_row(name, dots, 100 * first.blind))
     return dots_chart(
         DotsChart(
-            title=f"{task}: accuracy by form, beside guessing",
+            title=f"{task}: accuracy by form, beside blind",
             caption=(
                 "A row is a form of question, with the number of those answered in parentheses: "
-                "dots to the right of the dashed line know more than the best guesser."
+                "dots to the right of the dashed line know more than blind, which sees no frame."
             ),
             axis=f"{lines[0].metric} (%)",
             label="form",
@@ -198,21 +198,20 @@ def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
     return _by_rows("Gain over blank frames", caption, rows, "gain, in points")
 
 
-def _above_guessing_chart(runs: Sequence[ReportRun]) -> Chart | None:
-    """Draw the score above guessing of each run, a row per task; None if no guess is known."""
+def _above_blind_chart(runs: Sequence[ReportRun]) -> Chart | None:
+    """Draw the score above blind of each run, a row per task; None if no floor is known."""
     rows = [
         (f"{run.label}, {name}", above)
         for run in runs
         for name, task in run.summary.summary.tasks.items()
-        if (above := task.above_guessing.get(main_metric(task))) is not None
-        and above.mean is not None
+        if (above := task.above_blind.get(main_metric(task))) is not None and above.mean is not None
     ]
-    caption = "0 is the best guesser, 100 all right; lines are 95 % intervals."
-    return _by_rows("Above guessing", caption, rows, "% above guessing")
+    caption = "0 is blind, which sees no frame, 100 all right; lines are 95 % intervals."
+    return _by_rows("Above blind", caption, rows, "% above blind")
 
 
 def _by_rows(
-    title: str, caption: str, rows: Sequence[tuple[str, MeanEstimate | AboveGuessing]], axis: str
+    title: str, caption: str, rows: Sequence[tuple[str, MeanEstimate | AboveBlind]], axis: str
 ) -> Chart | None:
     """Draw a row with a dot for each value, around 0; None without rows."""
     if not rows:

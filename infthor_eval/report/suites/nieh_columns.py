@@ -3,7 +3,7 @@
 from functools import partial
 
 from infthor_eval.nieh.records import NiehAnswer
-from infthor_eval.nieh.results.above_guessing import score_above_guessing
+from infthor_eval.nieh.results.above_blind import score_above_blind
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.sample_columns import SampleColumn, payload_column
 from infthor_eval.runs import UnitRecord
@@ -11,13 +11,13 @@ from infthor_eval.runs import UnitRecord
 __all__ = ["NIEH_COLUMNS"]
 
 
-def _guess_score(scorer: str, record: UnitRecord[NiehAnswer]) -> float | None:
-    guess = record.payload.guess
-    return None if guess is None else guess.scores.get(scorer)
+def _blind_score(scorer: str, record: UnitRecord[NiehAnswer]) -> float | None:
+    blind = record.payload.blind
+    return None if blind is None else blind.scores.get(scorer)
 
 
-def _above_guessing(scorer: str, record: UnitRecord[NiehAnswer]) -> float | None:
-    return score_above_guessing(record.payload, scorer)
+def _above_blind(scorer: str, record: UnitRecord[NiehAnswer]) -> float | None:
+    return score_above_blind(record.payload, scorer)
 
 
 def _clues(name: str, record: UnitRecord[NiehAnswer]) -> int | None:
@@ -47,9 +47,9 @@ NIEH_COLUMNS = (
     payload_column("n_clues", int),
     SampleColumn("n_clues_shown", int, partial(_clues, "n_shown")),
     SampleColumn("n_frames_after_clues", int, partial(_clues, "n_after")),
-    *(SampleColumn(f"guess_{scorer}", float, partial(_guess_score, scorer)) for scorer in SCORERS),
+    *(SampleColumn(f"blind_{scorer}", float, partial(_blind_score, scorer)) for scorer in SCORERS),
     *(
-        SampleColumn(f"above_guessing_{scorer}", float, partial(_above_guessing, scorer))
+        SampleColumn(f"above_blind_{scorer}", float, partial(_above_blind, scorer))
         for scorer in SCORERS
     ),
     SampleColumn("pair", str, partial(_twin, "pair")),

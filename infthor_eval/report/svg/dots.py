@@ -62,7 +62,7 @@ class DotRow(NamedTuple):
     Attributes:
         label: what the row is of.
         dots: a dot for each series; None where it has no value.
-        chance: what guessing scores (`DotsChart.dashed`), in percent; None if it is not known.
+        chance: what `blind` scores (`DotsChart.dashed`), in percent; None if it is not known.
         heading: what is written above the row; empty for nothing.
     """
 
@@ -107,7 +107,7 @@ class DotsChart:
     label: str
     series: Sequence[Series]
     rows: Sequence[DotRow]
-    dashed: str = "guessing"
+    dashed: str = "blind"
     limits: tuple[float, float] = (0.0, 100.0)
     description: str = ""
 

@@ -5,8 +5,8 @@ from functools import lru_cache
 from typing import ClassVar
 
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.nieh.guessing.blind import questions_by_file, sample_on_clues
 from infthor_eval.nieh.guessing.guessers import GUESSERS
-from infthor_eval.nieh.guessing.guesses import questions_by_file, sample_on_clues
 from infthor_eval.nieh.guessing.learner import guess_by_learning
 from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.records import NiehAnswer

@@ -1,13 +1,13 @@
 """Whether a score is above what blindness and knowledge of homes give.
 
-Both are warnings: who is no better than a guess is not thereby dishonest. The row says it.
+Both are warnings: who is no better than `blind` is not thereby dishonest. The row says it.
 """
 
 from collections.abc import Iterator, Sequence
 from typing import ClassVar
 
 from infthor_eval.nieh.options import OTHER
-from infthor_eval.nieh.results.above_guessing import above_guessing
+from infthor_eval.nieh.results.above_blind import above_blind
 from infthor_eval.statistics import paired_difference
 from infthor_eval.submissions.case import Case
 from infthor_eval.submissions.expected import Expected
@@ -17,10 +17,10 @@ __all__ = ["AboveBlind", "AboveOtherHome"]
 
 
 class AboveBlind:
-    """The score is above what can be guessed without a frame."""
+    """The score is above that of `blind`, which sees no frame."""
 
     name: ClassVar[str] = "above blind"
-    reason: ClassVar[str] = "a score at the best guess shows no memory"
+    reason: ClassVar[str] = "a score that is had without a frame shows no memory"
 
     def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
         """See `Check`."""
@@ -28,14 +28,14 @@ class AboveBlind:
             if not self.is_above(task):
                 yield Problem(
                     self.name,
-                    f"{task.name}: is not above what can be guessed without a frame",
+                    f"{task.name}: is not above blind, which sees no frame",
                     is_warning=True,
                 )
 
     @staticmethod
     def is_above(task: Expected) -> bool:
-        """Return True if the whole interval of the score above guessing is above 0."""
-        of_task = above_guessing(task.graded, "strict")
+        """Return True if the whole interval of the score above blind is above 0."""
+        of_task = above_blind(task.graded, "strict")
         return of_task.low is not None and of_task.low > 0
 
 

@@ -1,18 +1,21 @@
 """The guesser by chains of words, by hand."""
 
+import tracemalloc
+
 import pytest
 
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.guessing.chains import (
-    Guesser,
     chains_of_words,
     chains_of_words_and_count,
     chains_of_words_and_place,
-    held_out,
+    guess_by_chains,
     words_of,
 )
+from infthor_eval.nieh.guessing.folds import held_out
+from infthor_eval.nieh.guessing.guessers import GUESSERS
 
-from ...helpers.questions import make_question, make_samples_on_clues
+from ...helpers.questions import guess_with, make_question, make_samples_on_clues
 
 QUESTION = make_question("t", "Is Mug on-the Bed?", "yes", (250, 310))
 LEADING = [("leading", *words) for words in (["is"], ["is", "mug"], ["is", "mug", "on"])]
@@ -65,15 +68,12 @@ def test_a_context_counts_less_the_more_different_answers_it_has(n_y, guess):
     """
     key = [("a", "x"), *[("a", "y")] * n_y, *[("c", "x")] * 17]
     samples = make_samples_on_clues(
-        *(make_question(f"t{number}", text, answer) for number, (text, answer) in enumerate(key))
+        *(make_question(f"t{number}", text, answer) for number, (text, answer) in enumerate(key)),
+        *(make_question("new", text, "?") for text in "ae"),
     )
-    guesser = Guesser(samples, chain_of(lambda sample: sample.question.text))
-    assert [
-        guesser.guess(sample)
-        for sample in make_samples_on_clues(
-            make_question("new", "a", "?"), make_question("new", "e", "?")
-        )
-    ] == [guess, "x"]
+    folds = [0] * len(key) + [1, 1]
+    fit = guess_by_chains(samples, folds, chain_of(lambda sample: sample.question.text))
+    assert fit(frozenset({1})) == {len(key): guess, len(key) + 1: "x"}
 
 
 def test_own_answers_are_taken_away_before_counting():
@@ -84,21 +84,21 @@ def test_own_answers_are_taken_away_before_counting():
         Sample(make_question(traj, text, answer, (number,)), (1,))
         for number, (traj, text, answer) in enumerate(key)
     ]
-    guesser = Guesser(samples, chain_of(lambda sample: sample.question.text))
+    chains = chain_of(lambda sample: sample.question.text)
+    guesses = guess_with(guess_by_chains, samples, chains=chains)
     # After "a": (0 + 1 * 2/3) / 2 = 1/3 for x and (1 + 1/3) / 2 = 2/3 for y.
-    assert guesser.guess(samples[0]) == "y"
-    assert guesser.guess(samples[5]) == "x"
+    assert (guesses[0], guesses[5]) == ("y", "x")
 
 
 def test_of_equally_likely_answers_the_first_in_the_alphabet_is_guessed():
     samples = make_samples_on_clues(
         *(
             make_question(f"t{i}", "Why?", answer)
-            for i, answer in enumerate(("pear", "fig", "pear", "fig"))
+            for i, answer in enumerate(("pear", "fig", "pear", "fig", "?"))
         )
     )
-    guesser = Guesser(samples, chains_of_words)
-    assert guesser.guess(make_samples_on_clues(make_question("new", "Why?", "?"))[0]) == "fig"
+    fit = guess_by_chains(samples, [0, 0, 0, 0, 1], chains_of_words)
+    assert fit(frozenset({1})) == {4: "fig"}
 
 
 @pytest.mark.parametrize(
@@ -106,4 +106,25 @@ def test_of_equally_likely_answers_the_first_in_the_alphabet_is_guessed():
 )
 def test_of_one_question_nothing_is_learned(chains):
     (sample,) = make_samples_on_clues(make_question("t", "Why?", "x"))
-    assert Guesser([sample], chains).guess(sample) == ""
+    assert guess_with(guess_by_chains, [sample], chains=chains) == [""]
+
+
+def test_a_long_question_takes_memory_by_its_length():
+    """Chains of all its leading words, and forms before each word, would take gigabytes."""
+    (short, long) = (
+        make_samples_on_clues(
+            make_question("t", "w" * 9 * n + " " + " ".join(f"w{i}" for i in range(9 * n)), "x"),
+            make_question("u", "Why?", "y"),
+        )
+        for n in (100, 1000)
+    )
+    assert len(short[0].question.text) > 5000
+    peaks = []
+    for samples in (short, long):
+        tracemalloc.start()
+        for name in ("words", "learner: words"):
+            guesser = next(it for it in GUESSERS if it.name == name)
+            assert guesser.guess(samples) == ["y", "x"]
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 26 * peaks[0]

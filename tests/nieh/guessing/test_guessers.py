@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
+from infthor_eval.nieh.guessing.blind import visible_knowledge
+from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge, blind_guesser
 
 from ...helpers.questions import make_question, make_samples_on_clues
 
@@ -17,7 +18,8 @@ _TEXTS = st.sampled_from(
 _ROWS = st.tuples(
     st.integers(0, 3), _TEXTS, st.sampled_from(("yes", "no", "Bed")), st.integers(1, 3)
 )
-_EACH = pytest.mark.parametrize("guesser", GUESSERS, ids=lambda guesser: guesser.name)
+BLIND = blind_guesser(visible_knowledge("clues"))
+_EACH = pytest.mark.parametrize("guesser", (*GUESSERS, BLIND), ids=lambda guesser: guesser.name)
 
 
 def questions_of(rows):

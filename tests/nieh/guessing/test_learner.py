@@ -4,17 +4,16 @@ from dataclasses import replace
 
 import pytest
 
-from infthor_eval.nieh.guessing.chains import held_out
 from infthor_eval.nieh.guessing.clue_facts import ClueFacts
 from infthor_eval.nieh.guessing.learner import guess_by_learning
 
-from ...helpers.questions import make_question, make_samples_on_clues
+from ...helpers.questions import guess_with, make_question, make_samples_on_clues
 
 TEXTS = ("Is Mug on the Bed?", "Is Box on the Bed?")
 
 
 def right(samples, **knowledge):
-    guesses = guess_by_learning(samples, held_out(samples), **knowledge)
+    guesses = guess_with(guess_by_learning, samples, **knowledge)
     return sum(
         guess == sample.question.answers[0] for guess, sample in zip(guesses, samples, strict=True)
     )
@@ -71,8 +70,8 @@ def test_of_a_scene_that_is_held_out_nothing_is_learned():
     questions = [make_question(f"t{i}", f"{i // 2}?", ("yes", "no")[i // 2 % 2]) for i in range(8)]
     samples = make_samples_on_clues(*questions)
     scenes = {f"t{i}": f"scene-{i // 2}" for i in range(8)}
-    for hold_out, expected in ((held_out(samples), 8), (held_out(samples, scenes), 0)):
-        guesses = guess_by_learning(samples, hold_out, number=False, place=False)
+    for held_out, expected in (({}, 8), (scenes, 0)):
+        guesses = guess_with(guess_by_learning, samples, held_out, number=False, place=False)
         assert (
             sum(guess == item.answers[0] for guess, item in zip(guesses, questions, strict=True))
             == expected
@@ -81,9 +80,9 @@ def test_of_a_scene_that_is_held_out_nothing_is_learned():
 
 def test_without_another_trajectory_or_answer_there_is_nothing_to_fit():
     (alone,) = make_samples_on_clues(make_question("t", TEXTS[0], "yes"))
-    assert guess_by_learning([alone], held_out([alone]), number=True, place=True) == [""]
+    assert guess_with(guess_by_learning, [alone], number=True, place=True) == [""]
     same = make_samples_on_clues(*(make_question(f"t{i}", TEXTS[0], "yes") for i in range(3)))
-    assert guess_by_learning(same, held_out(same), number=True, place=True) == ["yes"] * 3
+    assert guess_with(guess_by_learning, same, number=True, place=True) == ["yes"] * 3
 
 
 def test_on_one_trajectory_each_question_is_guessed_from_the_others():

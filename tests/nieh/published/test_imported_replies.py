@@ -9,10 +9,10 @@ import pytest
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import PublishedColumns, Question
-from infthor_eval.nieh.guessing.guesses import visible_knowledge
+from infthor_eval.nieh.guessing.blind import visible_knowledge
 from infthor_eval.nieh.published import imported_replies
 from infthor_eval.nieh.published.imported_replies import import_logs
-from infthor_eval.nieh.records import Guess, ShownClues
+from infthor_eval.nieh.records import BlindGuess, ShownClues
 from infthor_eval.nieh.results.summary import summarise
 
 SINGLE, MULTI = "qa_set_nieh_single_clue", "qa_set_nsieh_multi_clue"
@@ -32,7 +32,7 @@ QUESTIONS = [
 @pytest.fixture(autouse=True)
 def no_guesses(monkeypatch):
     """Spares the tests the guessers, which take a second."""
-    monkeypatch.setattr(imported_replies, "find_guesses", lambda *_: {})
+    monkeypatch.setattr(imported_replies, "find_floor", lambda *_: {})
 
 
 @pytest.fixture
@@ -194,12 +194,12 @@ def test_frames_asked_about_in_the_words_of_main_are_no_published_row(imported):
     )
 
 
-def test_records_have_the_guesses_that_suit_the_mode(imported, monkeypatch):
-    guess = Guess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.5})
-    known = {visible_knowledge("trajectory"): {"q0": guess}}
-    monkeypatch.setattr(imported_replies, "find_guesses", lambda _, knowledge: known[knowledge])
+def test_records_have_what_blind_says_that_suits_the_mode(imported, monkeypatch):
+    blind = BlindGuess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.5})
+    known = {visible_knowledge("trajectory"): {"q0": blind}}
+    monkeypatch.setattr(imported_replies, "find_floor", lambda _, knowledge: known[knowledge])
     (run,) = imported(full_traj=[row(0), row(1)])
-    assert {record.id: record.payload.guess for record in run.records} == {"q0": guess, "q1": None}
+    assert {record.id: record.payload.blind for record in run.records} == {"q0": blind, "q1": None}
 
 
 @pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published logs are not at ../shared/data")

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from infthor_eval.nieh.records import Guess
+from infthor_eval.nieh.records import BlindGuess
 from infthor_eval.nieh.results.effective_length import (
     KEPT,
     effective_length,
@@ -88,9 +88,9 @@ def test_whole_trajectories_are_in_bins_of_their_length():
     assert {row.cells[4] for row in table.rows} == {"32-64K"}
 
 
-def test_the_same_rule_holds_above_guessing():
-    guess = Guess(form="a", scores={"strict": 0.5}, form_scores={"strict": 0.5})
-    base, far = (of_share(share, guess=guess) for share in (1.0, 0.9))
+def test_the_same_rule_holds_above_blind():
+    guess = BlindGuess(form="a", scores={"strict": 0.5}, form_scores={"strict": 0.5})
+    base, far = (of_share(share, blind=guess) for share in (1.0, 0.9))
     runs = [
         make_run(make_config(), base),
         make_run(make_config(context="haystack", ctx_size=8), far),

@@ -1,12 +1,12 @@
-"""Tables by shown evidence, and the cells of the score above guessing."""
+"""Tables by shown evidence, and the cells of the score above blind."""
 
 import pytest
 
-from infthor_eval.nieh.records import Guess, ShownClues
-from infthor_eval.nieh.results.above_guessing import above_guessing
+from infthor_eval.nieh.records import BlindGuess, ShownClues
+from infthor_eval.nieh.results.above_blind import above_blind
 from infthor_eval.nieh.results.evidence_tables import (
-    above_guessing_cell,
-    above_guessing_notes,
+    above_blind_cell,
+    above_blind_notes,
     evidence_tables,
     short_name,
 )
@@ -84,16 +84,16 @@ def guessed(number, reply, score, mean=0.5, form="f"):
     return make_record(
         number,
         reply,
-        guess=Guess(form=form, scores={"strict": score}, form_scores={"strict": mean}),
+        blind=BlindGuess(form=form, scores={"strict": score}, form_scores={"strict": mean}),
     )
 
 
-def test_a_cell_has_the_score_above_guessing_with_its_interval():
+def test_a_cell_has_the_score_above_blind_with_its_interval():
     records = [guessed(i, "mug" if i % 2 else "cup", 0.25, 0.25) for i in range(8)]
-    cell = above_guessing_cell(above_guessing(records, "strict"))
+    cell = above_blind_cell(above_blind(records, "strict"))
     assert cell.numbers[""] == "33.3"  # (0.5 - 0.25) / 0.75
     assert cell == f"33.3 [{cell.numbers['low']}, {cell.numbers['high']}]"
-    assert [above_guessing_cell(none) for none in (None, above_guessing([], "strict"))] == [
+    assert [above_blind_cell(none) for none in (None, above_blind([], "strict"))] == [
         "-",
         "-",
     ]
@@ -102,7 +102,7 @@ def test_a_cell_has_the_score_above_guessing_with_its_interval():
 @pytest.mark.parametrize("n_solved", [0, 2])
 def test_the_note_tells_what_is_not_counted(n_solved):
     solved = [guessed(10 + i, "mug", 1.0, 1.0, f"easy {i}") for i in range(n_solved)]
-    (note,) = above_guessing_notes([make_run(make_config(), [guessed(0, "mug", 0.5), *solved])])
+    (note,) = above_blind_notes([make_run(make_config(), [guessed(0, "mug", 0.5), *solved])])
     expected = " Not counted, as guessing solves their forms (above 95%): 2 questions of 2 forms."
     assert note.endswith(expected) == bool(n_solved)
-    assert above_guessing_notes([make_run(make_config(), [make_record(0, "mug"), *solved])]) == []
+    assert above_blind_notes([make_run(make_config(), [make_record(0, "mug"), *solved])]) == []

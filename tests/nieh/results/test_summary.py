@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from infthor_eval.distances import DISTANCES, LENGTHS
-from infthor_eval.nieh.records import Guess, ShownClues
+from infthor_eval.nieh.records import BlindGuess, ShownClues
 from infthor_eval.nieh.results.summary import NiehSummary
 from infthor_eval.runs import Tokens
 
@@ -234,22 +234,22 @@ def test_samples_are_apart_by_the_length_of_their_context(tokens, name):
     assert means({length: at.cell for length, at in by_length.items()}) == {name: (1, 1.0)}
 
 
-def test_lengths_have_their_own_scores_above_guessing():
-    guess = Guess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.5})
+def test_lengths_have_their_own_scores_above_blind():
+    guess = BlindGuess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.5})
     lengths = (("mug", 500), ("cup", 500), ("mug", 70_000), ("mug", 3000))
     records = [
-        make_record(i, reply, tokens=Tokens(context=n), guess=guess)
+        make_record(i, reply, tokens=Tokens(context=n), blind=guess)
         for i, (reply, n) in enumerate(lengths[:3])
     ]
     summary = task_of([*records, make_record(3, "mug", tokens=Tokens(context=3000))])
-    assert {name: at.above_guessing["strict"] for name, at in summary.by_length.items()} == {
+    assert {name: at.above_blind["strict"] for name, at in summary.by_length.items()} == {
         "0-1": 0.0,
         "2-4": None,  # its guess is not known
         "64-128": 1.0,
     }
     assert list(summary.by_length) == ["0-1", "2-4", "64-128"]
-    assert summary.above_guessing["strict"].mean == pytest.approx(1 / 3)
-    assert summary.above_guessing["strict"].n_unknown == 1
+    assert summary.above_blind["strict"].mean == pytest.approx(1 / 3)
+    assert summary.above_blind["strict"].n_unknown == 1
 
 
 @pytest.mark.parametrize("names", [DISTANCES, LENGTHS])

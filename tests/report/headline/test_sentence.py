@@ -14,7 +14,7 @@ def said(*results):
 def test_a_run_by_itself_has_its_interval():
     assert said(make_result("nano", 0.5)) == (
         "On nieh_gt nano gets 50.0 % (95 % interval 25.0 to 75.0) of the questions right and "
-        "guessing 25.0 %."
+        "blind 25.0 %."
     )
 
 
@@ -23,7 +23,7 @@ def test_models_come_before_baselines_and_the_best_first():
     results += [make_result("low", 0.1), make_result("high", 0.9)]
     assert said(*results) == (
         "On nieh_gt high gets 90.0 % of the questions right, low 10.0 %, the baseline blind 30.0 % "
-        "and guessing 25.0 %."
+        "and blind 25.0 %."
     )
 
 
@@ -35,12 +35,12 @@ def test_baselines_alone_are_called_so():
     )
 
 
-def test_guessing_is_left_out_unless_it_is_known_of_all():
+def test_blind_is_left_out_unless_it_is_known_of_all():
     results = [make_result("a", 0.5), make_result("b", 0.25, chance=None)]
     assert said(*results) == "On nieh_gt a gets 50.0 % of the questions right and b 25.0 %."
 
 
-def test_a_task_that_guessing_never_gets_right_comes_first():
+def test_a_task_that_blind_never_gets_right_comes_first():
     tasks = ("nieh_gt", "nieh_full", "nieh_twins")
     results = [
         make_result("a", 0.5, task=task, chance=0.0 if task == "nieh_twins" else 0.25)
@@ -49,9 +49,9 @@ def test_a_task_that_guessing_never_gets_right_comes_first():
     assert said(*results).startswith("On nieh_twins a gets")
 
 
-def test_guessing_on_different_questions_is_a_range():
+def test_blind_on_different_questions_is_a_range():
     results = [make_result("a", 0.5), make_result("b", 0.25, chance=0.4)]
-    assert "guessing 25.0 to 40.0 %, by the questions answered" in said(*results)
+    assert "blind 25.0 to 40.0 %, by the questions answered" in said(*results)
 
 
 def test_a_run_that_is_not_whole_says_over_how_many_its_score_is():
@@ -74,7 +74,7 @@ def test_of_many_runs_the_ends_are_named():
     results = [make_result(f"m{number}", number / 10) for number in range(6)]
     assert said(*results) == (
         "On nieh_gt m5 gets 50.0 % of the questions right, the highest of 6 runs, m0 0.0 %, the "
-        "lowest, and guessing 25.0 %."
+        "lowest, and blind 25.0 %."
     )
 
 

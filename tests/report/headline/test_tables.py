@@ -11,17 +11,17 @@ def test_the_table_has_a_row_for_each_run_with_its_cost_beside_its_score():
     table = results_table(results)
     assert [row.link for row in table.rows] == ["#run-0", ""]
     by_name = dict(zip((column.name for column in table.columns), table.rows[0].cells, strict=True))
-    assert (by_name["%"], by_name["guessing, %"], by_name["cost, $"]) == ("50.0", "25.0", "0.2500")
+    assert (by_name["%"], by_name["blind, %"], by_name["cost, $"]) == ("50.0", "25.0", "0.2500")
     assert table.rows[1].cells[3] == "none answered"
     latex = export_tables([table], "latex")
     assert latex.splitlines()[0] == r"\begin{tabular}{lllrrrrrrr}"
     assert r"a & nieh\_gt & questions right & 50.0 & 25.0–75.0" in latex
 
 
-def test_the_chart_has_intervals_guessing_and_a_row_without_a_score():
+def test_the_chart_has_intervals_blind_and_a_row_without_a_score():
     chart = results_chart([make_result("a", 0.5), make_result("b", None)])
     assert "25.0 to 75.0" in chart.svg
-    assert "guessing 25.0" in chart.svg
+    assert "blind 25.0" in chart.svg
     assert ">none<" in chart.svg
     assert chart.description == "nieh_gt: questions right, a 50.0; b none"
     (row,) = chart.table.rows

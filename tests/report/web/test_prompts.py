@@ -1,4 +1,4 @@
-"""What was sent, and what failed: prompts, clues that a context left out, tracebacks, guessing."""
+"""What was sent, and what failed: prompts, clues that a context left out, tracebacks, `blind`."""
 
 import json
 import shutil
@@ -83,17 +83,17 @@ def test_clues_that_a_context_left_out_are_marked(page, open_page):
         assert without == (", ".join(labels) if caption.endswith("shown") else labels[1])
 
 
-def test_evidence_and_guessing_stand_beside_the_reply(page, open_page):
+def test_evidence_and_blind_stand_beside_the_reply(page, open_page):
     sample = next(
         it
         for it in page.samples
-        if "guessing" in it.results[0].details and "clue frames shown" in it.results[0].details
+        if "blind" in it.results[0].details and "clue frames shown" in it.results[0].details
     )
     tab = open_page(page.__class__(**(vars(page) | {"samples": [sample]}))).tab
     text = tab.locator("#sample .details").first.inner_text()
     assert "clue frames shown" in text
-    assert "strict" in sample.results[0].details["guessing"]
-    assert sample.results[0].details["guessing"] in text
+    assert "strict" in sample.results[0].details["blind"]
+    assert sample.results[0].details["blind"] in text
 
 
 def test_tracebacks_of_failures_unfold_as_text(make_page, nieh_runs, tmp_path, open_page):

@@ -1,4 +1,4 @@
-"""The best guess at each question of a set."""
+"""What `blind` says to the questions of a set."""
 
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -8,15 +8,15 @@ import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
-from infthor_eval.nieh.guessing import guesses
-from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
-from infthor_eval.nieh.guessing.guesses import (
-    find_guesses,
+from infthor_eval.nieh.guessing import blind
+from infthor_eval.nieh.guessing.blind import (
+    find_floor,
     questions_by_file,
     sample_on_clues,
     visible_knowledge,
 )
-from infthor_eval.nieh.results.above_guessing import above_guessing
+from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
+from infthor_eval.nieh.results.above_blind import above_blind
 from infthor_eval.storage.folders import user_cache
 
 from ...helpers.nieh_runs import make_record
@@ -52,34 +52,34 @@ def test_a_form_has_the_score_of_its_best_guesser(make_set):
     data = make_set(
         test=[*constant(PRESENCE, ("yes",) * 4 + ("no",)), *constant(OPEN, ("yes", "yes"))]
     )
-    by_id = find_guesses(data, Knowledge.WORDS)
+    by_id = find_floor(data, Knowledge.WORDS)
     by_question = [by_id[question.id] for question in data.questions]
     assert [guess.form for guess in by_question] == ["Is {} in/on {}?"] * 5 + ["Was {} open?"] * 2
     assert [guess.scores["strict"] for guess in by_question] == [1, 1, 1, 1, 0, 1, 1]
     assert [guess.form_scores["strict"] for guess in by_question] == [pytest.approx(0.8)] * 5 + [
         1
     ] * 2
-    assert find_guesses(data, Knowledge.WORDS) is by_id
+    assert find_floor(data, Knowledge.WORDS) is by_id
 
 
 def test_guesses_are_learned_once_for_the_same_questions(make_set, monkeypatch):
     questions = [*constant(PRESENCE, ("yes",) * 4 + ("no",)), *constant(OPEN, ("yes", "yes"))]
-    first = find_guesses(make_set(test=questions), Knowledge.WORDS)
+    first = find_floor(make_set(test=questions), Knowledge.WORDS)
     with monkeypatch.context() as patch:
-        patch.setattr(guesses, "GUESSERS", ())  # nobody left to learn from
-        assert find_guesses(make_set(test=questions), Knowledge.WORDS) == first
+        patch.setattr(blind, "blind_guesser", None)  # nobody left to learn from
+        assert find_floor(make_set(test=questions), Knowledge.WORDS) == first
     others = make_set(test=questions[:-1])
-    assert len(find_guesses(others, Knowledge.WORDS)) == len(first) - 1
-    for path in user_cache("guesses").iterdir():
+    assert len(find_floor(others, Knowledge.WORDS)) == len(first) - 1
+    for path in user_cache("blind").iterdir():
         path.write_text("{")
-    assert find_guesses(make_set(test=questions), Knowledge.WORDS) == first
+    assert find_floor(make_set(test=questions), Knowledge.WORDS) == first
 
 
 def test_a_file_is_guessed_from_itself_alone(make_set):
     data = make_set(
         a=constant(PRESENCE, ("yes",) * 3, (1,)), b=constant(PRESENCE, ("no",) * 3, (2,))
     )
-    guesses = find_guesses(data, Knowledge.WORDS)
+    guesses = find_floor(data, Knowledge.WORDS)
     assert {guess.scores["strict"] for guess in guesses.values()} == {1.0}
     assert {name: len(questions) for name, questions in questions_by_file(data).items()} == {
         "qa_set_a": 3,
@@ -93,14 +93,13 @@ def test_what_a_guesser_may_not_know_does_not_help(make_set):
         test=[make_question(traj, PRESENCE, answer, clues) for traj, answer, clues in key]
     )
     with_clues, without_clues = (
-        find_guesses(data, knowledge)
-        for knowledge in map(visible_knowledge, ("clues", "trajectory"))
+        find_floor(data, knowledge) for knowledge in map(visible_knowledge, ("clues", "trajectory"))
     )
     assert {guess.form_scores["strict"] for guess in with_clues.values()} == {1.0}
     assert {guess.form_scores["strict"] for guess in without_clues.values()} == {0.5}
 
 
-def test_no_guesser_is_above_guessing_and_the_best_is_there(make_set):
+def test_no_guesser_is_above_blind_and_the_best_is_there(make_set):
     answers = ("yes", "yes", "no", "yes", "no", "no", "yes", "no", "yes")
     questions = [
         make_question(
@@ -112,15 +111,15 @@ def test_no_guesser_is_above_guessing_and_the_best_is_there(make_set):
         for i, answer in enumerate(answers)
     ]
     data = make_set(test=questions)
-    guesses = find_guesses(data, ~Knowledge.FILE)
+    guesses = find_floor(data, ~Knowledge.FILE)
     scores = []
     for guesser in GUESSERS:
         replies = zip(questions, guesser.guess(make_samples_on_clues(*questions)), strict=True)
         records = [
-            make_record(i, reply, question.answers, guess=guesses[question.id])
+            make_record(i, reply, question.answers, blind=guesses[question.id])
             for i, (question, reply) in enumerate(replies)
         ]
-        scores.append(above_guessing(records, "strict").mean)
+        scores.append(above_blind(records, "strict").mean)
     assert max(scores) == pytest.approx(0)
 
 
@@ -137,7 +136,7 @@ def test_questions_that_are_asked_at_once_wait_for_the_one_that_learns(make_set,
             started.wait(0.2)  # a second one that learned too would be here meanwhile
         return {}
 
-    monkeypatch.setattr(guesses, "_learn_guesses", learn)
+    monkeypatch.setattr(blind, "_learn", learn)
     with ThreadPoolExecutor(2) as pool:
-        list(pool.map(lambda _: find_guesses(data, Knowledge.WORDS), range(2)))
+        list(pool.map(lambda _: find_floor(data, Knowledge.WORDS), range(2)))
     assert len(n_learned) == 1

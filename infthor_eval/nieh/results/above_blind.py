@@ -1,8 +1,8 @@
-"""The share of what could not be guessed that a run got: 0 for a guesser, 1 for all right.
+"""The share of what `blind` has not that a run got: 0 for `blind`, 1 for all right.
 
-Of a form of questions with the score s and the guess g it is (s - g) / (1 - g); forms are pooled by
-their questions. That equals the mean over questions of (their score - their guess) / (1 - g), so it
-has intervals, and runs can be paired. A form that is in two files counts as two.
+Of a form of questions with the score s, and b of `blind`, it is (s - b) / (1 - b); forms are
+pooled by their questions. That equals the mean over questions of (their score - that of `blind`)
+/ (1 - b), so it has intervals, and runs can be paired. A form that is in two files counts as two.
 docs/reference/metrics.md says what it assumes.
 """
 
@@ -16,38 +16,37 @@ from infthor_eval.statistics import bootstrap_interval
 
 __all__ = [
     "SOLVED",
-    "AboveGuessing",
+    "AboveBlind",
     "FormScore",
-    "above_guessing",
-    "score_above_guessing",
+    "above_blind",
+    "score_above_blind",
     "score_range",
 ]
 
-# A form with a better guess counts as solved by guessing: what is left of it is a few questions,
-# and a run that errs on one of them more than the guesser would lose more than it could win on all
-# others.
+# A form of which `blind` has more counts as solved by it: what is left is a few questions, and a
+# run that errs on one of them more than `blind` would lose more than it could win on all others.
 SOLVED = 0.95
 
 
 class FormScore(msgspec.Struct, frozen=True):
-    """A form's questions: their number, the run's mean score, and the best guesser's mean."""
+    """A form's questions: their number, the run's mean score, and that of `blind`."""
 
     n: int
     score: float
-    guess: float
+    blind: float
 
 
-class AboveGuessing(msgspec.Struct, frozen=True):
-    """The score above guessing of n questions, at most 1; None if there is none.
+class AboveBlind(msgspec.Struct, frozen=True):
+    """The score above blind of n questions, at most 1; None if there is none.
 
     Attributes:
         low: lower end of the 95 % interval over resampled trajectories; None with fewer than two.
         high: its upper end.
         n: number of questions that count.
-        n_solved: number of questions that do not, as guessing solves their form.
-        n_unknown: number of questions whose guess is not known.
-        forms: all forms with a guess.
-        solved_forms: those that guessing solves.
+        n_solved: number of questions that do not, as `blind` solves their form.
+        n_unknown: number of questions to which it is not known what `blind` says.
+        forms: all forms for which that is known.
+        solved_forms: those that `blind` solves.
     """
 
     mean: float | None
@@ -60,33 +59,33 @@ class AboveGuessing(msgspec.Struct, frozen=True):
     solved_forms: list[str]
 
 
-def score_above_guessing(payload: NiehAnswer, scorer: str) -> float | None:
-    """Return what an answered question adds to the mean above guessing; None if it does not
+def score_above_blind(payload: NiehAnswer, scorer: str) -> float | None:
+    """Return what an answered question adds to the mean above blind; None if it does not
     count."""
-    guess = payload.guess
-    if guess is None or scorer not in guess.form_scores or guess.form_scores[scorer] > SOLVED:
+    blind = payload.blind
+    if blind is None or scorer not in blind.form_scores or blind.form_scores[scorer] > SOLVED:
         return None
     if payload.scores and scorer not in payload.scores:  # the task has not this scorer
         return None
-    return (payload.scores.get(scorer, 0.0) - guess.scores[scorer]) / (
-        1 - guess.form_scores[scorer]
+    return (payload.scores.get(scorer, 0.0) - blind.scores[scorer]) / (
+        1 - blind.form_scores[scorer]
     )
 
 
-def above_guessing(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> AboveGuessing:
-    """Return the score above guessing of some answered questions under a scorer."""
+def above_blind(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> AboveBlind:
+    """Return the score above blind of some answered questions under a scorer."""
     known = [
         record
         for record in records
-        if record.payload.guess and scorer in record.payload.guess.scores
+        if record.payload.blind and scorer in record.payload.blind.scores
     ]
-    pairs = [(score_above_guessing(record.payload, scorer), record.cluster) for record in known]
+    pairs = [(score_above_blind(record.payload, scorer), record.cluster) for record in known]
     counted = [(score, cluster) for score, cluster in pairs if score is not None]
     scores = [score for score, _ in counted]
     clusters = [cluster for _, cluster in counted]
     mean = sum(scores) / len(scores) if scores else None
     low, high = _interval(scores, clusters, [it for it in known if _counts(it, scorer)], scorer)
-    return AboveGuessing(
+    return AboveBlind(
         mean=mean,
         low=low,
         high=high,
@@ -95,17 +94,13 @@ def above_guessing(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> Ab
         n_unknown=len(records) - len(known),
         forms=_by_form(known, scorer),
         solved_forms=sorted(
-            {
-                _form(record)
-                for record in known
-                if score_above_guessing(record.payload, scorer) is None
-            }
+            {_form(record) for record in known if score_above_blind(record.payload, scorer) is None}
         ),
     )
 
 
 def _counts(record: UnitRecord[NiehAnswer], scorer: str) -> bool:
-    return score_above_guessing(record.payload, scorer) is not None
+    return score_above_blind(record.payload, scorer) is not None
 
 
 def _interval(
@@ -116,7 +111,7 @@ def _interval(
 ) -> tuple[float, float] | tuple[None, None]:
     """Return the interval over resampled trajectories, cut off where all are right, or wrong.
 
-    A question on which the guess is wrong adds more than 1 if it is right, so a sample of such ones
+    A question on which `blind` is wrong adds more than 1 if it is right, so a sample of such ones
     would exceed 1.
     """
     found = bootstrap_interval(scores, clusters) if scores else None
@@ -128,7 +123,7 @@ def _interval(
 
 
 def score_range(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> tuple[float, float]:
-    """Return the score above guessing of questions that count if all are wrong, and if all are
+    """Return the score above blind of questions that count if all are wrong, and if all are
     right."""
     ends = []
     for right in (0.0, 1.0):
@@ -136,7 +131,7 @@ def score_range(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> tuple
             msgspec.structs.replace(record.payload, scores={scorer: right}) for record in records
         )
         ends.append(
-            sum(score_above_guessing(payload, scorer) or 0.0 for payload in payloads) / len(records)
+            sum(score_above_blind(payload, scorer) or 0.0 for payload in payloads) / len(records)
         )
     return ends[0], ends[1]
 
@@ -144,18 +139,18 @@ def score_range(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> tuple
 def _by_form(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> dict[str, FormScore]:
     by_form: dict[str, list[tuple[float, float]]] = {}
     for record in records:
-        assert record.payload.guess is not None
-        pair = record.payload.scores.get(scorer, 0.0), record.payload.guess.scores[scorer]
+        assert record.payload.blind is not None
+        pair = record.payload.scores.get(scorer, 0.0), record.payload.blind.scores[scorer]
         by_form.setdefault(_form(record), []).append(pair)
     scores = {}
     for form, pairs in sorted(by_form.items()):
-        replied, guessed = zip(*pairs, strict=True)
-        scores[form] = FormScore(len(pairs), sum(replied) / len(pairs), sum(guessed) / len(pairs))
+        replied, blind = zip(*pairs, strict=True)
+        scores[form] = FormScore(len(pairs), sum(replied) / len(pairs), sum(blind) / len(pairs))
     return scores
 
 
 def _form(record: UnitRecord[NiehAnswer]) -> str:
-    assert record.payload.guess is not None
+    assert record.payload.blind is not None
     file = record.payload.file
-    form = record.payload.guess.form
+    form = record.payload.blind.form
     return f"{file}: {form}" if file else form

@@ -4,12 +4,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from infthor_eval.nieh.records import Guess
-from infthor_eval.nieh.results.above_guessing import (
+from infthor_eval.nieh.records import BlindGuess
+from infthor_eval.nieh.results.above_blind import (
     SOLVED,
     FormScore,
-    above_guessing,
-    score_above_guessing,
+    above_blind,
+    score_above_blind,
 )
 
 from ...helpers.nieh_runs import make_record
@@ -22,7 +22,7 @@ _FORMS = st.dictionaries(st.sampled_from("abcd"), _PAIRS, min_size=1)
 
 def guess(score, mean=None, form="a", scorer="strict"):
     """A guess with that score at a question, and that mean at its form."""
-    return Guess(
+    return BlindGuess(
         form=form, scores={scorer: score}, form_scores={scorer: score if mean is None else mean}
     )
 
@@ -34,7 +34,7 @@ def answered(forms):
         mean = sum(guessed for _, guessed in pairs) / len(pairs)
         items += [(score, guess(guessed, mean, form)) for score, guessed in pairs]
     return [
-        make_record(number, "?", scores={"strict": score}, guess=at)
+        make_record(number, "?", scores={"strict": score}, blind=at)
         for number, (score, at) in enumerate(items)
     ]
 
@@ -42,7 +42,7 @@ def answered(forms):
 @settings(max_examples=40)
 @given(_FORMS)
 def test_it_is_the_mean_of_the_forms_weighted_by_their_questions(forms):
-    above = above_guessing(answered(forms), "strict")
+    above = above_blind(answered(forms), "strict")
     total = n = 0
     for pairs in forms.values():
         score, guessed = (sum(column) / len(pairs) for column in zip(*pairs, strict=True))
@@ -60,7 +60,7 @@ def test_it_is_the_mean_of_the_forms_weighted_by_their_questions(forms):
 def test_the_guesser_itself_gets_nothing_and_all_right_is_all(forms):
     guessed = {form: [(right, right) for _, right in pairs] for form, pairs in forms.items()}
     all_right = {form: [(1.0, right) for _, right in pairs] for form, pairs in forms.items()}
-    none, whole = (above_guessing(answered(records), "strict") for records in (guessed, all_right))
+    none, whole = (above_blind(answered(records), "strict") for records in (guessed, all_right))
     assert none.mean == (pytest.approx(0) if none.n else None)
     assert whole.mean == (pytest.approx(1) if whole.n else None)
 
@@ -69,11 +69,11 @@ def test_by_hand():
     # Form a: 3 of 4 right where the guess is 1 of 2; (0.75 - 0.5) / 0.5 = 0.5. Form b: 0 of 1,
     # guess 0.2; -0.25.
     records = [
-        make_record(i, "?", scores={"strict": float(i > 0)}, guess=guess(i % 2, 0.5))
+        make_record(i, "?", scores={"strict": float(i > 0)}, blind=guess(i % 2, 0.5))
         for i in range(4)
     ]
-    records.append(make_record(4, "?", scores={"strict": 0.0}, guess=guess(0.2, form="b")))
-    above = above_guessing(records, "strict")
+    records.append(make_record(4, "?", scores={"strict": 0.0}, blind=guess(0.2, form="b")))
+    above = above_blind(records, "strict")
     assert above.mean == pytest.approx((4 * 0.5 - 0.25) / 5)
     assert above.low < above.mean < above.high
     assert above.forms == {"a": FormScore(4, 0.75, 0.5), "b": FormScore(1, 0.0, 0.2)}
@@ -82,10 +82,10 @@ def test_by_hand():
 
 def test_a_form_that_guessing_solves_is_left_out_and_counted():
     records = [
-        make_record(i, "?", scores={"strict": 0.0}, guess=guess(1.0, 0.96, "easy"))
+        make_record(i, "?", scores={"strict": 0.0}, blind=guess(1.0, 0.96, "easy"))
         for i in range(3)
     ]
-    alone = above_guessing(records, "strict")
+    alone = above_blind(records, "strict")
     assert (alone.mean, alone.low, alone.n, alone.n_solved, alone.solved_forms) == (
         None,
         None,
@@ -94,8 +94,8 @@ def test_a_form_that_guessing_solves_is_left_out_and_counted():
         ["easy"],
     )
     assert alone.forms == {"easy": FormScore(3, 0.0, 1.0)}
-    border = make_record(3, "?", scores={"strict": 1.0}, guess=guess(0.0, SOLVED, "hard"))
-    both = above_guessing([*records, border], "strict")
+    border = make_record(3, "?", scores={"strict": 1.0}, blind=guess(0.0, SOLVED, "hard"))
+    both = above_blind([*records, border], "strict")
     assert (both.mean, both.n, both.n_solved, both.solved_forms) == (
         pytest.approx(20.0),
         1,
@@ -105,9 +105,9 @@ def test_a_form_that_guessing_solves_is_left_out_and_counted():
 
 
 def test_a_question_on_which_the_model_failed_counts_as_wrong():
-    failed = make_record(0, None, failure="too long", guess=guess(0.25))
-    above = above_guessing(
-        [failed, make_record(1, "?", scores={"strict": 1.0}, guess=guess(0.25))], "strict"
+    failed = make_record(0, None, failure="too long", blind=guess(0.25))
+    above = above_blind(
+        [failed, make_record(1, "?", scores={"strict": 1.0}, blind=guess(0.25))], "strict"
     )
     assert above.forms == {"a": FormScore(2, 0.5, 0.25)}
     assert above.mean == pytest.approx((0.5 - 0.25) / 0.75)
@@ -117,22 +117,22 @@ def test_questions_whose_guess_is_not_known_are_counted():
     other = guess(0.5, scorer="reference")
     records = [
         make_record(0, "mug"),
-        make_record(1, "mug", guess=other),
-        make_record(2, "mug", guess=guess(0.5)),
+        make_record(1, "mug", blind=other),
+        make_record(2, "mug", blind=guess(0.5)),
     ]
-    above = above_guessing(records, "strict")
+    above = above_blind(records, "strict")
     assert (above.mean, above.n, above.n_unknown) == (1.0, 1, 2)
-    assert [score_above_guessing(item.payload, "strict") for item in records] == [None, None, 1.0]
-    assert above_guessing([], "strict").mean is None
+    assert [score_above_blind(item.payload, "strict") for item in records] == [None, None, 1.0]
+    assert above_blind([], "strict").mean is None
 
 
 def test_a_form_in_two_files_is_two_forms():
     easy, hard = guess(0.75), guess(0.5)
     records = [
-        make_record(0, "mug", guess=easy, file="f"),
-        make_record(1, "mug", guess=hard, file="g"),
+        make_record(0, "mug", blind=easy, file="f"),
+        make_record(1, "mug", blind=hard, file="g"),
     ]
-    assert above_guessing(records, "strict").forms == {
+    assert above_blind(records, "strict").forms == {
         "f: a": FormScore(1, 1.0, 0.75),
         "g: a": FormScore(1, 1.0, 0.5),
     }
@@ -140,7 +140,7 @@ def test_a_form_in_two_files_is_two_forms():
 
 def test_one_trajectory_gives_no_interval():
     records = [
-        make_record(4 * i, "?", scores={"strict": float(i)}, guess=guess(0.5)) for i in range(2)
+        make_record(4 * i, "?", scores={"strict": float(i)}, blind=guess(0.5)) for i in range(2)
     ]
-    above = above_guessing(records, "strict")
+    above = above_blind(records, "strict")
     assert (above.mean, above.low, above.high) == (0.0, None, None)

@@ -1,10 +1,11 @@
-"""The best guess at each question of a set, by which runs are measured above guessing."""
+"""What `blind` says to each question of a set: what can be had without a frame."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
+from statistics import fmean
 from threading import Lock
 from types import MappingProxyType
 
@@ -15,23 +16,27 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import NOT_JSON
 from infthor_eval.nieh import scoring
 from infthor_eval.nieh.contexts import Sample
-from infthor_eval.nieh.guessing.chains import form_of, held_out
-from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge, NamedGuesser
-from infthor_eval.nieh.records import Guess
-from infthor_eval.nieh.scoring import SCORERS, score, scores
+from infthor_eval.nieh.guessing.chains import form_of
+from infthor_eval.nieh.guessing.guessers import (
+    GUESSERS,
+    Knowledge,
+    NamedGuesser,
+    blind_guesser,
+)
+from infthor_eval.nieh.records import BlindGuess
+from infthor_eval.nieh.scoring import score, scores
 from infthor_eval.storage.digests import digest_of_files, fingerprint
 from infthor_eval.storage.files import write_atomically
 from infthor_eval.storage.folders import user_cache
 
 __all__ = [
-    "find_guesses",
+    "find_blind",
+    "find_floor",
     "questions_by_file",
     "sample_on_clues",
     "score_guesses",
     "visible_knowledge",
 ]
-
-_Scores = Sequence[Mapping[str, float]]  # by scorer, of each question
 
 
 def visible_knowledge(context: str) -> Knowledge:
@@ -47,24 +52,30 @@ def visible_knowledge(context: str) -> Knowledge:
 _LEARNING = Lock()
 
 
-def find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
-    """Return by id of a question what can be guessed of it by guessers that know no more than that.
+@lru_cache(maxsize=8)
+def find_floor(data: NiehSet, knowledge: Knowledge) -> Mapping[str, BlindGuess]:
+    """Return `find_blind`, by which runs are measured; nothing of a set of one trajectory, whose
+    other questions alone say too little."""
+    is_alone = len({question.cluster for question in data.questions}) < 2
+    return {} if is_alone else find_blind(data, knowledge)
 
-    Of each file and form the guesser with the highest mean counts, for each scorer of its own; so
-    the guess is rather too good than too bad. They are kept in the user's cache, as learning takes
-    seconds.
+
+def find_blind(data: NiehSet, knowledge: Knowledge) -> Mapping[str, BlindGuess]:
+    """Return by id of a question what `blind` says to it that knows no more than that.
+
+    It is kept in the user's cache, as learning takes seconds.
     """
     with _LEARNING:
-        return _find_guesses(data, knowledge)
+        return _find_blind(data, knowledge)
 
 
 @lru_cache(maxsize=8)
-def _find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
-    path = user_cache("guesses") / f"{_key(data, knowledge)}.json"
+def _find_blind(data: NiehSet, knowledge: Knowledge) -> Mapping[str, BlindGuess]:
+    path = user_cache("blind") / f"{_key(data, knowledge)}.json"
     try:
-        return msgspec.json.decode(path.read_bytes(), type=dict[str, Guess])
+        return msgspec.json.decode(path.read_bytes(), type=dict[str, BlindGuess])
     except (OSError, *NOT_JSON):  # not there yet, or damaged
-        guesses = _learn_guesses(data, knowledge)
+        guesses = _learn(data, knowledge)
     with suppress(OSError):  # a cache that cannot be written costs only time
         path.parent.mkdir(parents=True, exist_ok=True)
         with write_atomically(path) as temporary:
@@ -80,16 +91,23 @@ def _key(data: NiehSet, knowledge: Knowledge) -> str:
     return fingerprint(learner | {"questions": list(map(repr, data.questions))})
 
 
-def _learn_guesses(data: NiehSet, knowledge: Knowledge) -> dict[str, Guess]:
-    guesses: dict[str, Guess] = {}
+def _learn(data: NiehSet, knowledge: Knowledge) -> dict[str, BlindGuess]:
+    guesses: dict[str, BlindGuess] = {}
     for questions in questions_by_file(data).values():
-        samples = [sample_on_clues(question) for question in questions]
-        by_guesser = []
-        for guesser in GUESSERS:
-            if guesser.knows in knowledge:
-                replies = zip(guesser.guess(samples), questions, strict=True)
-                by_guesser.append([scores(reply, question.answers) for reply, question in replies])
-        guesses |= _best_by_form(questions, by_guesser)
+        replies = blind_guesser(knowledge).guess(list(map(sample_on_clues, questions)))
+        scored = [scores(*it) for it in zip(replies, (it.answers for it in questions), strict=True)]
+        by_form: dict[str, list[dict[str, float]]] = {}
+        for question, of_question in zip(questions, scored, strict=True):
+            by_form.setdefault(form_of(question), []).append(of_question)
+        means = {
+            form: {name: fmean(it[name] for it in of_form) for name in of_form[0]}
+            for form, of_form in by_form.items()
+        }
+        for question, reply, of_question in zip(questions, replies, scored, strict=True):
+            form = form_of(question)
+            guesses[question.id] = BlindGuess(
+                form=form, reply=reply, scores=of_question, form_scores=means[form]
+            )
     return guesses
 
 
@@ -114,8 +132,7 @@ def score_guesses(
         scenes: scene by id of the trajectory, to guess without the question's whole scene.
     """
     samples = [sample_on_clues(question) for question in questions]
-    hold_out = held_out(samples, scenes)
-    by_guesser = [guesser.guess(samples, hold_out) for guesser in guessers]
+    by_guesser = [guesser.guess(samples, scenes) for guesser in guessers]
     by_question = zip(*by_guesser, strict=True)
     rows = []
     for question, guesses in zip(questions, by_question, strict=True):
@@ -126,27 +143,3 @@ def score_guesses(
 def sample_on_clues(question: Question) -> Sample:
     """Return the question on its clue frames, by their numbers in the file."""
     return Sample(question, tuple(sorted(question.clues)))
-
-
-def _best_by_form(questions: Sequence[Question], by_guesser: Sequence[_Scores]) -> dict[str, Guess]:
-    positions: dict[str, list[int]] = {}
-    for position, question in enumerate(questions):
-        positions.setdefault(form_of(question), []).append(position)
-    guesses = {}
-    for form, of_form in positions.items():
-        best: dict[str, _Scores] = {
-            scorer: _best(by_guesser, of_form, scorer) for scorer in SCORERS
-        }
-        means = {scorer: _mean(scored, of_form, scorer) for scorer, scored in best.items()}
-        for position in of_form:
-            own = {scorer: scored[position][scorer] for scorer, scored in best.items()}
-            guesses[questions[position].id] = Guess(form=form, scores=own, form_scores=means)
-    return guesses
-
-
-def _best(by_guesser: Sequence[_Scores], positions: Sequence[int], scorer: str) -> _Scores:
-    return max(by_guesser, key=lambda scored: _mean(scored, positions, scorer))
-
-
-def _mean(scored: _Scores, positions: Sequence[int], scorer: str) -> float:
-    return sum(scored[position][scorer] for position in positions) / len(positions)
