@@ -13,7 +13,7 @@ import msgspec
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import NOT_JSON
-from infthor_eval.nieh import scoring
+from infthor_eval.nieh import numbers, scoring
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.guessing.chains import form_of, held_out
 from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge, NamedGuesser
@@ -75,7 +75,7 @@ def _find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
 def _key(data: NiehSet, knowledge: Knowledge) -> str:
     """Return a hash of all that guesses depend on: the questions, guessers, scorers and library."""
     guessers = sorted(Path(__file__).parent.glob("*.py"))
-    code = digest_of_files([*guessers, Path(scoring.__file__)])
+    code = digest_of_files([*guessers, Path(scoring.__file__), Path(numbers.__file__)])
     learner = {"knowledge": knowledge.value, "code": code, "library": version("scikit-learn")}
     return fingerprint(learner | {"questions": list(map(repr, data.questions))})
 

@@ -14,9 +14,8 @@ from statistics import fmean
 import msgspec
 
 from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
-from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.records import NiehAnswer, TwinSide
-from infthor_eval.nieh.scoring import plain_form, score
+from infthor_eval.nieh.scoring import compared_form, score
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.runs import UnitRecord
 
@@ -253,7 +252,7 @@ class _Pairs:
         reply = side.record.payload.reply
         if reply is None or _is_right(side.record, self.metric):
             return False
-        return score(last_line(reply), side.twin.answers, "strict") >= 1
+        return score(reply, side.twin.answers, "strict") >= 1
 
     def _commoner(self, pairs: Sequence[TwinRecords]) -> Rate:
         """Return how often the answer that was got right is the commoner one of its form."""
@@ -324,8 +323,8 @@ def _is_right(record: Record, metric: str) -> bool:
 
 def _said(record: Record) -> str | None:
     """Return what a reply says, as scorers compare it; None if there is none."""
-    reply = record.payload.reply
-    return None if reply is None else plain_form(last_line(reply)).casefold()
+    payload = record.payload
+    return None if payload.reply is None else compared_form(payload.reply, payload.answers)
 
 
 def _distance(pair: TwinRecords) -> str | None:
