@@ -77,35 +77,26 @@ def _find(gold: Answer, pieces: Sequence[str], scorer: Scorer) -> str:
         return f"{str(gold)!r} is not said: the reply is empty"
     form = _FORMS[scorer]
     nearest = max(pieces, key=lambda piece: similarity(form(piece), form(gold)))
-    return f"{str(gold)!r} is not said by {_quote(nearest)}: {_why_not(nearest, gold, scorer)}"
+    return f"{str(gold)!r} is not said by {_quote(nearest)}: {_why(nearest, gold, scorer)}"
 
 
 def _why(piece: str, gold: Answer, scorer: Scorer) -> str:
-    said, wanted = _FORMS[scorer](piece), _FORMS[scorer](gold)
-    if scorer == "strict" and wanted in _YES_NO:
-        return f"the first word is {wanted}, and the other is not said"
-    if scorer == "strict" and number_of(gold) is not None:
-        return "the same number, and no other"
-    if said == wanted:
-        return f"equal as {_quote(said)}"
-    alike = similarity(said, wanted)
-    if said and wanted and alike >= NEAR:
-        return f"{_quote(said)} and {wanted!r} are {alike} % alike, {NEAR} % are enough"
-    if are_synonyms(said, wanted):
-        return f"{_quote(said)} and {wanted!r} are in one row of synonyms"
-    return f"it begins with {wanted}"  # within the first letters, to the published scorer
-
-
-def _why_not(piece: str, gold: Answer, scorer: Scorer) -> str:
+    """Return why a piece is a gold answer to a scorer, or is not."""
     said, wanted = _FORMS[scorer](piece), _FORMS[scorer](gold)
     if scorer == "strict" and wanted in _YES_NO:
         return f"the first word must be {wanted}, and the other may not be said"
     if scorer == "strict" and number_of(gold) is not None:
-        return f"the number must be {number_of(gold)}, and no other"
+        return f"the number must be {number_of(gold)}, and no other said"
+    if said == wanted:
+        return f"equal as {_quote(said)}"
     alike = similarity(said, wanted)
+    both = f"{_quote(said)} and {wanted!r} are"
+    if are_synonyms(said, wanted):
+        return f"{both} in one row of synonyms"
+    if scorer == "strict" and alike >= NEAR and not matches_strict(piece, gold):
+        return f"{both} {alike} % alike, but their figures differ"
     if alike >= NEAR:
-        return f"{_quote(said)} and {wanted!r} must have the same figures"
-    return (
-        f"{_quote(said)} and {wanted!r} are {alike} % alike, {NEAR} % are needed, and no row of "
-        "synonyms has both"
-    )
+        return f"{both} {alike} % alike, {NEAR} % are enough"
+    if scorer == "reference" and matches_reference(piece, gold):
+        return f"it begins with {wanted}"  # within the first letters
+    return f"{both} {alike} % alike, {NEAR} % are needed, and no row of synonyms has both"

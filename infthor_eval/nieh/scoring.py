@@ -67,7 +67,8 @@ NEAR = 80  # similarity in percent from which two normalised strings count as eq
 _YES_NO = ("yes", "no")
 _IS = re.compile(r"^\s*\w+\s+is\s+")
 _BULLET = re.compile(r"^\s*(?:[-*+•·–—]|\(?\d{1,3}[.)])\s+")
-_SENTENCE = re.compile(r".*[:!?：！？。]|\S+\s+\S+\s.*\.")  # "Side table." is an answer
+# "Side table." is an answer yet.
+_SENTENCE = re.compile(rf"(?:{_BULLET.pattern})?+(?:.*[:!?：！？。]|\S+\s+\S+\s.*\.)[*_\s]*")
 _SEPARATOR = re.compile(r",(?!\d{3}(?!\d))|(?<!\d),|[;；，、/&\n]|\band\b", re.IGNORECASE)
 _SLICE = re.compile(r"\b(?:slices?|sliced)\b(?: of\b)?|(?<=\w)sliced\b")
 
@@ -75,7 +76,8 @@ _SLICE = re.compile(r"\b(?:slices?|sliced)\b(?: of\b)?|(?<=\w)sliced\b")
 def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference") -> float:
     """Return how many gold answers a response gives, as a share or F1; 1.0 or 0.0 for a single one.
 
-    The strict scorer takes whole replies, too, and rates what counts of them (`response_of`). Only the reference scorer can exceed 1.0, when one gold answer is repeated.
+    The strict scorer takes whole replies, too, and rates what counts of them (`response_of`). Only
+    the reference scorer can exceed 1.0, when one gold answer is repeated.
 
     Raises:
         UsageError: there is no such scorer, or no gold answer.
@@ -101,12 +103,8 @@ def response_of(reply: str, answers: Sequence[Answer]) -> str:
     if len(answers) == 1:
         return last_line(reply)
     *before, last = [line for line in reply.splitlines() if line.strip()] or [""]
-    listed = takewhile(lambda line: not _is_sentence(line), reversed(before))
-    return "\n".join([*reversed(list(listed)), last]).strip()
-
-
-def _is_sentence(line: str) -> bool:
-    return _SENTENCE.fullmatch(_BULLET.sub("", line, 1).rstrip("*_ \t")) is not None
+    listed = list(takewhile(lambda line: not _SENTENCE.fullmatch(line), reversed(before)))
+    return "\n".join([*reversed(listed), last]).strip()
 
 
 def says_yes_or_no(response: str) -> str | None:
