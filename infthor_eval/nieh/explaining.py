@@ -89,14 +89,13 @@ def _why(piece: str, gold: Answer, scorer: Scorer) -> str:
         return f"the number must be {number_of(gold)}, and no other said"
     if said == wanted:
         return f"equal as {_quote(said)}"
-    alike = similarity(said, wanted)
-    both = f"{_quote(said)} and {wanted!r} are"
     if are_synonyms(said, wanted):
-        return f"{both} in one row of synonyms"
-    if scorer == "strict" and alike >= NEAR and not matches_strict(piece, gold):
-        return f"{both} {alike} % alike, but their figures differ"
+        return f"{_quote(said)} and {wanted!r} are in one row of synonyms"
+    alike = similarity(said, wanted)
+    is_said = (matches_reference if scorer == "reference" else matches_strict)(piece, gold)
+    if is_said and alike < NEAR:
+        return f"it begins with {wanted}"  # within the first letters, to the published scorer
+    reason = f"{NEAR} % are needed, and no row of synonyms has both"
     if alike >= NEAR:
-        return f"{both} {alike} % alike, {NEAR} % are enough"
-    if scorer == "reference" and matches_reference(piece, gold):
-        return f"it begins with {wanted}"  # within the first letters
-    return f"{both} {alike} % alike, {NEAR} % are needed, and no row of synonyms has both"
+        reason = f"{NEAR} % are enough" if is_said else "but their figures differ"
+    return f"{_quote(said)} and {wanted!r} are {alike} % alike, {reason}"

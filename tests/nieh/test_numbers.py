@@ -1,11 +1,9 @@
 """Which number a person means who writes so: a table by hand, not by the code."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from infthor_eval.nieh import score
-from infthor_eval.nieh.numbers import number_in, number_of
+from infthor_eval.nieh.numbers import number_in
 
 MEANT = {
     0: [

@@ -29,6 +29,7 @@ from infthor_eval.storage.limits import JUDGE_SECONDS
 from model_adapters import (
     Decoding,
     Model,
+    Reply,
     adapter_identity,
     answer_of,
     check_options,
@@ -178,8 +179,8 @@ class Judge:
         request = {"system": self._form.system, "text": text, "decoding": self._decoding.document()}
         inputs = fingerprint({"judge": self._identity, **request})
         known = session.find_artifact(inputs, NiehVerdict)
-        if known is not None:
-            return known.score
+        if known is not None:  # what it said is read as of today
+            return self._form.read(answer_of(Reply(known.said)).answer)
         start = time.perf_counter()
         seconds = JUDGE_SECONDS.value
         late = f"{self.name} gives no verdict within {seconds} s; {JUDGE_SECONDS.hint}"

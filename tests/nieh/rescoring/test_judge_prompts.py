@@ -49,7 +49,13 @@ VERDICTS = {
         *("A sofa is a couch.\nYes", "There is no difference.\nAnswer: yes"),
     ],
     0.0: [
-        *("no", "No.", "**No**", "No, it names another thing.", "No. It contradicts, with no doubt."),
+        *(
+            "no",
+            "No.",
+            "**No**",
+            "No, it names another thing.",
+            "No. It contradicts, with no doubt.",
+        ),
         *("No\nThe couch is no table.", "The answer is no.", "Verdict: No", "It differs.\nNo."),
     ],
     None: [
