@@ -67,7 +67,7 @@ NEAR = 80  # similarity in percent from which two normalised strings count as eq
 _YES_NO = ("yes", "no")
 _IS = re.compile(r"^\s*\w+\s+is\s+")
 _BULLET = re.compile(r"^\s*(?:[-*+•·–—]|\(?\d{1,3}[.)])\s+")
-# "Side table." is an answer yet.
+# "Side table." is an answer, "It is there." a sentence.
 _SENTENCE = re.compile(rf"(?:{_BULLET.pattern})?+(?:.*[:!?：！？。]|\S+\s+\S+\s.*\.)[*_\s]*")
 _SEPARATOR = re.compile(r",(?!\d{3}(?!\d))|(?<!\d),|[;；，、/&\n]|\band\b", re.IGNORECASE)
 _SLICE = re.compile(r"\b(?:slices?|sliced)\b(?: of\b)?|(?<=\w)sliced\b")

@@ -1,9 +1,12 @@
 """Which number a person means who writes so: a table by hand, not by the code."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from word2number import w2n
 
 from infthor_eval.nieh import score
-from infthor_eval.nieh.numbers import number_in
+from infthor_eval.nieh.numbers import number_in, number_of
 
 MEANT = {
     0: [
@@ -163,3 +166,77 @@ def test_what_is_no_number_or_several_is_none():
     assert {text: number_in(text) for text in NO_NUMBER if number_in(text) is not None} == {}
     assert not any(score(text, [gold], "strict") for text in NO_NUMBER for gold in MEANT)
     assert sum(map(len, MEANT.values())) + len(NO_NUMBER) >= 200
+
+
+NAMES = list(w2n.american_number_system)  # zero to nineteen, twenty to ninety
+
+
+def spell(number, hyphen, link):
+    """A number in words: "two thousand one hundred and twenty-three"."""
+    for unit, name in ((1000, "thousand"), (100, "hundred")):
+        if number >= unit:
+            rest = f"{link}{spell(number % unit, hyphen, link)}" if number % unit else ""
+            return f"{spell(number // unit, hyphen, link)} {name}{rest}"
+    if number < 20:
+        return NAMES[number]
+    rest = f"{hyphen}{NAMES[number % 10]}" if number % 10 else ""
+    return NAMES[18 + number // 10] + rest
+
+
+around = st.sampled_from(
+    ["{}", "{}.", "**{}**", "({})", "It is {}.", "There were {} mugs.", "_{}_"]
+)
+
+
+@given(st.integers(1, 99_999), st.sampled_from("- "), st.sampled_from([" ", " and "]), around)
+def test_a_number_is_read_in_words_and_in_figures_whatever_stands_around_it(
+    number, hyphen, link, around
+):
+    for said in (spell(number, hyphen, link), str(number), f"{number:,}", f"{number}.0"):
+        assert number_in(around.format(said)) == number
+        assert number_of(said) == number
+        assert score(around.format(said), [number + 1], "strict") == 0.0
+
+
+@given(
+    st.integers(0, 50), st.integers(0, 50), st.sampled_from([" or ", "-", ", ", "/", ":", " to "])
+)
+def test_two_numbers_are_none(one, other, between):
+    said = f"{one}{between}{other}"
+    assert number_in(said) == (one if one == other else None)
+
+
+@given(st.text(max_size=40))
+def test_any_text_is_read(text):
+    assert number_in(text) is None or number_in(f" {text}\n") == number_in(text)
+    assert number_of(text) in (None, number_in(text))
+
+
+@pytest.mark.parametrize(
+    ("gold", "number"),
+    [
+        *[("4.0", 4), (4.0, 4), ("Two", 2), ("three mugs", 3), ("1,000", 1000), ("-3", -3)],
+        *[("none", 0), ("Shelf 2", None), ("the one on the table", None), ("10:30", None)],
+        *[
+            ("2/3", None),
+            ("one of the drawers", None),
+            ("box", None),
+            ("", None),
+            (float("nan"), None),
+        ],
+    ],
+)
+def test_a_gold_answer_is_a_number_if_it_is_nothing_else(gold, number):
+    assert number_of(gold) == number
+
+
+@pytest.mark.parametrize(
+    ("reply", "gold", "right"),
+    [
+        *[("4", "4.0", 1), ("40", "4.0", 0), ("four", "4.0", 1), ("5", "0.5", 0), ("0.5", 0.5, 1)],
+        *[("12", "1-2", 0), ("1-2", "1-2", 1), ("23", "2/3", 0), ("2/3", "2/3", 1)],
+        *[("1030", "10:30", 0), ("10:30", "10:30", 1), ("shelf 1", "shelf 2", 0)],
+    ],
+)
+def test_marks_inside_numbers_stay(reply, gold, right):
+    assert score(reply, [gold], "strict") == right
