@@ -16,6 +16,7 @@ class ArmTaskConfig(EpisodeTaskConfig, frozen=True, kw_only=True, omit_defaults=
         stand: where the agent stands at the start, see `Stand`; None in runs of older versions.
         hand: height of its arm at the start, see `Hand`; likewise.
         closing: when a policy's hand closes, see `Closing`; likewise.
+        rules: number of the rules of success, see `SUCCESS_RULES`.
     """
 
     kind: ManipulationKind
@@ -24,6 +25,7 @@ class ArmTaskConfig(EpisodeTaskConfig, frozen=True, kw_only=True, omit_defaults=
     stand: str | None = None
     hand: str | None = None
     closing: str | None = None
+    rules: int = 1
 
 
 class ManipulationConfig(

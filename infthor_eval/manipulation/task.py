@@ -10,7 +10,7 @@ from infthor_eval.errors import UsageError
 from infthor_eval.household.wording import canonical_type, noun
 from infthor_eval.manipulation.config import ArmTaskConfig
 from infthor_eval.manipulation.conversion import Conversion
-from infthor_eval.manipulation.environment import Grasp
+from infthor_eval.manipulation.environment import SUCCESS_RULES, Grasp
 from infthor_eval.manipulation.kinds import KIND_NAMES, Closing, Hand, ManipulationKind, Stand
 from infthor_eval.manipulation.options import RADII, ManipulationOptions
 from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory, read_arm_trajectory
@@ -174,6 +174,7 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             stand=self.settings.stand,
             hand=self.settings.hand,
             closing=self.settings.closing,
+            rules=SUCCESS_RULES,
         )
 
     def _check_instruction(self, name: str) -> None:

@@ -7,10 +7,11 @@ fixes the faults:
 * of several answers the score is F1, so that naming everything does not score: each gold answer and
   each answer of the response is matched at most once, and seven answers of which two are the two
   gold ones score 0.44, not 1. "mug, mug, mug" against [mug, plate] scores 0.4, not 1.5;
-* "and" separates answers only as a whole word, so "hand towel" stays one answer;
+* "and" separates answers only as a whole word, so "hand towel" stays one answer, and other marks
+  than a comma do, line ends too;
 * yes and no must be the first word said ("not sure", "none", "notebook" are not "no"; "yesterday"
   is not "yes"), and an answer that says both counts as neither;
-* numbers must be equal: "100" is not nearly "10";
+* numbers are read by `infthor_eval.nieh.numbers`, and must be equal: "100" is not nearly "10";
 * a slice is its food: "lettuce slice", "sliced lettuce", "lettucesliced" and "lettuce" are one
   thing, in keys too.
 
@@ -23,6 +24,7 @@ from collections.abc import Callable, Mapping, Sequence
 from difflib import SequenceMatcher
 from functools import cache, lru_cache
 from importlib import resources
+from itertools import takewhile
 from typing import Literal
 
 import yaml
@@ -30,6 +32,7 @@ from word2number import w2n
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.question import Answer
+from infthor_eval.nieh.numbers import number_in, number_of
 from infthor_eval.nieh.prompts import last_line
 
 __all__ = [
@@ -38,37 +41,43 @@ __all__ = [
     "STRICT_RULES",
     "Scorer",
     "are_synonyms",
-    "is_number",
+    "compared_form",
     "matches_reference",
     "matches_strict",
     "normal_form",
     "pieces_of",
     "plain_form",
-    "says_number",
+    "response_of",
     "says_yes_or_no",
     "score",
     "scores",
     "similarity",
     "split_published",
-    "without_slice",
+    "strict_form",
 ]
 
 # Part of a run's identity: scores of other rules are another run's. 2: F1 of several answers;
-# slices.
-STRICT_RULES = "2"
+# slices. 3: numbers with marks and words around them; separators and lines of lists.
+STRICT_RULES = "3"
 Scorer = Literal["reference", "strict"]
 SCORERS: tuple[Scorer, ...] = ("reference", "strict")
 _KEPT = 2**13  # comparisons that are remembered: answers are few, and replies repeat them
 
 NEAR = 80  # similarity in percent from which two normalised strings count as equal
 _YES_NO = ("yes", "no")
+_IS = re.compile(r"^\s*\w+\s+is\s+")
+_BULLET = re.compile(r"^\s*(?:[-*+•·–—]|\(?\d{1,3}[.)])\s+")
+# "Side table." is an answer, "It is there." a sentence.
+_SENTENCE = re.compile(rf"(?:{_BULLET.pattern})?+(?:.*[:!?：！？。]|\S+\s+\S+\s.*\.)[*_\s]*")
+_SEPARATOR = re.compile(r",(?!\d{3}(?!\d))|(?<!\d),|[;；，、/&\n]|\band\b", re.IGNORECASE)
 _SLICE = re.compile(r"\b(?:slices?|sliced)\b(?: of\b)?|(?<=\w)sliced\b")
 
 
 def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference") -> float:
     """Return how many gold answers a response gives, as a share or F1; 1.0 or 0.0 for a single one.
 
-    Only the reference scorer can exceed 1.0, when one gold answer is repeated.
+    The strict scorer takes whole replies, too, and rates what counts of them (`response_of`). Only
+    the reference scorer can exceed 1.0, when one gold answer is repeated.
 
     Raises:
         UsageError: there is no such scorer, or no gold answer.
@@ -81,9 +90,21 @@ def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference"
 
 
 def scores(reply: str, answers: Sequence[Answer]) -> dict[str, float]:
-    """Return the scores of a whole reply, of which the last line counts, under each scorer."""
-    response = last_line(reply)
-    return {scorer: score(response, answers, scorer) for scorer in SCORERS}
+    """Return the scores of a whole reply under each scorer; the last line counts to `reference`."""
+    return {
+        "reference": score(last_line(reply), answers, "reference"),
+        "strict": score(reply, answers, "strict"),
+    }
+
+
+def response_of(reply: str, answers: Sequence[Answer]) -> str:
+    """Return what of a reply counts to the strict scorer: the last line; where several answers are
+    wanted, the lines before it too, up to one that is a sentence."""
+    if len(answers) == 1:
+        return last_line(reply)
+    *before, last = [line for line in reply.splitlines() if line.strip()] or [""]
+    listed = list(takewhile(lambda line: not _SENTENCE.fullmatch(line), reversed(before)))
+    return "\n".join([*reversed(listed), last]).strip()
 
 
 def says_yes_or_no(response: str) -> str | None:
@@ -91,18 +112,13 @@ def says_yes_or_no(response: str) -> str | None:
     return next((answer for answer in _YES_NO if matches_strict(response, answer)), None)
 
 
-def says_number(response: str) -> bool:
-    """Return True if both scorers read a response as a number."""
-    return is_number(normal_form(response))
-
-
-def pieces_of(response: str) -> list[str]:
-    """Return the answers that a response enumerates, as the strict scorer separates them."""
-    return [
-        piece
-        for piece in re.split(r"[,;\n]|\band\b", response, flags=re.IGNORECASE)
-        if piece.strip()
-    ]
+def pieces_of(response: str, answers: Sequence[Answer]) -> list[str]:
+    """Return the answers that a response enumerates, as the strict scorer separates them: not
+    within a gold answer, such as "salt and pepper"."""
+    whole = "|".join(re.escape(text) for text in map(str, answers) if _SEPARATOR.search(text))
+    apart = re.compile(rf"({whole or '(?!)'})|{_SEPARATOR.pattern}", re.IGNORECASE)
+    pieces = apart.sub(lambda found: found[1] or "\n", response).split("\n")
+    return [bare for piece in pieces if (bare := _BULLET.sub("", piece, 1)).strip()]
 
 
 def split_published(response: str) -> list[str]:
@@ -111,9 +127,14 @@ def split_published(response: str) -> list[str]:
 
 
 def plain_form(text: str) -> str:
-    """Return a text without marks and a leading "X is", as both scorers compare it."""
-    bare = re.sub(r"[^\w\s]", "", text)
-    return re.sub(r"^\s*\w+\s+is\s+", "", bare).strip()
+    """Return a text as the strict scorer compares it: without a leading "X is" and marks but those
+    between figures."""
+    return _IS.sub("", re.sub(r"(?<!\d)[^\w\s]|[^\w\s](?!\d)", "", text)).strip()
+
+
+def compared_form(reply: str, answers: Sequence[Answer]) -> str:
+    """Return what a reply answers in a form in which equal answers are equal."""
+    return plain_form(response_of(reply, answers)).casefold()
 
 
 def _reference(response: str, answers: Sequence[Answer]) -> float:
@@ -125,10 +146,11 @@ def _reference(response: str, answers: Sequence[Answer]) -> float:
     )
 
 
-def _strict(response: str, answers: Sequence[Answer]) -> float:
+def _strict(reply: str, answers: Sequence[Answer]) -> float:
+    response = response_of(reply, answers)
     if len(answers) == 1:
         return float(matches_strict(response, answers[0]))
-    pieces = pieces_of(response)
+    pieces = pieces_of(response, answers)
     return 2 * _largest_matching(answers, pieces, matches_strict) / (len(answers) + len(pieces))
 
 
@@ -165,27 +187,28 @@ def matches_reference(response: str, gold: Answer) -> bool:
 
 def matches_strict(response: str, gold: Answer) -> bool:
     """Return whether a response, or a piece of it, is a gold answer to the strict scorer."""
-    wanted = normal_form(gold)
+    wanted = strict_form(gold)
     if wanted in _YES_NO:
         words = re.findall(r"\w+", response.lower())
         other = _YES_NO[wanted == "yes"]
         return words[:1] == [wanted] and other not in words
-    if is_number(wanted):
-        answer = normal_form(response)
-        return is_number(answer) and float(answer) == float(wanted)
-    answer = without_slice(plain_form(response.lower().strip()))
-    wanted = without_slice(wanted)
+    number = number_of(gold)
+    if number is not None:
+        return number_in(response) == number
+    answer = strict_form(response)
+    # As numbers, figures in a text are never nearly equal: "shelf 1" is not "shelf 2".
+    figures = re.findall(r"\d+", wanted)
+    if figures and figures != re.findall(r"\d+", answer):
+        return False
     return _near(answer, wanted) or are_synonyms(answer, wanted)
 
 
-def without_slice(text: str) -> str:
-    """Return the food of a slice; another text, and one that is nothing but "slice", as it is."""
-    return " ".join(_SLICE.sub(" ", text).split()) or text if _SLICE.search(text) else text
-
-
-def is_number(text: str) -> bool:
-    """Return whether a text in normal form is a number."""
-    return re.fullmatch(r"-?\d+(\.\d+)?", text) is not None
+@lru_cache(_KEPT, typed=True)
+def strict_form(text: Answer) -> str:
+    """Return a text as the strict scorer compares it where it is no number: a slice as its food,
+    and one that is nothing but "slice" as it is."""
+    plain = plain_form(str(text).lower().strip())
+    return " ".join(_SLICE.sub(" ", plain).split()) or plain if _SLICE.search(plain) else plain
 
 
 @lru_cache(_KEPT, typed=True)
@@ -198,7 +221,7 @@ def normal_form(text: Answer) -> str:
         return str(w2n.word_to_num(text))
     # The library's own ways to say "not a number" ("thousand one": IndexError).
     except (ValueError, IndexError):
-        return plain_form(text)
+        return _IS.sub("", re.sub(r"[^\w\s]", "", text)).strip()
 
 
 def _near(answer: str, wanted: str) -> bool:

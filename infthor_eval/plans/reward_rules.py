@@ -14,7 +14,7 @@ __all__ = ["RewardRules", "reward_rules"]
 _FILE = Path(__file__).with_name("rewards.yaml")
 
 
-class RewardRules(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class RewardRules(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A set of rules, as in `rewards.yaml`.
 
     Attributes:
@@ -29,6 +29,7 @@ class RewardRules(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         look_degrees: angle of one LookUp or LookDown.
         rewards: reward per success, by kind.
         valid_actions: actions that are valid for a kind, by AI2-THOR's names.
+        version: number of the rules as code; another one when that gives other rewards.
     """
 
     scoring: Literal["default", "published"]
@@ -40,6 +41,7 @@ class RewardRules(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     look_degrees: float
     rewards: dict[PlanKind, float]
     valid_actions: dict[PlanKind, frozenset[str]]
+    version: int = 1
 
     def forcing(self) -> "RewardRules":
         """Return the same rules with `force_action`."""

@@ -49,6 +49,8 @@ def test_a_gold_answer_is_said_where_it_scores(reply, answers, scorer):
         ("not sure", ("no",), "the first word must be no"),
         ("sliced lettuce", ("lettuce",), "equal as 'lettuce'"),
         ("think\nmug", ("mug",), "the last line counts: 'mug'"),
+        ("They are:\nmug\nplate", ("mug", "plate"), "the list counts: 'mug\\nplate'"),
+        ("shelf 1", ("shelf 2",), "86 % alike, but their figures differ"),
     ],
 )
 def test_the_reason_is_said_in_words(reply, answers, reason):

@@ -162,6 +162,53 @@ def test_the_last_line_of_a_reply_counts():
     assert scores("yes\nI think so.", ["yes"]) == {"reference": 0.0, "strict": 0.0}
 
 
+FORMS = [
+    "{}, ",
+    "{}; ",
+    "{} and ",
+    "{}/",
+    "{} & ",
+    "{}，",
+    "{}、",
+    "{}\n",
+    "- {}\n",
+    "* {}\n",
+    "1. {}\n",
+]
+FORMS += ["{}.\n", "{}\n\n", "2) {}, ", "**{}**\r\n"]
+
+
+@given(
+    answers, st.sampled_from(FORMS), st.sampled_from(["", "I looked at it all.\n", "They are:\n\n"])
+)
+def test_strict_reads_a_list_in_any_form(gold, form, before):
+    reply = before + "".join(form.format(name) for name in gold).rstrip(",; &/，、\n")
+    reply = reply.removesuffix(" and")
+    if len(gold) > 1:
+        assert scores(reply, gold)["strict"] == 1.0
+    assert scores(reply, gold)["reference"] == score(reply.strip().split("\n")[-1].strip(), gold)
+
+
+@pytest.mark.parametrize(
+    ("reply", "gold", "strict"),
+    [
+        ("Let me look. I see it now.\nmug, plate", ["mug", "plate"], 1.0),
+        ("mug\nplate\nThese are the objects.", ["mug", "plate"], 0.8),
+        ("mug\nplate", ["plate"], 1.0),  # of one answer the last line alone counts
+        ("cup\nI was wrong!\nmug\nplate", ["mug", "plate"], 1.0),
+        ("salt and pepper, mug", ["salt and pepper", "mug"], 1.0),
+        ("mug / TV/monitor", ["TV/monitor", "mug"], 1.0),
+        ("1,000 and 5", [1000, 5], 1.0),
+        ("2/3", [2, 3], 1.0),
+        ("", ["mug", "plate"], 0.0),
+        ("\n\n", ["mug", "plate"], 0.0),
+    ],
+)
+def test_lines_and_marks_of_lists(reply, gold, strict):
+    assert scores(reply, gold)["strict"] == strict
+    assert score(reply, gold, "strict") == strict
+
+
 def test_word_to_number_failures_of_the_library_are_no_numbers():
     assert score("thousand one", ["thousand one"]) == 1.0
 

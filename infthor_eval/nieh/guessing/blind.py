@@ -14,7 +14,7 @@ import msgspec
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import NOT_JSON
-from infthor_eval.nieh import scoring
+from infthor_eval.nieh import numbers, scoring
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.guessers import (
@@ -86,7 +86,7 @@ def _find_blind(data: NiehSet, knowledge: Knowledge) -> Mapping[str, BlindGuess]
 def _key(data: NiehSet, knowledge: Knowledge) -> str:
     """Return a hash of all that guesses depend on: the questions, guessers, scorers and library."""
     guessers = sorted(Path(__file__).parent.glob("*.py"))
-    code = digest_of_files([*guessers, Path(scoring.__file__)])
+    code = digest_of_files([*guessers, Path(scoring.__file__), Path(numbers.__file__)])
     learner = {"knowledge": knowledge.value, "code": code, "library": version("scikit-learn")}
     return fingerprint(learner | {"questions": list(map(repr, data.questions))})
 

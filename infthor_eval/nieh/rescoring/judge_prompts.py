@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from infthor_eval.formats.question import Answer
-from infthor_eval.nieh.scoring import says_yes_or_no
+from infthor_eval.nieh.prompts import last_line
 
 __all__ = ["JUDGE_PROMPTS", "YES_NO", "JudgePrompt"]
 
@@ -57,6 +57,12 @@ Ground-truth answers:
 Model's answer:
 """{reply}"""'''  # noqa: W291
 _OBJECT = re.compile(r"\{[^{}]*\}")
+# The first word decides. "Yes, no contradiction" is a yes; "yes, no", and a no that says yes, none.
+_VERDICT = re.compile(
+    r"[\W_]*(?:(?:(?:the|my|final)\s+)*(?:answer|verdict)[\W_]+(?:is[\W_]+)?)?"
+    r"(?:(yes)(?!\W*(?:(?:and|or|but)\W+)?no\b(?!\s+\w))|no(?!.*\byes\b))(?![^\W_])",
+    re.IGNORECASE | re.DOTALL,
+)
 
 
 @dataclass(frozen=True)
@@ -96,8 +102,9 @@ def _yes_no_text(question: str, answers: Sequence[Answer], reply: str) -> str:
 
 
 def _read_yes_no(answer: str) -> float | None:
-    verdict = says_yes_or_no(answer)
-    return None if verdict is None else float(verdict == "yes")
+    """Return the verdict at the beginning, or else at that of the last line, behind reasons."""
+    verdict = _VERDICT.match(answer) or _VERDICT.match(last_line(answer))
+    return None if verdict is None else float(verdict[1] is not None)
 
 
 def _published_text(question: str, answers: Sequence[Answer], reply: str) -> str:

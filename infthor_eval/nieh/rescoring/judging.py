@@ -16,11 +16,11 @@ from typing import Any, Self
 import msgspec
 
 from infthor_eval.errors import DataError, ModelError, UsageError, unknown_name
-from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.records import NiehAnswer, NiehVerdict
 from infthor_eval.nieh.rescoring.judge_prompts import JUDGE_PROMPTS, YES_NO
 from infthor_eval.nieh.rescoring.unsure import KnownAnswers
 from infthor_eval.nieh.results.summary import is_open_ended
+from infthor_eval.nieh.scoring import response_of
 from infthor_eval.runs import Session, Unit, UnitKey, UnitRecord, Usage
 from infthor_eval.runs.limiting import limit_items
 from infthor_eval.storage.deadlines import limit_time
@@ -29,6 +29,7 @@ from infthor_eval.storage.limits import JUDGE_SECONDS
 from model_adapters import (
     Decoding,
     Model,
+    Reply,
     adapter_identity,
     answer_of,
     check_options,
@@ -173,13 +174,13 @@ class Judge:
             ModelError: the judge cannot be asked.
         """
         payload = record.payload
-        response = last_line(payload.reply or "")
+        response = response_of(payload.reply or "", payload.answers)
         text = self._form.text(payload.question, payload.answers, response)
         request = {"system": self._form.system, "text": text, "decoding": self._decoding.document()}
         inputs = fingerprint({"judge": self._identity, **request})
         known = session.find_artifact(inputs, NiehVerdict)
-        if known is not None:
-            return known.score
+        if known is not None:  # what it said is read as of today
+            return self._form.read(answer_of(Reply(known.said)).answer)
         start = time.perf_counter()
         seconds = JUDGE_SECONDS.value
         late = f"{self.name} gives no verdict within {seconds} s; {JUDGE_SECONDS.hint}"
@@ -248,7 +249,7 @@ def _sample(
         for record in scored
         if is_open_ended(record)
         and record.key not in unsure
-        and last_line(record.payload.reply or "")
+        and (record.payload.reply or "").strip()
     ]
 
     def sample(score: float) -> list[Record]:

@@ -5,8 +5,7 @@ table" is. A reply is unsure if
 
 * its question is open-ended: the first gold answer is a text other than yes and no,
 * it is not empty, and has less than full marks under `strict`, and
-* a piece of it is not accounted for. Pieces are what commas, semicolons, line ends and the word
-  "and" separate.
+* a piece of it is not accounted for: of what the strict scorer separates in a list.
 
 A piece is accounted for if it is
 
@@ -25,10 +24,9 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 from infthor_eval.formats.question import Answer
-from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.results.summary import is_open_ended
-from infthor_eval.nieh.scoring import pieces_of, plain_form, score
+from infthor_eval.nieh.scoring import pieces_of, plain_form, response_of, score
 from infthor_eval.runs import UnitRecord
 
 __all__ = ["KnownAnswers"]
@@ -36,7 +34,7 @@ __all__ = ["KnownAnswers"]
 Record = UnitRecord[NiehAnswer]
 
 _BEGINNING = re.compile(r"^(?:(?:on|in|to|into|onto|at) )?(?:(?:the|a|an) )?")
-_NEVER_OPEN_ENDED = re.compile(r"yes|no|\d+")
+_NEVER_OPEN_ENDED = re.compile(r"yes|no|\d[\d\W]*")
 
 
 class KnownAnswers:
@@ -52,12 +50,13 @@ class KnownAnswers:
         """Return True if the rules are unsure of a reply that `strict` has scored; see the module
         for the rule."""
         payload = record.payload
-        response = last_line(payload.reply or "")
+        response = response_of(payload.reply or "", payload.answers)
         if not response or not is_open_ended(record) or payload.scores["strict"] >= 1.0:
             return False
         others = self._names[payload.question_type] - set(map(_name, payload.answers))
         return not all(
-            _is_accounted_for(piece, payload.answers, others) for piece in pieces_of(response)
+            _is_accounted_for(piece, payload.answers, others)
+            for piece in pieces_of(response, payload.answers)
         )
 
 

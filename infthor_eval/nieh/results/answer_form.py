@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
+from infthor_eval.nieh.numbers import number_in, number_of
 from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.records import NiehAnswer
-from infthor_eval.nieh.scoring import says_number, says_yes_or_no
+from infthor_eval.nieh.scoring import says_yes_or_no
 from infthor_eval.runs import UnitRecord
 
 __all__ = ["YesNo", "format_failures", "repetition_note", "yes_no"]
@@ -63,7 +64,7 @@ def _failures(record: Record, response: str, max_new_tokens: int | None) -> list
         reasons.append("empty" if record.payload.thinking is None else "cut off while thinking")
     elif gold in ({"yes"}, {"no"}) and says_yes_or_no(response) is None:
         reasons.append("neither yes nor no")
-    elif len(gold) == 1 and says_number(next(iter(gold))) and not says_number(response):
+    elif len(gold) == 1 and number_of(next(iter(gold))) is not None and number_in(response) is None:
         reasons.append("no number")
     is_cut_thinking = not response and record.payload.thinking is not None
     if (

@@ -14,9 +14,8 @@ from typing import NamedTuple
 import msgspec
 
 from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
-from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.records import NiehAnswer, TwinSide
-from infthor_eval.nieh.scoring import SCORERS, plain_form, scores
+from infthor_eval.nieh.scoring import SCORERS, compared_form, scores
 from infthor_eval.pairs import PAIR_BOUNDS, PairShares
 from infthor_eval.rates import Rate, clustered_rate, resampled_rate
 from infthor_eval.runs import UnitRecord
@@ -351,8 +350,8 @@ def _is_right_in_twin(side: _Side, metric: str) -> bool:
 
 def _said(record: Record) -> str | None:
     """Return what a reply says, as scorers compare it; None if there is none."""
-    reply = record.payload.reply
-    return None if reply is None else plain_form(last_line(reply)).casefold()
+    payload = record.payload
+    return None if payload.reply is None else compared_form(payload.reply, payload.answers)
 
 
 def _distance(pair: TwinRecords) -> str | None:

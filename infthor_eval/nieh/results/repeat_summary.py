@@ -13,9 +13,8 @@ from statistics import fmean, variance
 
 import msgspec
 
-from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.records import NiehAnswer
-from infthor_eval.nieh.scoring import plain_form
+from infthor_eval.nieh.scoring import compared_form
 from infthor_eval.runs import UnitRecord
 
 __all__ = ["RepeatSummary", "by_question", "mean_record", "summarise_repeats"]
@@ -118,7 +117,8 @@ def summarise_repeats(questions: Sequence[Sequence[Record]], metric: str) -> Rep
 
 def _vote(records: Sequence[Record], metric: str) -> tuple[float, float]:
     """Return the commonest answer's score and share of the answers."""
-    answers = [plain_form(last_line(record.payload.reply or "")).casefold() for record in records]
+    payloads = [record.payload for record in records]
+    answers = [compared_form(payload.reply or "", payload.answers) for payload in payloads]
     counts = Counter(answers)
     # The first of equals: counters keep the order.
     text, count = max(counts.items(), key=lambda counted: counted[1])

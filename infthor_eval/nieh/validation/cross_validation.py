@@ -14,8 +14,7 @@ from pathlib import Path
 from infthor_eval.errors import DataError
 from infthor_eval.formats.csv_files import read_rows, unshield, write_sheet
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.prompts import last_line
-from infthor_eval.nieh.scoring import Scorer, score
+from infthor_eval.nieh.scoring import Scorer, scores
 
 __all__ = [
     "DECISIONS",
@@ -103,9 +102,7 @@ def judge_questions(
     for question in questions:
         by_model = {model: _reply(question, model, of_model) for model, of_model in replies.items()}
         scores = {
-            m: score(last_line(t), question.answers, scorer)
-            for m, t in by_model.items()
-            if t is not None
+            m: scores(t, question.answers)[scorer] for m, t in by_model.items() if t is not None
         }
         right = judge_scores(scores, partial_credit=partial_credit)
         judged = JudgedQuestion(question, by_model, right, decisions.get(question.id))

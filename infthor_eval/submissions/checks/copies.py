@@ -8,10 +8,9 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.guessing.blind import questions_by_file, sample_on_clues
 from infthor_eval.nieh.guessing.guessers import GUESSERS
 from infthor_eval.nieh.guessing.learner import guess_by_learning
-from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.results.summary import is_open_ended
-from infthor_eval.nieh.scoring import plain_form
+from infthor_eval.nieh.scoring import compared_form, plain_form
 from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.submissions.case import Case
 from infthor_eval.submissions.expected import Expected
@@ -135,7 +134,7 @@ def _errs(record: Record) -> bool:
 
 
 def _said(record: Record) -> str:
-    return plain_form(last_line(record.payload.reply or "")).casefold()
+    return compared_form(record.payload.reply or "", record.payload.answers)
 
 
 @lru_cache(maxsize=8)

@@ -1,11 +1,13 @@
 """A judge on the replies of a run: where it decides, what it is asked, and how it is measured."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
 from infthor_eval.nieh.records import RECORDS
+from infthor_eval.nieh.rescoring import judge_prompts
 from infthor_eval.runs import read_run
 from infthor_eval.storage.limits import JUDGE_SECONDS
 
@@ -137,6 +139,16 @@ def test_a_verdict_is_in_the_journal_and_is_not_asked_for_again(source, rescore,
     other = rescore(folder, *WITH_JUDGE, "--judge-args", "soft=no")[2]
     assert (other != new, len(requests())) == (True, 5)
     assert rescore(folder, "--judge", "judge.py:Judge:soft=no")[2] == other
+    assert requests() == []
+
+
+def test_a_verdict_in_the_journal_is_read_by_todays_rules(source, rescore, requests, monkeypatch):
+    folder, judge = source(), (*WITH_JUDGE, "--judge-args", "soft=Yes; there is no contradiction")
+    with monkeypatch.context() as before:
+        before.setattr(judge_prompts, "_VERDICT", re.compile("(never)"))
+        assert read_scores(rescore(folder, *judge)[2], "judged")["q1"] == 0.0
+    requests()
+    assert read_scores(rescore(folder, *judge)[2], "judged")["q1"] == 1.0
     assert requests() == []
 
 

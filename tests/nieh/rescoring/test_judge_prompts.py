@@ -39,11 +39,37 @@ def test_a_score_is_read_as_the_published_prompt_asks_for_it(verdict, score):
     assert JUDGE_PROMPTS["published"].read(verdict) == score
 
 
-@pytest.mark.parametrize(
-    ("verdict", "score"), [("Yes.", 1.0), ("no", 0.0), ("yes and no", None), ("perhaps", None)]
-)
-def test_yes_and_no_are_scores(verdict, score):
-    assert JUDGE_PROMPTS["yes-no"].read(verdict) == score
+VERDICTS = {
+    1.0: [
+        *("Yes.", "yes", "YES", "**Yes**", "_Yes_", '"Yes."', "Yes, it does.", "Yes\n", "- Yes"),
+        *("Yes, the reply is right and there is no contradiction.", "Yes, no contradiction."),
+        *("Yes - no contradiction", "Yes (no contradiction).", "Yes. No contradiction was found."),
+        *("Yes, and no other thing is named.", "Yes; no doubt.", "Yes.\nThere is no difference."),
+        *("Answer: yes", "The answer is yes.", "**Final answer:** Yes", "Verdict: **Yes**"),
+        *("A sofa is a couch.\nYes", "There is no difference.\nAnswer: yes"),
+    ],
+    0.0: [
+        *(
+            "no",
+            "No.",
+            "**No**",
+            "No, it names another thing.",
+            "No. It contradicts, with no doubt.",
+        ),
+        *("No\nThe couch is no table.", "The answer is no.", "Verdict: No", "It differs.\nNo."),
+    ],
+    None: [
+        *("yes and no", "Yes or no", "yes/no", "Yes, no.", "Yes. No.", "Yes, but no.", "No, yes."),
+        *("No contradiction, so yes.", "perhaps", "yesterday", "none", "not sure", "", "Not yes."),
+        *("There is no contradiction.", "It says no such thing, yes"),
+    ],
+}
+
+
+@pytest.mark.parametrize("score", VERDICTS, ids=str)
+def test_yes_and_no_are_scores(score):
+    read = JUDGE_PROMPTS["yes-no"].read
+    assert [verdict for verdict in VERDICTS[score] if read(verdict) != score] == []
 
 
 def test_the_command_has_all_prompts():
