@@ -6,7 +6,7 @@ picked up and are directly there.
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from infthor_eval.generation.questions.candidates import Candidate, further_type, type_question
 from infthor_eval.generation.questions.history import Event, TrajectoryHistory, is_same_object
@@ -149,7 +149,7 @@ def _loose_contents_question(
     if items is not None and history.shows(event.frame, event.target):
         frames = _unchanged_frames(history, event.frame, receptacle)
         yield from _contents_question(
-            history, FURTHER, wording, frames, receptacle, items, shown_first=True
+            history, FURTHER, wording, frames, receptacle, items, event=event
         )
 
 
@@ -172,7 +172,7 @@ def _contents_question(
     receptacle: str,
     items: frozenset[str],
     *,
-    shown_first: bool = False,
+    event: Event | None = None,
 ) -> Iterator[Candidate]:
     """Yield a question on objects in a receptacle, with the frames that show them there.
 
@@ -183,25 +183,40 @@ def _contents_question(
         frames: frames during which the contents are the same.
         receptacle: its id.
         items: ids of the objects.
-        shown_first: True if the first of the frames must be among the clues.
+        event: the event before the first of the frames, if a clue must show it: that frame, or a
+            later one in which its object is still in the hand, or open.
     """
     seen_at = {}
     for frame in frames:
         is_ambiguous = _shows_similar_contents(history, frame, receptacle)
         if history.shows(frame, receptacle) and not is_ambiguous:
             seen_at[frame] = frozenset(key for key in items if history.shows_inside(frame, key))
-    if shown_first and frames[0] not in seen_at:
+    if event is not None and frames[0] not in seen_at:
         return
-    first = {frames[0]} if shown_first else set[int]()
+    first = set[int]() if event is None else {frames[0]}
     missing = items.difference(*map(seen_at.__getitem__, first))
     if not items:
         return
     cover = minimal_cover(missing, seen_at, lambda frame, keys: history.clarity(frame, *keys))
     if cover is not None:
+        shown = frozenset[str]().union(*map(seen_at.__getitem__, cover))
+        if event is not None and items <= shown and _show_still(history, cover, event):
+            first = set()
         clues = tuple(sorted(first.union(cover)))
         types = sorted(_whole_types(history, frames[0], items))
         receptacle_type = history.states(frames[0])[receptacle].type
         yield from type_question(question_type, *wording, clues, types, (receptacle_type,))
+
+
+def _show_still(history: TrajectoryHistory, frames: Iterable[int], event: Event) -> bool:
+    """Return True if one of some frames shows the object of an event as it was left by it."""
+    left = history.states(event.frame)[event.target]
+    return any(
+        history.shows(frame, event.target)
+        and history.states(frame)[event.target].held == left.held
+        and history.states(frame)[event.target].is_open == left.is_open
+        for frame in frames
+    )
 
 
 def _whole_types(history: TrajectoryHistory, frame: int, keys: frozenset[str]) -> list[str]:
