@@ -1,9 +1,9 @@
 """Whether an eye sees in the pictures what differs: objects, actions, the answer to a question."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from infthor_eval.formats.object_ids import object_type_of
-from infthor_eval.formats.step_log import ObjectInFrame
+from infthor_eval.formats.step_log import ObjectInFrame, Step
 from infthor_eval.formats.twins import PairedQuestion
 from infthor_eval.generation.twins.comparison import Difference, World
 from infthor_eval.generation.twins.kinds import Worlds
@@ -11,7 +11,7 @@ from infthor_eval.generation.twins.pairing import AskedWorld, types_of_fact
 from infthor_eval.generation.twins.pictures import are_clearly_unlike
 from infthor_eval.household.wording import canonical_type
 
-__all__ = ["check_insertions", "check_sightings", "is_shown"]
+__all__ = ["check_insertions", "check_no_own", "check_sightings", "is_shown"]
 
 
 def check_insertions(world: World, inserted: range) -> None:
@@ -37,6 +37,18 @@ def check_sightings(first: AskedWorld, second: AskedWorld) -> None:
     n_seen, n_seen_there = (len(one.changed & one.history.seen) for one in (first, second))
     if n_seen != n_seen_there:
         raise Difference("one world shows a changed object that the other hides")
+
+
+def check_no_own(episode: Sequence[Step], *worlds: World) -> None:
+    """Check that the frames of each world tell it from the episode, by the sizes of objects.
+
+    Raises:
+        Difference: those of one do not.
+    """
+    if any(
+        [step.seen for step in world.steps] == [own.seen for own in episode] for world in worlds
+    ):
+        raise Difference("a world looks as the episode does")
 
 
 def is_shown(question: PairedQuestion, worlds: Worlds, first: World, second: World) -> bool:
