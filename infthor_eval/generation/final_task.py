@@ -2,7 +2,8 @@
 
 The object to pick up is among those `pickupable` in the first fifth of the steps and the receptacle
 (or lamp) among those `visible` in the last fifth, or vice versa. So the task requires to remember
-what was seen long ago.
+what was seen long ago, unless that was seen later, too. With `alone` it was not, nor the other one
+before the last fifth.
 """
 
 import math
@@ -13,7 +14,7 @@ from typing import Any
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.tasks import Task
 
-__all__ = ["SHARE", "EndTypes", "end_types", "violation"]
+__all__ = ["SHARE", "EndTypes", "end_types", "needs_memory", "violation"]
 
 SHARE = 0.2  # of the frames, at either end
 
@@ -42,19 +43,36 @@ class EndTypes:
         return self.allows(task.pickup, task.receptacle or task.light, task.movable)
 
 
-def end_types(object_log: Sequence[dict[str, Any]]) -> tuple[EndTypes, EndTypes]:
-    """Return the types at a log's ends (an entry per frame), with the object early and late."""
+def end_types(
+    object_log: Sequence[dict[str, Any]], alone: bool = False
+) -> tuple[EndTypes, EndTypes]:
+    """Return the types at a log's ends (an entry per frame), with the object early and late.
+
+    With `alone` these are types that no other frame shows, but for what is carried with them.
+    """
     count = max(1, math.floor(SHARE * len(object_log)))
     first = object_log[:count]
     last = object_log[-count:]
     either = _types(first, "visible") | _types(last, "visible")
+    later, before = (
+        _with_wholes(_types(rest, "visible")) if alone else frozenset[str]()
+        for rest in (object_log[count:], object_log[:-count])
+    )
     return (
-        EndTypes(_types(first, "pickupable"), _types(last, "visible"), either),
-        EndTypes(_types(last, "pickupable"), _types(first, "visible"), either),
+        EndTypes(_types(first, "pickupable") - later, _types(last, "visible") - before, either),
+        EndTypes(_types(last, "pickupable") - before, _types(first, "visible") - later, either),
     )
 
 
-def violation(trajectory: Trajectory) -> str | None:
+def needs_memory(trajectory: Trajectory) -> bool:
+    """Return whether one thing of a final task was seen in the first fifth alone, one in the last.
+
+    False if there is no final task.
+    """
+    return violation(trajectory, alone=True) is None
+
+
+def violation(trajectory: Trajectory, alone: bool = False) -> str | None:
     """Return how a final task violates the rule, by the object log, or None if it does not."""
     task = trajectory.long_horizon_task
     if task is None:
@@ -62,12 +80,17 @@ def violation(trajectory: Trajectory) -> str | None:
     before = trajectory.sub_trajs[-1].low_pddl_idx[0]
     info = task.task_info
     other = info.receptacle or task.pddl_params.get("toggle_target")
-    for ends in end_types(trajectory.object_log[: before + 1]):
+    for ends in end_types(trajectory.object_log[: before + 1], alone):
         if info.pickup is not None and ends.allows(info.pickup, other, info.movable):
             return None
     return (
         f"'{task.task_desc}' is not about types seen at both ends of the {before} steps before it"
     )
+
+
+def _with_wholes(types: frozenset[str]) -> frozenset[str]:
+    """Return types, and those of which some are slices."""
+    return types | {name.removesuffix("Sliced") for name in types}
 
 
 def _types(entries: Sequence[dict[str, Any]], name: str) -> frozenset[str]:

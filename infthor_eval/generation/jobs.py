@@ -28,6 +28,7 @@ def trajectory_jobs(
     look_around: bool = False,
     words: Words = Words.NATURAL,
     scene_goal_filter: bool = True,
+    final_task_memory: bool = False,
 ) -> list[TrajectorySettings]:
     """Return the settings of all trajectories of a set, scene by scene.
 
@@ -44,6 +45,7 @@ def trajectory_jobs(
         look_around: True to walk long stretches with a level camera.
         words: the words of tasks, plain English or the published generator's.
         scene_goal_filter: False to sample task types that a scene's room type has not, too.
+        final_task_memory: True for final tasks on an object seen early alone and one late alone.
 
     Raises:
         UsageError: the number of trajectories, or of their actions or sub-goals, exceeds the limit.
@@ -68,6 +70,7 @@ def trajectory_jobs(
             look_around=look_around,
             words=words,
             scene_goal_filter=scene_goal_filter,
+            final_task_memory=final_task_memory,
         )
         for scene in scenes
         for k in seeds

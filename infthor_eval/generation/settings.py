@@ -26,6 +26,8 @@ class TrajectorySettings:
         min_subgoals: minimum number of sub-goals, as Algorithm 1 calls tasks and put-downs, without
             the final task.
         final_task: True to end with a final task (see the module `final_task`).
+        final_task_memory: True if one of its objects is to be one that was seen early alone, and
+            one late alone.
         task_types: task types to sample from, if the scene's room type has them.
         scene_goal_filter: True to sample only task types that the published tables name for the
             scene's room type; False to sample any that its objects allow.
@@ -47,6 +49,7 @@ class TrajectorySettings:
     save_floor: int = 0
     look_around: bool = False
     words: Words = Words.NATURAL
+    final_task_memory: bool = False
 
     @property
     def traj_id(self) -> str:
@@ -72,7 +75,7 @@ class TrajectorySettings:
             "replay_every": 0,
             "scene_goal_filter": self.scene_goal_filter,
             "look_around": self.look_around,
-            "final_task": self.final_task,
+            "final_task": "memory" if self.final_task_memory else self.final_task,
             "task_types": [str(task_type) for task_type in self.task_types],
             "words": str(self.words),
         }

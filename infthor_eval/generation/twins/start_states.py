@@ -34,7 +34,7 @@ def _with_states(trajectory: Trajectory, *states: StartState) -> Trajectory:
 
 @dataclass(frozen=True)
 class _Opening:
-    """One of two objects is not as the episode has it, open or closed; in the other world the other.
+    """One of two objects is open for closed or closed for open, against the episode.
 
     Attributes:
         one: the object that is asked about.
@@ -70,7 +70,7 @@ class Opened:
     name: ClassVar[str] = "state"
 
     def propose(self, episode: Episode, rng: random.Random) -> Iterator[_Opening]:
-        """See `EditKind`: only what frames show and the agent never opens, closes, or takes from."""
+        """See `EditKind`: what frames show and the agent never opens, closes, or takes from."""
         acted = {event.target for event in episode.history.events}
         acted |= episode.put_targets | {
             move.origin for move in episode.history.moves if move.origin
