@@ -240,6 +240,27 @@ def test_at_dead_ends_1_2_and_4_subgoals_are_dropped(simulator, monkeypatch):
     assert _refused(generated.trajectory, simulator) == []
 
 
+def test_at_dead_ends_a_put_down_is_dropped_with_its_task(simulator, monkeypatch):
+    tries = iter(range(10_000))
+    started = []
+
+    def while_(generated):
+        if generated._draft.n_subgoals >= 4:
+            started.append(True)
+        return bool(started) and next(tries) < 4
+
+    _Failing(monkeypatch, while_)
+    kinds = (TaskType.EXAMINE,)  # which leave the object in the hand
+    generated = generate(
+        TrajectorySettings("bedroom-3", 0, 30, 5, task_types=kinds, max_fail=1), simulator
+    )
+    # The published generator drops one, and two.
+    assert [item.subgoals for item in generated.statistics.roll_backs] == [2, 2]
+    goals = [task.task_info.goal for task in generated.trajectory.sub_tasks]
+    assert goals == [TaskType.EXAMINE, TaskType.PUT_AWAY] * (len(goals) // 2)
+    assert _refused(generated.trajectory, simulator) == []
+
+
 def test_an_accepted_task_ends_the_row_of_failures(simulator, monkeypatch):
     tries = iter(range(10_000))
     # What fails of itself is among the other two.

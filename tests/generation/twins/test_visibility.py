@@ -10,7 +10,7 @@ from infthor_eval.formats.twins import PairedQuestion
 from infthor_eval.generation.twins.comparison import Difference, World
 from infthor_eval.generation.twins.kinds import Worlds
 from infthor_eval.generation.twins.pairing import AskedWorld
-from infthor_eval.generation.twins.visibility import check_sightings, is_shown
+from infthor_eval.generation.twins.visibility import check_no_own, check_sightings, is_shown
 
 from ..questions.logs import history, state
 
@@ -48,6 +48,17 @@ def world(tmp_path):
         return World(log.steps, [name if lighter else "same"], [path])
 
     return make
+
+
+def test_a_world_that_no_frame_tells_from_the_episode_is_refused(world):
+    closed, unseen = world("closed"), world("unseen", seen=False)
+    larger = world("larger")
+    larger.steps[0].seen[FRIDGE] = ObjectInFrame(4100, (0, 0, 40, 99))
+    check_no_own(closed.steps, larger, unseen)
+    check_no_own([*closed.steps, *closed.steps], closed, larger)
+    for pair in ((closed, larger), (larger, closed)):
+        with pytest.raises(Difference, match="a world looks as the episode does"):
+            check_no_own(closed.steps, *pair)
 
 
 def test_another_thing_that_changed_beside_it_does_not_show_the_answer(world):
