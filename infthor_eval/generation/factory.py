@@ -22,7 +22,7 @@ from infthor_eval.generation.look_around import look_around
 from infthor_eval.generation.rehearsal import rehearse
 from infthor_eval.generation.rollout import Rollout
 from infthor_eval.generation.sampling import TaskPool
-from infthor_eval.generation.settings import TrajectorySettings
+from infthor_eval.generation.settings import MEMORY, TrajectorySettings
 from infthor_eval.generation.simulator_jobs import JobProgress, TellProgress, tell_nobody
 from infthor_eval.generation.statistics import AttemptStatistics, RollBack
 from infthor_eval.generation.trace import RolloutError, Trace
@@ -199,7 +199,7 @@ class _Factory:
             _GaveUp: none works. The published generator discards the trajectory, too; where the
                 task is to need a memory, ordinary tasks are added before other tries.
         """
-        for n_added in range(1 + _MAX_ADDED * self._settings.final_task_memory):
+        for n_added in range(1 + _MAX_ADDED * (self._settings.final_task == MEMORY)):
             if n_added:
                 self.extend()
             if self._add_final_task():
@@ -209,8 +209,7 @@ class _Factory:
 
     def _add_final_task(self) -> bool:
         """Try the tasks between the trajectory's ends, each once, in a direction drawn anew."""
-        alone = self._settings.final_task_memory
-        directions = end_types(self._draft.object_log(), alone)
+        directions = end_types(self._draft.object_log(), self._settings.final_task == MEMORY)
         pool = TaskPool(self._rng)
         while True:
             room = self._room()

@@ -14,7 +14,7 @@ from typing import Any
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.tasks import Task
 
-__all__ = ["SHARE", "EndTypes", "end_types", "needs_memory", "violation"]
+__all__ = ["SHARE", "EndTypes", "end_types", "violation"]
 
 SHARE = 0.2  # of the frames, at either end
 
@@ -54,22 +54,12 @@ def end_types(
     first = object_log[:count]
     last = object_log[-count:]
     either = _types(first, "visible") | _types(last, "visible")
-    later, before = (
-        _with_wholes(_types(rest, "visible")) if alone else frozenset[str]()
-        for rest in (object_log[count:], object_log[:-count])
-    )
+    later = _seen(object_log[count:]) if alone else frozenset()
+    before = _seen(object_log[:-count]) if alone else frozenset()
     return (
         EndTypes(_types(first, "pickupable") - later, _types(last, "visible") - before, either),
         EndTypes(_types(last, "pickupable") - before, _types(first, "visible") - later, either),
     )
-
-
-def needs_memory(trajectory: Trajectory) -> bool:
-    """Return whether one thing of a final task was seen in the first fifth alone, one in the last.
-
-    False if there is no final task.
-    """
-    return violation(trajectory, alone=True) is None
 
 
 def violation(trajectory: Trajectory, alone: bool = False) -> str | None:
@@ -88,10 +78,11 @@ def violation(trajectory: Trajectory, alone: bool = False) -> str | None:
     )
 
 
-def _with_wholes(types: frozenset[str]) -> frozenset[str]:
-    """Return types, and those of which some are slices."""
-    return types | {name.removesuffix("Sliced") for name in types}
-
-
 def _types(entries: Sequence[dict[str, Any]], name: str) -> frozenset[str]:
     return frozenset(object_type for entry in entries for object_type in entry[name])
+
+
+def _seen(entries: Sequence[dict[str, Any]]) -> frozenset[str]:
+    """Return the types that are visible, and those of which slices are."""
+    types = _types(entries, "visible")
+    return types | {name.removesuffix("Sliced") for name in types}

@@ -10,7 +10,7 @@ import msgspec
 from infthor_eval.errors import InfthorError, UsageError, wrap_errors
 from infthor_eval.formats.trajectory import Trajectory, encode_trajectory, iter_sources
 from infthor_eval.generation.factory import GeneratedTrajectory, generate
-from infthor_eval.generation.final_task import needs_memory
+from infthor_eval.generation.final_task import violation
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.simulator_jobs import (
     SimulatorWorker,
@@ -58,7 +58,8 @@ class GenerationSummary(msgspec.Struct):
             back to 203".
         pool_restarts: how often in this run all tasks had been drawn, and were drawn again.
         kept: number of trajectories in this run that gave up, and were kept as far as they got.
-        final_tasks: by trajectory, whether its final task needs a memory (`needs_memory`).
+        final_tasks: by trajectory with a final task, whether that needs a memory: one object was
+            seen in the first fifth of the steps alone, the other in the last alone.
         failures: trajectories that could not be generated, one line each.
     """
 
@@ -141,7 +142,7 @@ class _GenerationOutcome:
     ) -> "_GenerationOutcome":
         """Return the outcome of a job whose trajectory is there."""
         has_final = trajectory.long_horizon_task is not None
-        memory = needs_memory(trajectory) if has_final else None
+        memory = violation(trajectory, alone=True) is None if has_final else None
         return cls(path, len(trajectory.plan.low_actions), statistics, memory)
 
     @property

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.object_ids import Words
-from infthor_eval.generation.settings import MAX_FAIL, TrajectorySettings
+from infthor_eval.generation.settings import MAX_FAIL, FinalTask, TrajectorySettings
 from infthor_eval.scene_types import BATHROOM, scene_type
 from infthor_eval.storage.limits import STEPS, TRAJECTORIES
 
@@ -22,13 +22,12 @@ def trajectory_jobs(
     count: int,
     min_steps: int,
     min_subgoals: int,
-    final_task: bool,
+    final_task: FinalTask,
     max_fail: int = MAX_FAIL,
     save_floor: int = 0,
     look_around: bool = False,
     words: Words = Words.NATURAL,
     scene_goal_filter: bool = True,
-    final_task_memory: bool = False,
 ) -> list[TrajectorySettings]:
     """Return the settings of all trajectories of a set, scene by scene.
 
@@ -38,14 +37,13 @@ def trajectory_jobs(
         count: number of trajectories for each scene.
         min_steps: minimum number of low-level actions.
         min_subgoals: minimum number of sub-goals: tasks and put-downs.
-        final_task: True to end each trajectory with a final task.
+        final_task: True, or MEMORY, to end each trajectory with a final task.
         max_fail: number of failed tasks in a row after which the last sub-goals are dropped.
         save_floor: number of steps from which a trajectory that gives up is kept as far as it got;
             0: never.
         look_around: True to walk long stretches with a level camera.
         words: the words of tasks, plain English or the published generator's.
         scene_goal_filter: False to sample task types that a scene's room type has not, too.
-        final_task_memory: True for final tasks on an object seen early alone and one late alone.
 
     Raises:
         UsageError: the number of trajectories, or of their actions or sub-goals, exceeds the limit.
@@ -70,7 +68,6 @@ def trajectory_jobs(
             look_around=look_around,
             words=words,
             scene_goal_filter=scene_goal_filter,
-            final_task_memory=final_task_memory,
         )
         for scene in scenes
         for k in seeds

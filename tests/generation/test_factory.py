@@ -19,7 +19,7 @@ from infthor_eval.generation.final_task import EndTypes, end_types, violation
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.replay_summary import summarise
-from infthor_eval.generation.settings import TrajectorySettings
+from infthor_eval.generation.settings import MEMORY, TrajectorySettings
 from infthor_eval.generation.trace import RolloutError
 from infthor_eval.household.tasks import TaskType
 from infthor_eval.thor.grounding import Grounding
@@ -120,7 +120,7 @@ def test_where_no_final_task_works_the_trajectory_is_discarded(
 
     monkeypatch.setattr(factory, "end_types", nothing)
     monkeypatch.setattr(factory, "_MAX_ADDED", 2)
-    settings = dataclasses.replace(SHORT, final_task_memory=memory)
+    settings = dataclasses.replace(SHORT, final_task=MEMORY if memory else True)
     with pytest.raises(UsageError, match="kitchen-2, seed 3: no final task works"):
         generate(settings, simulator)
     assert {alone for _, alone in asked} == {memory}
@@ -135,7 +135,7 @@ def test_a_final_task_that_needs_a_memory_is_on_what_is_seen_nowhere_else(simula
         return end_types(log)
 
     monkeypatch.setattr(factory, "end_types", alone_there)
-    trajectory = generate(dataclasses.replace(SHORT, final_task_memory=True), simulator).trajectory
+    trajectory = generate(dataclasses.replace(SHORT, final_task=MEMORY), simulator).trajectory
     assert trajectory.gen_info["final_task"] == "memory"
     assert trajectory.sub_tasks[-1] == trajectory.long_horizon_task
 

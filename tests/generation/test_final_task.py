@@ -9,7 +9,7 @@ from infthor_eval.formats.trajectory import (
     TaskInfo,
     Trajectory,
 )
-from infthor_eval.generation.final_task import end_types, needs_memory, violation
+from infthor_eval.generation.final_task import end_types, violation
 
 
 def log(*types):
@@ -81,10 +81,9 @@ def test_a_memory_is_needed_of_what_is_seen_nowhere_else(pickup, receptacle, mid
     made = trajectory(pickup, receptacle)
     made.object_log[4] = log(middle)[0]
     assert violation(made) is None
-    assert needs_memory(made) == memory
+    assert (violation(made, alone=True) is None) == memory
 
 
 def test_without_a_final_task():
     nothing = Trajectory(Scene("kitchen-1", InitAction(0, 0, 0)), ExpertPlan([]))
-    assert not needs_memory(nothing)
     assert violation(nothing) == "there is no final task"

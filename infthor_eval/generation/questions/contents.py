@@ -6,7 +6,7 @@ picked up and are directly there.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from infthor_eval.generation.questions.candidates import Candidate, further_type, type_question
 from infthor_eval.generation.questions.history import Event, TrajectoryHistory, is_same_object
@@ -199,8 +199,8 @@ def _contents_question(
         return
     cover = minimal_cover(missing, seen_at, lambda frame, keys: history.clarity(frame, *keys))
     if cover is not None:
-        shown = frozenset[str]().union(*map(seen_at.__getitem__, cover))
-        if event is not None and items <= shown and _show_still(history, cover, event):
+        shown = set[str]().union(*map(seen_at.__getitem__, cover))
+        if event and items <= shown and any(_shows_still(history, f, event) for f in cover):
             first = set()
         clues = tuple(sorted(first.union(cover)))
         types = sorted(_whole_types(history, frames[0], items))
@@ -208,15 +208,12 @@ def _contents_question(
         yield from type_question(question_type, *wording, clues, types, (receptacle_type,))
 
 
-def _show_still(history: TrajectoryHistory, frames: Iterable[int], event: Event) -> bool:
-    """Return True if one of some frames shows the object of an event as it was left by it."""
-    left = history.states(event.frame)[event.target]
-    return any(
-        history.shows(frame, event.target)
-        and history.states(frame)[event.target].held == left.held
-        and history.states(frame)[event.target].is_open == left.is_open
-        for frame in frames
-    )
+def _shows_still(history: TrajectoryHistory, frame: int, event: Event) -> bool:
+    """Return True if a frame shows the object of an event as that left it, held or open."""
+    if not history.shows(frame, event.target):
+        return False
+    now, left = (history.states(number)[event.target] for number in (frame, event.frame))
+    return now.held == left.held and now.is_open == left.is_open
 
 
 def _whole_types(history: TrajectoryHistory, frame: int, keys: frozenset[str]) -> list[str]:

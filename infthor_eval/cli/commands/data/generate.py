@@ -141,6 +141,7 @@ def command(
     from infthor_eval.formats.object_ids import Words
     from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
+    from infthor_eval.generation.settings import MEMORY
     from infthor_eval.storage.files import hold_folder
     from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor.launch import embedded_launch
@@ -156,8 +157,7 @@ def command(
         count=count,
         min_steps=min_steps,
         min_subgoals=min_subgoals,
-        final_task=final_task or final_task_memory or test_set,
-        final_task_memory=final_task_memory,
+        final_task=MEMORY if final_task_memory else final_task or test_set,
         max_fail=max_fail,
         save_floor=save_floor,
         look_around=look_around,
