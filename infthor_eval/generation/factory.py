@@ -3,7 +3,9 @@
 Failures are counted as the published generator of July 2026 does. Those of tasks of which something
 was executed count in a row; when there are too many, the last sub-goals are dropped: 1, then 2, 4,
 ... until a task is accepted. Those of tasks of which nothing was executed add up, and end the
-attempt. (They begin anew with the pool of tasks, which ends an attempt there.)
+attempt. (They begin anew with the pool of tasks, which ends an attempt there.) A put-down and its
+task are dropped together, so that no task begins with a full hand: two sub-goals where the
+published generator drops the put-down alone.
 """
 
 import random
@@ -20,7 +22,7 @@ from infthor_eval.generation.look_around import look_around
 from infthor_eval.generation.rehearsal import rehearse
 from infthor_eval.generation.rollout import Rollout
 from infthor_eval.generation.sampling import TaskPool
-from infthor_eval.generation.settings import TrajectorySettings
+from infthor_eval.generation.settings import MEMORY, TrajectorySettings
 from infthor_eval.generation.simulator_jobs import JobProgress, TellProgress, tell_nobody
 from infthor_eval.generation.statistics import AttemptStatistics, RollBack
 from infthor_eval.generation.trace import RolloutError, Trace
@@ -38,7 +40,7 @@ from infthor_eval.thor.simulator import Simulator, SimulatorMark
 
 __all__ = ["GeneratedTrajectory", "generate"]
 
-_MAX_EXTENSIONS = 4  # ordinary tasks that are added at most because no final task works
+_MAX_ADDED = 8  # ordinary tasks, where a final task is to need a memory and none does
 _MIN_NOT_EXECUTED = 200  # tasks without any executed action that end an attempt, at least
 _OTHER_SETTINGS = "choose another scene or seed or a higher --max-fail"
 
@@ -191,21 +193,23 @@ class _Factory:
                 length = self._draft.length
 
     def finish(self) -> None:
-        """Add the final task; if none works, an ordinary task is added before the next try.
+        """Add the final task.
 
         Raises:
-            _GaveUp: none works after some more tasks either.
+            _GaveUp: none works. The published generator discards the trajectory, too; where the
+                task is to need a memory, ordinary tasks are added before other tries.
         """
-        for _ in range(_MAX_EXTENSIONS):
+        for n_added in range(1 + _MAX_ADDED * (self._settings.final_task == MEMORY)):
+            if n_added:
+                self.extend()
             if self._add_final_task():
                 self._draft.make_last_task_final()
                 return
-            self.extend()
-        raise _GaveUp("no final task works; choose another scene or seed")
+        raise _GaveUp("no final task works; choose another scene (a house, for a memory) or seed")
 
     def _add_final_task(self) -> bool:
         """Try the tasks between the trajectory's ends, each once, in a direction drawn anew."""
-        directions = end_types(self._draft.object_log())
+        directions = end_types(self._draft.object_log(), self._settings.final_task == MEMORY)
         pool = TaskPool(self._rng)
         while True:
             room = self._room()

@@ -2,7 +2,8 @@
 
 The object to pick up is among those `pickupable` in the first fifth of the steps and the receptacle
 (or lamp) among those `visible` in the last fifth, or vice versa. So the task requires to remember
-what was seen long ago.
+what was seen long ago, unless that was seen later, too. With `alone` it was not, nor the other one
+before the last fifth.
 """
 
 import math
@@ -42,19 +43,26 @@ class EndTypes:
         return self.allows(task.pickup, task.receptacle or task.light, task.movable)
 
 
-def end_types(object_log: Sequence[dict[str, Any]]) -> tuple[EndTypes, EndTypes]:
-    """Return the types at a log's ends (an entry per frame), with the object early and late."""
+def end_types(
+    object_log: Sequence[dict[str, Any]], alone: bool = False
+) -> tuple[EndTypes, EndTypes]:
+    """Return the types at a log's ends (an entry per frame), with the object early and late.
+
+    With `alone` these are types that no other frame shows, but for what is carried with them.
+    """
     count = max(1, math.floor(SHARE * len(object_log)))
     first = object_log[:count]
     last = object_log[-count:]
     either = _types(first, "visible") | _types(last, "visible")
+    later = _seen(object_log[count:]) if alone else frozenset()
+    before = _seen(object_log[:-count]) if alone else frozenset()
     return (
-        EndTypes(_types(first, "pickupable"), _types(last, "visible"), either),
-        EndTypes(_types(last, "pickupable"), _types(first, "visible"), either),
+        EndTypes(_types(first, "pickupable") - later, _types(last, "visible") - before, either),
+        EndTypes(_types(last, "pickupable") - before, _types(first, "visible") - later, either),
     )
 
 
-def violation(trajectory: Trajectory) -> str | None:
+def violation(trajectory: Trajectory, alone: bool = False) -> str | None:
     """Return how a final task violates the rule, by the object log, or None if it does not."""
     task = trajectory.long_horizon_task
     if task is None:
@@ -62,7 +70,7 @@ def violation(trajectory: Trajectory) -> str | None:
     before = trajectory.sub_trajs[-1].low_pddl_idx[0]
     info = task.task_info
     other = info.receptacle or task.pddl_params.get("toggle_target")
-    for ends in end_types(trajectory.object_log[: before + 1]):
+    for ends in end_types(trajectory.object_log[: before + 1], alone):
         if info.pickup is not None and ends.allows(info.pickup, other, info.movable):
             return None
     return (
@@ -72,3 +80,9 @@ def violation(trajectory: Trajectory) -> str | None:
 
 def _types(entries: Sequence[dict[str, Any]], name: str) -> frozenset[str]:
     return frozenset(object_type for entry in entries for object_type in entry[name])
+
+
+def _seen(entries: Sequence[dict[str, Any]]) -> frozenset[str]:
+    """Return the types that are visible, and those of which slices are."""
+    types = _types(entries, "visible")
+    return types | {name.removesuffix("Sliced") for name in types}

@@ -8,8 +8,9 @@ from pathlib import Path
 import msgspec
 
 from infthor_eval.errors import InfthorError, UsageError, wrap_errors
-from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
+from infthor_eval.formats.trajectory import Trajectory, encode_trajectory, iter_sources
 from infthor_eval.generation.factory import GeneratedTrajectory, generate
+from infthor_eval.generation.final_task import violation
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.simulator_jobs import (
     SimulatorWorker,
@@ -57,6 +58,8 @@ class GenerationSummary(msgspec.Struct):
             back to 203".
         pool_restarts: how often in this run all tasks had been drawn, and were drawn again.
         kept: number of trajectories in this run that gave up, and were kept as far as they got.
+        final_tasks: by trajectory with a final task, whether that needs a memory: one object was
+            seen in the first fifth of the steps alone, the other in the last alone.
         failures: trajectories that could not be generated, one line each.
     """
 
@@ -69,6 +72,7 @@ class GenerationSummary(msgspec.Struct):
     roll_backs: list[str]
     pool_restarts: int
     kept: int
+    final_tasks: dict[str, bool]
     failures: list[str]
 
 
@@ -82,6 +86,7 @@ class GeneratedSet:
         steps: number of low-level actions in all trajectories.
         failures: trajectories that could not be generated, one line each.
         kept: number of trajectories in this run that gave up, and were kept as far as they got.
+        final_tasks: by trajectory with a final task, whether that needs a memory.
         statistics: tasks tried and accepted in this run.
     """
 
@@ -90,6 +95,7 @@ class GeneratedSet:
     steps: int = 0
     failures: list[str] = field(default_factory=list)
     kept: int = 0
+    final_tasks: dict[str, bool] = field(default_factory=dict)
     statistics: AttemptStatistics = field(default_factory=AttemptStatistics)
 
     def summary(self) -> GenerationSummary:
@@ -107,6 +113,7 @@ class GeneratedSet:
             roll_backs=list(map(str, statistics.roll_backs)),
             pool_restarts=len(statistics.pool_restarts),
             kept=self.kept,
+            final_tasks=self.final_tasks,
             failures=self.failures,
         )
 
@@ -119,13 +126,24 @@ class _GenerationOutcome:
         path: file of the trajectory; None if it could not be generated.
         steps: number of low-level actions.
         statistics: tasks tried and accepted; None for a trajectory of an earlier run.
+        needs_memory: whether its final task does; None if it has none.
         failure: reason why it could not be generated.
     """
 
     path: Path | None = None
     steps: int = 0
     statistics: AttemptStatistics | None = None
+    needs_memory: bool | None = None
     failure: str | None = None
+
+    @classmethod
+    def of(
+        cls, path: Path, trajectory: Trajectory, statistics: AttemptStatistics | None = None
+    ) -> "_GenerationOutcome":
+        """Return the outcome of a job whose trajectory is there."""
+        has_final = trajectory.long_horizon_task is not None
+        memory = violation(trajectory, alone=True) is None if has_final else None
+        return cls(path, len(trajectory.plan.low_actions), statistics, memory)
 
     @property
     def is_resumed(self) -> bool:
@@ -198,6 +216,8 @@ def _summarise(
             continue
         result.paths.append(outcome.path)
         result.steps += outcome.steps
+        if outcome.needs_memory is not None:
+            result.final_tasks[outcome.path.stem] = outcome.needs_memory
         if outcome.statistics is None:
             result.resumed += 1
         else:
@@ -212,15 +232,14 @@ def _generate_one(
     path = out / f"{file_name(job.traj_id)}.json"
     try:
         if is_written(path):
-            return _GenerationOutcome(path, _check_earlier(path, job))
+            return _GenerationOutcome.of(path, _read_earlier(path, job))
         with freeze_existing_objects():
             generated = generate(job, simulator, tell)
     except InfthorError as error:
         return _GenerationOutcome(failure=str(error))
     # Outside of `try`: if this file has no room, generating the other trajectories would be wasted.
     _write(generated, path)
-    n_steps = len(generated.trajectory.plan.low_actions)
-    return _GenerationOutcome(path, n_steps, generated.statistics)
+    return _GenerationOutcome.of(path, generated.trajectory, generated.statistics)
 
 
 def _write(generated: GeneratedTrajectory, path: Path) -> None:
@@ -235,11 +254,11 @@ def _write(generated: GeneratedTrajectory, path: Path) -> None:
             partial_file.write_bytes(encode_trajectory(generated.trajectory))
 
 
-def _check_earlier(path: Path, job: TrajectorySettings) -> int:
-    """Check that a trajectory has the same settings, and return its number of actions."""
+def _read_earlier(path: Path, job: TrajectorySettings) -> Trajectory:
+    """Return the trajectory of an earlier run, if it has the same settings."""
     trajectory = next(iter_sources(path)).read()
     if not job.document().items() <= (trajectory.gen_info or {}).items():
         raise UsageError(
             f"{path}: generated with other settings; remove it or choose another --out"
         )
-    return len(trajectory.plan.low_actions)
+    return trajectory

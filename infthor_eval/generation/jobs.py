@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.object_ids import Words
-from infthor_eval.generation.settings import MAX_FAIL, TrajectorySettings
+from infthor_eval.generation.settings import MAX_FAIL, FinalTask, TrajectorySettings
 from infthor_eval.scene_types import BATHROOM, scene_type
 from infthor_eval.storage.limits import STEPS, TRAJECTORIES
 
@@ -22,7 +22,7 @@ def trajectory_jobs(
     count: int,
     min_steps: int,
     min_subgoals: int,
-    final_task: bool,
+    final_task: FinalTask,
     max_fail: int = MAX_FAIL,
     save_floor: int = 0,
     look_around: bool = False,
@@ -37,7 +37,7 @@ def trajectory_jobs(
         count: number of trajectories for each scene.
         min_steps: minimum number of low-level actions.
         min_subgoals: minimum number of sub-goals: tasks and put-downs.
-        final_task: True to end each trajectory with a final task.
+        final_task: True, or MEMORY, to end each trajectory with a final task.
         max_fail: number of failed tasks in a row after which the last sub-goals are dropped.
         save_floor: number of steps from which a trajectory that gives up is kept as far as it got;
             0: never.

@@ -1,18 +1,21 @@
 """Settings of a generated trajectory."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.household.possible_tasks import usual_tasks
 from infthor_eval.household.tasks import SAMPLED, TaskType
 
-__all__ = ["MAX_FAIL", "MIN_STEPS", "MIN_SUBGOALS", "TrajectorySettings"]
+__all__ = ["MAX_FAIL", "MEMORY", "MIN_STEPS", "MIN_SUBGOALS", "FinalTask", "TrajectorySettings"]
 
 # Values of the paper's Algorithm 1
 MIN_STEPS = 300
 MIN_SUBGOALS = 10
 MAX_FAIL = 20
+
+MEMORY: Literal["memory"] = "memory"
+FinalTask = bool | Literal["memory"]
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,8 @@ class TrajectorySettings:
         min_steps: minimum number of low-level actions.
         min_subgoals: minimum number of sub-goals, as Algorithm 1 calls tasks and put-downs, without
             the final task.
-        final_task: True to end with a final task (see the module `final_task`).
+        final_task: True to end with a final task (see the module `final_task`); MEMORY for one on
+            an object seen early alone and one seen late alone.
         task_types: task types to sample from, if the scene's room type has them.
         scene_goal_filter: True to sample only task types that the published tables name for the
             scene's room type; False to sample any that its objects allow.
@@ -40,7 +44,7 @@ class TrajectorySettings:
     seed: int
     min_steps: int = MIN_STEPS
     min_subgoals: int = MIN_SUBGOALS
-    final_task: bool = False
+    final_task: FinalTask = False
     task_types: tuple[TaskType, ...] = SAMPLED
     scene_goal_filter: bool = True
     max_fail: int = MAX_FAIL

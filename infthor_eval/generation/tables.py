@@ -6,7 +6,14 @@ from infthor_eval.generation.generate_set import GenerationSummary
 from infthor_eval.generation.replay_summary import OverlapStatistics, ReplaySummary
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["generation_notes", "overlaps_table", "refusals_table", "regular_numbers", "tasks_table"]
+__all__ = [
+    "final_tasks_table",
+    "generation_notes",
+    "overlaps_table",
+    "refusals_table",
+    "regular_numbers",
+    "tasks_table",
+]
 
 _MAX_REASONS = 3  # in a line
 _EXACT = 0.995  # an IoU that is shown as 1.00
@@ -22,6 +29,14 @@ def tasks_table(summary: GenerationSummary) -> Table:
     accepted = sum(counts.accepted for counts in summary.tasks.values())
     rows.append(Row(("all", str(tried), str(accepted))))
     return Table("", (Column("task", False), Column("tried"), Column("accepted")), tuple(rows))
+
+
+def final_tasks_table(summary: GenerationSummary) -> Table:
+    """Return when the objects of each trajectory's final task were seen, by fifths of its steps."""
+    when = {True: "one in the first fifth alone, one in the last alone", False: "elsewhere, too"}
+    rows = [Row((name, when[memory])) for name, memory in summary.final_tasks.items()]
+    columns = Column("trajectory", False), Column("objects of its final task were seen", False)
+    return Table("", columns, tuple(rows))
 
 
 def generation_notes(summary: GenerationSummary) -> list[str]:

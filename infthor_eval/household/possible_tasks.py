@@ -31,6 +31,7 @@ _APPLIANCES = {
     TaskType.HEAT: {"Microwave"},
     TaskType.COOL: {"Fridge"},
 }
+_NOT_FOR_TWO = {"CoffeeMachine", "HandTowelHolder", "ToiletPaperHanger"}  # as published
 
 
 def usual_tasks(scene: str) -> frozenset[TaskType]:
@@ -94,7 +95,7 @@ def _placements(
     task = Task(TaskType.PLACE, pickup, receptacle, sliced=sliced)
     target = task.target
     yield task
-    if sliced or count[pickup] > 1:
+    if (sliced or count[pickup] > 1) and receptacle not in _NOT_FOR_TWO:
         yield Task(TaskType.PLACE_TWO, pickup, receptacle, sliced=sliced)
     for task_type, types in _TREATED.items():
         if (

@@ -15,11 +15,11 @@ from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.generation import factory
 from infthor_eval.generation.factory import generate
-from infthor_eval.generation.final_task import violation
+from infthor_eval.generation.final_task import EndTypes, end_types, violation
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.replay_summary import summarise
-from infthor_eval.generation.settings import TrajectorySettings
+from infthor_eval.generation.settings import MEMORY, TrajectorySettings
 from infthor_eval.generation.trace import RolloutError
 from infthor_eval.household.tasks import TaskType
 from infthor_eval.thor.grounding import Grounding
@@ -103,6 +103,41 @@ def test_the_final_task_is_about_both_ends_and_comes_last(simulator):
     assert trajectory.sub_tasks[-1] == trajectory.long_horizon_task
     assert trajectory.sub_trajs[-1].subgoal == trajectory.long_horizon_task.task_desc
     assert trajectory.sub_trajs[-1].low_pddl_idx[1] == len(trajectory.plan.low_actions)
+
+
+SHORT = TrajectorySettings("kitchen-2", 3, 20, 1, final_task=True)
+
+
+@pytest.mark.parametrize(("memory", "n_tries"), [(False, 1), (True, 3)])
+def test_where_no_final_task_works_the_trajectory_is_discarded(
+    memory, n_tries, simulator, monkeypatch
+):
+    asked = []
+
+    def nothing(log, alone):
+        asked.append((len(log), alone))
+        return (EndTypes(frozenset(), frozenset(), frozenset()),) * 2
+
+    monkeypatch.setattr(factory, "end_types", nothing)
+    monkeypatch.setattr(factory, "_MAX_ADDED", 2)
+    settings = dataclasses.replace(SHORT, final_task=MEMORY if memory else True)
+    with pytest.raises(UsageError, match="kitchen-2, seed 3: no final task works"):
+        generate(settings, simulator)
+    assert {alone for _, alone in asked} == {memory}
+    lengths = [length for length, _ in asked]
+    assert lengths == sorted(set(lengths)) and len(lengths) == n_tries
+
+
+def test_a_final_task_that_needs_a_memory_is_on_what_is_seen_nowhere_else(simulator, monkeypatch):
+    def alone_there(log, alone):
+        assert alone
+        # As if each end had been seen alone, which a short trajectory in one room has seldom.
+        return end_types(log)
+
+    monkeypatch.setattr(factory, "end_types", alone_there)
+    trajectory = generate(dataclasses.replace(SHORT, final_task=MEMORY), simulator).trajectory
+    assert trajectory.gen_info["final_task"] == "memory"
+    assert trajectory.sub_tasks[-1] == trajectory.long_horizon_task
 
 
 @pytest.mark.parametrize(("scene", "seed"), [("living-room-3", 2), ("FloorPlan317", 0)])
@@ -202,6 +237,27 @@ def test_at_dead_ends_1_2_and_4_subgoals_are_dropped(simulator, monkeypatch):
     ]
     assert len(generated.trajectory.sub_tasks) == len(generated.problems) >= 9
     assert generated.statistics.reasons["made to fail"] == 9
+    assert _refused(generated.trajectory, simulator) == []
+
+
+def test_at_dead_ends_a_put_down_is_dropped_with_its_task(simulator, monkeypatch):
+    tries = iter(range(10_000))
+    started = []
+
+    def while_(generated):
+        if generated._draft.n_subgoals >= 4:
+            started.append(True)
+        return bool(started) and next(tries) < 4
+
+    _Failing(monkeypatch, while_)
+    kinds = (TaskType.EXAMINE,)  # which leave the object in the hand
+    generated = generate(
+        TrajectorySettings("bedroom-3", 0, 30, 5, task_types=kinds, max_fail=1), simulator
+    )
+    # The published generator drops one, and two.
+    assert [item.subgoals for item in generated.statistics.roll_backs] == [2, 2]
+    goals = [task.task_info.goal for task in generated.trajectory.sub_tasks]
+    assert goals == [TaskType.EXAMINE, TaskType.PUT_AWAY] * (len(goals) // 2)
     assert _refused(generated.trajectory, simulator) == []
 
 

@@ -48,6 +48,7 @@ def test_the_filter_of_goals_is_a_setting_by_which_a_run_is_resumed(run_cli, tmp
     assert run_cli("generate", *words, "--no-scene-goal-filter")[0] == 0
     info = json.loads((tmp_path / "bathroom-1-seed0.json").read_text())["gen_info"]
     assert info["scene_goal_filter"] is False and "banked_on_giveup" not in info
-    code, _, err = run_cli("generate", *words)
-    assert code == 1 and "generated with other settings" in err
+    for other in ((), ("--no-scene-goal-filter", "--final-task-memory")):
+        code, _, err = run_cli("generate", *words, *other)
+        assert code == 1 and "generated with other settings" in err
     assert run_cli("generate", *words, "--no-scene-goal-filter")[0] == 0

@@ -1,10 +1,16 @@
+from infthor_eval.generation.generate_set import GeneratedSet
 from infthor_eval.generation.replay_summary import (
     ActionCounts,
     Divergence,
     OverlapStatistics,
     ReplaySummary,
 )
-from infthor_eval.generation.tables import overlaps_table, refusals_table, regular_numbers
+from infthor_eval.generation.tables import (
+    final_tasks_table,
+    overlaps_table,
+    refusals_table,
+    regular_numbers,
+)
 
 EXACT, SHIFTED = OverlapStatistics(4, 1.0, 0.9951), OverlapStatistics(2, 1.0, 0.94)
 
@@ -54,3 +60,11 @@ def test_recordings_without_boxes_or_with_nothing_as_recorded():
     )
     none = summary({"OpenObject": ActionCounts(0, 1)}, {"OpenObject": SHIFTED}, {"Fridge": SHIFTED})
     assert regular_numbers(none).startswith("nothing as recorded")
+
+
+def test_each_final_task_is_said_to_need_a_memory_or_not():
+    made = GeneratedSet(final_tasks={"kitchen-1-seed0": False, "house-1-seed0": True}).summary()
+    assert [row.cells for row in final_tasks_table(made).rows] == [
+        ("kitchen-1-seed0", "elsewhere, too"),
+        ("house-1-seed0", "one in the first fifth alone, one in the last alone"),
+    ]

@@ -149,7 +149,7 @@ def _loose_contents_question(
     if items is not None and history.shows(event.frame, event.target):
         frames = _unchanged_frames(history, event.frame, receptacle)
         yield from _contents_question(
-            history, FURTHER, wording, frames, receptacle, items, shown_first=True
+            history, FURTHER, wording, frames, receptacle, items, event=event
         )
 
 
@@ -172,7 +172,7 @@ def _contents_question(
     receptacle: str,
     items: frozenset[str],
     *,
-    shown_first: bool = False,
+    event: Event | None = None,
 ) -> Iterator[Candidate]:
     """Yield a question on objects in a receptacle, with the frames that show them there.
 
@@ -183,25 +183,37 @@ def _contents_question(
         frames: frames during which the contents are the same.
         receptacle: its id.
         items: ids of the objects.
-        shown_first: True if the first of the frames must be among the clues.
+        event: the event before the first of the frames, if a clue must show it: that frame, or a
+            later one in which its object is still in the hand, or open.
     """
     seen_at = {}
     for frame in frames:
         is_ambiguous = _shows_similar_contents(history, frame, receptacle)
         if history.shows(frame, receptacle) and not is_ambiguous:
             seen_at[frame] = frozenset(key for key in items if history.shows_inside(frame, key))
-    if shown_first and frames[0] not in seen_at:
+    if event is not None and frames[0] not in seen_at:
         return
-    first = {frames[0]} if shown_first else set[int]()
+    first = set[int]() if event is None else {frames[0]}
     missing = items.difference(*map(seen_at.__getitem__, first))
     if not items:
         return
     cover = minimal_cover(missing, seen_at, lambda frame, keys: history.clarity(frame, *keys))
     if cover is not None:
+        shown = set[str]().union(*map(seen_at.__getitem__, cover))
+        if event and items <= shown and any(_shows_still(history, f, event) for f in cover):
+            first = set()
         clues = tuple(sorted(first.union(cover)))
         types = sorted(_whole_types(history, frames[0], items))
         receptacle_type = history.states(frames[0])[receptacle].type
         yield from type_question(question_type, *wording, clues, types, (receptacle_type,))
+
+
+def _shows_still(history: TrajectoryHistory, frame: int, event: Event) -> bool:
+    """Return True if a frame shows the object of an event as that left it, held or open."""
+    if not history.shows(frame, event.target):
+        return False
+    now, left = (history.states(number)[event.target] for number in (frame, event.frame))
+    return now.held == left.held and now.is_open == left.is_open
 
 
 def _whole_types(history: TrajectoryHistory, frame: int, keys: frozenset[str]) -> list[str]:

@@ -23,7 +23,7 @@ from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Pr
 from infthor_eval.generation.twins.pairing import AskedWorld, ScoreReply, pair_questions
 from infthor_eval.generation.twins.rewriting import without_traces
 from infthor_eval.generation.twins.tolerance import tolerance_of
-from infthor_eval.generation.twins.visibility import check_insertions, check_sightings, is_shown
+from infthor_eval.generation.twins.visibility import check_insertions, check_original, is_shown
 from infthor_eval.storage.digests import digest, digest_of_file
 from infthor_eval.storage.files import file_name, write_atomically
 from infthor_eval.storage.scratch import ScratchFolder
@@ -203,8 +203,7 @@ class _Maker:
             AskedWorld(first.steps, worlds.changed, seed),
             AskedWorld(second.steps, worlds.changed_in_second, seed),
         )
-        if worlds.has_own:
-            check_sightings(*asked)
+        check_original(worlds.has_own, self._episode.history.steps, *asked)
         questions = pair_questions(asked, worlds.types, self._score)
         names = name_worlds(self._draft.rooms, pair_id)
         pair = TwinPair(

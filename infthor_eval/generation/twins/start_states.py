@@ -34,11 +34,11 @@ def _with_states(trajectory: Trajectory, *states: StartState) -> Trajectory:
 
 @dataclass(frozen=True)
 class _Opening:
-    """One of two objects is open at the start, the other closed; and the other way round.
+    """One of two objects is open for closed or closed for open, against the episode.
 
     Attributes:
         one: the object that is asked about.
-        other: another one, so that in neither world all is closed, as generated rooms begin.
+        other: another one, so that neither world is the episode's own.
     """
 
     one: ThorObject
@@ -47,8 +47,8 @@ class _Opening:
     def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
         """See `Proposal`."""
         worlds = []
-        for open_one, closed in permutations((self.one, self.other)):
-            states = {open_one.name: True, closed.name: False}
+        for turned, kept in permutations((self.one, self.other)):
+            states = {turned.name: not turned.is_open, kept.name: bool(kept.is_open)}
             worlds.append(
                 _with_states(
                     episode.trajectory,
@@ -65,12 +65,12 @@ class _Opening:
 
 
 class Opened:
-    """A container that is the only one of its type is open at the start, or another one is."""
+    """A container that is the only one of its type is opened or closed at the start, or another."""
 
     name: ClassVar[str] = "state"
 
     def propose(self, episode: Episode, rng: random.Random) -> Iterator[_Opening]:
-        """See `EditKind`: only what the agent never opens, closes, or takes from."""
+        """See `EditKind`: what frames show and the agent never opens, closes, or takes from."""
         acted = {event.target for event in episode.history.events}
         acted |= episode.put_targets | {
             move.origin for move in episode.history.moves if move.origin
@@ -78,7 +78,9 @@ class Opened:
         untouched = [
             obj
             for key, obj in sorted(episode.start.objects.items())
-            if obj.openable and obj.object_type in ASKED_OPEN and key not in acted
+            if obj.openable
+            and obj.object_type in ASKED_OPEN
+            and key in episode.history.seen - acted
         ]
         single = [obj for obj in untouched if episode.is_only_one(obj)]
         pairs = [
@@ -87,17 +89,11 @@ class Opened:
             if canonical_type(one.object_type) != canonical_type(other.object_type)
         ]
         rng.shuffle(pairs)
-        # Of those that frames show first, each object once before any a second time, and those in
-        # nobody's way.
+        # Each object once before any a second time, and first those in nobody's way.
         used = Counter[str]()
 
-        def rank(pair: tuple[ThorObject, ThorObject]) -> tuple[int, bool, int]:
-            is_unseen = pair[0].object_id not in episode.history.seen
-            return (
-                used[pair[0].name],
-                is_unseen,
-                sum(obj.object_type in _WITH_DOORS for obj in pair),
-            )
+        def rank(pair: tuple[ThorObject, ThorObject]) -> tuple[int, int]:
+            return used[pair[0].name], sum(obj.object_type in _WITH_DOORS for obj in pair)
 
         while pairs:
             best = min(pairs, key=rank)

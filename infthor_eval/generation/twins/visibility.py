@@ -1,9 +1,9 @@
 """Whether an eye sees in the pictures what differs: objects, actions, the answer to a question."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from infthor_eval.formats.object_ids import object_type_of
-from infthor_eval.formats.step_log import ObjectInFrame
+from infthor_eval.formats.step_log import ObjectInFrame, Step
 from infthor_eval.formats.twins import PairedQuestion
 from infthor_eval.generation.twins.comparison import Difference, World
 from infthor_eval.generation.twins.kinds import Worlds
@@ -11,7 +11,7 @@ from infthor_eval.generation.twins.pairing import AskedWorld, types_of_fact
 from infthor_eval.generation.twins.pictures import are_clearly_unlike
 from infthor_eval.household.wording import canonical_type
 
-__all__ = ["check_insertions", "check_sightings", "is_shown"]
+__all__ = ["check_insertions", "check_original", "is_shown"]
 
 
 def check_insertions(world: World, inserted: range) -> None:
@@ -25,18 +25,24 @@ def check_insertions(world: World, inserted: range) -> None:
             raise Difference("an action that is added cannot be seen")
 
 
-def check_sightings(first: AskedWorld, second: AskedWorld) -> None:
-    """Check that frames show as many of the changed objects in one world as in the other.
+def check_original(
+    has_own: bool, episode: Sequence[Step], first: AskedWorld, second: AskedWorld
+) -> None:
+    """Check that frames do not tell an original.
 
-    Edits of objects that the episode shows are proposed first, so a world that hides one would be
-    the edited one.
+    Where one world is the episode's own, they show as many of the changed objects in one as in the
+    other: edits of objects that the episode shows are proposed first, so a world that hides one
+    would be the edited one. Else each world's show objects at other sizes than the episode's.
 
     Raises:
-        Difference: they do not.
+        Difference: they tell it.
     """
     n_seen, n_seen_there = (len(one.changed & one.history.seen) for one in (first, second))
-    if n_seen != n_seen_there:
+    if has_own and n_seen != n_seen_there:
         raise Difference("one world shows a changed object that the other hides")
+    own = [step.seen for step in episode]
+    if not has_own and own in ([step.seen for step in one.steps] for one in (first, second)):
+        raise Difference("a world looks as the episode does")
 
 
 def is_shown(question: PairedQuestion, worlds: Worlds, first: World, second: World) -> bool:

@@ -31,12 +31,12 @@ def trajectory(
 def truncate_head(
     data: NiehSet, question: Question, settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """Ask on the last frames that fit (published under the same name); earlier clues are lost."""
+    """Ask on the last frames that fit (published under the same name); earlier clues are lost.
+
+    As published, the last one is always shown, though it be larger than the context.
+    """
     n_all = len(data.frames(question.traj_id))
-    n = settings.n_frames(_K_TOKENS)
-    if n < 1:
-        return [SkippedQuestion(question, "no frame fits the context")]
-    n_cut = max(0, n_all - n)
+    n_cut = max(0, n_all - max(1, settings.n_frames(_K_TOKENS)))
     return [Sample(question, tuple(range(n_cut, n_all)), n_cut=n_cut)]
 
 

@@ -87,6 +87,52 @@ def test_further_contents_say_what_counts_and_count_it_so():
     assert answers == ("mug", "pan")
 
 
+AT_PICKUP = "Which other things that can be picked up were directly on the dining table when you "
+
+
+@pytest.mark.parametrize(
+    ("unseen", "carried", "clues"),
+    [
+        ({}, 3, (1,)),
+        ({1: [MUG]}, 3, (2,)),  # the book is still in the hand there, so the first is needless
+        ({1: [MUG], 2: [PAN]}, 3, (1, 2)),  # neither shows all
+        ({1: [MUG], 2: [MUG], 3: [PAN]}, 2, (1, 3)),  # put down before the mug is seen
+        ({1: [MUG], 2: [MUG]}, 2, (1, 3)),  # as before: without the first nothing says when
+    ],
+)
+def test_of_what_was_left_a_later_clue_makes_the_first_needless_while_it_is_held(
+    unseen, carried, clues
+):
+    start = {**PLACES, **{key: state(key, TABLE) for key in (MUG, PAN, BOOK)}}
+    pick, put = moved(BOOK, TABLE, DESK)
+    waits = [("MoveAhead", None, None, {})] * 3
+    events = [pick, *waits]
+    events[carried] = put
+    log = history(start, *events)
+    for frame, keys in unseen.items():
+        for key in keys:
+            del log.steps[frame].seen[key]
+    (candidate,) = contents.at_pickup(log)
+    assert candidate.text.startswith(AT_PICKUP)
+    assert candidate.clues == clues
+    assert check(log, [candidate]) == {candidate.text: ("mug", "pan")}
+
+
+@pytest.mark.parametrize(("closed", "clues"), [(False, (2,)), (True, (1, 2))])
+def test_of_a_first_opening_a_later_clue_makes_the_first_needless_while_it_is_open(closed, clues):
+    start = {**PLACES, **{key: state(key, FRIDGE) for key in (MUG, PAN)}}
+    start[FRIDGE] = state(FRIDGE, is_open=False)
+    log = history(
+        start,
+        ("OpenObject", FRIDGE, None, {FRIDGE: state(FRIDGE, is_open=True)}),
+        ("MoveAhead", None, None, {FRIDGE: state(FRIDGE, is_open=not closed)}),
+    )
+    del log.steps[1].seen[MUG]
+    (candidate,) = contents.at_opening(log)
+    assert candidate.clues == clues
+    assert check(log, [candidate]) == {candidate.text: ("mug", "pan")}
+
+
 def test_the_end_is_counted_where_every_reading_gives_the_same():
     start = {**PLACES, APPLE: state(APPLE, TABLE), MUG: state(MUG, TABLE)}
     log = history(start, *moved(APPLE, TABLE, DESK))

@@ -10,7 +10,7 @@ from infthor_eval.formats.twins import PairedQuestion
 from infthor_eval.generation.twins.comparison import Difference, World
 from infthor_eval.generation.twins.kinds import Worlds
 from infthor_eval.generation.twins.pairing import AskedWorld
-from infthor_eval.generation.twins.visibility import check_sightings, is_shown
+from infthor_eval.generation.twins.visibility import check_original, is_shown
 
 from ..questions.logs import history, state
 
@@ -74,8 +74,20 @@ def asked(*shown):
     return AskedWorld(log.steps, WORLDS.changed, 0)
 
 
-def test_a_world_that_hides_what_the_other_shows_is_no_twin():
-    check_sightings(asked(FRIDGE), asked(OVEN))
-    check_sightings(asked(), asked())
+def test_a_world_that_hides_what_the_other_shows_is_no_twin_of_the_episode():
+    check_original(True, [], asked(FRIDGE), asked(OVEN))
+    check_original(True, [], asked(), asked())
     with pytest.raises(Difference, match="that the other hides"):
-        check_sightings(asked(FRIDGE, OVEN), asked(OVEN))
+        check_original(True, [], asked(FRIDGE, OVEN), asked(OVEN))
+
+
+def test_of_two_edited_worlds_none_looks_as_the_episode():
+    episode = asked(FRIDGE, OVEN).steps
+    larger = asked(FRIDGE, OVEN)
+    larger.steps[0].seen[FRIDGE] = ObjectInFrame(4100, (0, 0, 40, 99))
+    check_original(False, episode, larger, asked(FRIDGE))
+    check_original(False, [*episode, *episode], larger, asked(FRIDGE, OVEN))
+    for pair in ((asked(FRIDGE, OVEN), larger), (larger, asked(FRIDGE, OVEN))):
+        check_original(True, episode, *pair)
+        with pytest.raises(Difference, match="a world looks as the episode does"):
+            check_original(False, episode, *pair)

@@ -81,6 +81,12 @@ __all__ = ["command"]
     help="Add a final task that needs objects seen early and late in the trajectory.",
 )
 @click.option(
+    "--final-task-memory",
+    is_flag=True,
+    help="Add a final task on one object seen in the first fifth of the steps alone and one in the "
+    "last alone; up to 8 more tasks come before it, until there is one. Houses have it most often.",
+)
+@click.option(
     "--test-set",
     is_flag=True,
     help="Generate a test set as published: with a final task, without bathrooms.",
@@ -117,6 +123,7 @@ def command(
     seed: int,
     count: int,
     final_task: bool,
+    final_task_memory: bool,
     test_set: bool,
     look_around: bool,
     words: str,
@@ -134,6 +141,7 @@ def command(
     from infthor_eval.formats.object_ids import Words
     from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
+    from infthor_eval.generation.settings import MEMORY
     from infthor_eval.storage.files import hold_folder
     from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor.launch import embedded_launch
@@ -149,7 +157,7 @@ def command(
         count=count,
         min_steps=min_steps,
         min_subgoals=min_subgoals,
-        final_task=final_task or test_set,
+        final_task=MEMORY if final_task_memory else final_task or test_set,
         max_fail=max_fail,
         save_floor=save_floor,
         look_around=look_around,
@@ -179,7 +187,7 @@ def command(
 
 
 def _print(summary: GenerationSummary, out: Path, output: Console) -> None:
-    from infthor_eval.generation.tables import generation_notes, tasks_table
+    from infthor_eval.generation.tables import final_tasks_table, generation_notes, tasks_table
     from infthor_eval.report.terminal import print_table
 
     output.print(
@@ -187,5 +195,7 @@ def _print(summary: GenerationSummary, out: Path, output: Console) -> None:
         f"{summary.steps} steps: {out}"
     )
     print_table(tasks_table(summary), output)
+    if summary.final_tasks:
+        print_table(final_tasks_table(summary), output)
     for note in generation_notes(summary):
         output.print(note, markup=False, highlight=False)

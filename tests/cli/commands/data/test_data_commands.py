@@ -69,10 +69,12 @@ def test_what_they_print_for_people(made_folder, tmp_path, run_cli):
     assert "1 trajectories on 1 floor plans (1 replayed earlier, 0 failed), 1 complete" in out
     assert "actions accepted, " in out and "MoveAhead" not in out and len(out.splitlines()) == 2
     code, out, _ = run_cli(
-        "generate", "--scene", "kitchen-5", "--min-steps", 1, "--min-subgoals", 1, "--out", tmp_path
-    )
+        "generate", "--scene", "kitchen-5", "--min-steps", 1, "--min-subgoals", 1, "--final-task",
+        "--out", tmp_path,
+    )  # fmt: skip
     assert code == 0
     assert "1 trajectories (0 generated earlier)" in out
+    assert "objects of its final task were seen" in out and "kitchen-5-seed0" in out
 
 
 def test_replay_writes_what_the_published_renderer_writes(made_folder, tmp_path, run_cli):
