@@ -207,7 +207,7 @@ def _sentences_on_form(group: Group) -> Iterator[str]:
 
 
 def audit(data: NiehSet) -> Audit:
-    """BlindGuess each question of a set that can be asked, in all ways that the set allows."""
+    """Guess each question of a set that can be asked, in all ways that the set allows."""
     facts = read_clue_facts(data)
     scenes = read_scenes(data)
     blind = blind_guesser(visible_knowledge("clues"))
