@@ -74,8 +74,8 @@ def draw_guessing(data: NiehSet, tasks: Mapping[str, TaskSummary]) -> Figure:
         means = dict(zip(file.guessers, file.means(), strict=True))
         rows = [
             ("no frame: one answer for all", LOOKS["guess"], 100 * means["one answer a file"]),
-            ("no frame: words (blind)", LOOKS["guess"], 100 * means["words (blind)"]),
-            ("no frame: the best guesser", LOOKS["guess"], 100 * max(file.means())),
+            ("no frame: blind", LOOKS["guess"], 100 * means["blind"]),
+            ("no frame: the best guesser in hindsight", LOOKS["guess"], 100 * max(file.means())),
         ]
         rows += [
             (
@@ -135,7 +135,7 @@ def draw_above_blind(tasks: Mapping[str, TaskSummary]) -> Figure:
     axes.set_yticks(range(len(tasks)), [MODES[name] for name in reversed(tasks)])
     axes.set_ylim(-0.6, len(tasks) - 0.4)
     axes.set_xlim(-35, 105)
-    axes.set_xlabel("above blind, %: 0 is the best guesser, 100 all right")
+    axes.set_xlabel("above blind, %: 0 is blind, which sees no frame, 100 all right")
     axes.grid(axis="y", visible=False)
     return figure
 

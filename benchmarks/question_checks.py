@@ -11,8 +11,8 @@ chosen from the candidates.
 import argparse
 import random
 from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
+from statistics import fmean
 
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.questions.checker import Checker
@@ -22,8 +22,10 @@ from infthor_eval.generation.questions.generate import (
     generate_questions,
 )
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
-from infthor_eval.nieh.asking.baselines import BASELINES, Predict
 from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.docs import doc_target
+from infthor_eval.nieh.guessing.blind import visible_knowledge
+from infthor_eval.nieh.guessing.guessers import blind_guesser
 from infthor_eval.nieh.scoring import score
 
 _YES_NO = {"yes", "no"}
@@ -49,12 +51,17 @@ def main() -> None:
         f"{generated.by_type()}"
     )
     samples = [Sample(question, question.clues) for question in generated.questions]
-    yes_no = [item for item in samples if item.question.answers[0] in _YES_NO]
-    for name in ("oracle", "blind"):
-        predict = BASELINES[name](0).fit(samples)
+    keys = [doc_target(question) for question in generated.questions]
+    guesses = blind_guesser(visible_knowledge("clues")).guess(samples)
+    for name, replies in (("oracle", keys), ("blind", guesses)):
+        scores = [
+            (score(reply, item.question.answers, "strict"), item.question.answers[0] in _YES_NO)
+            for item, reply in zip(samples, replies, strict=True)
+        ]
+        yes_no = [right for right, is_yes_no in scores if is_yes_no]
         print(
-            f"{name}, strict: {mean(predict, samples):.3f}; yes/no alone "
-            f"{mean(predict, yes_no):.3f}"
+            f"{name}, strict: {fmean(right for right, _ in scores):.3f}; yes/no alone "
+            f"{fmean(yes_no):.3f}"
         )
 
 
@@ -92,13 +99,6 @@ def check_all(folder: Path) -> None:
                 )
     shares = ", ".join(f"{name} {counts[name]}" for name in ("right", "sufficient", "minimal"))
     print(f"{len(histories)} trajectories, {counts['all']} candidates: {shares}")
-
-
-def mean(predict: Predict, samples: Sequence[Sample]) -> float:
-    """Return the mean of a baseline with the strict scorer."""
-    return sum(score(predict(item), item.question.answers, "strict") for item in samples) / len(
-        samples
-    )
 
 
 if __name__ == "__main__":

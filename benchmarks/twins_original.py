@@ -1,4 +1,4 @@
-"""BlindGuess which world of a pair of twins is the original, with a learner that sees both.
+"""Guess which world of a pair of twins is the original, with a learner that sees both.
 
 python benchmarks/twins_original.py SET [SET ...] [--flips 60]
 

@@ -91,7 +91,7 @@ class Group:
         return total / len(self.questions)
 
     def means(self) -> tuple[float, ...]:
-        """Return the mean score of each guesser."""
+        """Return the mean score of each guesser; the last is that of `blind`."""
         return _means([audited.scores for audited in self.questions])
 
     def pair_means(self) -> tuple[float, ...]:
@@ -109,11 +109,6 @@ class Group:
                 both = zip(*scores, strict=True)
                 rows.append(tuple(float(min(sides) >= 1) for sides in both))
         return _means(rows)
-
-    @property
-    def blind(self) -> float:
-        """The mean score of `blind`."""
-        return dict(zip(self.guessers, self.means(), strict=True))["blind"]
 
     def best(self) -> tuple[str, float]:
         """Return the name of the best guesser, the simplest of equals, and its score."""
@@ -199,7 +194,7 @@ class Audit:
             if len(group.questions) >= _MANY:
                 yield from _sentences_on_form(group)
         for group in self.groups("file"):
-            yield f"{group.name}: blind has {100 * group.blind:.2f} % without a frame."
+            yield f"{group.name}: blind has {100 * group.means()[-1]:.2f} % without a frame."
 
 
 def _sentences_on_form(group: Group) -> Iterator[str]:
@@ -212,7 +207,7 @@ def _sentences_on_form(group: Group) -> Iterator[str]:
 
 
 def audit(data: NiehSet) -> Audit:
-    """BlindGuess each question of a set that can be asked, in all ways that the set allows."""
+    """Guess each question of a set that can be asked, in all ways that the set allows."""
     facts = read_clue_facts(data)
     scenes = read_scenes(data)
     blind = blind_guesser(visible_knowledge("clues"))

@@ -75,7 +75,7 @@ def _cells(group: Group) -> tuple[str, ...]:
         _percent(group.share_yes),
         _percent(group.chance),
         _percent(group.best_without_scene()),
-        _percent(group.blind),
+        _percent(group.means()[-1]),
         _percent(mean),
         name,
     )

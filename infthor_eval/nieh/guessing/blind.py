@@ -124,20 +124,14 @@ def score_guesses(
     guessers: Sequence[NamedGuesser] = GUESSERS,
     scenes: Mapping[str, str] = MappingProxyType({}),
 ) -> list[tuple[float, ...]]:
-    """Return for each question of a file the guessers' strict scores, in their order.
-
-    Args:
-        questions: the questions.
-        guessers: who guesses.
-        scenes: scene by id of the trajectory, to guess without the question's whole scene.
-    """
-    samples = [sample_on_clues(question) for question in questions]
-    by_guesser = [guesser.guess(samples, scenes) for guesser in guessers]
-    by_question = zip(*by_guesser, strict=True)
-    rows = []
-    for question, guesses in zip(questions, by_question, strict=True):
-        rows.append(tuple(score(guess, question.answers, "strict") for guess in guesses))
-    return rows
+    """Return for each question of a file the guessers' strict scores, in their order; without its
+    whole scene where scenes are given by trajectory."""
+    samples = list(map(sample_on_clues, questions))
+    by_question = zip(*(guesser.guess(samples, scenes) for guesser in guessers), strict=True)
+    return [
+        tuple(score(guess, question.answers, "strict") for guess in guesses)
+        for question, guesses in zip(questions, by_question, strict=True)
+    ]
 
 
 def sample_on_clues(question: Question) -> Sample:

@@ -17,14 +17,8 @@ _MOST = 6  # each fold, and each two, are guessed from the others
 def held_out(
     samples: Sequence[Sample], scenes: Mapping[str, str] = MappingProxyType({})
 ) -> Callable[[Sample], str]:
-    """Return the name of what a sample is left out with: its trajectory, or itself if all are on
-    one.
-
-    Twins are left out with all twins of their trajectory.
-
-    Args:
-        samples: all samples that are guessed.
-        scenes: scene by id of the trajectory, to leave out whole scenes.
+    """Return what names the samples that one of some is held out with: those on its trajectory, or
+    on all twins of it; on its scene, if scenes are given by trajectory; itself, if all are on one.
     """
 
     def group(sample: Sample) -> str:

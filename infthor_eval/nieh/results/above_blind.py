@@ -74,47 +74,34 @@ def score_above_blind(payload: NiehAnswer, scorer: str) -> float | None:
 
 def above_blind(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> AboveBlind:
     """Return the score above blind of some answered questions under a scorer."""
-    known = [
-        record
-        for record in records
-        if record.payload.blind and scorer in record.payload.blind.scores
-    ]
-    pairs = [(score_above_blind(record.payload, scorer), record.cluster) for record in known]
-    counted = [(score, cluster) for score, cluster in pairs if score is not None]
-    scores = [score for score, _ in counted]
-    clusters = [cluster for _, cluster in counted]
-    mean = sum(scores) / len(scores) if scores else None
-    low, high = _interval(scores, clusters, [it for it in known if _counts(it, scorer)], scorer)
+    known = [it for it in records if it.payload.blind and scorer in it.payload.blind.scores]
+    found = [(it, score_above_blind(it.payload, scorer)) for it in known]
+    counted = [(it, score) for it, score in found if score is not None]
+    mean = sum(score for _, score in counted) / len(counted) if counted else None
+    low, high = _interval(counted, scorer)
     return AboveBlind(
         mean=mean,
         low=low,
         high=high,
-        n=len(scores),
-        n_solved=len(known) - len(scores),
+        n=len(counted),
+        n_solved=len(known) - len(counted),
         n_unknown=len(records) - len(known),
         forms=_by_form(known, scorer),
-        solved_forms=sorted(
-            {_form(record) for record in known if score_above_blind(record.payload, scorer) is None}
-        ),
+        solved_forms=sorted({_form(it) for it, score in found if score is None}),
     )
 
 
-def _counts(record: UnitRecord[NiehAnswer], scorer: str) -> bool:
-    return score_above_blind(record.payload, scorer) is not None
-
-
 def _interval(
-    scores: Sequence[float],
-    clusters: Sequence[str],
-    records: Sequence[UnitRecord[NiehAnswer]],
-    scorer: str,
+    counted: Sequence[tuple[UnitRecord[NiehAnswer], float]], scorer: str
 ) -> tuple[float, float] | tuple[None, None]:
     """Return the interval over resampled trajectories, cut off where all are right, or wrong.
 
     A question on which `blind` is wrong adds more than 1 if it is right, so a sample of such ones
     would exceed 1.
     """
-    found = bootstrap_interval(scores, clusters) if scores else None
+    records = [it for it, _ in counted]
+    scores = [score for _, score in counted]
+    found = bootstrap_interval(scores, [it.cluster for it in records]) if scores else None
     if found is None:
         return None, None
     lowest, highest = score_range(records, scorer)

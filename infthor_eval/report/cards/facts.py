@@ -135,8 +135,7 @@ class SetFacts:
     @property
     def blind(self) -> float:
         """What `blind` has of the set without a frame, %."""
-        at = self.audited.guessers.index("blind")
-        return 100 * fmean(audited.scores[at] for audited in self.audited.questions)
+        return 100 * fmean(audited.scores[-1] for audited in self.audited.questions)
 
 
 def read_facts(root: Path) -> SetFacts:

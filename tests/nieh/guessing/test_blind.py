@@ -1,7 +1,9 @@
 """What `blind` says to the questions of a set."""
 
+import random
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from statistics import fmean
 from threading import Barrier, BrokenBarrierError
 
 import pytest
@@ -10,16 +12,15 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.nieh.guessing import blind
 from infthor_eval.nieh.guessing.blind import (
+    find_blind,
     find_floor,
     questions_by_file,
     sample_on_clues,
     visible_knowledge,
 )
-from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
-from infthor_eval.nieh.results.above_blind import above_blind
+from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge, blind_guesser
 from infthor_eval.storage.folders import user_cache
 
-from ...helpers.nieh_runs import make_record
 from ...helpers.questions import make_question, make_samples_on_clues
 
 PRESENCE, OPEN = "Is Mug on the Bed?", "Was Box open?"
@@ -99,28 +100,61 @@ def test_what_a_guesser_may_not_know_does_not_help(make_set):
     assert {guess.form_scores["strict"] for guess in without_clues.values()} == {0.5}
 
 
-def test_no_guesser_is_above_blind_and_the_best_is_there(make_set):
-    answers = ("yes", "yes", "no", "yes", "no", "no", "yes", "no", "yes")
-    questions = [
-        make_question(
-            f"t{i % 5}",
-            f"Is {('Mug', 'Box', 'Pan')[i % 3]} on the Bed?",
-            answer,
-            (i, i + 9)[: 1 + i % 2],
-        )
-        for i, answer in enumerate(answers)
+def words_tell(n):
+    """On each trajectory, of things that are always in a place, and of those that never are."""
+    things = (("Mug", "yes"), ("Box", "no"), ("Pan", "yes"), ("Pen", "no"))
+    return [
+        make_question(f"t{i}", f"Is {thing} on the Bed?", answer)
+        for i in range(n)
+        for thing, answer in things
     ]
-    data = make_set(test=questions)
-    guesses = find_floor(data, ~Knowledge.FILE)
-    scores = []
-    for guesser in GUESSERS:
-        replies = zip(questions, guesser.guess(make_samples_on_clues(*questions)), strict=True)
-        records = [
-            make_record(i, reply, question.answers, blind=guesses[question.id])
-            for i, (question, reply) in enumerate(replies)
+
+
+@pytest.mark.parametrize("n_yes", [60, 30])
+def test_where_nothing_tells_no_constant_is_far_above(n_yes):
+    """Forty trajectories of three questions in six wordings. Balanced answers are the trap: what is
+    the commoner on the others is the rarer on the own."""
+    right = []
+    for seed in range(4):
+        draw = random.Random(seed)
+        answers = ["yes"] * n_yes + ["no"] * (120 - n_yes)
+        draw.shuffle(answers)
+        questions = [
+            make_question(f"t{i // 3}", f"Is {draw.choice('ABCDEF')} on the Bed?", answer, (i,))
+            for i, answer in enumerate(answers)
         ]
-        scores.append(above_blind(records, "strict").mean)
-    assert max(scores) == pytest.approx(0)
+        guesses = blind_guesser(Knowledge.WORDS).guess(make_samples_on_clues(*questions))
+        right += [guess == answer for guess, answer in zip(guesses, answers, strict=True)]
+    assert fmean(right) >= max(n_yes, 120 - n_yes) / 120 - 0.02
+
+
+def test_blind_is_the_guesser_that_is_right_on_other_trajectories():
+    for n in (3, 40):
+        questions = words_tell(n)
+        guesses = blind_guesser(Knowledge.WORDS).guess(make_samples_on_clues(*questions))
+        assert guesses == [question.answers[0] for question in questions]
+
+
+def test_a_form_leaves_the_guesser_of_all_forms_where_another_is_better_by_a_standard_error():
+    odd = [make_question(f"t{i}", f"Where is Cup{i} now?", "Sink") for i in range(12)]
+    questions = [*words_tell(12), *odd]
+    by_words, by_constant = (
+        next(it for it in GUESSERS if it.name == name).guess(make_samples_on_clues(*questions))
+        for name in ("words", "one answer a form")
+    )
+    assert by_constant[48:] == ["Sink"] * 12
+    guesses = blind_guesser(Knowledge.WORDS).guess(make_samples_on_clues(*questions))
+    assert (
+        guesses
+        == [question.answers[0] for question in questions]
+        == [*by_words[:48], *guesses[48:]]
+    )
+
+
+def test_of_a_set_of_one_trajectory_there_is_no_floor(make_set):
+    data = make_set(test=[make_question("t", OPEN, "yes", (i,)) for i in range(4)])
+    assert {it.reply for it in find_blind(data, Knowledge.WORDS).values()} == {"yes"}
+    assert find_floor(data, Knowledge.WORDS) == {}
 
 
 def test_a_question_on_its_clue_frames_has_them_in_order():

@@ -103,6 +103,7 @@ def test_a_cell_has_the_score_above_blind_with_its_interval():
 def test_the_note_tells_what_is_not_counted(n_solved):
     solved = [guessed(10 + i, "mug", 1.0, 1.0, f"easy {i}") for i in range(n_solved)]
     (note,) = above_blind_notes([make_run(make_config(), [guessed(0, "mug", 0.5), *solved])])
-    expected = " Not counted, as guessing solves their forms (above 95%): 2 questions of 2 forms."
+    expected = " Not counted, as blind solves their forms (above 95%): 2 questions of 2 forms."
     assert note.endswith(expected) == bool(n_solved)
-    assert above_blind_notes([make_run(make_config(), [make_record(0, "mug"), *solved])]) == []
+    unknown = [make_record(0, "mug"), make_record(1, "mug")]
+    assert above_blind_notes([make_run(make_config(), [*unknown, *solved])]) == []
