@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 
 import httpx2
 
+from infthor_eval.errors import UsageError, in_one_line, wrap_errors
 from model_adapters.addresses import is_local
 from model_adapters.served.options import ServedOptions
 
@@ -59,6 +60,7 @@ class Call:
         form: fields of a form before the file that it uploads, instead of a body.
         largest: bytes of the largest accepted reply; None for that of one reply in words.
         timeout_s: limit for the whole reply; None for that of one reply in words.
+        failure: returns the error in a body that came with the status of a success, if it has one.
     """
 
     path: str
@@ -68,6 +70,7 @@ class Call:
     form: Mapping[str, str] | None = None
     largest: int | None = None
     timeout_s: float | None = None
+    failure: Callable[[bytes], StatusError | None] = lambda _: None
 
 
 @dataclass(frozen=True)
@@ -87,7 +90,12 @@ class Wire:
     """
 
     def __init__(self, options: ServedOptions, headers: Mapping[str, str]) -> None:
-        """Take the options, and the headers of every request."""
+        """Take the options, and the headers of every request.
+
+        Raises:
+            UsageError: the proxy that the environment names cannot be used.
+        """
+        self._client = _client(options, headers)
         self._url = options.url
         self._timeout_s = options.timeout_s
         self._closed = False
@@ -96,7 +104,6 @@ class Wire:
         self._loop = asyncio.new_event_loop()
         self._thread = Thread(target=self._loop.run_forever, name="served", daemon=True)
         self._thread.start()
-        self._client = _client(options, headers)
 
     def send(self, call: Call) -> Answer:
         """Return the server's reply to a request.
@@ -105,7 +112,8 @@ class Wire:
             UnreachableError: no connection, or one that breaks.
             StatusError: the status is no success.
             TimeoutError: no complete reply in time.
-            UnreadableError: the reply is too long or encoded, or the client is closed.
+            UnreadableError: the reply is too long or encoded, the client is closed, or the address,
+                which may be a server's, is none.
         """
         if self._closed:
             raise UnreadableError("gets no more requests: the model is closed")
@@ -114,6 +122,8 @@ class Wire:
             return future.result()
         except CancelledError as error:
             raise UnreadableError("is no longer waited for: the model is closed") from error
+        except httpx2.InvalidURL as error:
+            raise UnreadableError(f"gives no address ({in_one_line(error)})") from error
         except httpx2.HTTPError as error:
             raise UnreachableError(str(error.__cause__ or error) or type(error).__name__) from error
         finally:
@@ -153,14 +163,21 @@ class Wire:
 
 
 def _client(options: ServedOptions, headers: Mapping[str, str]) -> httpx2.AsyncClient:
-    # A local server is asked without the proxy of the environment, which may be on another machine.
-    return httpx2.AsyncClient(
-        headers={"Accept-Encoding": "identity", **headers},
-        timeout=httpx2.Timeout(None, connect=min(_CONNECT_S, options.timeout_s)),
-        limits=httpx2.Limits(max_connections=None, max_keepalive_connections=options.max_in_flight),
-        follow_redirects=False,
-        trust_env=not is_local(urlsplit(options.url)),
-    )
+    problem = "ALL_PROXY, HTTPS_PROXY, HTTP_PROXY or NO_PROXY cannot be used"
+    hint = "name a proxy as http://HOST:PORT, or unset them"
+    broken = (ImportError, ValueError, httpx2.InvalidURL)  # socks5:// needs a library more
+    with wrap_errors(problem, hint, catch=broken, raise_as=UsageError):
+        return httpx2.AsyncClient(
+            headers={"Accept-Encoding": "identity", **headers},
+            timeout=httpx2.Timeout(None, connect=min(_CONNECT_S, options.timeout_s)),
+            limits=httpx2.Limits(
+                max_connections=None, max_keepalive_connections=options.max_in_flight
+            ),
+            follow_redirects=False,
+            # A local server is asked without the environment's proxy, which may be on another
+            # machine.
+            trust_env=not is_local(urlsplit(options.url)),
+        )
 
 
 def _body(call: Call) -> dict[str, Any]:
