@@ -174,7 +174,10 @@ class ServedModel:
         return completion, faults
 
     def _failure(self, content: bytes) -> StatusError | None:
-        return self._dialect.read("it", content).failure
+        completion = self._dialect.read("it", content)
+        if completion.failure is None:
+            completion.text("it")  # an error if it has none
+        return completion.failure
 
     def _reply(self, completion: Completion, decoding: Decoding, faults: tuple[str, ...]) -> Reply:
         text = self._secret.redact(completion.text(self._endpoint.where))

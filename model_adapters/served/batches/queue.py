@@ -45,7 +45,7 @@ class BatchRules:
             `NotAskedError` where they allow none.
         count: takes each reply that arrives, for the caps.
         failure: returns the error in the body of a reply, if it has one; raises `ModelError` where
-            that is no reply.
+            that is no reply, or has no text.
         describe: returns status and body of a reply that is an error as one line.
         redact: returns a text without the key, which a server may repeat.
         where: the server, in messages.

@@ -1,5 +1,6 @@
 """What every dialect asks a server of batches for: values of a type, and whole files by lines."""
 
+import re
 from collections.abc import Callable, Iterator
 from typing import Annotated, TypeVar
 
@@ -20,13 +21,10 @@ LARGEST = 2**30  # bytes of the largest accepted list, or file of replies
 TRANSFER_S = 3600.0  # limit for sending or fetching a whole file, in seconds
 
 _MOST_PAGES = 1000
+# Names of requests (Google's field is another one), also in a line that is no JSON.
+_NAMES = re.compile(rb'"(?:custom_id|key)":\s*"([\w-]+)"')
 
 T = TypeVar("T")
-
-
-class _Named(msgspec.Struct, frozen=True):
-    custom_id: str = ""
-    key: str = ""  # Google's name of the same
 
 
 class Transfer:
@@ -64,26 +62,24 @@ class Transfer:
     ) -> Iterator[BatchReply]:
         """Yield the replies of a batch in a file; `read` makes one of a request and its line.
 
-        A line that is damaged is the fault of its request alone. The file is refused if it has
-        damaged lines, and none that names a request.
+        A line that is damaged is the fault of its request alone.
+
+        Raises:
+            ModelError: no line names a request.
         """
-        fault, n_named = None, 0
         call = Call(method="GET", path=path, largest=LARGEST, timeout_s=TRANSFER_S)
-        for content in self.send(call).content.splitlines():
-            request = None
+        lines = self.send(call).content.splitlines()
+        names = [_NAMES.findall(content) for content in lines]
+        if lines and not any(names):
+            raise ModelError(f"{self.where} answers without a line of a batch; see its log")
+        for content, named in zip(lines, names, strict=True):
+            request = next(filter(None, (batch.request_of(name.decode()) for name in named)), None)
+            if request is None:
+                continue
             try:
-                legible = content.decode(errors="replace").encode()
-                named = decode_reply(self.where, legible, _Named, "the lines of a batch")
-                n_named += 1
-                request = batch.request_of(named.custom_id or named.key)
-                if request is not None:
-                    yield read(request, decode_reply("it", content, kind, "a line of a batch"))
+                yield read(request, decode_reply("it", content, kind, "a line of a batch"))
             except ModelError as error:
-                fault = error
-                if request is not None:
-                    yield BatchReply(request, 0, str(error))
-        if fault is not None and not n_named:
-            raise fault
+                yield BatchReply(request, 0, str(error))
 
     def pages(self, path: str, kind: type[T], after: Callable[[T], str]) -> Iterator[T]:
         """Yield the pages of the server's list of batches; `after` returns what the address of the
