@@ -13,8 +13,8 @@ __all__ = ["Completion", "TokenUsage", "decode_reply", "read_error", "read_usage
 T = TypeVar("T")
 
 # Ends of replies at which the server failed: OpenRouter, vLLM and SGLang, Zhipu, DeepSeek, Google.
-_BROKEN = ("error", "abort", "network_error", "insufficient_system_resource")
-_BROKEN += ("OTHER", "MALFORMED_RESPONSE", "FINISH_REASON_UNSPECIFIED")
+_BROKEN = {"error", "abort", "network_error", "insufficient_system_resource"}
+_BROKEN |= {"OTHER", "MALFORMED_RESPONSE", "FINISH_REASON_UNSPECIFIED"}
 _MOST_TOKENS = 2**48
 _UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
@@ -113,8 +113,8 @@ def read_error(ending: str | None, *errors: msgspec.Raw) -> StatusError | None:
     for error in map(bytes, errors):
         if error not in (b"null", b"{}", b'""', b"false"):
             code = _fields(error).get("code")
-            is_status = isinstance(code, int) and 400 <= code < 600
-            return StatusError(code if is_status else 500, b"in a 200: " + error, {})
+            status = code if isinstance(code, int) and 400 <= code < 600 else 500
+            return StatusError(status, b"in a 200: " + error, {})
     return StatusError(500, f"a 200 that ended with {ending}".encode(), {}) if ending else None
 
 

@@ -5,7 +5,6 @@ import random
 import re
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from http import HTTPStatus
 from threading import Event
 from typing import TypeVar
@@ -140,9 +139,9 @@ class Endpoint:
     def _send_once(self, call: Call) -> Answer:
         try:
             answer = self._wire.send(call)
-            with suppress(ModelError):  # what is no reply is told where it is used
-                if (failure := call.failure(answer.content)) is not None:
-                    raise failure
+            failure = call.failure(answer.content)
+            if failure is not None and failure.status:  # what is no reply is told where it is used
+                raise failure
             return answer
         except TimeoutError as error:
             timeout_s = self._options.timeout_s if call.timeout_s is None else call.timeout_s

@@ -174,10 +174,13 @@ class ServedModel:
         return completion, faults
 
     def _failure(self, content: bytes) -> StatusError | None:
-        completion = self._dialect.read("it", content)
-        if completion.failure is None:
-            completion.text("it")  # an error if it has none
-        return completion.failure
+        try:
+            completion = self._dialect.read("it", content)
+            if completion.failure is None:
+                completion.text("it")
+            return completion.failure
+        except ModelError as error:  # no reply, or one without a text
+            return StatusError(0, str(error).encode(), {})
 
     def _reply(self, completion: Completion, decoding: Decoding, faults: tuple[str, ...]) -> Reply:
         text = self._secret.redact(completion.text(self._endpoint.where))

@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 import httpx2
 
-from infthor_eval.errors import UsageError, in_one_line, wrap_errors
+from infthor_eval.errors import UsageError, wrap_errors
 from model_adapters.addresses import is_local
 from model_adapters.served.options import ServedOptions
 
@@ -20,6 +20,8 @@ __all__ = ["Answer", "Call", "StatusError", "UnreachableError", "UnreadableError
 
 _LARGEST = 4 * 2**20  # bytes of the largest accepted reply
 _CONNECT_S = 30.0  # limit for a connection
+# The last three are of addresses that are none: of a proxy, or given by a server.
+_NO_CONNECTION = (httpx2.HTTPError, httpx2.InvalidURL, OverflowError, UnicodeError)
 # They log headers of replies, in which a server may repeat the key.
 _LOGGERS = ("httpcore2", "httpx2")
 
@@ -95,7 +97,11 @@ class Wire:
         Raises:
             UsageError: the proxy that the environment names cannot be used.
         """
-        self._client = _client(options, headers)
+        problem = "ALL_PROXY, HTTPS_PROXY, HTTP_PROXY or NO_PROXY cannot be used"
+        hint = "name a proxy as http://HOST:PORT, or unset them"
+        broken = (ImportError, ValueError, httpx2.InvalidURL)  # socks5:// needs one more library
+        with wrap_errors(problem, hint, catch=broken, raise_as=UsageError):
+            self._client = _client(options, headers)
         self._url = options.url
         self._timeout_s = options.timeout_s
         self._closed = False
@@ -112,8 +118,7 @@ class Wire:
             UnreachableError: no connection, or one that breaks.
             StatusError: the status is no success.
             TimeoutError: no complete reply in time.
-            UnreadableError: the reply is too long or encoded, the client is closed, or the address,
-                which may be a server's, is none.
+            UnreadableError: the reply is too long or encoded, or the client is closed.
         """
         if self._closed:
             raise UnreadableError("gets no more requests: the model is closed")
@@ -122,9 +127,7 @@ class Wire:
             return future.result()
         except CancelledError as error:
             raise UnreadableError("is no longer waited for: the model is closed") from error
-        except httpx2.InvalidURL as error:
-            raise UnreadableError(f"gives no address ({in_one_line(error)})") from error
-        except httpx2.HTTPError as error:
+        except _NO_CONNECTION as error:
             raise UnreachableError(str(error.__cause__ or error) or type(error).__name__) from error
         finally:
             future.cancel()  # has an effect if the waiting thread was interrupted
@@ -163,21 +166,14 @@ class Wire:
 
 
 def _client(options: ServedOptions, headers: Mapping[str, str]) -> httpx2.AsyncClient:
-    problem = "ALL_PROXY, HTTPS_PROXY, HTTP_PROXY or NO_PROXY cannot be used"
-    hint = "name a proxy as http://HOST:PORT, or unset them"
-    broken = (ImportError, ValueError, httpx2.InvalidURL)  # socks5:// needs a library more
-    with wrap_errors(problem, hint, catch=broken, raise_as=UsageError):
-        return httpx2.AsyncClient(
-            headers={"Accept-Encoding": "identity", **headers},
-            timeout=httpx2.Timeout(None, connect=min(_CONNECT_S, options.timeout_s)),
-            limits=httpx2.Limits(
-                max_connections=None, max_keepalive_connections=options.max_in_flight
-            ),
-            follow_redirects=False,
-            # A local server is asked without the environment's proxy, which may be on another
-            # machine.
-            trust_env=not is_local(urlsplit(options.url)),
-        )
+    # A local server is asked without the proxy of the environment, which may be on another machine.
+    return httpx2.AsyncClient(
+        headers={"Accept-Encoding": "identity", **headers},
+        timeout=httpx2.Timeout(None, connect=min(_CONNECT_S, options.timeout_s)),
+        limits=httpx2.Limits(max_connections=None, max_keepalive_connections=options.max_in_flight),
+        follow_redirects=False,
+        trust_env=not is_local(urlsplit(options.url)),
+    )
 
 
 def _body(call: Call) -> dict[str, Any]:

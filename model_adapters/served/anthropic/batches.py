@@ -83,7 +83,7 @@ class _Errored(msgspec.Struct, frozen=True):
 class _Result(msgspec.Struct, frozen=True):
     type: str
     message: msgspec.Raw = msgspec.Raw(b"null")
-    error: msgspec.Raw = msgspec.Raw(b"null")
+    error: msgspec.Raw = msgspec.Raw(b"{}")
 
 
 class _Line(msgspec.Struct, frozen=True):
@@ -111,12 +111,8 @@ class AnthropicBatches:
             headers={"Content-Type": "application/json"},
             timeout_s=TRANSFER_S,
         )
-        return self._transfer.submit(call, _Batch, lambda: self._find(batch, others)).id
-
-    def find(self, batch: Batch, others: Collection[str]) -> str | None:
-        """See `BatchService`."""
-        found = self._find(batch, others)
-        return None if found is None else found.id
+        made = self._transfer.submit(call, _Batch, lambda: self.find(batch, others))
+        return made if isinstance(made, str) else made.id
 
     def status(self, batch: Batch) -> BatchStatus:
         """See `BatchService`."""
@@ -137,8 +133,8 @@ class AnthropicBatches:
         path = f"/messages/batches/{server_id}/results"
         return self._transfer.replies(batch, path, _Line, _reply)
 
-    def _find(self, batch: Batch, others: Collection[str]) -> _Batch | None:
-        """Return a batch that may be ours, or is; None if the server has none.
+    def find(self, batch: Batch, others: Collection[str]) -> str | None:
+        """See `BatchService`; of those that may be ours, too.
 
         If one that may be ours is not, it has none of our requests in the end, and they are asked.
 
@@ -152,13 +148,13 @@ class AnthropicBatches:
             if found.processing_status != "ended":
                 candidates.append(found)
             elif any(self._replies(batch, found.id)):
-                return found
+                return found.id
         if len(candidates) > 1:
             raise ModelError(
                 f"{self._transfer.where} has {len(candidates)} batches that may be this run's; run "
                 "the same command again when they have ended"
             )
-        return candidates[0] if candidates else None
+        return candidates[0].id if candidates else None
 
     def _since(self, begin: float) -> Iterator[_Batch]:
         """Yield the server's batches, the latest first, back to a time."""
@@ -178,7 +174,7 @@ def _reply(request: str, line: _Line) -> BatchReply:
     if result.type == "succeeded":
         return BatchReply(request, 200, bytes(result.message).decode())
     if result.type == "errored":
-        told = decode_reply("it", bytes(result.error), _Errored | None, "an error") or _Errored()
+        told = decode_reply("it", bytes(result.error), _Errored, "an error")
         status = _STATUS.get(told.error.type, 500)
         return BatchReply(request, status, bytes(result.error).decode(), is_transient(status))
     return BatchReply(request, 0, f"it is {result.type}", result.type == "expired")

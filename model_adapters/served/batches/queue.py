@@ -44,8 +44,7 @@ class BatchRules:
         room: returns how many requests the caps allow now, None for any number; raises
             `NotAskedError` where they allow none.
         count: takes each reply that arrives, for the caps.
-        failure: returns the error in the body of a reply, if it has one; raises `ModelError` where
-            that is no reply, or has no text.
+        failure: returns the error in the body of a reply, of status 0 if it has no reply at all.
         describe: returns status and body of a reply that is an error as one line.
         redact: returns a text without the key, which a server may repeat.
         where: the server, in messages.
@@ -393,12 +392,7 @@ class BatchQueue:
 
     def _checked(self, reply: BatchReply) -> BatchReply:
         """Return a reply as its body has it: that of a success may hold an error, or be none."""
-        if not reply.is_answered:
-            return reply
-        try:
-            failure = self._rules.failure(reply.content.encode())
-        except ModelError as error:
-            return replace(reply, status=0, content=str(error))
+        failure = self._rules.failure(reply.content.encode()) if reply.is_answered else None
         if failure is None:
             return reply
         status, words = failure.status, failure.content.decode()

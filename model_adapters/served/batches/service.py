@@ -86,11 +86,8 @@ class BatchStatus(msgspec.Struct, frozen=True):
 
 
 def one_each(batch: Batch, replies: Sequence[BatchReply], status: BatchStatus) -> list[BatchReply]:
-    """Return one reply for each request of a batch; requests of others are left out.
-
-    Of two answers to one request nobody can tell which is to its question, so that it has none;
-    beside an answer, a fault does not count.
-    """
+    """Return one reply for each request of a batch; requests of others are left out. Of answers to
+    one request that differ, nobody can tell which is to its question, so that it has none."""
     found: dict[str, BatchReply] = {}
     for reply in sorted(replies, key=lambda each: not each.is_answered):
         first = found.setdefault(reply.id, reply)

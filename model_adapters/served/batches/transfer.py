@@ -46,16 +46,16 @@ class Transfer:
         """Return what the server answers, of a type; `what` names it in messages."""
         return decode_reply(self.where, self.send(call).content, kind, what)
 
-    def submit(self, call: Call, kind: type[T], find: Callable[[], T | None]) -> T:
-        """Return the batch that a call makes, and make it once.
+    def submit(self, call: Call, kind: type[T], find: Callable[[], str | None]) -> T | str:
+        """Return the batch that a call makes, or its name if it was lost, and make it once.
 
         The reply to an attempt may be lost, though the server has the batch: before each further
         attempt `find` looks for it there.
         """
         done = self._endpoint.ask_unless_done(call, find)[0]
-        if isinstance(done, Answer):
-            return decode_reply(self.where, done.content, kind, "a batch")
-        return done
+        if isinstance(done, str):
+            return done
+        return decode_reply(self.where, done.content, kind, "a batch")
 
     def replies(
         self, batch: Batch, path: str, kind: type[T], read: Callable[[str, T], BatchReply]

@@ -100,12 +100,8 @@ class GeminiBatches:
             content=msgspec.json.encode({"batch": request}),
             headers={"Content-Type": "application/json"},
         )
-        return self._transfer.submit(call, _Operation, lambda: self._find(batch)).name
-
-    def find(self, batch: Batch, others: Collection[str]) -> str | None:
-        """See `BatchService`."""
-        found = self._find(batch)
-        return None if found is None else found.name
+        made = self._transfer.submit(call, _Operation, lambda: self.find(batch, others))
+        return made if isinstance(made, str) else made.name
 
     def status(self, batch: Batch) -> BatchStatus:
         """See `BatchService`."""
@@ -159,12 +155,12 @@ class GeminiBatches:
         )
         return self._transfer.read(send, _Uploaded, "a file").file
 
-    def _find(self, batch: Batch) -> _Operation | None:
-        """Return a batch by our name of it; None if the server has none."""
+    def find(self, batch: Batch, others: Collection[str]) -> str | None:
+        """See `BatchService`; by our name of it."""
         for page in self._transfer.pages(f"/batches?pageSize={_PAGE}", _Page, _after):
             for found in page.operations:
                 if found.metadata.display_name == batch.name:
-                    return found
+                    return found.name
         return None
 
 

@@ -95,12 +95,8 @@ class OpenAIBatches:
             content=msgspec.json.encode(request),
             headers={"Content-Type": "application/json"},
         )
-        return self._transfer.submit(call, _Batch, lambda: self._find(batch)).id
-
-    def find(self, batch: Batch, others: Collection[str]) -> str | None:
-        """See `BatchService`."""
-        found = self._find(batch)
-        return None if found is None else found.id
+        made = self._transfer.submit(call, _Batch, lambda: self.find(batch, others))
+        return made if isinstance(made, str) else made.id
 
     def status(self, batch: Batch) -> BatchStatus:
         """See `BatchService`."""
@@ -131,13 +127,13 @@ class OpenAIBatches:
         call = Call(path="/files", content=path, form={"purpose": "batch"}, timeout_s=TRANSFER_S)
         return self._transfer.read(call, _File, "a file")
 
-    def _find(self, batch: Batch) -> _Batch | None:
-        """Return a batch by our name of it, the latest first; None if the server has none."""
+    def find(self, batch: Batch, others: Collection[str]) -> str | None:
+        """See `BatchService`; by our name of it, the latest first."""
         begin = batch.prepared_at - _CLOCKS_S
         for page in self._transfer.pages(f"/batches?limit={_PAGE}", _Page, _after):
             for found in page.data:
                 if (found.metadata or {}).get(_NAME) == batch.name:
-                    return found
+                    return found.id
             if all(found.created_at < begin for found in page.data):
                 break
         return None

@@ -32,12 +32,8 @@ class OpenAIDialect:
     def __init__(self, name: str, options: OpenAIOptions) -> None:
         self._name = name
         self._options = options
+        self.guides = options.guided is not None
         self._frames = EncodedFrames(options.image_format)
-
-    @property
-    def guides(self) -> bool:
-        """See `Dialect`."""
-        return self._options.guided is not None
 
     def headers(self, key: str | None) -> Mapping[str, str]:
         """See `Dialect`."""

@@ -197,6 +197,18 @@ def test_a_server_that_is_not_there_is_one_line() -> None:
     assert str(caught.value).endswith("in 2 attempts; is the server up?")
 
 
+@pytest.mark.parametrize("proxy", ["http://127.0.0.1:999999", "http://a..b", "garbage\u2028"])
+def test_a_proxy_that_is_not_there_is_one_line(proxy: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ALL_PROXY", proxy)
+    with (
+        open_model(base_url="https://none.example/v1", retries=0) as model,
+        pytest.raises(
+            ModelError, match=r"^https://none.example/v1 cannot be reached \(.*is the server up"
+        ),
+    ):
+        ask_once(model)
+
+
 def test_a_wait_that_the_server_asks_for_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     waited: list[float] = []
     monkeypatch.setattr(endpoint.time, "sleep", waited.append)

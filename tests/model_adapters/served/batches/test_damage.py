@@ -54,6 +54,11 @@ def _damages(model: str) -> dict[str, Damage]:
             .replace(b'"message", "role"', b'7, "role"')
         ),
         "an error of another type": instead(error[model]),
+        **(
+            {"no error": instead(b'{"type": "errored", "error": null}')}
+            if model == "anthropic"
+            else {}
+        ),
     }
 
 
