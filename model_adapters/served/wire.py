@@ -21,7 +21,7 @@ __all__ = ["Answer", "Call", "StatusError", "UnreachableError", "UnreadableError
 _LARGEST = 4 * 2**20  # bytes of the largest accepted reply
 _CONNECT_S = 30.0  # limit for a connection
 # The last three are of addresses that are none: of a proxy, or given by a server.
-_NO_CONNECTION = (httpx2.HTTPError, httpx2.InvalidURL, OverflowError, UnicodeError)
+_NO_CONNECTION = (httpx2.HTTPError, httpx2.InvalidURL, UnicodeError, ExceptionGroup)
 # They log headers of replies, in which a server may repeat the key.
 _LOGGERS = ("httpcore2", "httpx2")
 

@@ -82,16 +82,16 @@ def _failures(record: Record, response: str, max_new_tokens: int | None) -> list
 def form_notes(failures: Mapping[str, int], n_answered: int) -> Iterator[str]:
     """Yield a remark if most replies repeat their question, as behind a server that gives the
     prompt back, and one if any ends before its answer; `failures` are of `format_failures`."""
-    n_repeated, n_cut_off = failures.get(_REPEATED, 0), failures.get(_CUT_OFF, 0)
+    n_repeated = failures.get(_REPEATED, 0)
     if n_repeated > n_answered / 2:
         yield (
             f"{n_repeated:,} of {n_answered:,} replies repeat their question, and are scored so. "
             "Does the server give the prompt back with the reply?"
         )
-    if n_cut_off:
+    if _CUT_OFF in failures:
         yield (
-            f"{n_cut_off:,} replies reached the token limit before any answer, and are wrong; "
-            "--max-thinking-tokens N gives more"
+            f"{failures[_CUT_OFF]:,} replies reached the token limit before any answer, and are "
+            "wrong; --max-thinking-tokens N gives more"
         )
 
 

@@ -45,9 +45,8 @@ class Message(msgspec.Struct, frozen=True):
     @property
     def tokens(self) -> TokenUsage | None:
         """See `Completion`. What is cached is not in the server's count of the input."""
-        cached, stored = "cache_read_input_tokens", "cache_creation_input_tokens"
-        names = ("input_tokens", cached, stored), ("output_tokens",), cached, stored
-        return read_usage(self.usage, *names)
+        more = ("cache_read_input_tokens", "cache_creation_input_tokens")
+        return read_usage(self.usage, ("input_tokens", *more), ("output_tokens",), *more)
 
     @property
     def thinking(self) -> str | None:

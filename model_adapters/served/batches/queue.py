@@ -395,8 +395,8 @@ class BatchQueue:
         failure = self._rules.failure(reply.content.encode()) if reply.is_answered else None
         if failure is None:
             return reply
-        status, words = failure.status, failure.content.decode()
-        return BatchReply(reply.id, status, words, is_transient(status))
+        words = failure.content.decode()
+        return BatchReply(reply.id, failure.status, words, is_transient(failure.status))
 
     def _report_unfinished(self) -> None:
         left = self._unfinished

@@ -59,8 +59,8 @@ class GeneratedContent(msgspec.Struct, frozen=True, rename="camel"):
     def tokens(self) -> TokenUsage | None:
         """See `Completion`. Thoughts have the price of replies; zeros are left out."""
         reply = ("candidatesTokenCount", "thoughtsTokenCount")
-        names = ("promptTokenCount",), reply, "cachedContentTokenCount", ""
-        usage = read_usage(self.usage_metadata, *names)
+        cached = "cachedContentTokenCount"
+        usage = read_usage(self.usage_metadata, ("promptTokenCount",), reply, cached, "")
         return usage and replace(usage, n_cached=usage.n_cached or 0)
 
     @property

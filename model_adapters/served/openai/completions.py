@@ -58,8 +58,9 @@ class ChatCompletion(msgspec.Struct, frozen=True):
     @property
     def tokens(self) -> TokenUsage | None:
         """See `Completion`."""
-        names = ("prompt_tokens",), ("completion_tokens",), "cached_tokens", ""
-        return read_usage(self.usage, *names)
+        return read_usage(
+            self.usage, ("prompt_tokens",), ("completion_tokens",), "cached_tokens", ""
+        )
 
     @property
     def thinking(self) -> str | None:
@@ -74,7 +75,8 @@ class ChatCompletion(msgspec.Struct, frozen=True):
         """See `Completion`."""
         if not self.choices:
             raise ModelError(f"{where} answers without choices; is it a chat model's address?")
-        message, reason = self._choice.message, self._choice.finish_reason
+        message = self._choice.message
+        reason = self._choice.finish_reason
         why = _WHY.get(reason or "", "; see its log")
         text = _words(message.content) or message.refusal or ""
         is_said = message.content is not None and why != _FILTERED
