@@ -2,6 +2,8 @@
 
 import itertools
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from model_adapters.human.clock import ScreenClock
@@ -147,12 +149,14 @@ class Desk:
             self._changed.wait_for(lambda: self._n_kept >= number or self._is_closed)
             return self._n_kept >= number
 
-    def wait_for_change(self, version: int, timeout_s: float) -> None:
-        """Wait until there is another version than this one, or for so many seconds."""
-        with self._changed:
-            self._has_readers = True
-            self._n_reading += 1
-            self._changed.wait_for(lambda: self._version != version, timeout_s)
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Within this context a page waits for a change."""
+        self._has_readers = True
+        self._n_reading += 1
+        try:
+            yield
+        finally:
             self._n_reading -= 1
 
     def tell_closed(self) -> None:

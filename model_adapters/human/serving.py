@@ -1,7 +1,9 @@
 """The page of a desk: its routes, and the server that has them while a run goes on."""
 
+import asyncio
 import os
 import sys
+import time
 import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,6 +26,7 @@ from model_adapters.human.view import frames_of, state_of
 __all__ = ["desk_routes", "serve_desk"]
 
 _WAIT_S = 20.0  # a page asks again after so long without a change
+_LOOK_S = 0.03  # and hears of one so soon
 # For pages to learn that it is over: those that wait for news, and those that may be closed.
 _LAST_NEWS_S, _LAST_LOOK_S = 30.0, 3.0
 _LONGEST = 2000  # characters of an answer
@@ -83,7 +86,11 @@ class _Page:
         """What is asked now; waits for another version than the one that the page has."""
         seen = _number(request.query_params.get("seen", ""))
         if seen is not None:
-            await run_in_threadpool(self._desk.wait_for_change, seen, _WAIT_S)
+            # Not in a thread: there are few, and answers need one.
+            end = time.monotonic() + _WAIT_S
+            with self._desk.reading():
+                while self._desk.version == seen and time.monotonic() < end:
+                    await asyncio.sleep(_LOOK_S)
         state = state_of(self._desk)
         told = BackgroundTask(self._desk.tell_closed) if state["closed"] else None
         return JSONResponse(state, background=told)

@@ -24,17 +24,9 @@ class Dialect(Protocol):
         guides: true if replies can be restricted to choices.
     """
 
-    @property
-    def path(self) -> str:
-        """See above."""
-
-    @property
-    def hint(self) -> str:
-        """See above."""
-
-    @property
-    def guides(self) -> bool:
-        """See above."""
+    path: str
+    hint: str
+    guides: bool
 
     def headers(self, key: str | None) -> Mapping[str, str]:
         """Return the headers of every request; `key` is the API key, if there is one."""

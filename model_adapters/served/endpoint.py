@@ -138,7 +138,11 @@ class Endpoint:
 
     def _send_once(self, call: Call) -> Answer:
         try:
-            return self._wire.send(call)
+            answer = self._wire.send(call)
+            failure = call.failure(answer.content)
+            if failure is not None and failure.status:  # what is no reply is told where it is used
+                raise failure
+            return answer
         except TimeoutError as error:
             timeout_s = self._options.timeout_s if call.timeout_s is None else call.timeout_s
             raise _TransientError(

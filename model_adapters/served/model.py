@@ -20,7 +20,7 @@ from model_adapters.served.endpoint import Endpoint
 from model_adapters.served.options import ServedOptions
 from model_adapters.served.secret import Secret
 from model_adapters.served.spend import Caps, Charge, Prices, RateLimiter, Spend
-from model_adapters.served.wire import Call
+from model_adapters.served.wire import Call, StatusError
 from model_adapters.thinking import cut_at_stop
 
 __all__ = ["ServedModel"]
@@ -106,6 +106,7 @@ class ServedModel:
             retries=self._options.retries,
             room=self._spend.room,
             count=self._count,
+            failure=self._failure,
             describe=self._endpoint.describe,
             redact=self._secret.redact,
             where=self._endpoint.where,
@@ -157,7 +158,10 @@ class ServedModel:
         self._token_limiter.wait(expected)
         try:
             call = Call(
-                path=self._dialect.path, content=msgspec.json.encode(request), headers=_JSON
+                path=self._dialect.path,
+                content=msgspec.json.encode(request),
+                headers=_JSON,
+                failure=self._failure,
             )
             answer, faults = self._endpoint.ask(call)
             charge.sent = True
@@ -168,6 +172,15 @@ class ServedModel:
         finally:
             self._token_limiter.take(used - expected)
         return completion, faults
+
+    def _failure(self, content: bytes) -> StatusError | None:
+        try:
+            completion = self._dialect.read("it", content)
+            if completion.failure is None:
+                completion.text("it")
+            return completion.failure
+        except ModelError as error:  # no reply, or one without a text
+            return StatusError(0, str(error).encode(), {})
 
     def _reply(self, completion: Completion, decoding: Decoding, faults: tuple[str, ...]) -> Reply:
         text = self._secret.redact(completion.text(self._endpoint.where))

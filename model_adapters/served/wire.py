@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 
 import httpx2
 
+from infthor_eval.errors import UsageError, wrap_errors
 from model_adapters.addresses import is_local
 from model_adapters.served.options import ServedOptions
 
@@ -19,6 +20,8 @@ __all__ = ["Answer", "Call", "StatusError", "UnreachableError", "UnreadableError
 
 _LARGEST = 4 * 2**20  # bytes of the largest accepted reply
 _CONNECT_S = 30.0  # limit for a connection
+# The last three are of addresses that are none: of a proxy, or given by a server.
+_NO_CONNECTION = (httpx2.HTTPError, httpx2.InvalidURL, UnicodeError, ExceptionGroup)
 # They log headers of replies, in which a server may repeat the key.
 _LOGGERS = ("httpcore2", "httpx2")
 
@@ -59,6 +62,7 @@ class Call:
         form: fields of a form before the file that it uploads, instead of a body.
         largest: bytes of the largest accepted reply; None for that of one reply in words.
         timeout_s: limit for the whole reply; None for that of one reply in words.
+        failure: returns the error in a body that came with the status of a success, if it has one.
     """
 
     path: str
@@ -68,6 +72,7 @@ class Call:
     form: Mapping[str, str] | None = None
     largest: int | None = None
     timeout_s: float | None = None
+    failure: Callable[[bytes], StatusError | None] = lambda _: None
 
 
 @dataclass(frozen=True)
@@ -87,7 +92,16 @@ class Wire:
     """
 
     def __init__(self, options: ServedOptions, headers: Mapping[str, str]) -> None:
-        """Take the options, and the headers of every request."""
+        """Take the options, and the headers of every request.
+
+        Raises:
+            UsageError: the proxy that the environment names cannot be used.
+        """
+        problem = "ALL_PROXY, HTTPS_PROXY, HTTP_PROXY or NO_PROXY cannot be used"
+        hint = "name a proxy as http://HOST:PORT, or unset them"
+        broken = (ImportError, ValueError, httpx2.InvalidURL)  # socks5:// needs one more library
+        with wrap_errors(problem, hint, catch=broken, raise_as=UsageError):
+            self._client = _client(options, headers)
         self._url = options.url
         self._timeout_s = options.timeout_s
         self._closed = False
@@ -96,7 +110,6 @@ class Wire:
         self._loop = asyncio.new_event_loop()
         self._thread = Thread(target=self._loop.run_forever, name="served", daemon=True)
         self._thread.start()
-        self._client = _client(options, headers)
 
     def send(self, call: Call) -> Answer:
         """Return the server's reply to a request.
@@ -114,7 +127,7 @@ class Wire:
             return future.result()
         except CancelledError as error:
             raise UnreadableError("is no longer waited for: the model is closed") from error
-        except httpx2.HTTPError as error:
+        except _NO_CONNECTION as error:
             raise UnreachableError(str(error.__cause__ or error) or type(error).__name__) from error
         finally:
             future.cancel()  # has an effect if the waiting thread was interrupted

@@ -315,3 +315,20 @@ def test_a_run_outside_git_says_nothing_of_git(typed, capfd):
     assert typed(*RUN, "--output", "OUT")[0] == 0
     assert "git" not in capfd.readouterr().err
     assert not os.path.exists(".git")  # noqa: PTH110 - of the folder that the run was started in
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("ALL_PROXY", "socks4://127.0.0.1:1"),
+        ("ALL_PROXY", "ftp://127.0.0.1"),
+        ("HTTPS_PROXY", "http://a:b@:x"),
+    ],
+)
+def test_a_proxy_that_cannot_be_used_is_one_line(typed, monkeypatch, name, value):
+    monkeypatch.setenv(name, value)
+    options = "model=m,base_url=https://127.1.1.1.example/v1,api_key_env=NONE"
+    ended = typed(*option_words(model="openai", model_args=options, tasks="nieh_gt", data="SET"))
+    line = "ALL_PROXY, HTTPS_PROXY, HTTP_PROXY or NO_PROXY cannot be used ("
+    assert_refused(ended, line, after_notes=True)
+    assert "name a proxy as http://HOST:PORT, or unset them" in ended[2]

@@ -68,7 +68,8 @@ def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run_cli):
     assert (task["n_thought"], task["failures"]) == (3, [])
     n_tokens = sum(len(text.split()) for text in SAYS.values())
     assert task["tokens_per_right"] == n_tokens / 2
-    assert run_cli("show", results.parent)[0] == 0
+    note = "nieh_gt: 1 replies reached the token limit before any answer, and are wrong; --max-thi"
+    assert note in " ".join(run_cli("show", results.parent)[1].split())
     assert {limit for limit, _ in LIMITS} == {50}
 
 

@@ -84,10 +84,13 @@ class JudgePrompt:
 def _yes_no_text(question: str, answers: Sequence[Answer], reply: str) -> str:
     """Return the text that asks whether a reply gives all gold answers.
 
-    Everything that others wrote is inside one JSON object, out of which no reply can break.
+    Everything that others wrote is inside one JSON object, out of which no reply can break: ends
+    of lines that JSON knows nothing of (U+0085, U+2028) and marks that nobody sees are escaped.
     """
-    data = json.dumps(
-        {"question": question, "right": list(answers), "reply": reply}, ensure_ascii=False
+    content = {"question": question, "right": list(answers), "reply": reply}
+    data = "".join(
+        letter if letter.isprintable() else json.dumps(letter)[1:-1]
+        for letter in json.dumps(content, ensure_ascii=False)
     )
     wanted = "the right answer" if len(answers) == 1 else f"all {len(answers)} right answers"
     return (

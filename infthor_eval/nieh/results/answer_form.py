@@ -1,7 +1,7 @@
 """The form of replies, right or wrong: a leaning to yes, and replies that are no answer at all."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import msgspec
 
@@ -11,11 +11,12 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.scoring import says_yes_or_no
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["YesNo", "format_failures", "repetition_note", "yes_no"]
+__all__ = ["YesNo", "form_notes", "format_failures", "yes_no"]
 
 Record = UnitRecord[NiehAnswer]
 
 _REPEATED = "repeats the question"
+_CUT_OFF = "cut off while thinking"
 
 
 class YesNo(msgspec.Struct, frozen=True):
@@ -61,7 +62,7 @@ def _failures(record: Record, response: str, max_new_tokens: int | None) -> list
     gold = _gold(record)
     reasons = []
     if not response:
-        reasons.append("empty" if record.payload.thinking is None else "cut off while thinking")
+        reasons.append("empty" if record.payload.thinking is None else _CUT_OFF)
     elif gold in ({"yes"}, {"no"}) and says_yes_or_no(response) is None:
         reasons.append("neither yes nor no")
     elif len(gold) == 1 and number_of(next(iter(gold))) is not None and number_in(response) is None:
@@ -79,16 +80,20 @@ def _failures(record: Record, response: str, max_new_tokens: int | None) -> list
     return reasons
 
 
-def repetition_note(failures: Mapping[str, int], n_answered: int) -> str | None:
-    """Return a remark if most replies repeat their question, as behind a server that gives the
-    prompt back; `failures` are the counts of `format_failures`."""
+def form_notes(failures: Mapping[str, int], n_answered: int) -> Iterator[str]:
+    """Yield a remark if most replies repeat their question, as behind a server that gives the
+    prompt back, and one if any ends before its answer; `failures` are of `format_failures`."""
     n_repeated = failures.get(_REPEATED, 0)
-    if n_repeated <= n_answered / 2:
-        return None
-    return (
-        f"{n_repeated:,} of {n_answered:,} replies repeat their question, and are scored so. Does "
-        "the server give the prompt back with the reply?"
-    )
+    if n_repeated > n_answered / 2:
+        yield (
+            f"{n_repeated:,} of {n_answered:,} replies repeat their question, and are scored so. "
+            "Does the server give the prompt back with the reply?"
+        )
+    if _CUT_OFF in failures:
+        yield (
+            f"{failures[_CUT_OFF]:,} replies reached the token limit before any answer, and are "
+            "wrong; --max-thinking-tokens N gives more"
+        )
 
 
 def _gold(record: Record) -> set[str]:

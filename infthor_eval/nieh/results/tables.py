@@ -6,7 +6,7 @@ from infthor_eval.formats.published import PublishedRow, PublishedTable, publish
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.rescoring.report import sources_of
-from infthor_eval.nieh.results.answer_form import repetition_note
+from infthor_eval.nieh.results.answer_form import form_notes
 from infthor_eval.nieh.results.cells import Cell, both_intervals, mean_cell
 from infthor_eval.nieh.results.control_tables import control_tables, without_alike_notes
 from infthor_eval.nieh.results.effective_length import effective_lengths
@@ -106,7 +106,7 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
         *(
             f"{run}, {name}: {note}"
             for run, name, task in tasks
-            if (note := repetition_note(task.format_failures, task.total.n_answered))
+            for note in form_notes(task.format_failures, task.total.n_answered)
         ),
         *([_ALONE] if any(_is_alone(task) for *_, task in with_samples) else []),
         *_notes(runs),

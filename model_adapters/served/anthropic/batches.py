@@ -14,7 +14,8 @@ import msgspec
 
 from infthor_eval.errors import ModelError
 from model_adapters.served.batches.service import Batch, BatchReply, BatchStatus
-from model_adapters.served.batches.transfer import TRANSFER_S, Transfer
+from model_adapters.served.batches.transfer import TRANSFER_S, ServerId, Transfer
+from model_adapters.served.completion import decode_reply
 from model_adapters.served.endpoint import Endpoint, is_transient
 from model_adapters.served.wire import Call
 
@@ -22,6 +23,8 @@ __all__ = ["AnthropicBatches"]
 
 _PAGE = 100
 _CLOCKS_S = 3600  # by which the server's clock may be behind ours
+
+
 _STATUS = {  # of errors, by their type; it is that of the same error of a single request
     "invalid_request_error": 400,
     "authentication_error": 401,
@@ -49,17 +52,24 @@ class _Counts(msgspec.Struct, frozen=True):
 
 
 class _Batch(msgspec.Struct, frozen=True):
-    id: str
+    id: ServerId
     processing_status: str
-    created_at: datetime
+    created_at: str = ""
     request_counts: _Counts = _Counts()
     cancel_initiated_at: str | None = None
+
+    def is_since(self, begin: float) -> bool:
+        """Return whether it was made after a time; what has no time in words may have been."""
+        try:
+            return datetime.fromisoformat(self.created_at).timestamp() >= begin
+        except (ValueError, OverflowError):
+            return True
 
 
 class _Page(msgspec.Struct, frozen=True):
     data: list[_Batch]
     has_more: bool = False
-    last_id: str | None = None
+    last_id: ServerId | None = None
 
 
 class _Error(msgspec.Struct, frozen=True):
@@ -77,7 +87,6 @@ class _Result(msgspec.Struct, frozen=True):
 
 
 class _Line(msgspec.Struct, frozen=True):
-    custom_id: str
     result: _Result
 
 
@@ -102,12 +111,8 @@ class AnthropicBatches:
             headers={"Content-Type": "application/json"},
             timeout_s=TRANSFER_S,
         )
-        return self._transfer.submit(call, _Batch, lambda: self._find(batch, others)).id
-
-    def find(self, batch: Batch, others: Collection[str]) -> str | None:
-        """See `BatchService`."""
-        found = self._find(batch, others)
-        return None if found is None else found.id
+        made = self._transfer.submit(call, _Batch, lambda: self.find(batch, others))
+        return made if isinstance(made, str) else made.id
 
     def status(self, batch: Batch) -> BatchStatus:
         """See `BatchService`."""
@@ -122,18 +127,14 @@ class AnthropicBatches:
 
     def replies(self, batch: Batch, status: BatchStatus) -> Sequence[BatchReply]:
         """See `BatchService`."""
-        found = []
-        for line in self._lines(str(batch.server_id)):
-            request = batch.request_of(line.custom_id)
-            if request is not None:
-                found.append(_reply(request, line.result))
-        return found
+        return list(self._replies(batch, str(batch.server_id)))
 
-    def _lines(self, server_id: str) -> Iterator[_Line]:
-        return self._transfer.lines(f"/messages/batches/{server_id}/results", _Line)
+    def _replies(self, batch: Batch, server_id: str) -> Iterator[BatchReply]:
+        path = f"/messages/batches/{server_id}/results"
+        return self._transfer.replies(batch, path, _Line, _reply)
 
-    def _find(self, batch: Batch, others: Collection[str]) -> _Batch | None:
-        """Return a batch that may be ours, or is; None if the server has none.
+    def find(self, batch: Batch, others: Collection[str]) -> str | None:
+        """See `BatchService`; of those that may be ours, too.
 
         If one that may be ours is not, it has none of our requests in the end, and they are asked.
 
@@ -146,34 +147,34 @@ class AnthropicBatches:
                 continue
             if found.processing_status != "ended":
                 candidates.append(found)
-            elif any(batch.request_of(line.custom_id) for line in self._lines(found.id)):
-                return found
+            elif any(self._replies(batch, found.id)):
+                return found.id
         if len(candidates) > 1:
             raise ModelError(
                 f"{self._transfer.where} has {len(candidates)} batches that may be this run's; run "
                 "the same command again when they have ended"
             )
-        return candidates[0] if candidates else None
+        return candidates[0].id if candidates else None
 
     def _since(self, begin: float) -> Iterator[_Batch]:
         """Yield the server's batches, the latest first, back to a time."""
-        after = ""
-        while True:
-            page = self._transfer.page(f"/messages/batches?limit={_PAGE}{after}", _Page)
-            for found in page.data:
-                if found.created_at.timestamp() < begin:
-                    return
-                yield found
-            if not page.has_more or not page.last_id:
+        for page in self._transfer.pages(f"/messages/batches?limit={_PAGE}", _Page, _after):
+            recent = [found for found in page.data if found.is_since(begin)]
+            yield from recent
+            if not recent:
                 return
-            after = f"&after_id={page.last_id}"
 
 
-def _reply(request: str, result: _Result) -> BatchReply:
+def _after(page: _Page) -> str:
+    return f"&after_id={page.last_id}" if page.has_more and page.last_id else ""
+
+
+def _reply(request: str, line: _Line) -> BatchReply:
+    result = line.result
     if result.type == "succeeded":
         return BatchReply(request, 200, bytes(result.message).decode())
     if result.type == "errored":
-        error = msgspec.json.decode(result.error, type=_Errored).error
-        status = _STATUS.get(error.type, 500)
+        told = decode_reply("it", bytes(result.error), _Errored, "an error")
+        status = _STATUS.get(told.error.type, 500)
         return BatchReply(request, status, bytes(result.error).decode(), is_transient(status))
     return BatchReply(request, 0, f"it is {result.type}", result.type == "expired")

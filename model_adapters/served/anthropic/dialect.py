@@ -6,7 +6,8 @@ from typing import Any
 from infthor_eval.errors import ModelError
 from model_adapters.protocols import Decoding, Turn
 from model_adapters.served.anthropic.batches import AnthropicBatches
-from model_adapters.served.anthropic.messages import Message, read_message, to_messages
+from model_adapters.served.anthropic.messages import Message, to_messages
+from model_adapters.served.completion import decode_reply
 from model_adapters.served.endpoint import Endpoint
 from model_adapters.served.frames import EncodedFrames
 from model_adapters.served.options import AnthropicOptions
@@ -58,7 +59,7 @@ class AnthropicDialect:
 
     def read(self, where: str, content: bytes) -> Message:
         """See `Dialect`."""
-        return read_message(where, content)
+        return decode_reply(where, content, Message, "a message")
 
     def batch_service(self, endpoint: Endpoint) -> AnthropicBatches:
         """See `Dialect`."""

@@ -1,32 +1,25 @@
 """Conversations as Anthropic's messages, and its replies, which may be anything."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.protocols import Turn, Video
-from model_adapters.served.completion import TokenUsage, decode_reply
+from model_adapters.served.completion import TokenUsage, read_error, read_usage
 from model_adapters.served.frames import EncodedFrames, require_user_frames
+from model_adapters.served.wire import StatusError
 
-__all__ = ["Message", "read_message", "to_messages"]
+__all__ = ["Message", "to_messages"]
 
 _WHY = {
-    "max_tokens": ": the token limit was reached before any text; raise max_gen_toks of the task",
+    "max_tokens": ": the token limit was reached before any text; give --max-thinking-tokens N",
     "refusal": ": the server's classifiers stopped it; change the question",
     "tool_use": ": it calls a tool, though none was offered; use a server without tools",
     "model_context_window_exceeded": ": the context is too long; use fewer frames",
 }
-_Count = Annotated[int, msgspec.Meta(ge=0, le=2**48)]
-
-
-class _Usage(msgspec.Struct, frozen=True):
-    input_tokens: _Count
-    output_tokens: _Count
-    cache_creation_input_tokens: _Count | None = None
-    cache_read_input_tokens: _Count | None = None
 
 
 class _Block(msgspec.Struct, frozen=True):
@@ -39,24 +32,21 @@ class Message(msgspec.Struct, frozen=True):
     """A server's reply; see `Completion`."""
 
     type: str
-    content: list[_Block]
+    content: list[_Block] = []
     stop_reason: str | None = None
-    usage: _Usage | None = None
+    usage: msgspec.Raw = msgspec.Raw(b"null")
+    error: msgspec.Raw = msgspec.Raw(b"null")
+
+    @property
+    def failure(self) -> StatusError | None:
+        """See `Completion`."""
+        return read_error("error" if self.type == "error" else self.stop_reason, self.error)
 
     @property
     def tokens(self) -> TokenUsage | None:
         """See `Completion`. What is cached is not in the server's count of the input."""
-        usage = self.usage
-        if usage is None:
-            return None
-        cached = usage.cache_read_input_tokens or 0
-        stored = usage.cache_creation_input_tokens or 0
-        return TokenUsage(
-            usage.input_tokens + cached + stored,
-            usage.output_tokens,
-            None if usage.cache_read_input_tokens is None else cached,
-            stored,
-        )
+        more = ("cache_read_input_tokens", "cache_creation_input_tokens")
+        return read_usage(self.usage, ("input_tokens", *more), ("output_tokens",), *more)
 
     @property
     def thinking(self) -> str | None:
@@ -73,15 +63,6 @@ class Message(msgspec.Struct, frozen=True):
         raise ModelError(
             f"{where} gives no text{_WHY.get(self.stop_reason or '', '; see its log')}"
         )
-
-
-def read_message(where: str, content: bytes) -> Message:
-    """Parse a server's reply.
-
-    Raises:
-        ModelError: the body is not a message.
-    """
-    return decode_reply(where, content, Message, "a message")
 
 
 def to_messages(

@@ -21,7 +21,8 @@ from model_adapters.served.batches.service import (
     custom_id,
     one_each,
 )
-from model_adapters.served.endpoint import NoAnswerError
+from model_adapters.served.endpoint import NoAnswerError, is_transient
+from model_adapters.served.wire import StatusError
 
 __all__ = ["BatchQueue", "BatchRules", "BatchedReply"]
 
@@ -43,6 +44,7 @@ class BatchRules:
         room: returns how many requests the caps allow now, None for any number; raises
             `NotAskedError` where they allow none.
         count: takes each reply that arrives, for the caps.
+        failure: returns the error in the body of a reply, of status 0 if it has no reply at all.
         describe: returns status and body of a reply that is an error as one line.
         redact: returns a text without the key, which a server may repeat.
         where: the server, in messages.
@@ -53,6 +55,7 @@ class BatchRules:
     retries: int
     room: Callable[[], int | None]
     count: Callable[[BatchReply], None]
+    failure: Callable[[bytes], StatusError | None]
     describe: Callable[[int, bytes], str]
     redact: Callable[[str], str]
     where: str
@@ -134,8 +137,8 @@ class BatchQueue:
             if not batch.ended:
                 self._in_hand.update(batch.ids)
                 continue
-            answered = [reply for reply in self._ledger.replies(batch) if reply.is_answered]
-            self._answered |= {reply.id: reply for reply in answered}
+            checked = map(self._checked, self._ledger.replies(batch))
+            self._answered |= {reply.id: reply for reply in checked if reply.is_answered}
 
     @contextmanager
     def gathering(self) -> Iterator[None]:
@@ -233,7 +236,7 @@ class BatchQueue:
 
     def _describe(self, reply: BatchReply) -> str:
         if not reply.status:
-            return f"did not process it in a batch: {reply.content}"
+            return f"gives no reply in a batch: {reply.content}"
         return f"in a batch {self._rules.describe(reply.status, reply.content.encode())}"
 
     def _gather(self, request: str, make: Callable[[], dict[str, Any]]) -> None:
@@ -360,11 +363,14 @@ class BatchQueue:
                 )
             self._report(f"batch {batch.server_id}: {status.reason}")
             return True
+        given = one_each(batch, self._service.replies(batch, status), status)
         replies = [
             replace(reply, content=self._rules.redact(reply.content))
-            for reply in one_each(batch, self._service.replies(batch, status), status)
+            for reply in map(self._checked, given)
         ]
         self._end(batch, replies)
+        for paid in filter(lambda reply: reply.is_answered, given):  # whatever is in it
+            self._rules.count(paid)
         for reply in replies:
             self._take(reply)
         n = sum(reply.is_answered for reply in replies)
@@ -381,9 +387,16 @@ class BatchQueue:
     def _take(self, reply: BatchReply) -> None:
         if reply.is_answered:
             self._answered[reply.id] = reply
-            self._rules.count(reply)
         else:
             self._failed.setdefault(reply.id, []).append(reply)
+
+    def _checked(self, reply: BatchReply) -> BatchReply:
+        """Return a reply as its body has it: that of a success may hold an error, or be none."""
+        failure = self._rules.failure(reply.content.encode()) if reply.is_answered else None
+        if failure is None:
+            return reply
+        words = failure.content.decode()
+        return BatchReply(reply.id, failure.status, words, is_transient(failure.status))
 
     def _report_unfinished(self) -> None:
         left = self._unfinished

@@ -14,6 +14,7 @@ from msgspec.structs import replace
 __all__ = ["Batch", "BatchReply", "BatchService", "BatchStatus", "custom_id", "one_each"]
 
 _MISSING = "the batch has ended without a line for it"
+_CONTRADICTION = "it gives several that differ, and none counts"
 
 
 class Batch(msgspec.Struct, omit_defaults=True):
@@ -85,11 +86,13 @@ class BatchStatus(msgspec.Struct, frozen=True):
 
 
 def one_each(batch: Batch, replies: Sequence[BatchReply], status: BatchStatus) -> list[BatchReply]:
-    """Return one reply for each request of a batch; requests of others are left out."""
+    """Return one reply for each request of a batch; requests of others are left out. Of answers to
+    one request that differ, nobody can tell which is to its question, so that it has none."""
     found: dict[str, BatchReply] = {}
-    for reply in replies:
-        if reply.id not in found or reply.is_answered:
-            found[reply.id] = reply
+    for reply in sorted(replies, key=lambda each: not each.is_answered):
+        first = found.setdefault(reply.id, reply)
+        if reply.is_answered and first != reply:
+            found[reply.id] = BatchReply(reply.id, 0, _CONTRADICTION)
     missing = BatchReply("", 0, status.reason or _MISSING, status.again)
     return [found.get(each) or replace(missing, id=each) for each in batch.ids]
 

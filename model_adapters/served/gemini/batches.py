@@ -6,14 +6,14 @@ The form is that of `POST /upload/.../files` (resumable), `POST /models/M:batchG
 
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 from urllib.parse import quote, urlsplit
 
 import msgspec
 
 from infthor_eval.errors import ModelError
 from model_adapters.served.batches.service import Batch, BatchReply, BatchStatus
-from model_adapters.served.batches.transfer import LARGEST, TRANSFER_S, Transfer
+from model_adapters.served.batches.transfer import LARGEST, TRANSFER_S, ServerId, Transfer
 from model_adapters.served.completion import decode_reply
 from model_adapters.served.endpoint import Endpoint, is_transient
 from model_adapters.served.wire import Call
@@ -35,7 +35,7 @@ class _Error(msgspec.Struct, frozen=True):
 
 
 class _Output(msgspec.Struct, frozen=True, rename="camel"):
-    responses_file: str | None = None
+    responses_file: ServerId | None = None
 
 
 class _Metadata(msgspec.Struct, frozen=True, rename="camel"):
@@ -45,7 +45,7 @@ class _Metadata(msgspec.Struct, frozen=True, rename="camel"):
 
 
 class _Operation(msgspec.Struct, frozen=True):
-    name: str
+    name: ServerId
     metadata: _Metadata = _Metadata()
     error: _Error | None = None
     response: msgspec.Raw = msgspec.Raw(b"null")
@@ -58,11 +58,11 @@ class _Operation(msgspec.Struct, frozen=True):
 
 class _Page(msgspec.Struct, frozen=True, rename="camel"):
     operations: list[_Operation] = []
-    next_page_token: str = ""
+    next_page_token: Annotated[str, msgspec.Meta(max_length=2000)] = ""
 
 
 class _File(msgspec.Struct, frozen=True):
-    name: str
+    name: ServerId
 
 
 class _Uploaded(msgspec.Struct, frozen=True):
@@ -70,8 +70,7 @@ class _Uploaded(msgspec.Struct, frozen=True):
 
 
 class _Line(msgspec.Struct, frozen=True):
-    key: str
-    response: msgspec.Raw = msgspec.Raw(b"")
+    response: msgspec.Raw = msgspec.Raw(b"null")
     error: _Error | None = None
 
 
@@ -101,12 +100,8 @@ class GeminiBatches:
             content=msgspec.json.encode({"batch": request}),
             headers={"Content-Type": "application/json"},
         )
-        return self._transfer.submit(call, _Operation, lambda: self._find(batch)).name
-
-    def find(self, batch: Batch, others: Collection[str]) -> str | None:
-        """See `BatchService`."""
-        found = self._find(batch)
-        return None if found is None else found.name
+        made = self._transfer.submit(call, _Operation, lambda: self.find(batch, others))
+        return made if isinstance(made, str) else made.name
 
     def status(self, batch: Batch) -> BatchStatus:
         """See `BatchService`."""
@@ -127,14 +122,12 @@ class GeminiBatches:
 
     def replies(self, batch: Batch, status: BatchStatus) -> Sequence[BatchReply]:
         """See `BatchService`."""
-        found = []
-        for place in status.places:
-            address = f"{self._host}/download{self._version}/{place}:download?alt=media"
-            for line in self._transfer.lines(address, _Line):
-                request = batch.request_of(line.key)
-                if request is not None:
-                    found.append(_reply(request, line))
-        return found
+        address = f"{self._host}/download{self._version}/{{}}:download?alt=media"
+        return [
+            reply
+            for place in status.places
+            for reply in self._transfer.replies(batch, address.format(place), _Line, _reply)
+        ]
 
     def _upload(self, batch: Batch, path: Path) -> _File:
         kind = "application/jsonl"
@@ -150,7 +143,7 @@ class GeminiBatches:
             },
         )
         place = self._transfer.send(begin).headers.get("x-goog-upload-url", "")
-        if urlsplit(place).netloc != urlsplit(self._host).netloc:
+        if not place.startswith(f"{self._host}/"):
             raise ModelError(  # it would be sent the key
                 f"{self._transfer.where} gives no address of its own for an upload; check base_url"
             )
@@ -162,21 +155,22 @@ class GeminiBatches:
         )
         return self._transfer.read(send, _Uploaded, "a file").file
 
-    def _find(self, batch: Batch) -> _Operation | None:
-        """Return a batch by our name of it; None if the server has none."""
-        after = ""
-        while True:
-            page = self._transfer.page(f"/batches?pageSize={_PAGE}{after}", _Page)
+    def find(self, batch: Batch, others: Collection[str]) -> str | None:
+        """See `BatchService`; by our name of it."""
+        for page in self._transfer.pages(f"/batches?pageSize={_PAGE}", _Page, _after):
             for found in page.operations:
                 if found.metadata.display_name == batch.name:
-                    return found
-            if not page.next_page_token:
-                return None
-            after = f"&pageToken={quote(page.next_page_token, safe='')}"
+                    return found.name
+        return None
+
+
+def _after(page: _Page) -> str:
+    token = quote(page.next_page_token, safe="")
+    return f"&pageToken={token}" if token else ""
 
 
 def _reply(request: str, line: _Line) -> BatchReply:
     if line.error is None:
-        return BatchReply(request, 200, bytes(line.response).decode() or "null")
+        return BatchReply(request, 200, bytes(line.response).decode())
     status = line.error.status
     return BatchReply(request, status, line.error.message, is_transient(status))

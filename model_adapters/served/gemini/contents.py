@@ -1,25 +1,26 @@
 """Conversations as contents of the Gemini API, and its replies, which may be anything."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from dataclasses import replace
+from typing import Any
 
 import msgspec
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.protocols import Turn, Video
-from model_adapters.served.completion import TokenUsage, decode_reply
+from model_adapters.served.completion import TokenUsage, read_error, read_usage
 from model_adapters.served.frames import EncodedFrames, require_user_frames
+from model_adapters.served.wire import StatusError
 
-__all__ = ["GeneratedContent", "read_content", "to_contents"]
+__all__ = ["GeneratedContent", "to_contents"]
 
 _WHY = {
-    "MAX_TOKENS": ": the token limit was reached before any text; raise max_gen_toks of the task",
+    "MAX_TOKENS": ": the token limit was reached before any text; give --max-thinking-tokens N",
     "MALFORMED_FUNCTION_CALL": ": it calls a tool, though none was offered; use another model",
 }
 _BLOCKED = ("SAFETY", "RECITATION", "BLOCKLIST", "PROHIBITED_CONTENT", "SPII", "IMAGE_SAFETY")
 _FILTERED = ": the server's content filter blocked it; change the question"
-_Count = Annotated[int, msgspec.Meta(ge=0, le=2**48)]
 
 
 class _Part(msgspec.Struct, frozen=True):
@@ -40,30 +41,27 @@ class _Feedback(msgspec.Struct, frozen=True, rename="camel"):
     block_reason: str | None = None
 
 
-class _Usage(msgspec.Struct, frozen=True, rename="camel"):
-    prompt_token_count: _Count = 0
-    candidates_token_count: _Count = 0
-    thoughts_token_count: _Count = 0
-    cached_content_token_count: _Count | None = None
-
-
 class GeneratedContent(msgspec.Struct, frozen=True, rename="camel"):
     """A server's reply; see `Completion`."""
 
     candidates: list[_Candidate] = []
     prompt_feedback: _Feedback = _Feedback()
-    usage_metadata: _Usage | None = None
+    usage_metadata: msgspec.Raw = msgspec.Raw(b"null")
+    error: msgspec.Raw = msgspec.Raw(b"null")
+
+    @property
+    def failure(self) -> StatusError | None:
+        """See `Completion`."""
+        ending = self.candidates[0].finish_reason if self.candidates else None
+        return read_error(ending, self.error)
 
     @property
     def tokens(self) -> TokenUsage | None:
-        """See `Completion`. Thoughts have the price of replies."""
-        usage = self.usage_metadata
-        if usage is None:
-            return None
-        # The server leaves it out where nothing was cached.
-        cached = min(usage.cached_content_token_count or 0, usage.prompt_token_count)
-        written = usage.candidates_token_count + usage.thoughts_token_count
-        return TokenUsage(usage.prompt_token_count, written, cached)
+        """See `Completion`. Thoughts have the price of replies; zeros are left out."""
+        reply = ("candidatesTokenCount", "thoughtsTokenCount")
+        cached = "cachedContentTokenCount"
+        usage = read_usage(self.usage_metadata, ("promptTokenCount",), reply, cached, "")
+        return usage and replace(usage, n_cached=usage.n_cached or 0)
 
     @property
     def thinking(self) -> str | None:
@@ -86,15 +84,6 @@ class GeneratedContent(msgspec.Struct, frozen=True, rename="camel"):
     @property
     def _parts(self) -> list[_Part]:
         return self.candidates[0].content.parts if self.candidates else []
-
-
-def read_content(where: str, content: bytes) -> GeneratedContent:
-    """Parse a server's reply.
-
-    Raises:
-        ModelError: the body is not of the Gemini API.
-    """
-    return decode_reply(where, content, GeneratedContent, "generated content")
 
 
 def to_contents(name: str, turns: Sequence[Turn], frames: EncodedFrames) -> dict[str, Any]:

@@ -5,10 +5,11 @@ from typing import Any
 from urllib.parse import quote
 
 from model_adapters.protocols import Decoding, Turn
+from model_adapters.served.completion import decode_reply
 from model_adapters.served.endpoint import Endpoint
 from model_adapters.served.frames import EncodedFrames
 from model_adapters.served.gemini.batches import GeminiBatches
-from model_adapters.served.gemini.contents import GeneratedContent, read_content, to_contents
+from model_adapters.served.gemini.contents import GeneratedContent, to_contents
 from model_adapters.served.options import GeminiOptions
 
 __all__ = ["GeminiDialect"]
@@ -50,7 +51,7 @@ class GeminiDialect:
 
     def read(self, where: str, content: bytes) -> GeneratedContent:
         """See `Dialect`."""
-        return read_content(where, content)
+        return decode_reply(where, content, GeneratedContent, "generated content")
 
     def batch_service(self, endpoint: Endpoint) -> GeminiBatches:
         """See `Dialect`."""

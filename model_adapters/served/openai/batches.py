@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from model_adapters.served.batches.service import Batch, BatchReply, BatchStatus
-from model_adapters.served.batches.transfer import TRANSFER_S, Transfer
+from model_adapters.served.batches.transfer import TRANSFER_S, ServerId, Transfer
 from model_adapters.served.endpoint import Endpoint, is_transient
 from model_adapters.served.wire import Call
 
@@ -26,7 +26,7 @@ _CANCELLED = "batch_cancelled"
 
 
 class _File(msgspec.Struct, frozen=True):
-    id: str
+    id: ServerId
 
 
 class _Error(msgspec.Struct, frozen=True):
@@ -43,11 +43,11 @@ class _Errors(msgspec.Struct, frozen=True):
 
 
 class _Batch(msgspec.Struct, frozen=True):
-    id: str
+    id: ServerId
     status: str
     created_at: float = 0.0
-    output_file_id: str | None = None
-    error_file_id: str | None = None
+    output_file_id: ServerId | None = None
+    error_file_id: ServerId | None = None
     errors: _Errors | None = None
     metadata: dict[str, Any] | None = None
 
@@ -63,7 +63,6 @@ class _Response(msgspec.Struct, frozen=True):
 
 
 class _Line(msgspec.Struct, frozen=True):
-    custom_id: str
     response: _Response | None = None
     error: _Error | None = None
 
@@ -96,12 +95,8 @@ class OpenAIBatches:
             content=msgspec.json.encode(request),
             headers={"Content-Type": "application/json"},
         )
-        return self._transfer.submit(call, _Batch, lambda: self._find(batch)).id
-
-    def find(self, batch: Batch, others: Collection[str]) -> str | None:
-        """See `BatchService`."""
-        found = self._find(batch)
-        return None if found is None else found.id
+        made = self._transfer.submit(call, _Batch, lambda: self.find(batch, others))
+        return made if isinstance(made, str) else made.id
 
     def status(self, batch: Batch) -> BatchStatus:
         """See `BatchService`."""
@@ -122,32 +117,30 @@ class OpenAIBatches:
 
     def replies(self, batch: Batch, status: BatchStatus) -> Sequence[BatchReply]:
         """See `BatchService`."""
-        found = []
-        for place in status.places:
-            for line in self._transfer.lines(f"/files/{place}/content", _Line):
-                request = batch.request_of(line.custom_id)
-                if request is not None:
-                    found.append(_reply(request, line))
-        return found
+        return [
+            reply
+            for place in status.places
+            for reply in self._transfer.replies(batch, f"/files/{place}/content", _Line, _reply)
+        ]
 
     def _upload(self, path: Path) -> _File:
         call = Call(path="/files", content=path, form={"purpose": "batch"}, timeout_s=TRANSFER_S)
         return self._transfer.read(call, _File, "a file")
 
-    def _find(self, batch: Batch) -> _Batch | None:
-        """Return a batch by our name of it, the latest first; None if the server has none."""
-        after = ""
-        while True:
-            page = self._transfer.page(f"/batches?limit={_PAGE}{after}", _Page)
+    def find(self, batch: Batch, others: Collection[str]) -> str | None:
+        """See `BatchService`; by our name of it, the latest first."""
+        begin = batch.prepared_at - _CLOCKS_S
+        for page in self._transfer.pages(f"/batches?limit={_PAGE}", _Page, _after):
             for found in page.data:
                 if (found.metadata or {}).get(_NAME) == batch.name:
-                    return found
-            is_older = bool(page.data) and (
-                page.data[-1].created_at < batch.prepared_at - _CLOCKS_S
-            )
-            if not page.has_more or not page.data or is_older:
-                return None
-            after = f"&after={page.data[-1].id}"
+                    return found.id
+            if all(found.created_at < begin for found in page.data):
+                break
+        return None
+
+
+def _after(page: _Page) -> str:
+    return f"&after={page.data[-1].id}" if page.has_more and page.data else ""
 
 
 def _reply(request: str, line: _Line) -> BatchReply:

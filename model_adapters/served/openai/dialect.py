@@ -6,10 +6,11 @@ from typing import Any
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.storage.digests import fingerprint
 from model_adapters.protocols import Decoding, Turn
+from model_adapters.served.completion import decode_reply
 from model_adapters.served.endpoint import Endpoint
 from model_adapters.served.frames import EncodedFrames
 from model_adapters.served.openai.batches import OpenAIBatches
-from model_adapters.served.openai.completions import ChatCompletion, read_completion
+from model_adapters.served.openai.completions import ChatCompletion
 from model_adapters.served.openai.messages import to_messages
 from model_adapters.served.options import OpenAIOptions
 
@@ -31,12 +32,8 @@ class OpenAIDialect:
     def __init__(self, name: str, options: OpenAIOptions) -> None:
         self._name = name
         self._options = options
+        self.guides = options.guided is not None
         self._frames = EncodedFrames(options.image_format)
-
-    @property
-    def guides(self) -> bool:
-        """See `Dialect`."""
-        return self._options.guided is not None
 
     def headers(self, key: str | None) -> Mapping[str, str]:
         """See `Dialect`."""
@@ -70,7 +67,7 @@ class OpenAIDialect:
 
     def read(self, where: str, content: bytes) -> ChatCompletion:
         """See `Dialect`."""
-        return read_completion(where, content)
+        return decode_reply(where, content, ChatCompletion, "a chat completion")
 
     def batch_service(self, endpoint: Endpoint) -> OpenAIBatches:
         """See `Dialect`."""

@@ -15,7 +15,8 @@ from model_adapters.policies.checkpoint import PolicyCheckpoint
 from model_adapters.policies.http.adapter import HttpPolicy
 from model_adapters.policies.http.json_numpy import encode_array
 from model_adapters.policies.statistics import select_statistics
-from model_adapters.served.openai.completions import read_completion
+from model_adapters.served.completion import decode_reply
+from model_adapters.served.openai.completions import ChatCompletion
 
 from ..damage import Form
 from ..reader import Reader
@@ -49,7 +50,8 @@ def _make(name: str, document: object, folder: Path) -> Path:
 
 
 def _complete(folder: Path) -> None:
-    completion = read_completion("http://server", (folder / "reply.json").read_bytes())
+    body = (folder / "reply.json").read_bytes()
+    completion = decode_reply("http://server", body, ChatCompletion, "a chat completion")
     completion.text("http://server")
     tokens = completion.tokens
     if tokens is not None:

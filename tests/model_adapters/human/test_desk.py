@@ -97,19 +97,17 @@ def test_a_run_that_is_stopped_ends_as_by_ctrl_c() -> None:
 def test_who_waits_for_a_change_learns_of_it() -> None:
     desk = Desk()
     seen = desk.version
-    waiting = threading.Thread(target=desk.wait_for_change, args=(seen, 60.0), daemon=True)
-    waiting.start()
-    desk.close()
-    waiting.join(60.0)
-    assert not waiting.is_alive() and desk.is_closed and desk.version > seen
-    desk.wait_for_change(seen, 60.0)  # it has happened: returns at once
+    with desk.reading():
+        desk.close()
+    assert desk.is_closed and desk.version > seen
 
 
 def test_it_ends_when_a_page_has_learned_of_it_or_when_there_is_none() -> None:
     desk = Desk()
     desk.close()
     desk.wait_until_told(60.0, 60.0)  # nobody has asked: returns at once
-    desk.wait_for_change(-1, 60.0)
+    with desk.reading():
+        pass
     ending = threading.Thread(target=desk.wait_until_told, args=(0.0, 60.0), daemon=True)
     ending.start()
     ending.join(0.05)
@@ -121,11 +119,8 @@ def test_it_ends_when_a_page_has_learned_of_it_or_when_there_is_none() -> None:
 
 def test_a_page_that_waits_for_news_is_waited_for_longer_than_one_that_may_be_closed() -> None:
     desk = Desk()
-    reading = threading.Thread(target=desk.wait_for_change, args=(0, 60.0), daemon=True)
-    reading.start()
-    until(lambda: desk._n_reading == 1)
-    desk.close()
-    reading.join(60.0)
+    with desk.reading():
+        desk.close()
     ending = threading.Thread(target=desk.wait_until_told, args=(60.0, 0.0), daemon=True)
     ending.start()
     ending.join(0.05)

@@ -1,7 +1,9 @@
 """The routes of the answering page, without a browser, and the port that it takes."""
 
+import json
 import socket
 import threading
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
@@ -79,6 +81,21 @@ def test_a_number_that_is_none_of_a_frame_is_refused(get: Get, number: str) -> N
 def test_a_number_that_is_none_of_a_version_is_not_waited_for(get: Get, seen: str) -> None:
     status, media_type, _ = get(f"state.json?seen={seen}")
     assert (status, media_type) == (200, "application/json")
+
+
+def test_pages_that_wait_hold_up_no_answer(get: Get) -> None:
+    version = json.loads(get("state.json")[2])["version"]
+    waiting = [
+        threading.Thread(target=get, args=(f"state.json?seen={version}",), daemon=True)
+        for _ in range(60)  # more than there are threads
+    ]
+    for thread in waiting:
+        thread.start()
+    time.sleep(0.5)
+    assert all(thread.is_alive() for thread in waiting)
+    start = time.monotonic()
+    assert get("frames/1/0")[0] == 200  # from a thread, as answers are taken
+    assert time.monotonic() - start < 10
 
 
 def test_a_port_that_is_taken_ends_the_run_before_the_first_question(

@@ -17,7 +17,7 @@ from infthor_eval.errors import ModelError
 from model_adapters.served import endpoint, wire
 
 from ..policies.servers import Answer, send
-from .talking import always_send, ask_once, open_model, read_refusal, talkative
+from .talking import always_send, ask_once, completion, open_model, read_refusal, talkative
 
 
 def _resets(_request: Any, handler: BaseHTTPRequestHandler) -> None:
@@ -34,6 +34,10 @@ def _cut_off(_request: Any, handler: BaseHTTPRequestHandler) -> None:
 def _babbles(_request: Any, handler: BaseHTTPRequestHandler) -> None:
     handler.close_connection = True
     handler.wfile.write(b"SSH-2.0-OpenSSH_9.6\r\n\r\n")
+
+
+def _in_a_200(choice: dict[str, Any]) -> Answer:
+    return lambda *_: completion() | {"choices": [choice]}
 
 
 PASSING: dict[str, tuple[Answer, str]] = {
@@ -56,6 +60,32 @@ PASSING: dict[str, tuple[Answer, str]] = {
     "429 in words": (always_send(429, b"", {"Retry-After": "soon"}), "answers 429"),
     "408": (always_send(408, b""), "answers 408 Request Timeout: nothing"),
     "529": (always_send(529, b""), "answers 529: nothing"),
+    "an error in a choice": (
+        _in_a_200(
+            completion("It", finish_reason="error")["choices"][0]
+            | {"error": {"code": 502, "message": "upstream died"}}
+        ),
+        """answers 502 Bad Gateway: 'in a 200: {"code": 502, "message": "upstream died"}'""",
+    ),
+    "an error without a status": (
+        _in_a_200(completion("", finish_reason="error")["choices"][0] | {"error": "gone"}),
+        """answers 500 Internal Server Error: 'in a 200: "gone"'""",
+    ),
+    "an error alone": (
+        lambda *_: {"error": {"code": 503, "message": "no provider"}, "choices": None},
+        """answers 503 Service Unavailable: 'in a 200: {"code": 503, "message": "no provider"}'""",
+    ),
+    "an error beside an end that is none": (
+        lambda *_: completion("It", finish_reason=None) | {"error": {"code": "server_error"}},
+        "answers 500 Internal Server Error: 'in a 200: {",
+    ),
+    **{
+        ending: (
+            _in_a_200(completion("It", finish_reason=ending)["choices"][0]),
+            f"answers 500 Internal Server Error: 'a 200 that ended with {ending}'",
+        )
+        for ending in ("error", "abort", "network_error", "insufficient_system_resource")
+    },
     "reset": (_resets, "cannot be reached ("),
     "cut off": (_cut_off, "cannot be reached ("),
     "no HTTP": (_babbles, "cannot be reached ("),
@@ -84,6 +114,37 @@ def test_what_passes_is_sent_again_and_told(fault: str) -> None:
     assert f"{message}" in (line := read_refusal(answer, retries=1))
     assert ", in 2 attempts; " in line
     assert n_asked == 2
+
+
+@pytest.mark.parametrize(
+    ("code", "hint"), [(400, "check"), (401, "set the environment variable"), (402, "check your")]
+)
+def test_what_does_not_pass_is_not_asked_again_inside_a_200_either(code: int, hint: str) -> None:
+    n_asked = 0
+
+    def answer(*_: Any) -> dict[str, Any]:
+        nonlocal n_asked
+        n_asked += 1
+        return {"error": {"code": code, "message": "no such fridge"}}
+
+    line = read_refusal(answer, retries=3)
+    assert f"answers {code} " in line and "no such fridge" in line and hint in line
+    assert n_asked == 1
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        completion() | {"error": None},
+        completion() | {"error": {}},
+        completion() | {"error": {"message": "a warning"}},
+        completion() | {"choices": [completion()["choices"][0] | {"error": {"code": 500}}]},
+        completion(finish_reason="strange"),
+    ],
+)
+def test_a_reply_that_ended_well_is_none(document: dict[str, Any]) -> None:
+    with open_model(lambda *_: document) as model:
+        assert ask_once(model).text == "yes"
 
 
 def test_a_server_that_is_down_is_not_waited_for_by_every_unit() -> None:
@@ -134,6 +195,18 @@ def test_a_server_that_is_not_there_is_one_line() -> None:
             ask_once(model)
     assert str(caught.value).startswith(f"{where} cannot be reached (")
     assert str(caught.value).endswith("in 2 attempts; is the server up?")
+
+
+@pytest.mark.parametrize("proxy", ["http://127.0.0.1:999999", "http://a..b", "garbage"])
+def test_a_proxy_that_is_not_there_is_one_line(proxy: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ALL_PROXY", proxy)
+    with (
+        open_model(base_url="https://none.example/v1", retries=0) as model,
+        pytest.raises(
+            ModelError, match=r"^https://none.example/v1 cannot be reached \(.*is the server up"
+        ),
+    ):
+        ask_once(model)
 
 
 def test_a_wait_that_the_server_asks_for_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:

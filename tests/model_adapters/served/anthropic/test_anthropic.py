@@ -17,7 +17,8 @@ from PIL import Image
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
-from model_adapters.served.anthropic.messages import read_message
+from model_adapters.served.anthropic.messages import Message
+from model_adapters.served.completion import decode_reply
 
 from ...asking import up_to
 from ..batches.server import serve_batches
@@ -126,8 +127,8 @@ def test_cached_tokens_are_counted_and_priced() -> None:
         (errored(401, "authentication_error"), "a valid key"),
         (errored(413, "request_too_large"), "use fewer frames, or set image_format=jpeg"),
         (message("", content=[], stop_reason="refusal"), "the server's classifiers stopped it"),
-        (message("", content=[], stop_reason="max_tokens"), "raise max_gen_toks of the task"),
-        ({"type": "error"}, "does not answer with a message"),
+        (message("", content=[], stop_reason="max_tokens"), "give --max-thinking-tokens N"),
+        ({"content": []}, "does not answer with a message"),
     ],
 )
 def test_what_is_no_reply_is_one_line(outcome: Any, expected: str) -> None:
@@ -142,15 +143,44 @@ def test_what_is_no_reply_is_one_line(outcome: Any, expected: str) -> None:
 
 @pytest.mark.parametrize(
     "outcome",
-    [errored(429, "rate_limit_error"), errored(500, "api_error"), errored(529, "overloaded_error")],
+    [
+        errored(429, "rate_limit_error"),
+        errored(500, "api_error"),
+        errored(529, "overloaded_error"),
+        (500, message("It", stop_reason="error")),
+        (500, errored(200, "overloaded_error", "Overloaded")[1]),
+    ],
 )
 def test_what_passes_is_sent_again_and_told(outcome: Any) -> None:
-    outcomes = iter([outcome])
+    is_inside = "stop_reason" in outcome[1] or outcome[1]["error"]["message"] == "Overloaded"
+    outcomes = iter([outcome[1] if is_inside else outcome])
     with serve_batches(AnthropicServer(answer=lambda _: next(outcomes, message()))) as server:
         reply = _ask(server)
     assert reply.text == "yes"
+    assert ("a 200" in reply.faults[0]) == is_inside
     assert len(reply.faults) == 1
     assert f"answers {outcome[0]}" in reply.faults[0]
+
+
+@pytest.mark.parametrize(
+    ("usage", "counts"),
+    [
+        ({"input_tokens": 30, "output_tokens": 10}, (30, 10, None)),
+        (
+            {"input_tokens": 30, "output_tokens": 10, "cache_read_input_tokens": None},
+            (30, 10, None),
+        ),
+        ({"input_tokens": 30.0, "output_tokens": 10, "cache_read_input_tokens": 0}, (30, 10, 0)),
+        ({}, (None, None, None)),
+        ({"input_tokens": -1, "output_tokens": 10}, (None, None, None)),
+        ({"cache_read_input_tokens": 5, "output_tokens": 10}, (5, 10, 5)),
+        ("many", (None, None, None)),
+    ],
+)
+def test_no_usage_takes_the_reply_with_it(usage: Any, counts: Any) -> None:
+    with serve_batches(AnthropicServer(answer=lambda _: message(usage=usage))) as server:
+        reply = _ask(server)
+    assert (reply.n_context_tokens, reply.n_reply_tokens, reply.n_cached_tokens) == counts
 
 
 def test_thoughts_are_told_apart_and_refusals_in_words_are_replies() -> None:
@@ -191,7 +221,7 @@ def test_a_temperature_that_is_not_taken_is_refused() -> None:
 @given(st.binary(max_size=200) | st.text(max_size=80).map(str.encode))
 def test_no_bytes_are_a_traceback(content: bytes) -> None:
     try:
-        read_message("here", content).text("here")
+        decode_reply("here", content, Message, "a message").text("here")
     except ModelError as error:
         assert "\n" not in str(error)
 

@@ -114,7 +114,7 @@ def test_a_request_that_no_batch_can_hold_fails_alone(
     [
         (failed(429, "slow down"), "in a batch answers 429 Too Many Requests"),
         (failed(503, "busy"), "in a batch answers 503 Service Unavailable"),
-        ("batch_expired", "did not process it in a batch: batch_expired m"),
+        ("batch_expired", "gives no reply in a batch: batch_expired m"),
     ],
 )
 def test_what_passes_is_asked_again_and_told(
@@ -182,7 +182,7 @@ def test_who_cancels_a_batch_is_not_asked_to_pay_for_another(ask: Ask) -> None:
         code, _, err = ask(server)
     assert code == 1
     assert len(server.sizes) == 1
-    assert "did not process it in a batch: batch_cancelled m; run the same command again" in err
+    assert "gives no reply in a batch: batch_cancelled m; run the same command again" in err
 
 
 def test_a_batch_that_is_refused_ends_the_run_in_one_line(ask: Ask) -> None:

@@ -16,7 +16,8 @@ from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
 from model_adapters.served import endpoint
-from model_adapters.served.gemini.contents import read_content
+from model_adapters.served.completion import decode_reply
+from model_adapters.served.gemini.contents import GeneratedContent
 
 from ...asking import up_to
 from ..batches.server import serve_batches
@@ -93,7 +94,7 @@ def test_cached_tokens_and_thoughts_are_counted_and_priced() -> None:
         (errored(400, "INVALID_ARGUMENT", "no such field"), "answers 400 Bad Request"),
         (errored(403, "PERMISSION_DENIED"), "a key with access to this model"),
         (content("", "SAFETY"), "the server's content filter blocked it"),
-        (content("", "MAX_TOKENS"), "raise max_gen_toks of the task"),
+        (content("", "MAX_TOKENS"), "give --max-thinking-tokens N"),
         (
             {"promptFeedback": {"blockReason": "PROHIBITED_CONTENT"}},
             "the server's content filter blocked it",
@@ -125,6 +126,41 @@ def test_a_server_that_is_busy_is_asked_again_when_it_says(monkeypatch: pytest.M
     assert 7.5 <= waited[0] < 8.1
 
 
+@pytest.mark.parametrize(
+    ("outcome", "words"),
+    [
+        (content("It", "OTHER"), "ended with OTHER"),
+        (content("", "MALFORMED_RESPONSE"), "ended with MALFORMED_RESPONSE"),
+        (
+            errored(503, "UNAVAILABLE", "overloaded")[1],
+            "answers 503 Service Unavailable: 'in a 200",
+        ),
+    ],
+)
+def test_an_error_in_a_success_is_asked_again(outcome: Any, words: str) -> None:
+    outcomes = iter([outcome])
+    with serve_batches(GeminiServer(answer=lambda _: next(outcomes, content()))) as server:
+        reply = _ask(server)
+    assert (reply.text, len(reply.faults)) == ("yes", 1)
+    assert words in reply.faults[0]
+
+
+@pytest.mark.parametrize(
+    ("usage", "counts"),
+    [
+        ({"promptTokenCount": 9, "thoughtsTokenCount": 4.0}, (9, 4, 0)),
+        ({"promptTokenCount": 9, "candidatesTokenCount": None}, (None, None, None)),
+        ({}, (None, None, None)),
+        ([], (None, None, None)),
+    ],
+)
+def test_no_usage_takes_the_reply_with_it(usage: Any, counts: Any) -> None:
+    said = content(usageMetadata=usage)
+    with serve_batches(GeminiServer(answer=lambda _: said)) as server:
+        reply = _ask(server)
+    assert (reply.n_context_tokens, reply.n_reply_tokens, reply.n_cached_tokens) == counts
+
+
 def test_thoughts_are_told_apart() -> None:
     parts = [{"text": "A mug?", "thought": True}, {"text": "a cup"}]
     said = {"candidates": [{"content": {"parts": parts}, "finishReason": "STOP"}]}
@@ -150,7 +186,7 @@ def test_the_key_goes_into_the_head_alone(monkeypatch: pytest.MonkeyPatch) -> No
 @given(st.binary(max_size=200) | st.text(max_size=80).map(str.encode))
 def test_no_bytes_are_a_traceback(given_bytes: bytes) -> None:
     try:
-        read_content("here", given_bytes).text("here")
+        decode_reply("here", given_bytes, GeneratedContent, "content").text("here")
     except ModelError as error:
         assert "\n" not in str(error)
 
