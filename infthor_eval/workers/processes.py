@@ -12,6 +12,7 @@ from threading import Lock, Thread
 from typing import Any
 
 from infthor_eval.errors import Terminated
+from infthor_eval.safe_path import leave_safe_path, safe_path
 from infthor_eval.workers.host import WorkerHost, to_portable_error
 from infthor_eval.workers.link import Connect, OpenWorker, WorkerLostError
 
@@ -91,13 +92,14 @@ class ProcessLink:
 
     def _start(self) -> None:
         self._connection, theirs = _SPAWN.Pipe()
-        self._process = _SPAWN.Process(
-            target=_serve,
-            args=(theirs, self._number, self._count),
-            name=f"worker-{self._number}",
-            daemon=True,
-        )
-        self._process.start()
+        with safe_path() as before:
+            self._process = _SPAWN.Process(
+                target=_serve,
+                args=(theirs, self._number, self._count, before),
+                name=f"worker-{self._number}",
+                daemon=True,
+            )
+            self._process.start()
         theirs.close()
 
     def _send(self, message: Any) -> None:
@@ -124,8 +126,11 @@ class ProcessLink:
         return WorkerLostError(f"worker {self._number} died (exit status {self._process.exitcode})")
 
 
-def _serve(connection: "Connection[Any, Any]", number: int, count: int) -> None:
+def _serve(
+    connection: "Connection[Any, Any]", number: int, count: int, path_before: str | None
+) -> None:
     """Run a worker's process: create the worker it is sent; do jobs until the driver is gone."""
+    leave_safe_path(path_before)
     # A terminal sends Ctrl-C to all processes; the driver decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _raise_terminated)
