@@ -1,7 +1,7 @@
 """The config of a run of manipulation."""
 
 from infthor_eval.episodes.config import EpisodesConfig, EpisodeTaskConfig
-from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.manipulation.kinds import ManipulationKind, PutCriterion
 from infthor_eval.quantities import Amount
 
 __all__ = ["ArmTaskConfig", "ManipulationConfig"]
@@ -16,6 +16,7 @@ class ArmTaskConfig(EpisodeTaskConfig, frozen=True, kw_only=True, omit_defaults=
         stand: where the agent stands at the start, see `Stand`; None in runs of older versions.
         hand: height of its arm at the start, see `Hand`; likewise.
         closing: when a policy's hand closes, see `Closing`; likewise.
+        put_criterion: when a put succeeds, see `PutCriterion`.
     """
 
     kind: ManipulationKind
@@ -24,6 +25,7 @@ class ArmTaskConfig(EpisodeTaskConfig, frozen=True, kw_only=True, omit_defaults=
     stand: str | None = None
     hand: str | None = None
     closing: str | None = None
+    put_criterion: PutCriterion = PutCriterion.AT_REST
 
 
 class ManipulationConfig(

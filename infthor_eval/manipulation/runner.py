@@ -30,6 +30,7 @@ def arm_record(task: ManipulationTask, episode: ArmEpisode) -> ArmRecord:
         kind=str(episode.kind),
         instruction=task.instruction(episode),
         max_reward=task.settings.reward,
+        put_criterion=task.put_criterion,
     )
 
 
@@ -82,16 +83,11 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
             )
             steps, ended = self._act(environment, outcome, task.settings.max_steps)
         closest = min([outcome.distance, *(step.distance for step in steps)])
-        reward = task.settings.reward if ended == ArmEnded.DONE else 0.0
-        return EpisodeResult(
-            msgspec.structs.replace(
-                self.begun,
-                steps=tuple(steps),
-                closest=round(closest, _DIGITS),
-                reward=reward,
-                ended=str(ended),
-            )
+        record = msgspec.structs.replace(
+            self.begun, steps=tuple(steps), closest=round(closest, _DIGITS), ended=str(ended)
         )
+        reward = task.settings.reward if record.done else 0.0
+        return EpisodeResult(msgspec.structs.replace(record, reward=reward))
 
     def _act(
         self, environment: ArmEnvironment, outcome: ArmOutcome, max_steps: int

@@ -11,7 +11,7 @@ from .scripted import ScriptedPolicy
 pytestmark = pytest.mark.usefixtures("shared_simulators")
 
 TWIN = "openvla-tiny"  # whose place a scripted policy takes
-PICK = "manipulathor_pickup"
+PICK, PUT = "manipulathor_pickup", "manipulathor_put"
 OPEN = ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.9)
 
 
@@ -59,6 +59,32 @@ def test_the_hand_begins_at_rest_low_or_high(picking):
         hand: picking("still", hand=hand).steps[0].hand[1] for hand in ("rest", "low", "high")
     }
     assert heights["low"] < heights["rest"] - 0.05 < heights["rest"] + 0.05 < heights["high"]
+
+
+def test_a_put_counts_at_rest_or_when_it_is_released(prepare_run, monkeypatch):
+    monkeypatch.setattr(
+        "infthor_eval.runs.work.binding.load", lambda *_: ScriptedPolicy(lambda _: [OPEN])
+    )
+
+    def put(**changes):
+        (record,) = execute(prepare_run(TWIN, tasks=(PUT,), **changes)).records
+        return record.payload
+
+    usual, lenient = put(), put(put_criterion="release")
+    assert usual.ended == lenient.ended == "released elsewhere"
+    assert (usual.done, usual.reward) == (False, 0.0)
+    assert (lenient.done, lenient.reward) == (True, lenient.max_reward)
+
+
+def test_the_criterion_of_puts_is_a_setting_of_puts_alone(prepare_run):
+    def config(task, **changes):
+        run = prepare_run("still", tasks=(task,), **changes)
+        return run.evaluation.bind(run.suite.baselines["still"](0)).workload.config
+
+    changes = {"put_criterion": "release"}
+    assert config(PUT) != config(PUT, **changes)
+    assert config(PICK) == config(PICK, **changes)
+    assert config(PUT) == config(PUT, put_criterion="at-rest")
 
 
 @pytest.mark.parametrize("changes", [{"stand": "before"}, {"hand": "high"}, {"closing": "end"}])
