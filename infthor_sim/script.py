@@ -49,10 +49,11 @@ def prepare_script(script: str) -> tuple[ModuleType, CodeType]:
     finder = pkgutil.get_importer(place)
     if finder is not None:
         spec = finder.find_spec("__main__")
-        if spec is None or spec.loader is None:
+        if spec is None:
             raise DataError(f"{script}: there is no __main__.py in it")
         sys.path.insert(0, place)
-        return module_from_spec(spec), spec.loader.get_code("__main__")
+        loader_of_main: Any = spec.loader
+        return module_from_spec(spec), loader_of_main.get_code("__main__")
     try:
         content = Path(place).read_bytes()
     except OSError as error:
