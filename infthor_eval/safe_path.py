@@ -1,6 +1,7 @@
 """Where Python processes that are started look for modules: not in the folder where one stands."""
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import RLock
@@ -12,24 +13,21 @@ _CHANGING = RLock()  # the environment is of all threads
 
 
 @contextmanager
-def safe_path() -> Iterator[str | None]:
-    """Keep the folder where one stands from Python processes that are started meanwhile.
-
-    multiprocessing's take over `sys.path` from this process, but import modules before. Yields what
-    `leave_safe_path` needs, by which what such a process starts itself is as if this one had.
-    """
+def safe_path() -> Iterator[None]:
+    """Keep the folder where one stands from processes that multiprocessing starts meanwhile: they
+    take over this one's `sys.path`, but import modules before."""
+    if sys.flags.safe_path:  # which multiprocessing passes on
+        yield
+        return
     with _CHANGING:
-        before = os.environ.get(_VARIABLE)
         os.environ[_VARIABLE] = "1"
         try:
-            yield before
+            yield
         finally:
-            leave_safe_path(before)
+            leave_safe_path()
 
 
-def leave_safe_path(before: str | None) -> None:
-    """Have Python processes that are started from now on look for modules as before."""
-    if before is None:
+def leave_safe_path() -> None:
+    """Have what this process starts look for modules as if it had not been started in it."""
+    if "-P" not in sys.orig_argv:
         os.environ.pop(_VARIABLE, None)
-    else:
-        os.environ[_VARIABLE] = before

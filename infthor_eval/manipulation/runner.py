@@ -10,6 +10,7 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.manipulation.actors import ArmActor, ArmSituation, Step
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, arm_of
 from infthor_eval.manipulation.expert import ExpertStates
+from infthor_eval.manipulation.kinds import PutCriterion
 from infthor_eval.manipulation.records import ArmEnded, ArmRecord, ArmStep
 from infthor_eval.manipulation.task import ManipulationTask
 from infthor_eval.manipulation.trajectories import ArmEpisode
@@ -30,7 +31,7 @@ def arm_record(task: ManipulationTask, episode: ArmEpisode) -> ArmRecord:
         kind=str(episode.kind),
         instruction=task.instruction(episode),
         max_reward=task.settings.reward,
-        put_criterion=task.put_criterion,
+        put_criterion=PutCriterion(task.settings.put_criterion),
     )
 
 

@@ -185,14 +185,8 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             stand=self.settings.stand,
             hand=self.settings.hand,
             closing=self.settings.closing,
-            put_criterion=self.put_criterion,
+            put_criterion=PutCriterion(self.settings.put_criterion),
         )
-
-    @property
-    def put_criterion(self) -> PutCriterion:
-        """When a put succeeds; the usual one for pick-ups, which have none."""
-        is_put = self.kind == ManipulationKind.PUT
-        return PutCriterion(self.settings.put_criterion) if is_put else PutCriterion.AT_REST
 
     def _check_instruction(self, name: str) -> None:
         """Check that the instruction names the object, and all in braces can be filled in."""

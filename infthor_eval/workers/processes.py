@@ -92,13 +92,13 @@ class ProcessLink:
 
     def _start(self) -> None:
         self._connection, theirs = _SPAWN.Pipe()
-        with safe_path() as before:
-            self._process = _SPAWN.Process(
-                target=_serve,
-                args=(theirs, self._number, self._count, before),
-                name=f"worker-{self._number}",
-                daemon=True,
-            )
+        self._process = _SPAWN.Process(
+            target=_serve,
+            args=(theirs, self._number, self._count),
+            name=f"worker-{self._number}",
+            daemon=True,
+        )
+        with safe_path():
             self._process.start()
         theirs.close()
 
@@ -126,11 +126,9 @@ class ProcessLink:
         return WorkerLostError(f"worker {self._number} died (exit status {self._process.exitcode})")
 
 
-def _serve(
-    connection: "Connection[Any, Any]", number: int, count: int, path_before: str | None
-) -> None:
+def _serve(connection: "Connection[Any, Any]", number: int, count: int) -> None:
     """Run a worker's process: create the worker it is sent; do jobs until the driver is gone."""
-    leave_safe_path(path_before)
+    leave_safe_path()
     # A terminal sends Ctrl-C to all processes; the driver decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _raise_terminated)

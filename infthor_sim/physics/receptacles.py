@@ -172,27 +172,23 @@ def find_parent(world: World, item: SimObject) -> SimObject | None:
     # There is nothing near below its middle: it stands on what is below its edge.
     flat = [o for o in others if not (o.type.encloses or o.type.open_top)]
     at_edge, beside = _likeliest(flat, item, float(min(high[0] - low[0], high[2] - low[2])) / 2)
-    return beside if at_edge < _TOUCHING else parent
+    return beside if at_edge < _TOUCHING else parent if cost < math.inf else None
 
 
 def _likeliest(
     receptacles: list[SimObject], item: SimObject, reach: float
 ) -> tuple[float, SimObject | None]:
-    """Return the receptacle that an object is likeliest in, after its cost; infinite for none."""
+    """Return the least cost of a receptacle as an object's parent, and the receptacle."""
     low, high = item.bounds()
     point = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    best: tuple[float, SimObject | None] = (math.inf, None)
-    for receptacle in receptacles:
-        cost = _parent_cost(receptacle, point, item, reach)
-        if cost is not None and cost < best[0]:
-            best = (cost, receptacle)
-    return best
+    costs = (
+        (_parent_cost(receptacle, point, item, reach), receptacle) for receptacle in receptacles
+    )
+    return min(costs, key=lambda pair: pair[0], default=(math.inf, None))
 
 
-def _parent_cost(
-    receptacle: SimObject, point: Array, item: SimObject, reach: float
-) -> float | None:
-    """Return how unlikely it is that the object above `point` is in a receptacle; None: it is not.
+def _parent_cost(receptacle: SimObject, point: Array, item: SimObject, reach: float) -> float:
+    """Return how unlikely it is that the object above `point` is in a receptacle; infinite: not.
 
     Hollow receptacles come before surfaces, small before large ones. The floor comes before
     furniture of which it is not known that things stand so low in it, and else last. `reach` is
@@ -205,7 +201,7 @@ def _parent_cost(
         low[0] - reach <= point[0] <= high[0] + reach
         and low[2] - reach <= point[2] <= high[2] + reach
     ):
-        return None
+        return math.inf
     gap = float(point[1]) - receptacle.surface_height()
     if receptacle.object_type == "Floor":
         return 0.9 if gap <= _ON_FLOOR else _FAR_ABOVE
@@ -220,11 +216,11 @@ def _parent_cost(
             x, _, z = np.abs(yaw_matrix(float(receptacle.rotation[1])).T @ (point - middle))
             inside = inside and bool(x <= half[0] and z <= half[1])
         if not inside or (receptacle.type.pickupable and float(np.prod(item.box_size)) > volume):
-            return None
+            return math.inf
         return 0.01 * volume
     if -0.12 <= gap <= 0.25:
         return 0.1 + abs(gap)
-    return 1.0 + abs(gap) if low[1] <= point[1] <= high[1] + 0.05 else None
+    return 1.0 + abs(gap) if low[1] <= point[1] <= high[1] + 0.05 else math.inf
 
 
 def _depth_below(receptacle: SimObject) -> float:

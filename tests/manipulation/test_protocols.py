@@ -76,18 +76,10 @@ def test_a_put_counts_at_rest_or_when_it_is_released(prepare_run, monkeypatch):
     assert (lenient.done, lenient.reward) == (True, lenient.max_reward)
 
 
-def test_the_criterion_of_puts_is_a_setting_of_puts_alone(prepare_run):
-    def config(task, **changes):
-        run = prepare_run("still", tasks=(task,), **changes)
-        return run.evaluation.bind(run.suite.baselines["still"](0)).workload.config
-
-    changes = {"put_criterion": "release"}
-    assert config(PUT) != config(PUT, **changes)
-    assert config(PICK) == config(PICK, **changes)
-    assert config(PUT) == config(PUT, put_criterion="at-rest")
-
-
-@pytest.mark.parametrize("changes", [{"stand": "before"}, {"hand": "high"}, {"closing": "end"}])
+@pytest.mark.parametrize(
+    "changes",
+    [{"stand": "before"}, {"hand": "high"}, {"closing": "end"}, {"put_criterion": "release"}],
+)
 def test_each_is_another_run(prepare_run, changes):
     def config(**changes):
         run = prepare_run("still", **changes)

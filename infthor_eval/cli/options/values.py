@@ -94,11 +94,8 @@ class FiniteFloat(click.FloatRange):
 
 
 class SceneName(click.ParamType):
-    """The name of a procedural scene or of a floor plan, which need not exist.
-
-    Args:
-        houses: whether it may be the file of a house, too, which is given as a path.
-    """
+    """The name of a procedural scene or of a floor plan, which need not exist; with `houses`, it
+    may be the path of a house's file, too."""
 
     name = "SCENE"
 

@@ -63,9 +63,9 @@ def test_a_trajectory_in_a_house_carries_it_to_all_commands(tmp_path, run_cli):
     assert replayed["whole"] == replayed["trajectories"] == 1
     code, out, _ = run_cli("questions", tmp_path / "set", "--out", tmp_path / "qa.csv")
     assert code == 0 and "0 questions" not in out
-    twins = _print("twins", path, "--out", tmp_path / "twins", "--kinds", "move", "--per-kind", 1)
+    twins = _print("twins", path, "--out", tmp_path / "twins", "--kinds", "swap")
     assert twins["pairs"] > 0
-    run = ("--model", "expert", "--tasks", "infthor_plans", "--data", path, "--output", tmp_path)
+    run = ("--model", "planner", "--tasks", "infthor_plans", "--data", path, "--output", tmp_path)
     code, out, err = run_cli("run", *run)
     assert code == 0 and "100.0" in out, err
 
