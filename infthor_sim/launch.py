@@ -15,7 +15,8 @@ def player_command(data: Path | str | None = None, supplement: Path | str | None
         data: folder of recorded floor plans (`scenes.dataset`); None: procedural scenes alone.
         supplement: file with additions to them from trajectories (`scenes.supplement`).
     """
-    words = [sys.executable, "-m", "infthor_sim.player"]
+    # -P: a numpy.py in the folder where one stands is none of its modules.
+    words = [sys.executable, "-P", "-m", "infthor_sim.player"]
     if data is not None:
         words += ["--data", str(Path(data).resolve())]
     if supplement is not None:

@@ -36,6 +36,8 @@ class NamedPose:
 def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = False) -> None:
     """Give the named objects new poses, and ids by them; loose objects that are not named vanish.
 
+    In a house they keep their ids, as in AI2-THOR.
+
     A name that the scene does not have means any object of its type: the part of a name after the
     type differs between versions of AI2-THOR.
     """
@@ -51,9 +53,11 @@ def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = Fa
             if not keep_moveable:
                 world.set_pose(template, pose.position, pose.rotation)
             continue
-        item = template.duplicate(
-            _unused_id(world.objects, pose.name.split("_", 1)[0], pose.position)
-        )
+        if world.keeps_ids:
+            new_id = _unused_id(world.objects, template.object_id, "_copy_")
+        else:
+            new_id = _unused_id(world.objects, object_id(pose.name.split("_", 1)[0], pose.position))
+        item = template.duplicate(new_id)
         item.name, item.position, item.rotation = (
             pose.name,
             pose.position.copy(),
@@ -130,24 +134,25 @@ class _Templates:
         return self._chosen[name]
 
 
-def _unused_id(taken: Container[str], object_type: str, position: Array) -> str:
-    base = object_id(object_type, position)
+def _unused_id(taken: Container[str], base: str, mark: str = "|") -> str:
     number = 1
     unused = base
     while unused in taken:
-        unused = f"{base}|{number}"
+        unused = f"{base}{mark}{number}"
         number = number + 1
     return unused
 
 
 def ids_by_position(world: World) -> dict[str, str]:
     """Return the ids that AI2-THOR gives loose objects where they are now, by their present ids."""
+    if world.keeps_ids:
+        return {}
     # A slice keeps its id, whose number says how it is drawn.
     loose = [o for o in world.objects.values() if o.type.pickupable and not _is_slice(o)]
     taken = {*world.objects, *world.disabled}.difference(o.object_id for o in loose)
     renamed = {}
     for item in loose:
-        renamed[item.object_id] = _unused_id(taken, item.object_type, item.position)
+        renamed[item.object_id] = _unused_id(taken, object_id(item.object_type, item.position))
         taken.add(renamed[item.object_id])
     return renamed
 

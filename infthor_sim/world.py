@@ -75,6 +75,7 @@ class World:
         open_at_start: ids of the objects that are open in the recording; its cells already go
             around them.
         templates: copies of the loose objects as the scene first had them, by type.
+        keeps_ids: objects keep their ids, which are not made of positions, as in ProcTHOR's houses.
         arm: the arm of the only agent; None for agents that hold things in front of their camera.
         disabled: objects that are out of the scene until they are enabled again, by id.
         appearance: randomized looks.
@@ -93,6 +94,7 @@ class World:
     walls: tuple[Wall, ...] = ()
     open_at_start: frozenset[str] = frozenset()
     templates: dict[str, list[SimObject]] = field(default_factory=dict)
+    keeps_ids: bool = False
     arm: Arm | None = None
     disabled: dict[str, SimObject] = field(default_factory=dict)
     appearance: Appearance = field(default_factory=Appearance)

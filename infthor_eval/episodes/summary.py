@@ -110,16 +110,22 @@ def common_results(
     }
 
 
-def success_rate(records: Sequence[UnitRecord[P]], n_missing: int = 0) -> Rate | None:
+def success_rate(
+    records: Sequence[UnitRecord[P]],
+    n_missing: int = 0,
+    succeeds: Callable[[P], bool] = lambda payload: payload.done,
+) -> Rate | None:
     """Return the share of successes among results, clustered by trajectory; None without any.
 
     Args:
         records: records that count.
         n_missing: number of further episodes that count.
+        succeeds: whether an episode is a success.
     """
     answered = answered_records(records)
     rate = clustered_rate(
-        [float(record.payload.done) for record in answered], [record.cluster for record in answered]
+        [float(succeeds(record.payload)) for record in answered],
+        [record.cluster for record in answered],
     )
     return None if rate is None else rate.out_of(len(records) + n_missing)
 

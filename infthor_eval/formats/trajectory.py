@@ -121,7 +121,8 @@ class StartState(_Fields):
 class Scene(_Fields, omit_defaults=False):
     """The initial state of a trajectory: scene, poses and states of objects, pose of the agent.
 
-    `object_states` is ours, and not written where it is empty, as in published files.
+    `object_states` and `house`, the JSON of a ProcTHOR house in place of a scene that simulators
+    know by `floor_plan`, are ours, and not written where they are empty, as in published files.
     """
 
     floor_plan: str
@@ -132,6 +133,7 @@ class Scene(_Fields, omit_defaults=False):
     dirty_and_empty: bool = False
     random_seed: int = 0
     object_states: list[StartState] | msgspec.UnsetType = msgspec.UNSET
+    house: dict[str, Any] | msgspec.UnsetType = msgspec.UNSET
 
 
 class ApiAction(_Fields):

@@ -47,6 +47,7 @@ def initial_scene(settings: TrajectorySettings, view: SimulatorView, start: Init
             if loose.pickupable
         ],
         random_seed=settings.seed,
+        house=settings.house or msgspec.UNSET,
     )
 
 

@@ -128,7 +128,7 @@ class _Factory:
         self._longest = self._draft.copy()
 
     def _start_draft(self) -> Draft:
-        view = self._simulator.reset(self._settings.scene)
+        view = self._simulator.reset(self._settings.house or self._settings.scene)
         grid = reachable_grid(self._simulator)
         if not grid.cells:
             raise UsageError(

@@ -1,6 +1,7 @@
 """The trajectories to generate for a set."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.object_ids import Words
@@ -28,6 +29,7 @@ def trajectory_jobs(
     look_around: bool = False,
     words: Words = Words.NATURAL,
     scene_goal_filter: bool = True,
+    houses: Mapping[str, dict[str, Any]] | None = None,
 ) -> list[TrajectorySettings]:
     """Return the settings of all trajectories of a set, scene by scene.
 
@@ -44,6 +46,7 @@ def trajectory_jobs(
         look_around: True to walk long stretches with a level camera.
         words: the words of tasks, plain English or the published generator's.
         scene_goal_filter: False to sample task types that a scene's room type has not, too.
+        houses: ProcTHOR houses among the scenes, by their names.
 
     Raises:
         UsageError: the number of trajectories, or of their actions or sub-goals, exceeds the limit.
@@ -68,6 +71,7 @@ def trajectory_jobs(
             look_around=look_around,
             words=words,
             scene_goal_filter=scene_goal_filter,
+            house=(houses or {}).get(scene),
         )
         for scene in scenes
         for k in seeds

@@ -1,6 +1,6 @@
 """Settings of a generated trajectory."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from infthor_eval.formats.object_ids import Words
@@ -38,6 +38,7 @@ class TrajectorySettings:
             0: never.
         look_around: True to walk long stretches with a level camera (see the module `look_around`).
         words: the words of tasks, plain English or drawn among the published generator's.
+        house: JSON of the ProcTHOR house that the scene is; None for one that simulators know.
     """
 
     scene: str
@@ -51,6 +52,7 @@ class TrajectorySettings:
     save_floor: int = 0
     look_around: bool = False
     words: Words = Words.NATURAL
+    house: dict[str, Any] | None = field(default=None, hash=False, repr=False)
 
     @property
     def traj_id(self) -> str:

@@ -1,7 +1,7 @@
 """The config of a run of manipulation."""
 
 from infthor_eval.episodes.config import EpisodesConfig, EpisodeTaskConfig
-from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.manipulation.kinds import ManipulationKind, PutCriterion
 from infthor_eval.quantities import Amount
 
 __all__ = ["ArmTaskConfig", "ManipulationConfig"]
@@ -17,6 +17,7 @@ class ArmTaskConfig(EpisodeTaskConfig, frozen=True, kw_only=True, omit_defaults=
         hand: height of its arm at the start, see `Hand`; likewise.
         closing: when a policy's hand closes, see `Closing`; likewise.
         rules: number of the rules of success, see `SUCCESS_RULES`.
+        put_criterion: when a put succeeds, see `PutCriterion`.
     """
 
     kind: ManipulationKind
@@ -26,6 +27,7 @@ class ArmTaskConfig(EpisodeTaskConfig, frozen=True, kw_only=True, omit_defaults=
     hand: str | None = None
     closing: str | None = None
     rules: int = 1
+    put_criterion: PutCriterion = PutCriterion.AT_REST
 
 
 class ManipulationConfig(

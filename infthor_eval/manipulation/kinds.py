@@ -5,7 +5,7 @@ What the paper does not say of its protocol can be set (docs/manipulation.md).
 
 from enum import StrEnum
 
-__all__ = ["KIND_NAMES", "Closing", "Hand", "ManipulationKind", "Stand"]
+__all__ = ["KIND_NAMES", "Closing", "Hand", "ManipulationKind", "PutCriterion", "Stand"]
 
 
 class ManipulationKind(StrEnum):
@@ -32,6 +32,13 @@ class Closing(StrEnum):
     ASKED = "asked"
     ALWAYS = "always"
     END = "end"
+
+
+class PutCriterion(StrEnum):
+    """When a put succeeds: released wherever, or lying still in or on its receptacle."""
+
+    RELEASE = "release"
+    AT_REST = "at-rest"
 
 
 class Hand(StrEnum):

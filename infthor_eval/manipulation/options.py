@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from infthor_eval.episodes.options import SimulatorOptions
 from infthor_eval.errors import UsageError
-from infthor_eval.manipulation.kinds import Closing, Hand, Stand
+from infthor_eval.manipulation.kinds import Closing, Hand, PutCriterion, Stand
 
 __all__ = ["RADII", "ManipulationOptions"]
 
@@ -44,6 +44,14 @@ class ManipulationOptions(SimulatorOptions):
             "choices": tuple(map(str, Closing)),
             "help": "When a policy's hand closes in a pick-up: when it says so, with each step, or "
             "once at the end.",
+        },
+    )
+    put_criterion: str | None = field(
+        default=None,
+        metadata={
+            "choices": tuple(map(str, PutCriterion)),
+            "help": "When a put succeeds: once the object is released, wherever, or if it lies "
+            "still in or on its receptacle.",
         },
     )
     instruction: str | None = field(

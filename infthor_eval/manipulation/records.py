@@ -7,6 +7,7 @@ import msgspec
 
 from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.manipulation.config import ManipulationConfig
+from infthor_eval.manipulation.kinds import PutCriterion
 from infthor_eval.quantities import Amount, Number
 from infthor_eval.runs.journals.records import RecordTypes
 
@@ -66,6 +67,7 @@ class ArmRecord(
             start.
         closest: smallest such distance.
         max_reward: reward of a success.
+        put_criterion: when a put succeeds.
     """
 
     instruction: str
@@ -76,6 +78,17 @@ class ArmRecord(
     start_distance: Amount = 0.0
     closest: Amount = 0.0
     max_reward: Number = 0.0
+    put_criterion: PutCriterion = PutCriterion.AT_REST
+
+    @property
+    def done(self) -> bool:
+        """Whether it is a success."""
+        return self.released if self.put_criterion == PutCriterion.RELEASE else super().done
+
+    @property
+    def released(self) -> bool:
+        """Whether the object of a put was released, wherever."""
+        return self.ended in (ArmEnded.DONE, ArmEnded.ELSEWHERE)
 
     @property
     def n_collisions(self) -> int:

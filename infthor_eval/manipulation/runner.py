@@ -10,6 +10,7 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.manipulation.actors import ArmActor, ArmSituation, Step
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, arm_of
 from infthor_eval.manipulation.expert import ExpertStates
+from infthor_eval.manipulation.kinds import PutCriterion
 from infthor_eval.manipulation.records import ArmEnded, ArmRecord, ArmStep
 from infthor_eval.manipulation.task import ManipulationTask
 from infthor_eval.manipulation.trajectories import ArmEpisode
@@ -30,6 +31,7 @@ def arm_record(task: ManipulationTask, episode: ArmEpisode) -> ArmRecord:
         kind=str(episode.kind),
         instruction=task.instruction(episode),
         max_reward=task.settings.reward,
+        put_criterion=PutCriterion(task.settings.put_criterion),
     )
 
 
@@ -82,16 +84,11 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
             )
             steps, ended = self._act(environment, outcome, task.settings.max_steps)
         closest = min([outcome.distance, *(step.distance for step in steps)])
-        reward = task.settings.reward if ended == ArmEnded.DONE else 0.0
-        return EpisodeResult(
-            msgspec.structs.replace(
-                self.begun,
-                steps=tuple(steps),
-                closest=round(closest, _DIGITS),
-                reward=reward,
-                ended=str(ended),
-            )
+        record = msgspec.structs.replace(
+            self.begun, steps=tuple(steps), closest=round(closest, _DIGITS), ended=str(ended)
         )
+        reward = task.settings.reward if record.done else 0.0
+        return EpisodeResult(msgspec.structs.replace(record, reward=reward))
 
     def _act(
         self, environment: ArmEnvironment, outcome: ArmOutcome, max_steps: int

@@ -14,7 +14,8 @@ from infthor_eval.episodes.summary import (
     summarise_episodes,
 )
 from infthor_eval.manipulation.config import ArmTaskConfig, ManipulationConfig
-from infthor_eval.manipulation.records import ArmRecord
+from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.manipulation.records import ArmEnded, ArmRecord
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.runs import UnitRecord
 
@@ -30,6 +31,8 @@ class ArmTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
         kind: "pickup" or "put".
         radius: radius of the hand's sphere, metres.
         success: share of successful episodes.
+        released: share of puts whose object was released, wherever; None for pick-ups.
+        at_rest: share of puts whose object then lies in or on its receptacle; likewise.
         inside: share of episodes whose object is in the sphere at the start: pick-ups without a
             movement.
         closest: smallest distance from the sphere's centre to the target, metres, mean over
@@ -43,6 +46,8 @@ class ArmTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     kind: str
     radius: float
     success: Rate | None
+    released: Rate | None
+    at_rest: Rate | None
     inside: Rate | None
     closest: float | None
     steps: float | None
@@ -71,12 +76,16 @@ def _summarise_task(
     config: ArmTaskConfig, records: Sequence[Record], n_missing: int
 ) -> ArmTaskSummary:
     acted = answered_records(records)
+    counted = counted_records(records)
+    puts = counted if config.kind == ManipulationKind.PUT else []
     starts_inside = [float(record.payload.starts_inside) for record in acted]
     return ArmTaskSummary(
         **common_results(config, records, n_missing),
         kind=config.kind,
         radius=config.radius,
-        success=success_rate(counted_records(records), n_missing),
+        success=success_rate(counted, n_missing),
+        released=success_rate(puts, n_missing, lambda put: put.released),
+        at_rest=success_rate(puts, n_missing, lambda put: put.ended == ArmEnded.DONE),
         inside=clustered_rate(starts_inside, [record.cluster for record in acted]),
         closest=_mean([record.payload.closest for record in acted]),
         steps=_mean([len(record.payload.steps) for record in acted]),

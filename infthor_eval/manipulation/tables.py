@@ -21,6 +21,7 @@ __all__ = ["overview_table", "result_tables"]
 
 _STILL = "still"  # the baseline that never moves
 _ABOVE = ("Pick-up above still", "Put above still")
+_CRITERIA = ("Put, released", "Put, at rest")
 _FLOOR = (
     "Above still: percentage points more than the baseline that never moves, in the same episodes. "
     "With a sphere of 0.5 m it alone is above Table 6, so the paper's protocol differs from this "
@@ -76,6 +77,7 @@ def _success_table(runs: Sequence[RunSummary]) -> Table:
         "skipped",
         "failed",
         "not asked",
+        *_CRITERIA,
         *_ABOVE,
     )
     columns = (Column("model", False), Column("radius, m", False), *map(Column, names))
@@ -118,6 +120,8 @@ def _cells(pair: Sequence[ArmTaskSummary | None]) -> Iterator[str]:
     yield str(max(sum(task.skipped.values()) for task in tasks))
     yield str(sum(task.n_failed for task in tasks))
     yield str(sum(task.n_not_asked for task in tasks))
+    for rate in (pair[1].released, pair[1].at_rest) if pair[1] else (None, None):
+        yield format_percent(rate)
 
 
 def _episodes_table(tasks: Sequence[tuple[str, str, ArmTaskSummary]]) -> Table:

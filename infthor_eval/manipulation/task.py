@@ -11,7 +11,14 @@ from infthor_eval.household.wording import canonical_type, noun
 from infthor_eval.manipulation.config import ArmTaskConfig
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import SUCCESS_RULES, Grasp
-from infthor_eval.manipulation.kinds import KIND_NAMES, Closing, Hand, ManipulationKind, Stand
+from infthor_eval.manipulation.kinds import (
+    KIND_NAMES,
+    Closing,
+    Hand,
+    ManipulationKind,
+    PutCriterion,
+    Stand,
+)
 from infthor_eval.manipulation.options import RADII, ManipulationOptions
 from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory, read_arm_trajectory
 from infthor_eval.runs import TaskFile, TaskRequest
@@ -30,8 +37,10 @@ _CHOICES = {
     "stand": tuple(map(str, Stand)),
     "hand": tuple(map(str, Hand)),
     "closing": tuple(map(str, Closing)),
+    "put_criterion": tuple(map(str, PutCriterion)),
 }
-_GIVEN = ("instruction", "stand", "hand", "closing")  # settings that are options too
+# settings that are options too
+_GIVEN = ("instruction", "stand", "hand", "closing", "put_criterion")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +62,7 @@ class ArmTaskSettings:
         stand: where the agent stands at the start, see `Stand`.
         hand: height of its arm at the start of a pick-up, see `Hand`.
         closing: when a policy's hand closes in a pick-up, see `Closing`.
+        put_criterion: when a put succeeds, see `PutCriterion`.
         gripper_threshold: value of a policy's gripper below which the hand closes; else it opens.
         translation_scale: see `Conversion`.
         max_step: see `Conversion`.
@@ -73,6 +83,7 @@ class ArmTaskSettings:
     stand: str = Stand.EXPERT
     hand: str = Hand.REST
     closing: str = Closing.ASKED
+    put_criterion: str = PutCriterion.AT_REST
     gripper_threshold: float = 0.5
     translation_scale: float = 1.0
     max_step: float = 0.1
@@ -175,6 +186,7 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             hand=self.settings.hand,
             closing=self.settings.closing,
             rules=SUCCESS_RULES,
+            put_criterion=PutCriterion(self.settings.put_criterion),
         )
 
     def _check_instruction(self, name: str) -> None:

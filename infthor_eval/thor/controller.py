@@ -10,9 +10,14 @@ from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.transport import PeerFault, SafeFifoServer
 
-__all__ = ["SafeController"]
+__all__ = ["SafeController", "scene_name"]
 
 _ANY_DISPLAY = "0"  # ai2thor requires some DISPLAY; a simulator without a window does not use it
+
+
+def scene_name(scene: str | dict[str, Any] | None) -> str:
+    """Return a scene's name for messages."""
+    return "(a house)" if isinstance(scene, dict) else str(scene)
 
 
 class SafeController(ai2thor.controller.Controller):
@@ -67,8 +72,7 @@ class SafeController(ai2thor.controller.Controller):
                     "AI2-THOR's Unity build is not installed and cannot be downloaded; go online "
                     "once, or name an executable"
                 ) from error
-            name = scene if isinstance(scene, str) else "(a house)"
-            raise SceneError(f"scene {name}: {message}") from error
+            raise SceneError(f"scene {scene_name(scene)}: {message}") from error
         except BaseException:
             self.stop()
             raise

@@ -50,7 +50,7 @@ def restore(simulator: Simulator, scene: Scene) -> RestoreReport:
     Raises:
         SimulatorError: the simulator has no such scene, or fails.
     """
-    loaded = simulator.reset(scene.floor_plan)
+    loaded = simulator.reset(scene.house or scene.floor_plan)
     report = RestoreReport()
     calls = _state_calls(scene)
     start = scene.init_action

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from infthor_eval.errors import SceneError, SimulatorError
-from infthor_eval.thor.controller import SafeController
+from infthor_eval.thor.controller import SafeController, scene_name
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.transport import PeerFault
 from infthor_eval.thor.view import SimulatorView, teleport_call, view_of
@@ -267,7 +267,7 @@ class Simulator:
             return view_of(self._controller.reset(self._scene))
         except (ValueError, RuntimeError) as error:
             message = " ".join(str(error).split())[:300]
-            raise SceneError(f"scene {self._scene}: {message}") from error
+            raise SceneError(f"scene {scene_name(self._scene)}: {message}") from error
 
     def _call(self, call: dict[str, Any]) -> SimulatorView:
         assert self._controller is not None
@@ -284,8 +284,8 @@ class Simulator:
             if self._call(call).success != success:
                 raise SimulatorError(
                     f"after a restart action {index} ({call['action']}) of the episode in "
-                    f"{self._scene} ended differently than before; run the episode again from its "
-                    "start"
+                    f"{scene_name(self._scene)} ended differently than before; run the episode "
+                    "again from its start"
                 )
 
     def _recover_from(self, fault: PeerFault) -> None:

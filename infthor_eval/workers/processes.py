@@ -12,6 +12,7 @@ from threading import Lock, Thread
 from typing import Any
 
 from infthor_eval.errors import Terminated
+from infthor_eval.safe_path import leave_safe_path, safe_path
 from infthor_eval.workers.host import WorkerHost, to_portable_error
 from infthor_eval.workers.link import Connect, OpenWorker, WorkerLostError
 
@@ -97,7 +98,8 @@ class ProcessLink:
             name=f"worker-{self._number}",
             daemon=True,
         )
-        self._process.start()
+        with safe_path():
+            self._process.start()
         theirs.close()
 
     def _send(self, message: Any) -> None:
@@ -126,6 +128,7 @@ class ProcessLink:
 
 def _serve(connection: "Connection[Any, Any]", number: int, count: int) -> None:
     """Run a worker's process: create the worker it is sent; do jobs until the driver is gone."""
+    leave_safe_path()
     # A terminal sends Ctrl-C to all processes; the driver decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _raise_terminated)

@@ -13,6 +13,13 @@ from infthor_sim.world import World
 __all__ = ["Surface", "contains_box", "drawer_offset", "find_parent", "surfaces"]
 
 _TOUCH = 0.008  # metres by which what stands on a vessel's floor may reach into it
+# metres: what a recorded box may lack at its sides, a floor above its height, a sink at its rim
+_BESIDE = 0.01
+_ON_FLOOR = 0.03
+_RIM = 0.005
+# costs of parents: of a floor far below, and most of a surface that a thing stands on by its edge
+_FAR_ABOVE = 5.0
+_TOUCHING = 0.12
 
 
 @dataclass(frozen=True)
@@ -153,43 +160,67 @@ def contains_box(vessel: SimObject, low: Array, high: Array) -> bool:
 def find_parent(world: World, item: SimObject) -> SimObject | None:
     """Return the receptacle that an object is in or on, by position alone; None in mid-air."""
     low, high = item.bounds()
-    point = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    best: tuple[float, SimObject] | None = None
     inside = {o.object_id for o in world.descendants(item)}
-    for other in world.objects.values():
-        if other is item or not other.type.receptacle or other.object_id in inside:
-            continue
-        cost = _parent_cost(other, point, item)
-        if cost is not None and (best is None or cost < best[0]):
-            best = (cost, other)
-    return None if best is None else best[1]
+    others = [
+        o
+        for o in world.objects.values()
+        if o is not item and o.type.receptacle and o.object_id not in inside
+    ]
+    cost, parent = _likeliest(others, item, _BESIDE)
+    if cost < _FAR_ABOVE:
+        return parent
+    # There is nothing near below its middle: it stands on what is below its edge.
+    flat = [o for o in others if not (o.type.encloses or o.type.open_top)]
+    at_edge, beside = _likeliest(flat, item, float(min(high[0] - low[0], high[2] - low[2])) / 2)
+    return beside if at_edge < _TOUCHING else parent if cost < math.inf else None
 
 
-def _parent_cost(receptacle: SimObject, point: Array, item: SimObject) -> float | None:
-    """Return how unlikely it is that the object above `point` is in a receptacle; None: it is not.
+def _likeliest(
+    receptacles: list[SimObject], item: SimObject, reach: float
+) -> tuple[float, SimObject | None]:
+    """Return the least cost of a receptacle as an object's parent, and the receptacle."""
+    low, high = item.bounds()
+    point = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    costs = (
+        (_parent_cost(receptacle, point, item, reach), receptacle) for receptacle in receptacles
+    )
+    return min(costs, key=lambda pair: pair[0], default=(math.inf, None))
 
-    Hollow receptacles come before surfaces, small before large ones, and the floor last.
+
+def _parent_cost(receptacle: SimObject, point: Array, item: SimObject, reach: float) -> float:
+    """Return how unlikely it is that the object above `point` is in a receptacle; infinite: not.
+
+    Hollow receptacles come before surfaces, small before large ones. The floor comes before
+    furniture of which it is not known that things stand so low in it, and else last. `reach` is
+    how many metres `point` may be beside the receptacle.
     """
     low, high = receptacle.bounds()
     if receptacle.type.slides:
         low, high = low + drawer_offset(receptacle), high + drawer_offset(receptacle)
     if not (
-        low[0] - 0.01 <= point[0] <= high[0] + 0.01 and low[2] - 0.01 <= point[2] <= high[2] + 0.01
+        low[0] - reach <= point[0] <= high[0] + reach
+        and low[2] - reach <= point[2] <= high[2] + reach
     ):
-        return None
+        return math.inf
+    gap = float(point[1]) - receptacle.surface_height()
     if receptacle.object_type == "Floor":
-        return 5.0
+        return 0.9 if gap <= _ON_FLOOR else _FAR_ABOVE
     if receptacle.type.encloses or receptacle.type.open_top:
-        top = (low[1] + high[1]) / 2 if receptacle.type.slides else high[1] - 0.005
+        # Things stand on the rim of a sink, but on no other one's.
+        rim = _RIM if receptacle.pieces else -_RIM
+        top = (low[1] + high[1]) / 2 if receptacle.type.slides else high[1] + rim
         inside = low[1] - _depth_below(receptacle) <= point[1] <= top
         volume = float(np.prod(np.maximum(high - low, 0.02)))
+        if receptacle.type.open_top:  # not beside it, under its handle or flaps
+            middle, half = _standing_area(receptacle)
+            x, _, z = np.abs(yaw_matrix(float(receptacle.rotation[1])).T @ (point - middle))
+            inside = inside and bool(x <= half[0] and z <= half[1])
         if not inside or (receptacle.type.pickupable and float(np.prod(item.box_size)) > volume):
-            return None
+            return math.inf
         return 0.01 * volume
-    gap = point[1] - receptacle.surface_height()
     if -0.12 <= gap <= 0.25:
         return 0.1 + abs(gap)
-    return 1.0 + abs(gap) if low[1] <= point[1] <= high[1] + 0.05 else None
+    return 1.0 + abs(gap) if low[1] <= point[1] <= high[1] + 0.05 else math.inf
 
 
 def _depth_below(receptacle: SimObject) -> float:

@@ -60,11 +60,11 @@ def build_floor_plan(
     agent = _agent_at_start(name, nav, room, height)
     world = World(name, objects, (room,), nav, [agent], seed=_number(name), coarse=True)
     world.open_at_start = frozenset(o.object_id for o in objects.values() if o.state.openness > 0)
+    _assign_recorded_parents(world, entries)
     infer_layout(world)
     for item in objects.values():
         if item.object_type == "Floor":
             item.style = FLOOR_STYLES.index(room.floor_style)
-    _assign_recorded_parents(world, entries)
     assign_parents(world)
     add_door_cells(world)
     world.keep_templates()
@@ -79,7 +79,10 @@ def _agent_at_start(name: str, nav: NavGrid, room: RoomShell, height: float) -> 
 
 
 def _assign_recorded_parents(world: World, entries: Sequence[Mapping[str, Any]]) -> None:
-    """Attach loose objects to the innermost receptacle that the recording names, the smallest."""
+    """Attach loose objects to the innermost receptacle that the recording names, the smallest.
+
+    The floor is the outermost, however small.
+    """
     for entry in entries:
         item = world.objects.get(str(entry["objectId"]))
         if item is None or not item.type.pickupable:
@@ -87,11 +90,14 @@ def _assign_recorded_parents(world: World, entries: Sequence[Mapping[str, Any]])
         parents = [
             world.objects[p] for p in entry.get("parentReceptacles") or () if p in world.objects
         ]
-        inner = [
-            p for p in parents if p.object_type != "Floor" and p.type.receptacle and p is not item
-        ]
-        if inner:
-            world.attach(item, min(inner, key=lambda p: (float(np.prod(p.box_size)), p.object_id)))
+        holding = [p for p in parents if p.type.receptacle and p is not item]
+        if holding:
+            world.attach(item, min(holding, key=_size))
+
+
+def _size(receptacle: SimObject) -> tuple[bool, float, str]:
+    volume = float(np.prod(receptacle.box_size))
+    return receptacle.object_type == "Floor", volume, receptacle.object_id
 
 
 def _room(

@@ -177,7 +177,8 @@ def _infer_supports(world: World) -> None:
             low, high = item.bounds()
             middle = (low + high) / 2
             for other in world.objects.values():
-                if other.type.infer_support and _is_on(middle, other):
+                elsewhere = item.parent not in (None, other.object_id)
+                if other.type.infer_support and not elsewhere and _is_on(middle, other):
                     lying.setdefault(other.object_id, []).append(float(low[1]))
     for object_id, heights in lying.items():
         furniture = world.objects[object_id]

@@ -99,6 +99,7 @@ def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, fl
     )  # fmt: skip
     nav = _nav([r for _, rects in floors for r in rects], walls, list(objects.values()))
     world = World("Procedural", objects, rooms, nav, [_agent(house, nav)], walls=walls)
+    world.keeps_ids = True
     infer_layout(world)
     assign_parents(world)
     world.keep_templates()

@@ -88,6 +88,44 @@ def house() -> dict[str, Any]:
     }
 
 
+def furnished_house() -> dict[str, Any]:
+    """The same with things to do in it."""
+    made = house()
+    table = next(o for o in made["objects"] if o["id"].startswith("DiningTable"))
+    table["children"] += [
+        furniture("Mug|surface|2|9", "Mug_1", 0.8, 0.86, 2.2),
+        furniture("Plate|surface|2|11", "Plate_1", 1.3, 0.83, 2.2),
+    ]
+    book = furniture("Book|surface|3|1", "Book_1", 8.6, 0.75, 0.5)
+    made["objects"] += [
+        furniture("Microwave|2|6", "Microwave_1", 4.6, 1.05, 0.4),
+        furniture("SideTable|3|2", "Side_1", 8.6, 0.35, 0.5, children=[book]),
+    ]
+    return made
+
+
+def test_objects_of_a_house_keep_their_ids():
+    bench = Bench(size=20)
+    bench.reset("Procedural")
+    bench.ok("CreateHouse", house=furnished_house())
+    before = {o["objectId"] for o in bench.metadata["objects"]}
+    loose = [
+        {"objectName": o["name"], "position": o["position"], "rotation": o["rotation"]}
+        for o in bench.metadata["objects"]
+        if o["pickupable"]
+    ]
+    bench.ok("SetObjectPoses", objectPoses=loose)
+    assert {o["objectId"] for o in bench.metadata["objects"]} == before
+    bench.ok("InitialRandomSpawn", randomSeed=3)
+    assert {o["objectId"] for o in bench.metadata["objects"]} == before
+    bench.ok("SetObjectPoses", objectPoses=[loose[0], loose[0]])
+    named = [o for o in bench.metadata["objects"] if o["pickupable"]]
+    assert [o["objectId"] for o in named] == [
+        loose[0]["objectName"],
+        f"{loose[0]['objectName']}_copy_1",
+    ]
+
+
 def test_a_house_through_the_controller(launch):
     controller = launch(house())
     event = controller.last_event

@@ -1,8 +1,11 @@
 """What others import and start: Controller, `run SCRIPT`, the README's examples."""
 
+import json
 import os
+import py_compile
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +32,13 @@ controller = Controller(scene="bathroom-1", x_display="0.0", local_executable_pa
 controller.step(action="RotateRight")
 print(controller.last_event.metadata["sceneName"], sys.argv[1:], __name__)
 {ending}
+"""
+PLACE = """
+import json, os, sys
+told = [__file__, sys.argv, sys.path[0], __name__, __package__, str(__builtins__)]
+os.chdir(sys.argv[-1])
+same = sys.modules["__main__"].__dict__ is globals()
+print(json.dumps([*told, same, __file__, os.path.exists(__file__)]))
 """
 WAITING = """
 import time
@@ -172,7 +182,7 @@ def test_recorded_floor_plans_with_data():
 
 def test_the_command_starts_this_python_with_whole_paths(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert player_command() == f"{sys.executable} -m infthor_sim.player"
+    assert player_command() == f"{sys.executable} -P -m infthor_sim.player"
     command = player_command("a b", Path("s.json"))
     assert command.endswith(f" --data '{tmp_path}/a b' --supplement {tmp_path}/s.json")
 
@@ -181,6 +191,43 @@ def test_a_script_for_ai2thor_runs_as_it_stands(tmp_path):
     done = run_script(tmp_path, "controller.stop()", "script.py", "--data", "x", "-h")
     assert done.returncode == 0, done.stderr
     assert done.stdout == "bathroom-1 ['--data', 'x', '-h'] __main__\n"
+
+
+@pytest.fixture
+def places(tmp_path):
+    """A folder of scripts that print what python tells a script about its place."""
+    for folder in ("sub", "app", "away"):
+        (tmp_path / folder).mkdir()
+    for name in ("m.py", "no-ending", "sub/m.py", "app/__main__.py"):
+        (tmp_path / name).write_text(PLACE)
+    (tmp_path / "link.py").symlink_to("sub/m.py")
+    (tmp_path / "app-link").symlink_to("app")
+    with zipfile.ZipFile(tmp_path / "app.zip", "w") as archive:
+        archive.writestr("__main__.py", PLACE)
+    (tmp_path / "zip-link").symlink_to("app.zip")
+    py_compile.compile(str(tmp_path / "m.py"), str(tmp_path / "m.pyc"))
+    return tmp_path
+
+
+@pytest.mark.parametrize("flags", [[], ["-P"]], ids=["", "safe"])
+@pytest.mark.parametrize(
+    "script",
+    ["m.py", "./m.py", "sub/m.py", "sub/../m.py", "link.py", "no-ending", "m.pyc", "app", "app/",
+     "./app", "app-link", "app.zip", "./app.zip", "zip-link", "{place}/m.py", "{place}/app.zip"],
+)  # fmt: skip
+def test_a_script_is_told_its_place_as_python_tells_it(script, flags, places):
+    words = [script.format(place=places), "a", "--data", str(places / "away")]
+    by_python = python(*flags, *words, cwd=places)
+    by_us = python(*flags, "-m", "infthor_sim", "run", *words, cwd=places)
+    assert json.loads(by_us.stdout) == json.loads(by_python.stdout), by_us.stderr
+
+
+def test_no_process_runs_what_lies_in_the_folder_where_one_stands(tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "numpy.py").write_text("raise SystemExit('it was run')")
+    done = run_script(tmp_path / "sub", "controller.stop()", "script.py")
+    again = python("-m", "infthor_sim", "run", "sub/script.py", cwd=tmp_path)
+    assert (again.returncode, again.stdout) == (0, done.stdout), again.stderr
 
 
 def test_errors_and_exit_codes_of_a_script_are_its_own(tmp_path):
@@ -197,11 +244,13 @@ def test_errors_and_exit_codes_of_a_script_are_its_own(tmp_path):
     ("words", "message"),
     [
         (["run"], "arguments are required: script"),
-        (["run", "none.py"], "there is no file none.py"),
+        (["run", "none.py"], "none.py: cannot be read (No such file or directory)"),
+        (["run", "empty"], "empty: there is no __main__.py in it"),
         (["walk"], "invalid choice: 'walk'"),
     ],
 )
 def test_misuse_is_one_line(words, message, tmp_path):
+    (tmp_path / "empty").mkdir()
     done = python("-m", "infthor_sim", *words, cwd=tmp_path)
     assert done.returncode == 2
     assert message in done.stderr

@@ -11,7 +11,7 @@ from .scripted import ScriptedPolicy
 pytestmark = pytest.mark.usefixtures("shared_simulators")
 
 TWIN = "openvla-tiny"  # whose place a scripted policy takes
-PICK = "manipulathor_pickup"
+PICK, PUT = "manipulathor_pickup", "manipulathor_put"
 OPEN = ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.9)
 
 
@@ -61,7 +61,25 @@ def test_the_hand_begins_at_rest_low_or_high(picking):
     assert heights["low"] < heights["rest"] - 0.05 < heights["rest"] + 0.05 < heights["high"]
 
 
-@pytest.mark.parametrize("changes", [{"stand": "before"}, {"hand": "high"}, {"closing": "end"}])
+def test_a_put_counts_at_rest_or_when_it_is_released(prepare_run, monkeypatch):
+    monkeypatch.setattr(
+        "infthor_eval.runs.work.binding.load", lambda *_: ScriptedPolicy(lambda _: [OPEN])
+    )
+
+    def put(**changes):
+        (record,) = execute(prepare_run(TWIN, tasks=(PUT,), **changes)).records
+        return record.payload
+
+    usual, lenient = put(), put(put_criterion="release")
+    assert usual.ended == lenient.ended == "released elsewhere"
+    assert (usual.done, usual.reward) == (False, 0.0)
+    assert (lenient.done, lenient.reward) == (True, lenient.max_reward)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"stand": "before"}, {"hand": "high"}, {"closing": "end"}, {"put_criterion": "release"}],
+)
 def test_each_is_another_run(prepare_run, changes):
     def config(**changes):
         run = prepare_run("still", **changes)

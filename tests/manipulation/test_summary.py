@@ -116,8 +116,22 @@ def test_the_numbers_of_pick_ups():
 def test_the_numbers_of_puts():
     task = summed().tasks[PUT]
     assert (task.success.mean, task.success.n, task.n_trajectories) == (0.5, 2, 2)
+    assert (task.released.mean, task.at_rest.mean) == (1.0, 0.5)
     assert (task.closest, task.steps, task.collisions) == (pytest.approx(0.4), 2, 0)
     assert task.endings == {"done": 1, "released elsewhere": 1}
+
+
+def test_a_put_may_count_when_it_is_released():
+    records = [
+        msgspec.structs.replace(
+            record, payload=msgspec.structs.replace(record.payload, put_criterion="release")
+        )
+        for record in RECORDS
+    ]
+    task = summed(records).tasks[PUT]
+    assert (task.success.mean, task.released.mean, task.at_rest.mean) == (1.0, 1.0, 0.5)
+    assert list(task.outcomes.values()) == [1.0, 1.0]
+    assert summed(records).tasks[PICK].success == summed().tasks[PICK].success
 
 
 def test_a_summary_knows_no_order():
@@ -141,7 +155,8 @@ def test_table_6_has_the_published_columns_and_rows():
     names = [column.name for column in printed_table.columns]
     assert names == ["model", "radius, m", "Pick-up", "Put", "pick-ups", "puts", "trajectories",
                      "excluded", "skipped",
-                     "failed", "not asked", "Pick-up above still", "Put above still"]  # fmt: skip
+                     "failed", "not asked", "Put, released", "Put, at rest",
+                     "Pick-up above still", "Put above still"]  # fmt: skip
     published = [cells(row, printed_table) for row in printed_table.rows if row.is_published]
     assert [(row["model"], row["radius, m"], row["Pick-up"], row["Put"]) for row in published] == [
         ("OpenVLA 7B", "published, Table 6", "3.82", "6.38"),
@@ -150,6 +165,7 @@ def test_table_6_has_the_published_columns_and_rows():
     (row,) = own(printed_table)
     assert (row["model"], row["radius, m"]) == ("a policy", "0.5")
     assert row["Pick-up"].startswith("33.3 of 3 answered [") and row["Put"].startswith("50.0 [")
+    assert row["Put, released"].startswith("100.0") and row["Put, at rest"] == row["Put"]
     assert [row[name] for name in ("pick-ups", "puts", "trajectories", "excluded", "skipped",
                                    "failed")] == [
         "4", "2", "2", "2", "0", "1",

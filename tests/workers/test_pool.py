@@ -172,6 +172,17 @@ def test_processes_share_the_processors_of_the_machine(monkeypatch):
     shared.close()
 
 
+def test_no_process_runs_what_lies_in_the_folder_where_one_stands(tmp_path, monkeypatch):
+    for name in ("pickle", "signal", "threading", "numpy"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit(f'{__file__} was run')")
+    monkeypatch.chdir(tmp_path)
+    shared = Pool(WorkerSettings(2).connect(OpenCounter()), 2)
+    # What a worker's model starts looks for modules as it does without workers.
+    assert shared.open()["safe path"] is None
+    shared.close()
+    assert "PYTHONSAFEPATH" not in os.environ
+
+
 @pytest.mark.parametrize(
     ("count", "gpus", "shares"),
     [

@@ -65,6 +65,7 @@ class Counter:
             "number": number,
             "threads": os.environ["OMP_NUM_THREADS"],
             "gpus": os.environ.get("CUDA_VISIBLE_DEVICES"),
+            "safe path": os.environ.get("PYTHONSAFEPATH"),
         }
 
     def do(self, job: Job) -> Iterator[tuple[int, int]]:

@@ -94,12 +94,20 @@ class FiniteFloat(click.FloatRange):
 
 
 class SceneName(click.ParamType):
-    """The name of a procedural scene or of a floor plan, which need not exist."""
+    """The name of a procedural scene or of a floor plan, which need not exist; with `houses`, it
+    may be the path of a house's file, too."""
 
     name = "SCENE"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+    def __init__(self, *, houses: bool = False) -> None:
+        self._houses = houses
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str | Path:
         """See `click.ParamType`."""
+        if self._houses and str(value).endswith(".json"):
+            return Path(value)
         kind, _, seed = str(value).rpartition("-")
         has_seed = re.fullmatch(r"[0-9]+", seed) is not None
         if (kind in SCENE_KINDS and has_seed) or str(value).startswith("FloorPlan"):

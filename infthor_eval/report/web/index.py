@@ -18,6 +18,7 @@ from infthor_eval.report.web.processors import n_processors
 from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.sections import Section
 from infthor_eval.runs import RunHeader, read_header
+from infthor_eval.safe_path import safe_path
 from infthor_eval.storage.files import file_name, prepare_folder
 from infthor_eval.tables import Column, Row, Table
 
@@ -135,7 +136,7 @@ def _executor(n_jobs: int) -> Iterator[Executor | None]:
     if n_workers < 2 or n_jobs <= _FEW:
         yield None
         return
-    with ProcessPoolExecutor(n_workers, mp_context=get_context("spawn")) as executor:
+    with safe_path(), ProcessPoolExecutor(n_workers, get_context("spawn")) as executor:
         yield executor
 
 

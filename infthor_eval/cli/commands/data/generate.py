@@ -27,10 +27,11 @@ __all__ = ["command"]
 @click.option(
     "--scene",
     "scenes",
-    type=SceneName(),
+    type=SceneName(houses=True),
     multiple=True,
     required=True,
-    help="kitchen-3, FloorPlan10, ... (see `ls scenes`); may be repeated.",
+    help="kitchen-3, FloorPlan10, ... (see `ls scenes`), or the file of a ProcTHOR house "
+    "(house.json); may be repeated.",
 )
 @click.option(
     "--min-steps",
@@ -115,7 +116,7 @@ __all__ = ["command"]
 @click.pass_context
 def command(
     context: click.Context,
-    scenes: tuple[str, ...],
+    scenes: tuple[str | Path, ...],
     min_steps: int,
     min_subgoals: int,
     max_fail: int,
@@ -138,6 +139,7 @@ def command(
     Trajectories in the folder are not generated again. Exit code 1 if one cannot be generated.
     """
     from infthor_eval.cli.progress.bar import JobBar, PacedBar
+    from infthor_eval.formats.houses import read_house
     from infthor_eval.formats.object_ids import Words
     from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
@@ -148,7 +150,10 @@ def command(
 
     worker_settings = parse_worker_settings(**workers)
     notes = error_console()
-    chosen, skipped = without_bathrooms(scenes) if test_set else (scenes, [])
+    named = [read_house(scene) if isinstance(scene, Path) else (scene, None) for scene in scenes]
+    houses = {name: house for name, house in named if house is not None}
+    names = [name for name, _ in named]
+    chosen, skipped = without_bathrooms(names) if test_set else (names, [])
     if skipped:
         notes.print(f"bathrooms are left out of test sets: {', '.join(skipped)}")
     jobs = trajectory_jobs(
@@ -163,6 +168,7 @@ def command(
         look_around=look_around,
         words=Words(words),
         scene_goal_filter=not no_scene_goal_filter,
+        houses=houses,
     )
     with hold_folder(out), progress_bar(notes) as progress:
         bar = PacedBar(progress, "generate", len(jobs))

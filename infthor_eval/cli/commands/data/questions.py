@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, FiniteFloat, WholeNumber
+from infthor_eval.cli.options.values import PATH, FiniteFloat, WholeNumber, floor_plans_option
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
@@ -146,6 +146,7 @@ def questions(
     is_flag=True,
     help="Make twins for agents: trajectories with a final task, in place of questions.",
 )
+@floor_plans_option
 @worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
 @click.pass_context
@@ -160,6 +161,7 @@ def twins(
     limit: int | None,
     unity: bool,
     final_tasks: bool,
+    data: Path | None,
     as_json: bool,
     **workers: Any,
 ) -> None:
@@ -200,7 +202,7 @@ def twins(
             )
         summary = make(
             selection,
-            launch.unity_launch() if unity else launch.embedded_launch(None, supplement),
+            launch.unity_launch() if unity else launch.embedded_launch(data, supplement),
             out,
             settings,
             worker_settings=worker_settings,

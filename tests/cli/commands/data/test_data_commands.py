@@ -15,6 +15,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import read_questions
 
 from ....helpers.command_line import option_words
+from ....infthor_sim.test_houses import furnished_house
 
 
 def _print(*arguments: object) -> dict:
@@ -44,6 +45,49 @@ def work(tmp_path_factory):
 def made_folder(printed, work):
     """The folder of the trajectory and its set."""
     return work
+
+
+@pytest.mark.slow
+def test_a_trajectory_in_a_house_carries_it_to_all_commands(tmp_path, run_cli):
+    (tmp_path / "made").mkdir()
+    (tmp_path / "made/my.json").write_text(json.dumps(furnished_house()))
+    words = ("--scene", tmp_path / "made/my.json", "--min-steps", 40, "--min-subgoals", 2)
+    code, _, err = run_cli("generate", *words, "--seed", 1, "--out", tmp_path / "made/data")
+    assert code == 0, err
+    shutil.move(tmp_path / "made/data", tmp_path / "data")
+    shutil.rmtree(tmp_path / "made")  # the house's file is needed no more
+    (path,) = (tmp_path / "data").glob("procthor-*-seed1.json")
+    assert json.loads(path.read_text())["scene"]["house"] == furnished_house()
+
+    replayed = _print("replay", path, "--out", tmp_path / "set")
+    assert replayed["whole"] == replayed["trajectories"] == 1
+    code, out, _ = run_cli("questions", tmp_path / "set", "--out", tmp_path / "qa.csv")
+    assert code == 0 and "0 questions" not in out
+    twins = _print("twins", path, "--out", tmp_path / "twins", "--kinds", "swap")
+    assert twins["pairs"] > 0
+    run = ("--model", "planner", "--tasks", "infthor_plans", "--data", path, "--output", tmp_path)
+    code, out, err = run_cli("run", *run)
+    assert code == 0 and "100.0" in out, err
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "cannot be read (No such file or directory)"),
+        ("{", "not valid JSON"),
+        ("[]", "has not the lists rooms, walls, objects of a house"),
+        ('{"rooms": {}, "walls": [], "objects": []}', "has not the lists rooms"),
+        ('{"scene": {}, "plan": {}}', "has not the lists rooms"),
+    ],
+)
+def test_a_file_that_is_no_house_is_one_line(tmp_path, run_cli, content, message):
+    path = tmp_path / "house.json"
+    if content is not None:
+        path.write_text(content)
+    code, _, err = run_cli("generate", "--scene", path, "--out", tmp_path / "data")
+    assert (code, err.count("\n")) == (2, 1)
+    assert f"{path}: {message}" in err
+    assert not (tmp_path / "data").exists()
 
 
 def test_the_three_commands_make_a_set(printed, work, run_cli):
