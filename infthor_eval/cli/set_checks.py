@@ -91,6 +91,9 @@ def _trajectories(contents: SetContents) -> Iterator[Check]:
         yield Check("trajectories", "ok", detail)
         sizes = {f"{width}x{height}": n for (width, height), n in contents.image_sizes.items()}
         detail = f"in {_counted(contents.image_folders)}; {_counted(sizes)} pixels"
+        if contents.conversions:
+            done = _in_words(contents.conversions)
+            detail += f"; converted for models, as a browser shows them: {done}"
         yield Check("pictures", "ok", detail)
         yield Check("step logs", "ok", _counted(contents.layouts))
     if contents.unreadable:

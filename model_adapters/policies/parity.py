@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.frames import IMAGE_SUFFIXES, FrameRef
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.tables import Column, Row, Table
 from model_adapters.options.policies import VlaHttpOptions
@@ -29,7 +29,6 @@ __all__ = [
 ]
 
 INSTRUCTIONS = ("pick up the mug", "pick up the apple", "Put the knife in the drawer")
-_PICTURES = (".png", ".jpg", ".jpeg")
 _NOISE = 4
 
 
@@ -131,13 +130,13 @@ def frames_in_folder(folder: Path) -> list[FrameRef]:
         DataError: the folder has no pictures, or cannot be read.
     """
     paths = (
-        sorted(path for path in folder.iterdir() if path.suffix.lower() in _PICTURES)
+        sorted(path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES)
         if folder.is_dir()
         else []
     )
     if not paths:
         raise DataError(
-            f"{folder}: has no pictures ({', '.join(_PICTURES)}); give a folder of frames"
+            f"{folder}: has no pictures ({', '.join(IMAGE_SUFFIXES)}); give a folder of frames"
         )
     return [FrameRef(path) for path in paths]
 
