@@ -9,6 +9,7 @@ __all__ = [
     "DEFAULT_INTRINSICS",
     "ActionOptions",
     "CheckpointPolicyOptions",
+    "FrameCrop",
     "OpenVLAOptions",
     "PolicyOptions",
     "SpatialVLACheckpointOptions",
@@ -89,7 +90,19 @@ class CheckpointPolicyOptions(CheckpointSource, PolicyOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class OpenVLAOptions(CheckpointPolicyOptions):
+class FrameCrop:
+    """What OpenVLA gets of a frame, on any engine.
+
+    Attributes:
+        center_crop: the middle, 90 % of the area, for checkpoints that were fine-tuned on random
+            crops (those for LIBERO); false gives the whole frame.
+    """
+
+    center_crop: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenVLAOptions(FrameCrop, CheckpointPolicyOptions):
     """Options of `openvla`."""
 
     pretrained: str = "openvla/openvla-7b"

@@ -12,6 +12,7 @@ from model_adapters.policies.checkpoint import PolicyCheckpoint, find_policy_che
 from model_adapters.policies.openvla.adapter import OpenVLADescription, describe_openvla
 from model_adapters.policies.openvla.network import prompt_ids
 from model_adapters.policies.policy import VlaPolicy
+from model_adapters.policies.preprocessing import crop_centre
 from model_adapters.policies.statistics import ACTION_SIZE, Actions
 from model_adapters.protocols import Capabilities
 from model_adapters.vllm.arguments import engine_arguments
@@ -48,23 +49,26 @@ class OpenVLAOnVllm:
             "limit_mm_per_prompt": {"image": 1}
         }
         engine = Engine(name, arguments, options.threads)
-        identity = checkpoint.origin | {
-            "engine": "vllm",
-            "versions": {**versions(), "vllm": engine.version},
-            "dtype": options.dtype,
-            "quantization": options.quantization,
-            "parallel": [
-                options.tensor_parallel_size,
-                options.pipeline_parallel_size,
-                options.data_parallel_size,
-            ],
-            "enforce_eager": options.enforce_eager,
-            "batch_invariant": engine.batch_invariant,
-            "unnorm_key": description.key,
-        }
-        return VllmPolicy(
-            name, _VllmNetwork(name, engine, description), description, options, identity
+        identity = (
+            checkpoint.origin
+            | {
+                "engine": "vllm",
+                "versions": {**versions(), "vllm": engine.version},
+                "dtype": options.dtype,
+                "quantization": options.quantization,
+                "parallel": [
+                    options.tensor_parallel_size,
+                    options.pipeline_parallel_size,
+                    options.data_parallel_size,
+                ],
+                "enforce_eager": options.enforce_eager,
+                "batch_invariant": engine.batch_invariant,
+            }
+            | description.identity(options)
         )
+        size = description.config.image_size(options.pretrained)
+        network = _VllmNetwork(name, engine, description, size if options.center_crop else None)
+        return VllmPolicy(name, network, description, options, identity)
 
 
 class _TokenizerConfig(msgspec.Struct):
@@ -89,12 +93,15 @@ def _check_begin_token(name: str, checkpoint: PolicyCheckpoint) -> None:
 
 
 class _VllmNetwork:
-    """A network that lets vLLM decode the action tokens."""
+    """A network that lets vLLM decode the action tokens; frames are cropped to `crop`, if any."""
 
-    def __init__(self, name: str, engine: Engine, description: OpenVLADescription) -> None:
+    def __init__(
+        self, name: str, engine: Engine, description: OpenVLADescription, crop: int | None
+    ) -> None:
         self.engine = engine
         self._name = name
         self._description = description
+        self._crop = crop
 
     def predict(self, image: Image.Image, instruction: str, *, constrained: bool) -> Actions:
         """Return a chunk of one action; see `Network.predict` of the policies."""
@@ -106,6 +113,8 @@ class _VllmNetwork:
         }
         if constrained:
             settings["allowed_token_ids"] = list(action_ids)
+        if self._crop is not None:
+            image = crop_centre(image, self._crop)
         request = EngineRequest(prompt_ids(self._description.tokenizer, instruction), [image])
         (output,) = self.engine.generate([request], settings)
         if len(output.ids) != ACTION_SIZE:

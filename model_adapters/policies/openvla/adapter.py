@@ -7,7 +7,8 @@ from tokenizers import Tokenizer
 
 from infthor_eval.errors import ModelError
 from model_adapters.hf.loading.checkpoint import wrap_loading_errors
-from model_adapters.options.policies import OpenVLAOptions, PolicyOptions
+from model_adapters.options.policies import FrameCrop, OpenVLAOptions
+from model_adapters.options.tiny import OpenVLATinyOptions
 from model_adapters.policies.checkpoint import PolicyCheckpoint
 from model_adapters.policies.openvla.actions import ActionBins
 from model_adapters.policies.openvla.config import OpenVLAConfig
@@ -40,6 +41,11 @@ class OpenVLADescription:
     tokenizer: Tokenizer
     bins: ActionBins
 
+    def identity(self, options: FrameCrop) -> dict[str, Any]:
+        """Return the dataset and what is made of frames, as JSON values."""
+        cropped = {"center_crop": True} if options.center_crop else {}
+        return {"unnorm_key": self.key} | cropped
+
 
 def describe_openvla(checkpoint: PolicyCheckpoint, unnorm_key: str | None) -> OpenVLADescription:
     """Read the files beside OpenVLA's weights; without an unnorm_key, they must be of one dataset.
@@ -61,7 +67,9 @@ def describe_openvla(checkpoint: PolicyCheckpoint, unnorm_key: str | None) -> Op
     return OpenVLADescription(config, key, statistics, _tokenizer(checkpoint), bins)
 
 
-def load_openvla(name: str, checkpoint: PolicyCheckpoint, options: PolicyOptions) -> VlaPolicy:
+def load_openvla(
+    name: str, checkpoint: PolicyCheckpoint, options: OpenVLAOptions | OpenVLATinyOptions
+) -> VlaPolicy:
     """Load an OpenVLA; see `PolicyAdapter.build`."""
     description = describe_openvla(checkpoint, options.unnorm_key)
     config = description.config
@@ -80,8 +88,10 @@ def load_openvla(name: str, checkpoint: PolicyCheckpoint, options: PolicyOptions
             device=device,
             dtype=dtype,
         )
-    network = OpenVLANetwork(weights.eval(), description.tokenizer, description.bins, size)
-    identity = checkpoint.identity(device, dtype, options) | {"unnorm_key": description.key}
+    network = OpenVLANetwork(
+        weights.eval(), description.tokenizer, description.bins, size, options.center_crop
+    )
+    identity = checkpoint.identity(device, dtype, options) | description.identity(options)
     return VlaPolicy(name, network, description.statistics, options, identity, options.threads)
 
 
