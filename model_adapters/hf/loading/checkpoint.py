@@ -181,7 +181,7 @@ def assemble(
         "dtype": str(model.dtype).removeprefix("torch."),
         "device": model.device.type,
         "quantization": _quantization_method(model),
-        "attn_implementation": model.config._attn_implementation,
+        "attn_implementation": model.config.get_text_config()._attn_implementation,
         "rope": getattr(model.config.get_text_config(), "rope_parameters", None),
         "image_processor": json.loads(image_processor.to_json_string()),
         "chat_template": digest(template),
@@ -313,7 +313,7 @@ def _load_model(located: LocatedCheckpoint[CheckpointOptions]) -> Any:
         located.folder,
         config=located.config,
         dtype=resolve_dtype(options),
-        attn_implementation=options.attn_implementation,
+        attn_implementation=_attention(options, located.config),
         device_map=options.device_map or ({"": device} if options.quantization else None),
         quantization_config=_quantization(options),
         trust_remote_code=options.trust_remote_code,
@@ -331,6 +331,14 @@ def _load_model(located: LocatedCheckpoint[CheckpointOptions]) -> Any:
             f"{options.pretrained}; use quantization=bnb4, more GPUs, or device_map=none"
         )
     return model if options.device_map or options.quantization else model.to(device)
+
+
+def _attention(options: CheckpointOptions, config: Any) -> str | dict[str, str]:
+    """Return the attention of each part; Gemma 2 caps scores, which torch's kernel cannot."""
+    name = options.attn_implementation
+    if name == "sdpa" and getattr(config.get_text_config(), "attn_logit_softcapping", None):
+        return {"": name, "text_config": "eager"}
+    return name
 
 
 def _quantization(options: CheckpointOptions) -> Any:
