@@ -20,12 +20,12 @@ from pathlib import Path
 from PIL import Image, UnidentifiedImageError
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.pictures.as_shown import as_shown, conversions, shown_size
+from infthor_eval.formats.pictures.as_shown import as_shown, conversions, orientation
 from infthor_eval.formats.reading import file_problem, read_bytes, require_file
 from infthor_eval.storage.digests import digest, digest_of_file
 from infthor_eval.storage.limits import IMAGE_ASPECT, IMAGE_MEGAPIXELS
 
-__all__ = ["IMAGE_SUFFIXES", "FrameRef", "Patch", "find_images"]
+__all__ = ["FrameRef", "Patch", "find_images"]
 
 Image.MAX_IMAGE_PIXELS = None  # `_wrong_size` has the limit, which users can raise
 
@@ -33,7 +33,7 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 _SIGNATURE = re.compile(rb"\x89PNG\r\n\x1a\n|\xff\xd8\xff|RIFF.{4}WEBP", re.DOTALL)
 _HEAD = 24  # bytes of a PNG up to the end of its width and height
 _HINT = "restore the frame"
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
+_SUFFIXES = {".png", ".jpg", ".jpeg", ".webp"}
 _NUMBER = re.compile(r"([0-9]+)")
 # All that Pillow's decoders have raised on damaged or forged images.
 _DAMAGED = (
@@ -116,15 +116,11 @@ class FrameRef:
             DataError: as `load`, for errors that show in the header.
         """
         with _open(self.path) as image:
-            return shown_size(image)
+            return image.size[::-1] if orientation(image) > 4 else image.size
 
     @cached_property
     def conversions(self) -> str:
-        """What `load` does to the picture below the patches, in words; empty if it needs nothing.
-
-        Raises:
-            DataError: as `load`, for errors that show in the header.
-        """
+        """What `load` does to the picture below the patches, in words; raises as `size`."""
         with _open(self.path) as image:
             return conversions(image)
 
@@ -166,17 +162,12 @@ class FrameRef:
         return content.getvalue()
 
     def encoded(self) -> tuple[bytes, str]:
-        """Return the frame as the content of a file and its media type: its own file's, or a PNG's
-        where that shows something else.
-
-        Raises:
-            DataError: as `load`.
-        """
+        """Return content and media type of its file, or of a PNG if it is not shown as its file
+        is; raises as `load`."""
         if self.patches or self.conversions:
             return self.png(), "image/png"
-        content = read_bytes(self.path, _HINT)
-        kind = "png" if content.startswith(_PNG) else "webp" if content[:4] == b"RIFF" else "jpeg"
-        return content, f"image/{kind}"
+        with _open(self.path) as image:
+            return read_bytes(self.path, _HINT), Image.MIME[str(image.format)]
 
     @property
     def _paths(self) -> list[Path]:
@@ -192,13 +183,10 @@ def find_images(folder: Path) -> dict[str, Path]:
         DataError: two of them have one stem.
     """
     images: dict[str, Path] = {}
-    paths = [path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES]
+    paths = [path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES]
     for path in sorted(paths, key=_by_numbers):
         if path.stem in images:
-            raise DataError(
-                f"{folder}: two frames have the name {path.stem} (of several types); "
-                "remove one of them"
-            )
+            raise DataError(f"{folder}: two frames have the name {path.stem}; remove one of them")
         images[path.stem] = path
     return images
 

@@ -39,7 +39,7 @@ class SetContents:
         layouts: numbers of trajectories by the layout of their step log.
         image_folders: numbers of trajectories by the name of their folder of frames.
         image_sizes: numbers of trajectories by width and height of their first frame, pixels.
-        conversions: numbers of frames by what is done to their pictures, where anything is.
+        conversions: numbers of frames by what is done to their pictures, in words.
         unreadable: reasons of the trajectories that cannot be read.
     """
 
@@ -108,7 +108,7 @@ def _read_trajectory(data: NiehSet, traj_id: str, contents: SetContents) -> None
             contents.image_sizes[frames[0].size] += 1
     for frame in frames:
         with suppress(DataError):
-            contents.conversions.update([frame.conversions] if frame.conversions else ())
+            contents.conversions[frame.conversions] += 1
 
 
 def read_asked_tasks(root: Path, trajectories: Path | None = None) -> Iterator[AskedTask]:

@@ -94,8 +94,7 @@ class FrameCrop:
     """What OpenVLA gets of a frame, on any engine.
 
     Attributes:
-        center_crop: the middle, 90 % of the area, for checkpoints that were fine-tuned on random
-            crops (those for LIBERO); false gives the whole frame.
+        center_crop: 90 % of the area, for checkpoints fine-tuned on random crops (for LIBERO).
     """
 
     center_crop: bool = False

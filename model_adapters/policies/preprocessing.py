@@ -19,11 +19,8 @@ def resize(image: Image.Image, size: int) -> torch.Tensor:
 
 
 def crop_centre(image: Image.Image, size: int) -> Image.Image:
-    """Return the middle of an RGB frame, 90 % of its area, as a square of pixels.
-
-    Corners of the result are corners of the crop, pixels between are bilinear without smoothing,
-    and 255.5 levels are cut to 8 bits: so TensorFlow crops, and so OpenVLA was fine-tuned.
-    """
+    """Return the middle of an RGB frame, 90 % of its area, as a square of pixels: by TensorFlow's
+    rules, bilinear from corner to corner and 255.5 levels cut to 8 bits, as OpenVLA was trained."""
     side = math.sqrt(_CROPPED)
     pixels = torch.from_numpy(np.array(image, dtype=np.float32) / 255).permute(2, 0, 1)[None]
     places = torch.nn.functional.affine_grid(

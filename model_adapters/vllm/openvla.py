@@ -12,12 +12,11 @@ from model_adapters.policies.checkpoint import PolicyCheckpoint, find_policy_che
 from model_adapters.policies.openvla.adapter import OpenVLADescription, describe_openvla
 from model_adapters.policies.openvla.network import prompt_ids
 from model_adapters.policies.policy import VlaPolicy
-from model_adapters.policies.preprocessing import crop_centre
 from model_adapters.policies.statistics import ACTION_SIZE, Actions
 from model_adapters.protocols import Capabilities
 from model_adapters.vllm.arguments import engine_arguments
 from model_adapters.vllm.engine import Engine, EngineRequest, import_vllm
-from model_adapters.vllm.options import OpenVLAOnVllmOptions, VllmPolicyOptions
+from model_adapters.vllm.options import OpenVLAOnVllmOptions
 
 __all__ = ["OpenVLAOnVllm", "VllmPolicy"]
 
@@ -49,26 +48,23 @@ class OpenVLAOnVllm:
             "limit_mm_per_prompt": {"image": 1}
         }
         engine = Engine(name, arguments, options.threads)
-        identity = (
-            checkpoint.origin
-            | {
-                "engine": "vllm",
-                "versions": {**versions(), "vllm": engine.version},
-                "dtype": options.dtype,
-                "quantization": options.quantization,
-                "parallel": [
-                    options.tensor_parallel_size,
-                    options.pipeline_parallel_size,
-                    options.data_parallel_size,
-                ],
-                "enforce_eager": options.enforce_eager,
-                "batch_invariant": engine.batch_invariant,
-            }
-            | description.identity(options)
+        identity = checkpoint.origin | {
+            "engine": "vllm",
+            "versions": {**versions(), "vllm": engine.version},
+            "dtype": options.dtype,
+            "quantization": options.quantization,
+            "parallel": [
+                options.tensor_parallel_size,
+                options.pipeline_parallel_size,
+                options.data_parallel_size,
+            ],
+            "enforce_eager": options.enforce_eager,
+            "batch_invariant": engine.batch_invariant,
+            "unnorm_key": description.key,
+        }
+        return VllmPolicy(
+            name, _VllmNetwork(name, engine, description), description, options, identity
         )
-        size = description.config.image_size(options.pretrained)
-        network = _VllmNetwork(name, engine, description, size if options.center_crop else None)
-        return VllmPolicy(name, network, description, options, identity)
 
 
 class _TokenizerConfig(msgspec.Struct):
@@ -93,15 +89,12 @@ def _check_begin_token(name: str, checkpoint: PolicyCheckpoint) -> None:
 
 
 class _VllmNetwork:
-    """A network that lets vLLM decode the action tokens; frames are cropped to `crop`, if any."""
+    """A network that lets vLLM decode the action tokens."""
 
-    def __init__(
-        self, name: str, engine: Engine, description: OpenVLADescription, crop: int | None
-    ) -> None:
+    def __init__(self, name: str, engine: Engine, description: OpenVLADescription) -> None:
         self.engine = engine
         self._name = name
         self._description = description
-        self._crop = crop
 
     def predict(self, image: Image.Image, instruction: str, *, constrained: bool) -> Actions:
         """Return a chunk of one action; see `Network.predict` of the policies."""
@@ -113,8 +106,6 @@ class _VllmNetwork:
         }
         if constrained:
             settings["allowed_token_ids"] = list(action_ids)
-        if self._crop is not None:
-            image = crop_centre(image, self._crop)
         request = EngineRequest(prompt_ids(self._description.tokenizer, instruction), [image])
         (output,) = self.engine.generate([request], settings)
         if len(output.ids) != ACTION_SIZE:
@@ -135,10 +126,12 @@ class VllmPolicy(VlaPolicy):
         name: str,
         network: _VllmNetwork,
         description: OpenVLADescription,
-        options: VllmPolicyOptions,
+        options: OpenVLAOnVllmOptions,
         identity: dict[str, Any],
     ) -> None:
-        super().__init__(name, network, description.statistics, options, identity)
+        side = description.config.image_size(options.pretrained)
+        crop = side if options.center_crop else None
+        super().__init__(name, network, description.statistics, options, identity, crop=crop)
         self._engine = network.engine
 
     @property

@@ -22,10 +22,7 @@ _STEP = 1024
 
 
 def cache_arguments(model: Any, cache: Cache) -> dict[str, Any]:
-    """Return the arguments by which a model reads and extends a cache, as its class names them.
-
-    transformers has renamed `past_key_values`; models that come with a checkpoint may use either.
-    """
+    """Return the arguments by which a model extends a cache; transformers 5.24 has renamed one."""
     is_new = "cache" in inspect.signature(type(model).forward).parameters
     return {"cache" if is_new else "past_key_values": cache, "use_cache": True}
 

@@ -309,11 +309,16 @@ def wrap_loading_errors(pretrained: str) -> Iterator[None]:
 def _load_model(located: LocatedCheckpoint[CheckpointOptions]) -> Any:
     options = located.options
     device = resolve_device(options)
+    attention: str | dict[str, str] = options.attn_implementation
+    text = located.config.get_text_config()
+    # Gemma 2 caps its scores, which torch's kernel cannot.
+    if attention == "sdpa" and getattr(text, "attn_logit_softcapping", None):
+        attention = {"": "sdpa", "text_config": "eager"}
     model, report = cast(Any, transformers.AutoModelForImageTextToText).from_pretrained(
         located.folder,
         config=located.config,
         dtype=resolve_dtype(options),
-        attn_implementation=_attention(options, located.config),
+        attn_implementation=attention,
         device_map=options.device_map or ({"": device} if options.quantization else None),
         quantization_config=_quantization(options),
         trust_remote_code=options.trust_remote_code,
@@ -331,14 +336,6 @@ def _load_model(located: LocatedCheckpoint[CheckpointOptions]) -> Any:
             f"{options.pretrained}; use quantization=bnb4, more GPUs, or device_map=none"
         )
     return model if options.device_map or options.quantization else model.to(device)
-
-
-def _attention(options: CheckpointOptions, config: Any) -> str | dict[str, str]:
-    """Return the attention of each part; Gemma 2 caps scores, which torch's kernel cannot."""
-    name = options.attn_implementation
-    if name == "sdpa" and getattr(config.get_text_config(), "attn_logit_softcapping", None):
-        return {"": name, "text_config": "eager"}
-    return name
 
 
 def _quantization(options: CheckpointOptions) -> Any:

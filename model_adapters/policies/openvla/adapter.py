@@ -7,7 +7,7 @@ from tokenizers import Tokenizer
 
 from infthor_eval.errors import ModelError
 from model_adapters.hf.loading.checkpoint import wrap_loading_errors
-from model_adapters.options.policies import FrameCrop, OpenVLAOptions
+from model_adapters.options.policies import OpenVLAOptions
 from model_adapters.options.tiny import OpenVLATinyOptions
 from model_adapters.policies.checkpoint import PolicyCheckpoint
 from model_adapters.policies.openvla.actions import ActionBins
@@ -40,11 +40,6 @@ class OpenVLADescription:
     statistics: ActionStatistics
     tokenizer: Tokenizer
     bins: ActionBins
-
-    def identity(self, options: FrameCrop) -> dict[str, Any]:
-        """Return the dataset and what is made of frames, as JSON values."""
-        cropped = {"center_crop": True} if options.center_crop else {}
-        return {"unnorm_key": self.key} | cropped
 
 
 def describe_openvla(checkpoint: PolicyCheckpoint, unnorm_key: str | None) -> OpenVLADescription:
@@ -88,11 +83,12 @@ def load_openvla(
             device=device,
             dtype=dtype,
         )
-    network = OpenVLANetwork(
-        weights.eval(), description.tokenizer, description.bins, size, options.center_crop
+    network = OpenVLANetwork(weights.eval(), description.tokenizer, description.bins, size)
+    identity = checkpoint.identity(device, dtype, options) | {"unnorm_key": description.key}
+    crop = size if options.center_crop else None
+    return VlaPolicy(
+        name, network, description.statistics, options, identity, options.threads, crop
     )
-    identity = checkpoint.identity(device, dtype, options) | description.identity(options)
-    return VlaPolicy(name, network, description.statistics, options, identity, options.threads)
 
 
 def _tokenizer(checkpoint: PolicyCheckpoint) -> Tokenizer:

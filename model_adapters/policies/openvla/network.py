@@ -13,7 +13,7 @@ from model_adapters.hf.cached.kv_cache import cache_arguments
 from model_adapters.policies.decoding import decode_greedily, embed_ids
 from model_adapters.policies.openvla.actions import ActionBins
 from model_adapters.policies.openvla.vision import Tower, TowerShape, unused_keys
-from model_adapters.policies.preprocessing import crop_centre, normalise, resize
+from model_adapters.policies.preprocessing import normalise, resize
 from model_adapters.policies.statistics import ACTION_SIZE, Actions
 from model_adapters.policies.weights import Layout
 
@@ -98,14 +98,12 @@ class OpenVLANetwork:
         tokenizer: tokenizer of the language model, which adds the begin token.
         bins: conversion of action ids.
         image_size: image size of both towers, in pixels.
-        center_crop: crop frames as the original does for checkpoints that need it.
     """
 
     weights: OpenVLAWeights
     tokenizer: Tokenizer
     bins: ActionBins
     image_size: int
-    center_crop: bool = False
 
     @torch.inference_mode()
     def predict(self, image: Image.Image, instruction: str, *, constrained: bool) -> Actions:
@@ -120,8 +118,6 @@ class OpenVLANetwork:
         def step(token: int) -> torch.Tensor:
             return logits(embed_ids(model, [token]))
 
-        if self.center_crop:
-            image = crop_centre(image, self.image_size)
         pixels = resize(image, self.image_size).to(model.device)[None]
         patches = self.weights.projector(self.weights.vision_backbone(pixels))
         text = embed_ids(model, prompt_ids(self.tokenizer, instruction))
