@@ -18,7 +18,7 @@ ASKED = ("run", "--model", "infthor", "--model_args", "adapter=qwen2.5-vl-tiny",
 
 def test_ours_its_script_looks_for_the_model_before_a_task_file_registers_it(start):
     file = packaged_folder("tasks") / "nieh" / "nieh_mini_gt.yaml"
-    with pytest.raises(AssertionError, match="infthor.*no model for this name"):
+    with pytest.raises(AssertionError, match=r"infthor.*no model for this name"):
         start(LM_EVAL, *ASKED, "--tasks", file)
 
 

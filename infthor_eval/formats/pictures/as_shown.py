@@ -36,16 +36,16 @@ def conversions(image: Image.Image) -> str:
         "16-bit grey": image.mode.startswith("I"),
         "CMYK": image.mode == "CMYK",
         "transparency on white": image.has_transparency_data,
-        f"EXIF orientation {orientation(image)}": orientation(image) in _TURNS,
+        f"EXIF orientation {orientation(image)}": orientation(image) > 1,
     }
     return ", ".join(name for name, is_done in done.items() if is_done)
 
 
 def orientation(image: Image.Image) -> int:
-    """Return the EXIF orientation of an opened picture, 1 to 8; 1, too, where data are damaged."""
+    """Return the EXIF orientation of an opened picture, 1 to 8; 1 where none is."""
     exif = Image.Exif()
     if "exif" in image.info:
         with suppress(SyntaxError, ValueError, LookupError, TypeError, ArithmeticError):
             exif.load(image.info["exif"])
-            return int(exif.get(ExifTags.Base.Orientation, 1))
-    return 1
+    stored = exif.get(ExifTags.Base.Orientation)
+    return stored if stored in _TURNS else 1

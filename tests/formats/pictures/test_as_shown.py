@@ -143,6 +143,7 @@ def test_what_needs_nothing_is_left_as_it_is(save: Save) -> None:
         with Image.open(frame.path) as stored:
             media_type = f"image/{stored.format.lower()}"
             assert frame.load().tobytes() == stored.convert("RGB").tobytes()
+            assert frame.size == stored.size
         assert frame.conversions == ""
         assert frame.encoded() == (frame.path.read_bytes(), media_type)
 
