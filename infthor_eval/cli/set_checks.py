@@ -91,6 +91,8 @@ def _trajectories(contents: SetContents) -> Iterator[Check]:
         yield Check("trajectories", "ok", detail)
         sizes = {f"{width}x{height}": n for (width, height), n in contents.image_sizes.items()}
         detail = f"in {_counted(contents.image_folders)}; {_counted(sizes)} pixels"
+        if done := contents.conversions - Counter({"": contents.conversions[""]}):
+            detail += f"; converted for models, as a browser shows them: {_in_words(done)}"
         yield Check("pictures", "ok", detail)
         yield Check("step logs", "ok", _counted(contents.layouts))
     if contents.unreadable:

@@ -16,12 +16,9 @@ from infthor_eval.errors import DataError
 from infthor_eval.exports.measures import Measure
 from infthor_eval.exports.samples import ACT, Sample, TokenCounts, describe_result
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.reading import read_bytes
 from infthor_eval.report.web.samples import PromptFrames
 
 __all__ = ["SampleWriter", "model_usage", "sample_summary"]
-
-_JPEG = b"\xff\xd8\xff"
 
 Document = dict[str, Any]
 FindFrames = Callable[[Any], Sequence[FrameRef]]
@@ -190,9 +187,8 @@ def _attach(frame: FrameRef | None, attachments: dict[str, str]) -> Document:
 
 
 def _data_uri(frame: FrameRef) -> str:
-    content = frame.png() if frame.patches else read_bytes(frame.path, "restore the frame")
-    kind = "jpeg" if content.startswith(_JPEG) else "png"
-    return f"data:image/{kind};base64,{b64encode(content).decode()}"
+    content, media_type = frame.encoded()
+    return f"data:{media_type};base64,{b64encode(content).decode()}"
 
 
 def _text(text: str) -> Document:

@@ -20,7 +20,8 @@ from pathlib import Path
 from PIL import Image, UnidentifiedImageError
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.reading import file_problem, require_file
+from infthor_eval.formats.pictures.as_shown import as_shown, conversions, orientation
+from infthor_eval.formats.reading import file_problem, read_bytes, require_file
 from infthor_eval.storage.digests import digest, digest_of_file
 from infthor_eval.storage.limits import IMAGE_ASPECT, IMAGE_MEGAPIXELS
 
@@ -29,10 +30,10 @@ __all__ = ["FrameRef", "Patch", "find_images"]
 Image.MAX_IMAGE_PIXELS = None  # `_wrong_size` has the limit, which users can raise
 
 _PNG = b"\x89PNG\r\n\x1a\n"
-_SIGNATURES = (_PNG, b"\xff\xd8\xff")  # PNG, JPEG
+_SIGNATURE = re.compile(rb"\x89PNG\r\n\x1a\n|\xff\xd8\xff|RIFF.{4}WEBP", re.DOTALL)
 _HEAD = 24  # bytes of a PNG up to the end of its width and height
 _HINT = "restore the frame"
-_SUFFIXES = {".png", ".jpg", ".jpeg"}
+_SUFFIXES = {".png", ".jpg", ".jpeg", ".webp"}
 _NUMBER = re.compile(r"([0-9]+)")
 # All that Pillow's decoders have raised on damaged or forged images.
 _DAMAGED = (
@@ -71,7 +72,8 @@ class FrameRef:
     """One frame of a trajectory.
 
     Attributes:
-        path: its image (PNG or JPEG, 300x300 in the published data), or the one below its patches.
+        path: its image (PNG, JPEG or WebP; 300x300 in the published data), or the one below its
+            patches.
         patches: what is laid over it, the lowest first.
     """
 
@@ -114,7 +116,13 @@ class FrameRef:
             DataError: as `load`, for errors that show in the header.
         """
         with _open(self.path) as image:
-            return image.size
+            return image.size[::-1] if orientation(image) > 4 else image.size
+
+    @cached_property
+    def conversions(self) -> str:
+        """What `load` does to the picture below the patches, in words; raises as `size`."""
+        with _open(self.path) as image:
+            return conversions(image)
 
     @cached_property
     def problem(self) -> str | None:
@@ -122,14 +130,14 @@ class FrameRef:
         return next(filter(None, map(_problem_of, self._paths)), None)
 
     def load(self) -> Image.Image:
-        """Return the frame as an RGB image.
+        """Return the frame as an RGB image, as a browser shows it on white.
 
         Raises:
             DataError: a file is missing, truncated, or no image of a valid size, or a patch reaches
                 beyond the picture below it.
         """
         with _open(self.path) as image:
-            frame = image.convert("RGB")
+            frame = as_shown(image)
         for patch in self.patches:
             with _open(patch.path) as image:
                 layer = image.convert("RGBA")
@@ -153,13 +161,21 @@ class FrameRef:
         self.load().save(content, "PNG")
         return content.getvalue()
 
+    def encoded(self) -> tuple[bytes, str]:
+        """Return content and media type of its file, or of a PNG if it is not shown as its file
+        is; raises as `load`."""
+        if self.patches or self.conversions:
+            return self.png(), "image/png"
+        with _open(self.path) as image:
+            return read_bytes(self.path, _HINT), Image.MIME[str(image.format)]
+
     @property
     def _paths(self) -> list[Path]:
         return [self.path, *(patch.path for patch in self.patches)]
 
 
 def find_images(folder: Path) -> dict[str, Path]:
-    """Return the PNG and JPEG files of a folder by stem, in the order of their names.
+    """Return the PNG, JPEG and WebP files of a folder by stem, in the order of their names.
 
     Numbers in names count as numbers: `2.png` comes before `10.png`.
 
@@ -170,9 +186,7 @@ def find_images(folder: Path) -> dict[str, Path]:
     paths = [path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES]
     for path in sorted(paths, key=_by_numbers):
         if path.stem in images:
-            raise DataError(
-                f"{folder}: two frames have the name {path.stem} (.png, .jpg); remove one of them"
-            )
+            raise DataError(f"{folder}: two frames have the name {path.stem}; remove one of them")
         images[path.stem] = path
     return images
 
@@ -197,8 +211,8 @@ def _problem_of(path: Path) -> str | None:
             head = file.read(_HEAD)
     except OSError as error:
         return f"{path}: cannot be read ({error.strerror})"
-    if not head.startswith(_SIGNATURES):
-        return f"{path}: not a PNG or JPEG image"
+    if _SIGNATURE.match(head) is None:
+        return f"{path}: not a PNG, JPEG or WebP image"
     is_whole_png_head = head.startswith(_PNG) and len(head) == _HEAD and head[12:16] == b"IHDR"
     return _wrong_size(path, *struct.unpack(">II", head[16:])) if is_whole_png_head else None
 
@@ -218,9 +232,9 @@ def _open(path: Path) -> Iterator[Image.Image]:
 
 def _opened(path: Path) -> Image.Image:
     try:
-        return Image.open(path, formats=("PNG", "JPEG"))
+        return Image.open(path, formats=("PNG", "JPEG", "WEBP"))
     except UnidentifiedImageError as error:  # its message is the path
-        raise DataError(f"{path}: not a readable image (neither PNG nor JPEG); {_HINT}") from error
+        raise DataError(f"{path}: not a readable image (not PNG, JPEG or WebP); {_HINT}") from error
 
 
 def _wrong_size(path: Path, width: int, height: int) -> str | None:

@@ -1,7 +1,8 @@
 """A data set of one's own: a folder of frames and one CSV file of questions on them.
 
-The frames are PNG or JPEG files in the folder itself (one trajectory), or in a folder of their own
-for each trajectory. Numbers in their names count as numbers: `2.png` comes before `10.png`.
+The frames are PNG, JPEG or WebP files in the folder itself (one trajectory), or in a folder of
+their own for each trajectory. Numbers in their names count as numbers: `2.png` comes before
+`10.png`.
 
 Columns: `question`, `answer`, `clue_frames` (optional: names or numbers of frames, with commas
 between them) and, with several trajectories, `trajectory`. A question without clue frames has all

@@ -19,6 +19,7 @@ from msgspec import Meta
 from PIL import Image
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.reading import read_json
 from infthor_eval.generation.compact.twins import copy_compactly
@@ -276,9 +277,8 @@ def _raise_first(failures: list[str]) -> None:
 
 
 def _reduce_colors(path: Path, colors: int) -> None:
-    with Image.open(path) as frame:
-        reduced = frame.convert("RGB").quantize(colors, dither=Image.Dither.NONE)
-    reduced.save(path, optimize=True)
+    frame = FrameRef(path).load()
+    frame.quantize(colors, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 def _digests(root: Path) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,7 @@ class SetContents:
         layouts: numbers of trajectories by the layout of their step log.
         image_folders: numbers of trajectories by the name of their folder of frames.
         image_sizes: numbers of trajectories by width and height of their first frame, pixels.
+        conversions: numbers of frames by what is done to their pictures, in words.
         unreadable: reasons of the trajectories that cannot be read.
     """
 
@@ -50,6 +52,7 @@ class SetContents:
     layouts: Counter[str] = field(default_factory=Counter)
     image_folders: Counter[str] = field(default_factory=Counter)
     image_sizes: Counter[tuple[int, int]] = field(default_factory=Counter)
+    conversions: Counter[str] = field(default_factory=Counter)
     unreadable: list[str] = field(default_factory=list)
 
 
@@ -101,8 +104,11 @@ def _read_trajectory(data: NiehSet, traj_id: str, contents: SetContents) -> None
     contents.layouts[layout.value] += 1
     if frames:
         contents.image_folders[frames[0].path.parent.name] += 1
-        if frames[0].problem is None:
+        with suppress(DataError):  # tasks say what they cannot ask for it
             contents.image_sizes[frames[0].size] += 1
+    for frame in frames:
+        with suppress(DataError):
+            contents.conversions[frame.conversions] += 1
 
 
 def read_asked_tasks(root: Path, trajectories: Path | None = None) -> Iterator[AskedTask]:

@@ -17,6 +17,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Route
 
+from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.pages.server import file_route, serve_pages
 from model_adapters.human.adapter import HumanOptions
@@ -154,11 +155,11 @@ def _take(desk: Desk, form: _AnswerForm) -> Response:
 
 def _picture(frame: FrameRef) -> Response:
     """Return a frame, named as the image that it is, whatever the name of its file."""
-    problem = frame.problem
-    if problem is not None:
-        return _problem(problem, 404)
-    content = frame.png() if frame.patches else frame.path.read_bytes()
-    return Response(content, media_type=f"image/{'png' if content[1:4] == b'PNG' else 'jpeg'}")
+    try:
+        content, media_type = frame.encoded()
+    except DataError as error:
+        return _problem(str(error), 404)
+    return Response(content, media_type=media_type)
 
 
 def _number(text: str) -> int | None:

@@ -56,7 +56,8 @@ class Placement:
     Attributes:
         dtype: torch's name of the weights' type, or auto for that of the checkpoint.
         device: cpu, cuda, cuda:1, ..., or auto for a GPU if there is one.
-        attn_implementation: sdpa, eager, flash_attention_2, ...
+        attn_implementation: sdpa, eager, flash_attention_2, ...; with sdpa, text models that cap
+            scores (Gemma 2) have eager.
         threads: torch threads of this model's computations on the CPU; torch's default where None.
     """
 

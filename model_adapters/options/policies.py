@@ -9,6 +9,7 @@ __all__ = [
     "DEFAULT_INTRINSICS",
     "ActionOptions",
     "CheckpointPolicyOptions",
+    "FrameCrop",
     "OpenVLAOptions",
     "PolicyOptions",
     "SpatialVLACheckpointOptions",
@@ -89,7 +90,18 @@ class CheckpointPolicyOptions(CheckpointSource, PolicyOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class OpenVLAOptions(CheckpointPolicyOptions):
+class FrameCrop:
+    """What OpenVLA gets of a frame, on any engine.
+
+    Attributes:
+        center_crop: 90 % of the area, for checkpoints fine-tuned on random crops (for LIBERO).
+    """
+
+    center_crop: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenVLAOptions(FrameCrop, CheckpointPolicyOptions):
     """Options of `openvla`."""
 
     pretrained: str = "openvla/openvla-7b"

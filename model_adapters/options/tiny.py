@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.options.families import PixelLimits
-from model_adapters.options.policies import PolicyOptions, SpatialVLAOptions
+from model_adapters.options.policies import FrameCrop, PolicyOptions, SpatialVLAOptions
 
 __all__ = ["OpenVLATinyOptions", "Qwen25VLTinyOptions", "SpatialVLATinyOptions", "TinyOptions"]
 
@@ -36,7 +36,7 @@ class Qwen25VLTinyOptions(PixelLimits, TinyOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class OpenVLATinyOptions(_TinyPlacement, PolicyOptions):
+class OpenVLATinyOptions(FrameCrop, _TinyPlacement, PolicyOptions):
     """Options of `openvla-tiny`."""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.frames import FrameRef, find_images
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.tables import Column, Row, Table
 from model_adapters.options.policies import VlaHttpOptions
@@ -29,7 +29,6 @@ __all__ = [
 ]
 
 INSTRUCTIONS = ("pick up the mug", "pick up the apple", "Put the knife in the drawer")
-_PICTURES = (".png", ".jpg", ".jpeg")
 _NOISE = 4
 
 
@@ -128,17 +127,11 @@ def frames_in_folder(folder: Path) -> list[FrameRef]:
     """Return the pictures of a folder, sorted by name.
 
     Raises:
-        DataError: the folder has no pictures, or cannot be read.
+        DataError: the folder has no pictures, cannot be read, or has two of one name.
     """
-    paths = (
-        sorted(path for path in folder.iterdir() if path.suffix.lower() in _PICTURES)
-        if folder.is_dir()
-        else []
-    )
+    paths = find_images(folder).values() if folder.is_dir() else ()
     if not paths:
-        raise DataError(
-            f"{folder}: has no pictures ({', '.join(_PICTURES)}); give a folder of frames"
-        )
+        raise DataError(f"{folder}: has no pictures (PNG, JPEG, WebP); give a folder of frames")
     return [FrameRef(path) for path in paths]
 
 

@@ -12,6 +12,7 @@ from model_adapters.hf.global_settings import torch_threads
 from model_adapters.options.policies import ActionOptions, CheckpointPolicyOptions
 from model_adapters.policies.checkpoint import PolicyCheckpoint, find_policy_checkpoint
 from model_adapters.policies.ensemble import ExponentialEnsemble
+from model_adapters.policies.preprocessing import crop_centre
 from model_adapters.policies.statistics import ACTION_SIZE, Actions, ActionStatistics
 from model_adapters.protocols import ArmDelta, Capabilities
 from model_adapters.refusals import wrap_request_errors
@@ -66,6 +67,8 @@ class VlaPolicy:
         options: decoding and use of the actions.
         identity: identity of checkpoint, dataset and machine, as JSON values.
         threads: torch threads of the network's computations; torch's default where None.
+        crop: side in pixels to which the middle of a frame is scaled before the network gets it;
+            the whole frame where None.
     """
 
     def __init__(
@@ -76,6 +79,7 @@ class VlaPolicy:
         options: ActionOptions,
         identity: dict[str, Any],
         threads: int | None = None,
+        crop: int | None = None,
     ) -> None:
         self.name = name
         self._network = network
@@ -83,6 +87,7 @@ class VlaPolicy:
         self._options = options
         self._identity = identity
         self._threads = threads
+        self._crop = crop
         self._ensemble = ExponentialEnsemble()
 
     @property
@@ -94,12 +99,16 @@ class VlaPolicy:
         """Return checkpoint, dataset of the statistics, precision, versions and use of chunks, as
         JSON values."""
         options = self._options
-        return self._identity | {
-            "adapter": self.name,
-            "constrained": options.constrained,
-            "ensemble": options.ensemble,
-            "execute": options.execute,
-        }
+        return (
+            self._identity
+            | {
+                "adapter": self.name,
+                "constrained": options.constrained,
+                "ensemble": options.ensemble,
+                "execute": options.execute,
+            }
+            | ({} if self._crop is None else {"center_crop": True})
+        )
 
     def reset(self) -> None:
         """Drop the chunks of the last episode."""
@@ -109,6 +118,8 @@ class VlaPolicy:
         """Return the next steps; see `Policy.act`."""
         with wrap_request_errors(self.name), torch_threads(self._threads):
             image = frame.load()
+            if self._crop is not None:
+                image = crop_centre(image, self._crop)
             chunk = self._network.predict(image, instruction, constrained=self._options.constrained)
             actions = self._statistics.unnormalise(chunk)
             # Refuses a bad chunk before it is averaged into later steps.

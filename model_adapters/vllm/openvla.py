@@ -16,7 +16,7 @@ from model_adapters.policies.statistics import ACTION_SIZE, Actions
 from model_adapters.protocols import Capabilities
 from model_adapters.vllm.arguments import engine_arguments
 from model_adapters.vllm.engine import Engine, EngineRequest, import_vllm
-from model_adapters.vllm.options import OpenVLAOnVllmOptions, VllmPolicyOptions
+from model_adapters.vllm.options import OpenVLAOnVllmOptions
 
 __all__ = ["OpenVLAOnVllm", "VllmPolicy"]
 
@@ -126,10 +126,12 @@ class VllmPolicy(VlaPolicy):
         name: str,
         network: _VllmNetwork,
         description: OpenVLADescription,
-        options: VllmPolicyOptions,
+        options: OpenVLAOnVllmOptions,
         identity: dict[str, Any],
     ) -> None:
-        super().__init__(name, network, description.statistics, options, identity)
+        side = description.config.image_size(options.pretrained)
+        crop = side if options.center_crop else None
+        super().__init__(name, network, description.statistics, options, identity, crop=crop)
         self._engine = network.engine
 
     @property

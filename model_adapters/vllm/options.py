@@ -15,7 +15,7 @@ from model_adapters.options.families import (
     PixtralOptions,
     Qwen25VLOptions,
 )
-from model_adapters.options.policies import ActionOptions, OpenVLAOptions
+from model_adapters.options.policies import ActionOptions, FrameCrop, OpenVLAOptions
 
 __all__ = [
     "EngineOptions",
@@ -235,7 +235,7 @@ class HfVlmOnVllmOptions(VllmOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class OpenVLAOnVllmOptions(VllmPolicyOptions):
+class OpenVLAOnVllmOptions(FrameCrop, VllmPolicyOptions):
     """Options of `openvla@vllm`."""
 
     pretrained: str = OpenVLAOptions.pretrained

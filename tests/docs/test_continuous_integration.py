@@ -8,6 +8,10 @@ import yaml
 from .blocks import ROOT
 
 
+def _read(name):
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
 def commands_of(workflow):
     """The commands of a workflow's only job."""
     (job,) = yaml.safe_load((ROOT / ".github/workflows" / workflow).read_text())["jobs"].values()
@@ -25,6 +29,19 @@ def test_the_workflows_do_what_a_contributor_does():
     assert commands_of("ci.yml") == [".ci/run"]
     assert commands_of("docs.yml") == ["make docs"]
     assert commands_of("audit.yml") == ["make audit"]
+
+
+def test_each_week_runs_the_versions_of_transformers_that_may_be_installed():
+    workflow = yaml.safe_load((ROOT / ".github/workflows/libraries.yml").read_text())
+    commands = [step["run"] for job in workflow["jobs"].values() for step in job["steps"][2:]]
+    tried = re.findall(r"make test-transformers TRANSFORMERS=(\S+)", "\n".join(commands))
+    assert commands[-1] == "make test-lm-eval"
+    assert len(commands) == 4
+    allowed = re.search(r'"transformers>=(\d+)\.(\d+),<(\d+)\.(\d+)"', _read("pyproject.toml"))
+    oldest, newest = ([int(part) for part in tried[at].split(".")[:2]] for at in (0, -1))
+    bounds = [int(part) for part in allowed.groups()]
+    assert [*oldest, newest[0], newest[1] + 1] == bounds
+    assert f"\ntransformers=={tried[1]}\n" in _read("constraints.txt")
 
 
 def test_the_site_is_kept_from_where_it_is_built():

@@ -74,7 +74,7 @@ def test_a_clue_that_is_no_image_is_left_out_by_name(make_nieh_set):
     root = make_nieh_set([SOUND])
     frame = root / "metadata" / "t" / "img" / "000000001.png"
     frame.write_text("not an image")
-    assert reasons(root) == [f"{frame}: not a PNG or JPEG image"]
+    assert reasons(root) == [f"{frame}: not a PNG, JPEG or WebP image"]
 
 
 def test_a_clue_under_another_name_is_left_out_by_name(make_nieh_set):

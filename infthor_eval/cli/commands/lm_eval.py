@@ -1,6 +1,7 @@
 """`infthor-eval lm-eval`: lm-eval's own command, which knows these models and tasks."""
 
 import sys
+from importlib.metadata import version
 
 import click
 
@@ -41,6 +42,8 @@ def command(arguments: tuple[str, ...]) -> None:
 
 
 def _hint(error: BaseException) -> str:
+    if not version("lm_eval").startswith("0.4."):
+        return f"lm-eval {version('lm_eval')} is not supported: pip install 'lm_eval>=0.4.13,<0.5'"
     if "Tasks not found" in in_one_line(error):
         return "`infthor-eval ls tasks` lists those of this package; --include_path adds a folder"
     return "`infthor-eval lm-eval run --help` lists its options"

@@ -1,11 +1,10 @@
 """Blank frames for the frame ablation: plain grey, of the size of the frames that they replace."""
 
-from functools import cache
 from pathlib import Path
 
 from PIL import Image
 
-from infthor_eval.errors import wrap_errors
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.storage.files import write_atomically, writing_hint
 from infthor_eval.storage.folders import user_cache
@@ -24,23 +23,15 @@ def blank_like(frame: FrameRef) -> FrameRef:
     Raises:
         DataError: the file cannot be written.
     """
-    size = _size(frame)
-    if size is None:
+    try:
+        size = frame.size
+    except DataError:
         return frame
     path = user_cache("blank_frames") / f"{size[0]}x{size[1]}.png"
     if not path.is_file():
         with wrap_errors(f"{path}: cannot be written", writing_hint(", or set XDG_CACHE_HOME")):
             _write(path, size)
     return FrameRef(path)
-
-
-@cache
-def _size(frame: FrameRef) -> tuple[int, int] | None:
-    try:
-        with Image.open(frame.path) as image:  # reads only the header
-            return image.size
-    except (OSError, SyntaxError):
-        return None
 
 
 def _write(path: Path, size: tuple[int, int]) -> None:

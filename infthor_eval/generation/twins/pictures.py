@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image
 
+from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.step_log import ObjectInFrame
 from infthor_eval.generation.questions.history import DEFAULT_SHARE
 
@@ -29,9 +29,8 @@ def channel_differences(one: Path, other: Path) -> npt.NDArray[np.int64]:
     Returns:
         Differences of 0 to 255, of shape (height, width, 3).
     """
-    with Image.open(one) as first, Image.open(other) as second:
-        pictures = [np.asarray(picture.convert("RGB"), np.int64) for picture in (first, second)]
-    return np.abs(pictures[0] - pictures[1])
+    first, second = (np.asarray(FrameRef(path).load(), np.int64) for path in (one, other))
+    return np.abs(first - second)
 
 
 def are_clearly_unlike(one: Path, other: Path, of: Sequence[ObjectInFrame] = ()) -> bool:

@@ -7,6 +7,7 @@ import torch
 
 from model_adapters.hf.cached.branch_attention import BranchAttention
 from model_adapters.hf.cached.decoding import ReplyState, decode_replies
+from model_adapters.hf.cached.kv_cache import cache_arguments
 from model_adapters.hf.cached.prefix import Prefix, chunks
 from model_adapters.hf.prompting.embedding import Embed, Span
 from model_adapters.hf.prompting.prompt import Piece, token_ids
@@ -88,8 +89,7 @@ class _Branches:
             output = self._model(
                 **inputs,
                 position_ids=positions,
-                past_key_values=self._prefix.cache,
-                use_cache=True,
+                **cache_arguments(self._model, self._prefix.cache),
                 logits_to_keep=keep,
             )
         logits: torch.Tensor = output.logits[0]

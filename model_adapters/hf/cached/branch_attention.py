@@ -17,7 +17,7 @@ from transformers.masking_utils import AttentionMaskInterface
 from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
 
 from infthor_eval.errors import ModelError
-from model_adapters.hf.cached.kv_cache import BufferedCache
+from model_adapters.hf.cached.kv_cache import BufferedCache, cache_arguments
 from model_adapters.hf.prompting.embedding import Span
 
 __all__ = ["BranchAttention", "CannotBranchError", "layer_windows"]
@@ -73,8 +73,7 @@ def layer_windows(model: Any, words: Span) -> frozenset[int] | None:
             model(
                 **words.inputs,
                 position_ids=words.positions,
-                past_key_values=cache,
-                use_cache=True,
+                **cache_arguments(model, cache),
                 logits_to_keep=1,
             )
     except CannotBranchError:

@@ -5,6 +5,7 @@ again after every crop. Here keys and values are views on buffers with spare cap
 writes its own rows only, and a crop moves no memory, so rewinding a conversation costs nothing.
 """
 
+import inspect
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,11 +14,17 @@ from transformers.cache_utils import Cache, DynamicLayer
 
 from model_adapters.hf.cached.linear_states import LinearStates, linear_layers
 
-__all__ = ["BufferedCache"]
+__all__ = ["BufferedCache", "cache_arguments"]
 
 # capacities are multiples of this, so that a slightly longer question does not reallocate the
 # prefix
 _STEP = 1024
+
+
+def cache_arguments(model: Any, cache: Cache) -> dict[str, Any]:
+    """Return the arguments by which a model extends a cache; transformers 5.24 has renamed one."""
+    is_new = "cache" in inspect.signature(type(model).forward).parameters
+    return {"cache" if is_new else "past_key_values": cache, "use_cache": True}
 
 
 @dataclass

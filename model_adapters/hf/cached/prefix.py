@@ -13,7 +13,7 @@ from typing import Any
 
 import torch
 
-from model_adapters.hf.cached.kv_cache import BufferedCache
+from model_adapters.hf.cached.kv_cache import BufferedCache, cache_arguments
 from model_adapters.hf.family import Family
 from model_adapters.hf.loading.rope import LengthRope
 from model_adapters.hf.prompting.embedding import Embed
@@ -27,7 +27,7 @@ class Prefix:
 
     Args:
         model: a transformers model that takes what `embed` makes, `position_ids` and
-            `past_key_values`.
+            `cache_arguments`.
         family: family of the model.
         embed: prepares spans of prompts.
         chunk_tokens: most tokens of one forward pass (a larger frame is a chunk alone).
@@ -182,8 +182,7 @@ class Prefix:
             output = self._model(
                 **span.inputs,
                 position_ids=span.positions,
-                past_key_values=self._cache,
-                use_cache=True,
+                **cache_arguments(self._model, self._cache),
                 logits_to_keep=1,
             )
             done = True

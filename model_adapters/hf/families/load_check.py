@@ -82,9 +82,9 @@ def _check_shared(
     kind = loaded.model.config.model_type
     hint = "use share_prefix=false"
     problem = f"{pretrained}: {kind} cannot be run with shared prefixes"
-    inputs = _inputs(loaded, turns, processor, pretrained)
     with wrap_errors(problem, hint, catch=Exception, raise_as=ModelError):
         pieces = model.pieces(turns)
+    inputs = _inputs(loaded, turns, processor, pretrained)
     _compare_ids(pieces, inputs, f"{kind} cannot be run with shared prefixes; {hint}")
     # First the plain model: if it fails, too, the parts do not belong together.
     plain = _plain_logits(loaded, inputs, pretrained)

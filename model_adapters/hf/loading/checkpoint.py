@@ -181,7 +181,7 @@ def assemble(
         "dtype": str(model.dtype).removeprefix("torch."),
         "device": model.device.type,
         "quantization": _quantization_method(model),
-        "attn_implementation": model.config._attn_implementation,
+        "attn_implementation": model.config.get_text_config()._attn_implementation,
         "rope": getattr(model.config.get_text_config(), "rope_parameters", None),
         "image_processor": json.loads(image_processor.to_json_string()),
         "chat_template": digest(template),
@@ -309,11 +309,16 @@ def wrap_loading_errors(pretrained: str) -> Iterator[None]:
 def _load_model(located: LocatedCheckpoint[CheckpointOptions]) -> Any:
     options = located.options
     device = resolve_device(options)
+    attention: str | dict[str, str] = options.attn_implementation
+    text = located.config.get_text_config()
+    # Gemma 2 caps its scores, which torch's kernel cannot.
+    if attention == "sdpa" and getattr(text, "attn_logit_softcapping", None):
+        attention = {"": "sdpa", "text_config": "eager"}
     model, report = cast(Any, transformers.AutoModelForImageTextToText).from_pretrained(
         located.folder,
         config=located.config,
         dtype=resolve_dtype(options),
-        attn_implementation=options.attn_implementation,
+        attn_implementation=attention,
         device_map=options.device_map or ({"": device} if options.quantization else None),
         quantization_config=_quantization(options),
         trust_remote_code=options.trust_remote_code,

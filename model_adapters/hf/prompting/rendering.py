@@ -7,6 +7,7 @@ from datetime import date
 from typing import Any
 
 from jinja2 import TemplateError
+from transformers.utils.chat_template_utils import _compile_jinja_template
 
 from infthor_eval.errors import ModelError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
@@ -170,12 +171,13 @@ def _apply(
         wrap_errors(problem, "use other turns, or fix it", catch=_REFUSALS, raise_as=ModelError),
         limit_memory(TEMPLATE_MB.value),
     ):
+        # transformers takes no function from outside for a template.
+        _compile_jinja_template(template).globals["strftime_now"] = _TODAY.strftime
         text: str = tokenizer.apply_chat_template(
             list(messages),
             chat_template=template,
             tokenize=False,
             add_generation_prompt=True,
-            strftime_now=_TODAY.strftime,
         )
     if len(text) > TEMPLATE_CHARACTERS.value:  # the tokenizer would take minutes and gigabytes
         raise ModelError(

@@ -4,6 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from transformers import ProcessorMixin
+
 from infthor_eval.errors import ModelError
 from model_adapters.hf.family import Family
 
@@ -20,22 +22,24 @@ _PLAIN = """\
 
 
 def chat_template(folder: Path, tokenizer: Any) -> str:
-    """Return the processor's chat template if the checkpoint has one, else the tokenizer's.
+    """Return the processor's chat template if the checkpoint has one, else the tokenizer's; of
+    named ones the default.
 
     Raises:
-        ModelError: the checkpoint has no chat template.
+        ModelError: the checkpoint has no chat template, or only others with names.
     """
-    jinja = folder / "chat_template.jinja"
-    legacy = folder / "chat_template.json"
-    if jinja.is_file():
-        return jinja.read_text(encoding="utf-8")
-    if legacy.is_file():
-        template = json.loads(legacy.read_text(encoding="utf-8")).get("chat_template")
-    else:
-        template = tokenizer.chat_template
+    settings, _ = ProcessorMixin.get_processor_dict(folder)
+    template = settings.get("chat_template") or tokenizer.chat_template
+    if isinstance(template, list):
+        template = {named["name"]: named["template"] for named in template}
+    lacks = ""
+    if isinstance(template, dict):
+        lacks = f" named default (but {', '.join(sorted(template))})"
+        template = template.get("default")
     if not isinstance(template, str):
         raise ModelError(
-            f"{folder} has no chat template; add a chat_template.jinja to it, or set prompt=plain"
+            f"{folder} has no chat template{lacks}; add a chat_template.jinja to it, or set "
+            "prompt=plain"
         )
     return template
 

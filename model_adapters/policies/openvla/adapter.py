@@ -7,7 +7,8 @@ from tokenizers import Tokenizer
 
 from infthor_eval.errors import ModelError
 from model_adapters.hf.loading.checkpoint import wrap_loading_errors
-from model_adapters.options.policies import OpenVLAOptions, PolicyOptions
+from model_adapters.options.policies import OpenVLAOptions
+from model_adapters.options.tiny import OpenVLATinyOptions
 from model_adapters.policies.checkpoint import PolicyCheckpoint
 from model_adapters.policies.openvla.actions import ActionBins
 from model_adapters.policies.openvla.config import OpenVLAConfig
@@ -61,7 +62,9 @@ def describe_openvla(checkpoint: PolicyCheckpoint, unnorm_key: str | None) -> Op
     return OpenVLADescription(config, key, statistics, _tokenizer(checkpoint), bins)
 
 
-def load_openvla(name: str, checkpoint: PolicyCheckpoint, options: PolicyOptions) -> VlaPolicy:
+def load_openvla(
+    name: str, checkpoint: PolicyCheckpoint, options: OpenVLAOptions | OpenVLATinyOptions
+) -> VlaPolicy:
     """Load an OpenVLA; see `PolicyAdapter.build`."""
     description = describe_openvla(checkpoint, options.unnorm_key)
     config = description.config
@@ -82,7 +85,10 @@ def load_openvla(name: str, checkpoint: PolicyCheckpoint, options: PolicyOptions
         )
     network = OpenVLANetwork(weights.eval(), description.tokenizer, description.bins, size)
     identity = checkpoint.identity(device, dtype, options) | {"unnorm_key": description.key}
-    return VlaPolicy(name, network, description.statistics, options, identity, options.threads)
+    crop = size if options.center_crop else None
+    return VlaPolicy(
+        name, network, description.statistics, options, identity, options.threads, crop
+    )
 
 
 def _tokenizer(checkpoint: PolicyCheckpoint) -> Tokenizer:

@@ -9,6 +9,7 @@ from torch import nn
 from torch.nn.functional import gelu
 from transformers import DynamicCache, LlamaConfig, LlamaForCausalLM
 
+from model_adapters.hf.cached.kv_cache import cache_arguments
 from model_adapters.policies.decoding import decode_greedily, embed_ids
 from model_adapters.policies.openvla.actions import ActionBins
 from model_adapters.policies.openvla.vision import Tower, TowerShape, unused_keys
@@ -111,9 +112,7 @@ class OpenVLANetwork:
         cache = DynamicCache(config=model.config)
 
         def logits(embeds: torch.Tensor) -> torch.Tensor:
-            output = model(
-                inputs_embeds=embeds, past_key_values=cache, use_cache=True, logits_to_keep=1
-            )
+            output = model(inputs_embeds=embeds, **cache_arguments(model, cache), logits_to_keep=1)
             return output.logits[0, -1].float()
 
         def step(token: int) -> torch.Tensor:

@@ -16,6 +16,7 @@ from transformers import (
 )
 
 from infthor_eval.errors import ModelError
+from model_adapters.hf.cached.kv_cache import cache_arguments
 from model_adapters.policies.decoding import decode_greedily, embed_ids
 from model_adapters.policies.preprocessing import normalise, resize
 from model_adapters.policies.spatialvla.actions import SpatialBins
@@ -214,8 +215,7 @@ class SpatialVLANetwork:
                 attention_mask={"full_attention": mask, "sliding_attention": mask},
                 # PaliGemma counts from 1.
                 position_ids=torch.arange(past + 1, past + new + 1, device=mask.device)[None],
-                past_key_values=cache,
-                use_cache=True,
+                **cache_arguments(model, cache),
                 logits_to_keep=1,
             )
             return output.logits[0, -1].float()

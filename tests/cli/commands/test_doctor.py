@@ -5,6 +5,7 @@ import time
 from types import SimpleNamespace
 
 import pytest
+from PIL import Image
 
 from infthor_eval.cli.commands import doctor as checks
 from infthor_eval.cli.set_checks import Check
@@ -130,6 +131,23 @@ def test_what_a_set_lacks_is_counted_by_reason(run_cli, make_nieh_set):
     assert by_name["trajectories"]["detail"].endswith("; 1 more without a question")
     assert by_name["unreadable trajectories"]["detail"] == "1 cannot be read"
     assert by_name["task nieh_gt"]["detail"] == "1 of 5 samples can be asked"
+
+
+def test_pictures_that_are_converted_are_counted_by_kind(run_cli, tmp_path):
+    turned = Image.Exif()
+    turned[0x0112] = 6
+    plain = Image.new("RGB", (30, 20), "red")
+    for number in range(2):
+        plain.save(tmp_path / f"{number}.png", exif=turned)
+    Image.new("I;16", (30, 20), 40_000).save(tmp_path / "2.png")
+    plain.save(tmp_path / "3.jpg")
+    (tmp_path / "4.png").write_bytes(b"no picture")
+    (tmp_path / "questions.csv").write_text("question,answer\nWhat is it?,red\n")
+    _, by_name = checks_of(run_cli, "--data", str(tmp_path))
+    assert by_name["pictures"]["detail"].endswith(
+        "20x30 pixels; converted for models, as a browser shows them: EXIF orientation 6 (2); "
+        "16-bit grey (1)"
+    )
 
 
 def test_a_set_of_which_nothing_can_be_asked_sets_the_exit_code(run_cli, make_nieh_set):

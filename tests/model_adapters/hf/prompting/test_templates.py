@@ -1,6 +1,8 @@
 """How conversations are written: by a checkpoint's own template, or plainly, as transformers'
 processors take them."""
 
+import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -8,13 +10,14 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from transformers import AutoTokenizer
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Turn, check_adapter, load, registry
 from model_adapters.built_in import BUILT_IN
 from model_adapters.hf.families.hf_vlm import ProcessorFamily
-from model_adapters.hf.prompting.templates import plain_template
+from model_adapters.hf.prompting.templates import chat_template, plain_template
 from model_adapters.hf.uncached import UncachedModel
 from model_adapters.tiny.tokenizer import train_tokenizer
 
@@ -127,6 +130,46 @@ def test_a_checkpoint_without_a_template_is_asked_plainly_or_not_at_all(
         with pytest.raises(ModelError, match=r"has no chat template; add .*, or set prompt=plain"):
             _load(name, folder, prompt="chat", share_prefix=share_prefix)
         check_adapter(_load(name, folder, share_prefix=share_prefix))
+
+
+NAMED = [{"name": "tool_use", "template": "T"}, {"name": "default", "template": "D"}]
+
+
+@pytest.mark.parametrize(
+    ("files", "template"),
+    [
+        ({"tokenizer_config.json": {"chat_template": NAMED}}, "D"),
+        ({"chat_template.json": {"chat_template": "D"}}, "D"),
+        ({"chat_template.json": {"chat_template": NAMED}}, "D"),
+        ({"chat_template.json": {"chat_template": {"default": "D", "rag": "R"}}}, "D"),
+        ({"processor_config.json": {"chat_template": "D"}}, "D"),
+        ({"processor_config.json": {"chat_template": NAMED}}, "D"),
+        ({"processor_config.json": {}, "chat_template.jinja": "D"}, "D"),
+        ({"chat_template.jinja": "D", "additional_chat_templates/rag.jinja": "R"}, "D"),
+        ({"additional_chat_templates/default.jinja": "D"}, "D"),
+        # What only transformers' processor reads comes before what its tokenizer reads.
+        ({"processor_config.json": {"chat_template": "D"}, "chat_template.jinja": "J"}, "D"),
+        ({"chat_template.json": {"chat_template": "D"}, "chat_template.jinja": "J"}, "D"),
+        ({"tokenizer_config.json": {"chat_template": NAMED[:1]}}, "named default (but tool_use)"),
+        ({"additional_chat_templates/rag.jinja": "R"}, "named default (but rag)"),
+        ({"tokenizer_config.json": {"chat_template": []}}, "no chat template"),
+    ],
+)
+def test_of_all_places_and_names_transformers_default_is_taken(
+    files: dict[str, Any], template: str, checkpoints: dict[str, Path], tmp_path: Path
+) -> None:
+    folder = _without_template(checkpoints["llava"], tmp_path / "named")
+    for name, content in files.items():
+        path = folder / name
+        path.parent.mkdir(exist_ok=True)
+        known = json.loads(path.read_text()) if path.is_file() else {}
+        path.write_text(content if isinstance(content, str) else json.dumps(known | content))
+    tokenizer = AutoTokenizer.from_pretrained(folder)
+    if len(template) == 1:
+        assert chat_template(folder, tokenizer) == template
+    else:
+        with pytest.raises(ModelError, match=re.escape(template)):
+            chat_template(folder, tokenizer)
 
 
 def test_the_way_of_asking_is_part_of_the_identity(checkpoints: dict[str, Path]) -> None:

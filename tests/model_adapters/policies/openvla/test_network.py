@@ -3,16 +3,18 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
+from model_adapters import load
 from model_adapters.policies.decoding import embed_ids
 from model_adapters.policies.openvla.network import OpenVLANetwork, prompt, prompt_ids
 from model_adapters.policies.openvla.vision import Tower, TowerShape
 from model_adapters.policies.policy import VlaPolicy
-from model_adapters.policies.preprocessing import normalise, resize
+from model_adapters.policies.preprocessing import crop_centre, normalise, resize
 
 
 @pytest.fixture
@@ -44,6 +46,40 @@ def test_frames_are_squashed_by_pil_and_normalised_by_channel() -> None:
     assert pixels[:, 100, 100].tolist() == pytest.approx([1.0, 0.0, 0.2])
     seen = normalise(pixels, (0.5, 0.25, 0.0), (0.5, 0.25, 0.1))
     assert seen[:, 0, 0].tolist() == pytest.approx([1.0, -1.0, 2.0])
+
+
+def test_a_crop_is_the_middle_nine_tenths_of_the_area_as_tensorflow_makes_it() -> None:
+    ramps = np.zeros((101, 201, 3), dtype=np.uint8)
+    ramps[..., 0] = np.arange(201)
+    ramps[..., 1] = np.arange(101)[:, None]
+    cropped = np.asarray(crop_centre(Image.fromarray(ramps), 56))
+    side = 0.9**0.5
+    for channel, length in ((0, 201), (1, 101)):
+        ends = (length - 1) * (1 - side) / 2, (length - 1) * (1 + side) / 2
+        expected = np.floor(np.linspace(*ends, 56) * 255.5 / 255)
+        line = cropped[0, :, 0] if channel == 0 else cropped[:, 0, 1]
+        assert line.tolist() == expected.tolist()
+    assert (cropped[..., 2] == 0).all()
+    for level in (0, 1, 127, 254, 255):  # uniform frames stay as they are
+        plain = Image.new("RGB", (30, 20), (level, level, level))
+        assert crop_centre(plain, 8).getextrema() == ((level, level),) * 3
+
+
+def test_frames_are_cropped_where_the_option_says_so(
+    policy_checkpoints: dict[str, Path], tmp_path: Path
+) -> None:
+    noise = np.random.default_rng(0).integers(0, 256, (224, 224, 3), dtype=np.uint8)
+    whole, cropped = tmp_path / "whole.png", tmp_path / "cropped.png"
+    Image.fromarray(noise).save(whole)
+    crop_centre(Image.fromarray(noise), 56).save(cropped)
+    options = {"pretrained": str(policy_checkpoints["openvla"]), "device": "cpu"}
+    plain, cropping = (
+        load("openvla", {**options, **more}, 0) for more in ({}, {"center_crop": "true"})
+    )
+    steps = [policy.act(FrameRef(whole), "pick up the mug") for policy in (plain, cropping)]
+    assert steps[0] != steps[1] == plain.act(FrameRef(cropped), "pick up the mug")
+    assert "center_crop" not in plain.identity()
+    assert cropping.identity() == plain.identity() | {"center_crop": True}
 
 
 @pytest.mark.parametrize("kind", ["dinov2", "siglip"])
