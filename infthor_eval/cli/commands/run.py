@@ -33,6 +33,7 @@ from infthor_eval.runs import (
     RunRequest,
     Suite,
     check_equality,
+    check_runs,
     prepare_all,
     require_switches,
 )
@@ -79,6 +80,8 @@ def _are_equal(requests: Sequence[tuple[RunRequest, Suite]], n_units: int, quiet
         require_switches(request, n_units)
     n_changing = 0
     with quiet_notes(quiet):
+        with NOTES.status("checking all models"), prints_as_notes():
+            check_runs(prepare_all(requests[1:]))
         for request, suite in requests:
             with NOTES.status(f"{request.label}: asking with and without its switches"):
                 equality = check_equality(request, suite, n_units)

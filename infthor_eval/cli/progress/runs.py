@@ -9,7 +9,7 @@ from infthor_eval.cli.progress.bar import PacedBar
 from infthor_eval.cli.progress.notes import NOTES, print_note, prints_as_notes
 from infthor_eval.cli.progress.stopping import Stop, stop_on_sigint
 from infthor_eval.reasons import count_reasons
-from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, execute
+from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, check_all, execute
 from infthor_eval.terminal import progress_bar
 
 __all__ = ["execute_runs", "print_workload"]
@@ -54,6 +54,8 @@ def execute_runs(
 ) -> tuple[list[RunOutcome], bool]:
     """Execute runs one after another, each with a bar on a terminal and lines elsewhere.
 
+    What any of them refuses is told before the first begins.
+
     Args:
         runs: the runs.
         finish: called after each.
@@ -62,6 +64,8 @@ def execute_runs(
         The runs that were begun, and whether Ctrl-C left something undone: units of the last one,
         or the runs after it.
     """
+    with NOTES.status("checking all models"), prints_as_notes():
+        check_all(runs)
     outcomes: list[RunOutcome] = []
     for run in runs:
         outcome, is_requested = _execute(run)
