@@ -99,6 +99,7 @@ _NAMES = tuple(name for group in _COMMANDS.values() for name in group)
 _DEFAULT = "run"
 _INTERRUPTED, _TERMINATED = 130, 143  # exit codes
 _STOPPED = "stopped; run the same command to continue"
+_FOR_OUT = ("--dir", "--folder", "--output", "--output-dir", "--output-path")  # elsewhere, before
 _COLLECT_AFTER = 50_000  # new objects between two collections of garbage
 
 
@@ -260,6 +261,8 @@ def _unknown_option(error: click.NoSuchOption) -> str:
         name for option in error.ctx.command.params for name in option.opts if name.startswith("--")
     }
     near = difflib.get_close_matches(error.option_name, options, n=1)
+    if error.option_name in _FOR_OUT and "--out" in options:
+        near = ["--out"]
     hint = f"did you mean {near[0]}?" if near else f"see `{error.ctx.command_path} --help`"
     return f"unknown option {error.option_name}; {hint}"
 

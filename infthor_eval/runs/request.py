@@ -114,7 +114,7 @@ def _check(request: RunRequest, suite: Suite[SuiteUnit, Payload]) -> None:
         raise UsageError(
             f"{request.model} has no option {next(iter(request.model_options))}, nor any other"
         )
-    require_writable(request.output / file_name(request.label), "--output")
+    require_writable(request.output / file_name(request.label), "--out")
 
 
 def _unknown_model(name: str, known: Iterable[str]) -> UsageError:

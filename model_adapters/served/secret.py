@@ -39,8 +39,7 @@ def read_key(variable: str, *, usual: str, needed: bool) -> Secret:
     if not value:
         if needed:
             raise ModelError(
-                "the environment variable that api_key_env names holds no key; set it "
-                f"({usual})"
+                f"the environment variable that api_key_env names holds no key; set it ({usual})"
             )
         return Secret(None)
     if not (value.isascii() and value.isprintable()) or " " in value:

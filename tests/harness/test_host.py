@@ -22,7 +22,7 @@ def ours(make_nieh_set, tmp_path, run_cli):
     def ours(model, *options):
         data = make_nieh_set()
         arguments = option_words(
-            model=model, tasks="nieh_gt,nieh_full", data=data, output=tmp_path / "ours"
+            model=model, tasks="nieh_gt,nieh_full", data=data, out=tmp_path / "ours"
         )
         code, _, err = run_cli(*arguments, *options)
         assert code == 0, err

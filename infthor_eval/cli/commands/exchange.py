@@ -92,7 +92,7 @@ def _check_hub_name(option: str, name: str | None) -> None:
 @click.command(
     "import-replies",
     cls=ExampleCommand,
-    example="infthor-eval import-replies LOG --data SET --output results",
+    example="infthor-eval import-replies LOG --data SET --out results",
 )
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=PATH)
 @click.option(
@@ -104,7 +104,12 @@ def _check_hub_name(option: str, name: str | None) -> None:
     help="Name of the model. Default: the one that the log names.",
 )
 @click.option(
-    "--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs."
+    "--out",
+    "output",
+    type=PATH,
+    default=Path("results"),
+    show_default=True,
+    help="Folder of the runs.",
 )
 def import_replies(
     logs: tuple[Path, ...], data: Path | None, model: str | None, output: Path

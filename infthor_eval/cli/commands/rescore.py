@@ -72,7 +72,12 @@ _JUDGE_PROMPT = "yes-no"
     "--key", type=PATH, metavar="KEY", help="Key of a private set, for a run on its public part."
 )
 @click.option(
-    "--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs."
+    "--out",
+    "output",
+    type=PATH,
+    default=Path("results"),
+    show_default=True,
+    help="Folder of the runs.",
 )
 def command(
     folder: Path,

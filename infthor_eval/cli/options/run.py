@@ -54,7 +54,10 @@ _OPTIONS = (
         help="Library that runs the model; default: transformers, unless its name says otherwise.",
     ),
     click.option(
-        "--tasks", required=True, help="Task or group names with commas (see `ls tasks`)."
+        "--tasks",
+        required=True,
+        metavar="TASK,...",
+        help="Task or group names with commas (see `ls tasks`).",
     ),
     include_option,
     click.option("--data", type=PATH, help="Folder of the data set."),
@@ -103,7 +106,12 @@ _OPTIONS = (
         "command takes the first N instead.",
     ),
     click.option(
-        "--output", type=PATH, default=Path("results"), show_default=True, help="Results folder."
+        "--out",
+        "output",
+        type=PATH,
+        default=Path("results"),
+        show_default=True,
+        help="Folder of the runs.",
     ),
     click.option(
         "--seed",

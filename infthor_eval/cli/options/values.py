@@ -19,6 +19,7 @@ __all__ = [
     "ModelList",
     "ModelSpec",
     "SceneName",
+    "SceneNames",
     "WholeNumber",
     "floor_plans_option",
     "include_option",
@@ -106,6 +107,18 @@ class SceneName(click.ParamType):
             return str(value)
         procedural = [f"{kind}-{seed if has_seed else '<seed>'}" for kind in SCENE_KINDS]
         raise unknown_name("scene", value, [*procedural, "FloorPlan<N> with --data"])
+
+
+class SceneNames(click.ParamType):
+    """Names of scenes with commas; see `SceneName`."""
+
+    name = "SCENE,..."
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        """See `click.ParamType`."""
+        return tuple(SceneName().convert(one, param, ctx) for one in split_names(value, "--scene"))
 
 
 class ModelArgs(click.ParamType):

@@ -11,7 +11,7 @@ __all__ = ["label_runs"]
 
 # Options that change no number, and the tasks, which every table has a column for.
 _NOT_SHOWN = {
-    "output",
+    "out",
     "workers",
     "ray_address",
     "gpus_per_worker",

@@ -107,7 +107,7 @@ def refuse(run_cli, tmp_path, monkeypatch):
 
     def refuse(models, tasks, reason, *words):
         models = models.replace("mine:", "./mine.py:")
-        given = option_words(model=models, tasks=tasks, include_path="tasks", output="out")
+        given = option_words(model=models, tasks=tasks, include_path="tasks", out="out")
         assert_refused(run_cli(*words[:1], *given, *words[1:]), reason)
         assert not list((tmp_path / "out").rglob("journal"))
 

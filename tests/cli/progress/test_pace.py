@@ -88,7 +88,7 @@ def test_where_there_is_no_terminal_no_bar_is_left():
 def test_a_run_in_a_pipe_prints_lines_without_colour(make_nieh_set, tmp_path, run_cli, monkeypatch):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
     arguments = option_words(
-        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path
+        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path
     )
     _, out, err = run_cli(*arguments)
     lines = err.splitlines()
@@ -104,7 +104,7 @@ def test_quiet_prints_only_failures(make_nieh_set, tmp_path, run_cli):
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
     arguments = option_words(
-        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path / "out"
+        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, out=tmp_path / "out"
     )
     code, _, err = run_cli(*arguments, "--quiet")
     assert code == 1

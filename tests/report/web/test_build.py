@@ -104,7 +104,7 @@ def test_the_sections_have_their_pictures_and_tables(page):
 
 def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path, run_cli):
     words = option_words(model="oracle", tasks="nieh_mini_gt", limit="12", frames="shown,blank")
-    assert run_cli(*words, "--output", tmp_path)[0] == 0
+    assert run_cli(*words, "--out", tmp_path)[0] == 0
     page = make_page(*sorted((tmp_path / "oracle").iterdir()))
     (questions,) = (section for section in page.sections if section.key == "nieh")
     (chart,) = (chart for chart in questions.charts if chart.title == "Gain over blank frames")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, SceneName, WholeNumber, floor_plans_option
+from infthor_eval.cli.options.values import PATH, SceneNames, WholeNumber, floor_plans_option
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
@@ -27,10 +27,9 @@ __all__ = ["command"]
 @click.option(
     "--scene",
     "scenes",
-    type=SceneName(),
-    multiple=True,
+    type=SceneNames(),
     required=True,
-    help="kitchen-3, FloorPlan10, ... (see `ls scenes`); may be repeated.",
+    help="kitchen-3, FloorPlan10, ..., several with commas (see `ls scenes`).",
 )
 @click.option(
     "--min-steps",
