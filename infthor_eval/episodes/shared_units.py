@@ -87,13 +87,11 @@ def shared_units(
     ]
     if not shared:
         which = " and ".join(tasks)
-        lacks = [
-            _lack(run.label, names, of_run, units) for run, of_run in zip(runs, units, strict=True)
-        ]
-        known = ", ".join(filter(None, lacks))
+        lacks = [_lack(names, of_run, units) for of_run in units]
+        known = [f"{run.label} has {lack}" for run, lack in zip(runs, lacks, strict=True) if lack]
         raise DataError(
             f"the runs share no trajectory of {which} that all of them have in full ("
-            f"{known or 'they have other data, or each episode is left out in some run'}); "
+            f"{', '.join(known) or 'they have other data, or each episode is left out in some'}); "
             "finish them, or draw runs on the same data"
         )
     records = []
@@ -116,16 +114,13 @@ def shared_units(
     return SharedUnits(tuple(tasks), tuple(shared), tuple(records), (*notes, *differences))
 
 
-def _lack(
-    label: str, names: Sequence[str], of_run: Units[P], units: Sequence[Units[P]]
-) -> str | None:
-    """Return what a run lacks of the trajectories that some run has; None if nothing."""
+def _lack(names: Sequence[str], of_run: Units[P], units: Sequence[Units[P]]) -> str:
+    """Return how much a run has of the first trajectory that it has not in full; "" if none."""
     for name in names:
-        n_all = len(set().union(*(other.get(name, {}) for other in units)))
-        n = len(of_run.get(name, {}))
+        n, n_all = len(of_run.get(name, {})), len({k for each in units for k in each.get(name, {})})
         if n < n_all:
-            return f"{label} has {n} of {n_all} episodes of {name}"
-    return None
+            return f"{n} of {n_all} episodes of {name}"
+    return ""
 
 
 def _in_state(name: str, units: Sequence[Units[P]], states: Collection[State]) -> set[Any]:

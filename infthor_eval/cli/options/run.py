@@ -27,6 +27,7 @@ from infthor_eval.cli.options.values import (
     ModelSpec,
     WholeNumber,
     include_option,
+    output_option,
     split_names,
 )
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
@@ -105,14 +106,7 @@ _OPTIONS = (
         "evenly from all trajectories, drawn by --seed; a larger N includes these. lm-eval's own "
         "command takes the first N instead.",
     ),
-    click.option(
-        "--out",
-        "output",
-        type=PATH,
-        default=Path("results"),
-        show_default=True,
-        help="Folder of the runs.",
-    ),
+    output_option,
     click.option(
         "--seed",
         type=WholeNumber(),

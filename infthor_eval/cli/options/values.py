@@ -19,10 +19,10 @@ __all__ = [
     "ModelList",
     "ModelSpec",
     "SceneName",
-    "SceneNames",
     "WholeNumber",
     "floor_plans_option",
     "include_option",
+    "output_option",
     "parse_model_args",
     "parse_pairs",
     "split_names",
@@ -36,6 +36,15 @@ floor_plans_option = click.option(
     "--data",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
     help="Folder with recorded floor plans (thor_scenes/, alfred/layouts/), for scenes among them.",
+)
+
+output_option = click.option(
+    "--out",
+    "output",
+    type=PATH,
+    default=Path("results"),
+    show_default=True,
+    help="Folder of the runs.",
 )
 
 include_option = click.option(
@@ -107,18 +116,6 @@ class SceneName(click.ParamType):
             return str(value)
         procedural = [f"{kind}-{seed if has_seed else '<seed>'}" for kind in SCENE_KINDS]
         raise unknown_name("scene", value, [*procedural, "FloorPlan<N> with --data"])
-
-
-class SceneNames(click.ParamType):
-    """Names of scenes with commas; see `SceneName`."""
-
-    name = "SCENE,..."
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, ...]:
-        """See `click.ParamType`."""
-        return tuple(SceneName().convert(one, param, ctx) for one in split_names(value, "--scene"))
 
 
 class ModelArgs(click.ParamType):

@@ -9,7 +9,7 @@ from infthor_eval.cli.progress.bar import PacedBar
 from infthor_eval.cli.progress.notes import NOTES, print_note, prints_as_notes
 from infthor_eval.cli.progress.stopping import Stop, stop_on_sigint
 from infthor_eval.reasons import count_reasons
-from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, check_all, execute
+from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, check_runs, execute
 from infthor_eval.terminal import progress_bar
 
 __all__ = ["execute_runs", "print_workload"]
@@ -65,7 +65,7 @@ def execute_runs(
         or the runs after it.
     """
     with NOTES.status("checking all models"), prints_as_notes():
-        check_all(runs)
+        check_runs(runs[1:])
     outcomes: list[RunOutcome] = []
     for run in runs:
         outcome, is_requested = _execute(run)

@@ -75,19 +75,19 @@ def bind_run(
 def check_runs(runs: Iterable[PreparedRun[Any, Any]]) -> None:
     """Bind each run and release it again, to raise what `bind_run` would when its turn comes.
 
-    Runs that follow each other with one subject load it once. What fails in closing is told by the
-    run itself, beside its results.
+    Runs that follow each other with one subject load it once; those of a cluster are left to it.
     """
-    for _, (first, *others) in groupby(runs, key=_subject_of):
-        bound = bind_run(first)
+    here = (run for run in runs if run.request.worker_settings.ray_address is None)
+    for _, (first, *others) in groupby(here, key=_subject_of):
         with ExitStack() as stack:
+            bound = bind_run(first)
             stack.callback(_close_quietly, bound)
             for run in others:
                 _close_quietly(bind_run(run, bound.subject))
 
 
 def _close_quietly(bound: BoundRun[Any, Any]) -> None:
-    with suppress(UserCodeError):
+    with suppress(UserCodeError):  # told by the run itself, beside its results
         bound.close()
 
 

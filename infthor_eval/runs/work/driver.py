@@ -1,7 +1,7 @@
 """One run of any suite: its journal, the order of its work, its samples for other readers."""
 
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,11 +18,10 @@ from infthor_eval.runs.results import write_run_files
 from infthor_eval.runs.stored.command import write_command
 from infthor_eval.runs.suite import RunSummary, UnitSample, Workload
 from infthor_eval.runs.usage import Usage
-from infthor_eval.runs.work.binding import check_runs
 from infthor_eval.runs.work.executor import Executor, LocalExecutor
 from infthor_eval.runs.work.worker_executor import WorkerPoolExecutor
 
-__all__ = ["Observer", "RunOutcome", "Silent", "StoredSamples", "check_all", "execute"]
+__all__ = ["Observer", "RunOutcome", "Silent", "StoredSamples", "execute"]
 
 
 class Observer(Protocol):
@@ -71,23 +70,6 @@ class RunOutcome(Generic[SuiteUnit, Payload]):
     usage: Usage
     samples: Iterable[UnitSample]
     close_failure: str | None = None
-
-
-def check_all(runs: Sequence[PreparedRun[Any, Any]]) -> None:
-    """Have every run after the first refuse what it cannot do, before the first has done a unit.
-
-    Their models are loaded for that and freed again; those of several workers by one worker, as
-    this process may have no room for them.
-
-    Raises:
-        InfthorError: as `execute`, before its first unit.
-    """
-    check_runs(run for run in runs[1:] if run.request.worker_settings.is_local)
-    for run in runs[1:]:
-        settings = run.request.worker_settings
-        if not settings.is_local:
-            request = replace(run.request, worker_settings=replace(settings, workers=1))
-            WorkerPoolExecutor(replace(run, request=request), lambda _: None).close()
 
 
 def execute(

@@ -226,7 +226,7 @@ BAD = [
     ),
     (
         ["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--model-args", "a=1"],
-        "oracle has no option a",
+        "oracle has no option a, nor any other; of several models, MODEL:a=VALUE in --model gives",
     ),
     (
         option_words(model="qwen2.5-vl-tiny", tasks="nieh", data="SET", model_args="dtpe=x"),
@@ -306,6 +306,7 @@ def test_ls_lists_models_one_a_line_with_engine_and_usual_checkpoint(run_cli):
     rows = [line.split() for line in run_cli("ls", "models")[1].splitlines()[3:] if line.strip()]
     assert [row[0] for row in rows] == [*baseline_suites(), *names()]
     by_name = {row[0]: row[1:] for row in rows}
+    assert [name for name, (*what, _engine) in by_name.items() if not what] == []  # says what it is
     assert by_name["random"] == ["a", "baseline", "of", "nieh,", "plans", "-"]
     assert by_name["qwen2.5-vl"] == ["usually", "Qwen/Qwen2.5-VL-7B-Instruct", "transformers"]
     assert (by_name["qwen2.5-vl@vllm"][-1], by_name["openai"][-1]) == ("vllm", "-")

@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, SceneNames, WholeNumber, floor_plans_option
+from infthor_eval.cli.options.values import (
+    PATH,
+    SceneName,
+    WholeNumber,
+    floor_plans_option,
+    split_names,
+)
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
@@ -27,8 +33,11 @@ __all__ = ["command"]
 @click.option(
     "--scene",
     "scenes",
-    type=SceneNames(),
+    metavar="SCENE,...",
     required=True,
+    callback=lambda context, option, text: tuple(
+        SceneName().convert(name, option, context) for name in split_names(text, "--scene")
+    ),
     help="kitchen-3, FloorPlan10, ..., several with commas (see `ls scenes`).",
 )
 @click.option(
