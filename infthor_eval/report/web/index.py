@@ -62,7 +62,7 @@ class _Made:
 
     results: Sequence[TaskResult] = ()
     size: int = 0
-    footnote: str = ""
+    remark: str = ""
     problems: Sequence[str] = ()
     failure: str = ""
 
@@ -159,7 +159,7 @@ def _make(job: _Job, request: PageRequest) -> _Made:
         return _Made(problems=problems, failure=str(error))
     size = write_page(page, job.page)
     link = f"{job.page.parent.name}/{job.page.name}"
-    return _Made(list(task_results(run, link)), size, page.footnote, problems)
+    return _Made(list(task_results(run, link)), size, page.remark, problems)
 
 
 def _index_page(made: Iterable[_Made], failures: Sequence[tuple[str, str]]) -> Page:
@@ -170,9 +170,9 @@ def _index_page(made: Iterable[_Made], failures: Sequence[tuple[str, str]]) -> P
         columns = (Column("run", False), Column("reason", False))
         table = Table("", columns, tuple(map(Row, failures)))
         sections.append(Section("unread", "Not read", tables=(table,)))
-    n_embedded = sum(bool(one.footnote) for one in read)
+    n_embedded = sum(bool(one.remark) for one in read)
     which = "" if n_embedded == len(read) else f" ({n_embedded} of the runs)"
-    footnote = f"Numbers from the embedded simulator{which} are not comparable with published ones."
+    remark = f"Frames and numbers of the embedded simulator{which} are not comparable with published ones."
     return Page(
         title=f"{len(read)} {'run' if len(read) == 1 else 'runs'}",
         version=infthor_eval.__version__,
@@ -182,5 +182,5 @@ def _index_page(made: Iterable[_Made], failures: Sequence[tuple[str, str]]) -> P
         samples=(),
         metrics=(),
         pictures=(),
-        footnote=footnote if n_embedded else "",
+        remark=remark if n_embedded else "",
     )

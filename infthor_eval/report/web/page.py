@@ -99,7 +99,7 @@ class Page:
         notes: remarks on the samples.
         is_packed: whether all data of the samples are compressed, to a sixth of their size; those
             of many samples are in any case.
-        footnote: a remark at the end, on what the numbers are not comparable with; empty for none.
+        remark: what stands first, on what the numbers are not comparable with; empty for none.
         large: number of the enlarged picture by that of its thumbnail.
         frames: what is known of frames, by their numbers in the samples.
         prompts: requests as they were sent, by their numbers in the samples.
@@ -117,7 +117,7 @@ class Page:
     pictures: Sequence[str]
     notes: Sequence[str] = ()
     is_packed: bool = False
-    footnote: str = ""
+    remark: str = ""
     large: Mapping[int, int] = field(default_factory=dict)
     frames: Sequence[FrameFacts] = ()
     prompts: Sequence[Prompt] = ()

@@ -158,9 +158,9 @@ def test_a_run_that_was_stopped_and_has_failures_says_so(make_page, nieh_runs, t
 
 def test_the_footer_names_the_embedded_simulator_only_where_it_was_used(page, make_page, nieh_runs):
     embedded = [run for run in read_report_runs(nieh_runs) if "embedded" in run.simulator]
-    assert bool(embedded) == bool(page.footnote)
+    assert bool(embedded) == bool(page.remark)
     elsewhere = replace_simulator(read_report_runs(nieh_runs)[:1], None)
-    assert build_page(elsewhere, PageRequest(pictures=0)).footnote == ""
+    assert build_page(elsewhere, PageRequest(pictures=0)).remark == ""
 
 
 def test_plans_have_their_steps_and_what_was_seen(make_page, scripted_run, scripted_data):
