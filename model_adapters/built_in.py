@@ -11,6 +11,8 @@ __all__ = ["BUILT_IN", "BuiltIn"]
 
 _RANDOM = "random weights, for trying the harness; scores are those of chance"
 _ANY = "any image-text model of transformers with a chat template (pretrained=NAME)"
+_SERVED = "any model behind a server of this dialect (model=NAME)"
+_HTTP = "any policy behind a server of OpenVLA's convention, /act (url=ADDRESS)"
 _PERSON = "a person, who answers on a page of this machine"
 _NANO = "small, trained, bundled with the package"
 
@@ -39,25 +41,15 @@ def _locate(adapter: str, options: str, description: str = "") -> BuiltIn:
     return BuiltIn(f"model_adapters.{adapter}", f"model_adapters.{options}", description)
 
 
-def _serve(dialect: str) -> str:
-    return f"any model behind a server of {dialect} (model=NAME)"
-
-
 BUILT_IN = {
-    "anthropic": _locate(
-        "served.adapters:Anthropic",
-        "served.options:AnthropicOptions",
-        _serve("Anthropic's messages"),
-    ),
+    "anthropic": _locate("served.adapters:Anthropic", "served.options:AnthropicOptions", _SERVED),
     "deepseek-vl": _locate(
         "hf.families.deepseek_vl:DeepseekVL", "options.families:DeepseekVLOptions"
     ),
     "deepseek-vl-tiny": _locate(
         "tiny.deepseek_vl:DeepseekVLTiny", "options.tiny:TinyOptions", _RANDOM
     ),
-    "gemini": _locate(
-        "served.adapters:Gemini", "served.options:GeminiOptions", _serve("Google's Gemini API")
-    ),
+    "gemini": _locate("served.adapters:Gemini", "served.options:GeminiOptions", _SERVED),
     "gemma3": _locate("hf.families.named:Gemma3", "options.named:Gemma3Options"),
     "gemma4": _locate("hf.families.named:Gemma4", "options.named:Gemma4Options"),
     "glm-4.6v": _locate("hf.families.named:Glm46V", "options.named:Glm46VOptions"),
@@ -77,11 +69,7 @@ BUILT_IN = {
     ),
     "mistral-small": _locate("hf.families.named:MistralSmall", "options.named:MistralSmallOptions"),
     "molmo2": _locate("hf.families.named:Molmo2", "options.named:Molmo2Options"),
-    "openai": _locate(
-        "served.adapters:OpenAI",
-        "served.options:OpenAIOptions",
-        _serve("OpenAI's chat completions"),
-    ),
+    "openai": _locate("served.adapters:OpenAI", "served.options:OpenAIOptions", _SERVED),
     "openvla": _locate("policies.openvla.adapter:OpenVLA", "options.policies:OpenVLAOptions"),
     "openvla@vllm": _locate("vllm.openvla:OpenVLAOnVllm", "vllm.options:OpenVLAOnVllmOptions"),
     "openvla-tiny": _locate("tiny.openvla:OpenVLATiny", "options.tiny:OpenVLATinyOptions", _RANDOM),
@@ -106,9 +94,5 @@ BUILT_IN = {
     "spatialvla-tiny": _locate(
         "tiny.spatialvla:SpatialVLATiny", "options.tiny:SpatialVLATinyOptions", _RANDOM
     ),
-    "vla-http": _locate(
-        "policies.http.adapter:VlaHttp",
-        "options.policies:VlaHttpOptions",
-        "any policy behind a server of OpenVLA's convention, /act (url=ADDRESS)",
-    ),
+    "vla-http": _locate("policies.http.adapter:VlaHttp", "options.policies:VlaHttpOptions", _HTTP),
 }

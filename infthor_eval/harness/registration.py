@@ -3,7 +3,6 @@ is used."""
 
 import sys
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from infthor_eval.errors import InfthorError
@@ -33,16 +32,11 @@ def register() -> None:
 
     if NAME not in model_registry:
         model_registry.register(NAME, target=_TARGET)
-    sys.excepthook = _print_uncaught
-
-
-def _print_uncaught(
-    kind: type[BaseException], error: BaseException, trace: TracebackType | None
-) -> None:
-    if isinstance(error, InfthorError):
+    sys.excepthook = lambda kind, error, trace: (
         print_error(str(error))
-    else:
-        sys.__excepthook__(kind, error, trace)
+        if isinstance(error, InfthorError)
+        else sys.__excepthook__(kind, error, trace)
+    )
 
 
 def add_tasks() -> None:

@@ -22,7 +22,14 @@ class PacedBar:
         pace: how fast it goes.
     """
 
-    def __init__(self, progress: Progress, name: str, total: int, n_resumed: int = 0) -> None:
+    def __init__(
+        self,
+        progress: Progress,
+        name: str,
+        total: int,
+        n_resumed: int = 0,
+        work: float | None = None,
+    ) -> None:
         """Start a bar.
 
         Args:
@@ -30,14 +37,21 @@ class PacedBar:
             name: name of the work.
             total: units in all.
             n_resumed: units that an earlier run had done and that `advance` is not called for.
+            work: see `Pace`.
         """
-        self.pace = Pace(total, time.monotonic(), n_resumed)
+        self.pace = Pace(total, time.monotonic(), n_resumed, work)
         self._name = name
         self._progress = progress
         self._bar = progress.add_task(name, total=total, completed=n_resumed)
 
     def advance(
-        self, resumed: bool = False, *, context: int = 0, cached: int = 0, detail: str = ""
+        self,
+        resumed: bool = False,
+        *,
+        context: int = 0,
+        cached: int = 0,
+        detail: str = "",
+        work: float = 1.0,
     ) -> None:
         """Count a unit.
 
@@ -46,11 +60,12 @@ class PacedBar:
             context: tokens of its requests to a model.
             cached: tokens of these that were not encoded again.
             detail: text beside the pace.
+            work: see `Pace.count`.
         """
         now = time.monotonic()
-        self.pace.count(resumed, now, context, cached)
+        self.pace.count(resumed, now, context, cached, work)
         name = f"{self._name}: {detail}" if detail else self._name
-        self._progress.update(self._bar, advance=1, description=f"{name}  {self.pace.speed(now)}")
+        self._progress.update(self._bar, advance=1, description=f"{name}  {self.pace.rest(now)}")
         if self._progress.disable and self.pace.is_due(now):
             self._progress.console.print(
                 f"{self._name}: {self.pace.line(now)}{f'; {detail}' if detail else ''}"
@@ -78,7 +93,7 @@ class JobBar:
             self._bar,
             completed=job.n_done,
             total=job.n_units,
-            description=f"{job.name}  {self._pace.speed(now)}{detail}",
+            description=f"{job.name}  {self._pace.rest(now)}{detail}",
             visible=True,
         )
         if self._progress.disable and self._pace.is_due(now):

@@ -15,22 +15,30 @@ class Pace:
         n_new: units done by this run.
     """
 
-    def __init__(self, n_units: int, now: float, n_resumed: int = 0) -> None:
+    def __init__(
+        self, n_units: int, now: float, n_resumed: int = 0, work: float | None = None
+    ) -> None:
         """Start counting.
 
         Args:
             n_units: units in all.
             now: seconds, of any monotonic clock.
             n_resumed: units that an earlier run had done.
+            work: what all units have to do, in any unit; None if each has as much.
         """
         self._n_units = n_units
+        self._work_left = n_units - n_resumed if work is None else work
+        self._work_done = 0.0  # by this run, and when the last of it was done
+        self._worked_at: float | None = None
         self._context_tokens = self._cached_tokens = 0
         self._started_at = self._last_line_at = now
         self.n_resumed = n_resumed
         self.n_new = 0
         self._n_done_at_last_line = n_resumed
 
-    def count(self, resumed: bool, now: float, context: int = 0, cached: int = 0) -> None:
+    def count(
+        self, resumed: bool, now: float, context: int = 0, cached: int = 0, work: float = 1.0
+    ) -> None:
         """Count a unit.
 
         Args:
@@ -38,7 +46,11 @@ class Pace:
             now: seconds.
             context: tokens of its requests.
             cached: tokens of these that were not encoded again.
+            work: what is done with it; 0 where it is a part of what a later one completes.
         """
+        self._work_left -= work
+        if work and not resumed:
+            self._work_done, self._worked_at = self._work_done + work, now
         if resumed:
             self.n_resumed += 1
             self._started_at = now if not self.n_new else self._started_at
@@ -50,6 +62,7 @@ class Pace:
     def go_on(self, n_new: int, n_units: int) -> None:
         """Take how many units this run has done so far, and how many there are by now in all."""
         self.n_new, self._n_units = n_new, n_units
+        self._work_done, self._work_left = n_new, n_units - n_new - self.n_resumed
 
     def speed(self, now: float) -> str:
         """Return the pace, `1.3 a second, 83 % of tokens cached`; empty before a new unit."""
@@ -64,14 +77,17 @@ class Pace:
     def line(self, now: float) -> str:
         """Return all of it: `37 of 147 (25 %), 2 min left, 1.3 a second, 83 % of tokens cached`."""
         n_done = self._n_done
-        rate = self._rate(now)
         position = f"{n_done:,} of {self._n_units:,} ({100 * n_done / self._n_units:.0f} %)"
-        if rate is None:
-            return position
-        return (
-            f"{position}, {format_duration((self._n_units - n_done) / rate)} left, "
-            f"{self.speed(now)}"
-        )
+        rest = self.rest(now)
+        return f"{position}, {rest}" if rest else position
+
+    def rest(self, now: float) -> str:
+        """Return time left and pace, `2 min left, 1.3 a second`; empty before a new unit."""
+        if self._rate(now) is None or not self._work_done:
+            return self.speed(now)
+        worked_at = now if self._worked_at is None else self._worked_at
+        whole = (worked_at - self._started_at) * self._work_left / self._work_done
+        return f"{format_duration(max(0.0, whole - (now - worked_at)))} left, {self.speed(now)}"
 
     def is_due(self, now: float) -> bool:
         """Return whether to print a line now.

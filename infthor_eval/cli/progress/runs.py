@@ -9,10 +9,18 @@ from infthor_eval.cli.progress.bar import PacedBar
 from infthor_eval.cli.progress.notes import NOTES, print_note, prints_as_notes
 from infthor_eval.cli.progress.stopping import Stop, stop_on_sigint
 from infthor_eval.reasons import count_reasons
-from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, check_runs, execute
+from infthor_eval.runs import (
+    PreparedRun,
+    RunOutcome,
+    UnitKey,
+    UnitRecord,
+    Workload,
+    check_runs,
+    execute,
+)
 from infthor_eval.terminal import progress_bar
 
-__all__ = ["execute_runs", "print_workload"]
+__all__ = ["check_others", "execute_runs", "print_workload"]
 
 
 class _ProgressObserver:
@@ -22,17 +30,25 @@ class _ProgressObserver:
         self._name = name
         self._progress = progress
         self._stop = stop
+        self._work: dict[UnitKey, int] = {}
 
     def begin(self, workload: Workload, n_recovered: int) -> None:
         if n_recovered:
             set_aside = f"{n_recovered} bad line(s) of the journal set aside"
             print_note(f"{self._name}: {set_aside}; those samples are tried again")
         print_workload(workload)
-        self.bar = PacedBar(self._progress, self._name, workload.n_units)
+        # Tasks differ, and a group's first unit may pay for all of it: only whole groups tell how
+        # long the others take.
+        groups = workload.groups
+        if len(groups) > 1:
+            self._work = {group.units[-1].key: len(group.units) + group.frames for group in groups}
+        work = sum(self._work.values()) if self._work else None
+        self.bar = PacedBar(self._progress, self._name, workload.n_units, work=work)
         self._stop.has_begun = True
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
-        self.bar.advance(resumed, context=record.usage.context, cached=record.usage.cached)
+        usage, work = record.usage, self._work.get(record.key, 0) if self._work else 1
+        self.bar.advance(resumed, context=usage.context, cached=usage.cached, work=work)
 
     def note(self, text: str) -> None:
         print_note(f"{self._name}: {text}", "yellow")
@@ -47,6 +63,12 @@ def print_workload(workload: Workload) -> None:
         print_note(f"{task}: {n} sample(s) skipped: {reason}", "yellow")
     for cost in workload.costs:
         print_note(f"{cost.task}: {cost.description}")
+
+
+def check_others(runs: Sequence[PreparedRun]) -> None:
+    """Have the runs after the first refuse what they cannot do."""
+    with NOTES.status("checking all models"), prints_as_notes():
+        check_runs(runs[1:])
 
 
 def execute_runs(
@@ -64,8 +86,7 @@ def execute_runs(
         The runs that were begun, and whether Ctrl-C left something undone: units of the last one,
         or the runs after it.
     """
-    with NOTES.status("checking all models"), prints_as_notes():
-        check_runs(runs[1:])
+    check_others(runs)
     outcomes: list[RunOutcome] = []
     for run in runs:
         outcome, is_requested = _execute(run)

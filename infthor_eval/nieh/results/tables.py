@@ -51,8 +51,8 @@ _LEGEND = (
     "drops no article; `infthor-eval show RUN --question ID` says why a reply got its score.",
 )
 _EQUAL = (
-    "An interval of 100.00 or 0.00 is not empty: it tells how little so few trajectories, all alike, "
-    "say of others (Wilson's interval: 6 of 6 are 61.0 to 100.0)."
+    "The interval of 100.00 or 0.00 tells how little a few trajectories, all alike, say of others "
+    "(Wilson's: 6 of 6 are 61.0 to 100.0)."
 )
 _ALONE = "Questions on one trajectory alone have no interval: nothing is known of others."
 _EMBEDDED = (

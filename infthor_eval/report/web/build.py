@@ -13,7 +13,7 @@ from infthor_eval.report.headline.results import TaskResult, task_results
 from infthor_eval.report.headline.sentence import headline
 from infthor_eval.report.headline.tables import cost_chart, results_chart, results_table
 from infthor_eval.report.presented import PresentedRun
-from infthor_eval.report.web.page import About, Page, SuiteLabels
+from infthor_eval.report.web.page import About, Page, SuiteLabels, embedded_remark
 from infthor_eval.report.web.progress import PageProgress, Silent
 from infthor_eval.report.web.replays import EpisodeReplays
 from infthor_eval.report.web.run_tables import costs_table, left_out_table
@@ -135,7 +135,7 @@ def _remark(runs: Sequence[PresentedRun]) -> str:
     if not embedded:
         return ""
     which = "" if len(embedded) == len(runs) else f" ({', '.join(embedded)})"
-    return f"Frames and numbers of the embedded simulator{which} are not comparable with published ones."
+    return embedded_remark(which)
 
 
 def _suite_sections(runs: Sequence[PresentedRun]) -> Iterator[Section]:

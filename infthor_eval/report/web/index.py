@@ -13,7 +13,7 @@ from infthor_eval.report.headline.results import TaskResult, task_results
 from infthor_eval.report.presented import read_report_run
 from infthor_eval.report.runs import distinct_names
 from infthor_eval.report.web.build import PageRequest, build_page, results_section
-from infthor_eval.report.web.page import Page, write_page
+from infthor_eval.report.web.page import Page, embedded_remark, write_page
 from infthor_eval.report.web.processors import n_processors
 from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.sections import Section
@@ -172,7 +172,6 @@ def _index_page(made: Iterable[_Made], failures: Sequence[tuple[str, str]]) -> P
         sections.append(Section("unread", "Not read", tables=(table,)))
     n_embedded = sum(bool(one.remark) for one in read)
     which = "" if n_embedded == len(read) else f" ({n_embedded} of the runs)"
-    remark = f"Frames and numbers of the embedded simulator{which} are not comparable with published ones."
     return Page(
         title=f"{len(read)} {'run' if len(read) == 1 else 'runs'}",
         version=infthor_eval.__version__,
@@ -182,5 +181,5 @@ def _index_page(made: Iterable[_Made], failures: Sequence[tuple[str, str]]) -> P
         samples=(),
         metrics=(),
         pictures=(),
-        remark=remark if n_embedded else "",
+        remark=embedded_remark(which) if n_embedded else "",
     )

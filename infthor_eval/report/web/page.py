@@ -17,7 +17,7 @@ from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.web.samples import FrameFacts, Numbered, PageSample, Prompt
 from infthor_eval.report.web.sections import Section
 
-__all__ = ["About", "Page", "SuiteLabels", "write_page"]
+__all__ = ["About", "Page", "SuiteLabels", "embedded_remark", "write_page"]
 
 _SCRIPTS = (
     "wide.js",
@@ -81,6 +81,13 @@ class SuiteLabels(msgspec.Struct, frozen=True):
     reply: str
     compares_scorers: bool
     member: str = ""
+
+
+def embedded_remark(which: str) -> str:
+    """Return the remark of a page on frames of the embedded simulator, in which of its runs."""
+    return (
+        f"Frames are the embedded simulator's{which}: no number is comparable with published ones."
+    )
 
 
 @dataclass(frozen=True)

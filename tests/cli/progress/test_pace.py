@@ -1,6 +1,7 @@
 """The pace of a run: in lines without a terminal, and in the bar with one."""
 
 import io
+import re
 
 import pytest
 from rich.console import Console
@@ -28,6 +29,26 @@ def test_the_pace_of_a_slow_model_is_in_seconds_for_each():
     pace.count(False, 60.0)
     assert pace.speed(60.0) == "60.0 s each"
     assert pace.line(60.0) == "1 of 3 (33 %), 2 min left, 60.0 s each"
+
+
+def test_the_time_left_is_steady_where_groups_cost_more_later_and_their_first_unit_most_of_it():
+    # Ten groups of five units on 5 frames, then ten on 95: a second for each frame, with the first.
+    groups = [5] * 10 + [95] * 10
+    n_units, total = 100, sum(groups)
+    pace, now, told = Pace(n_units, 0.0, work=sum(5 + frames for frames in groups)), 0.0, []
+    for frames in groups:
+        for number in range(5):
+            now += frames if number == 0 else 0.0
+            pace.count(False, now, work=5 + frames if number == 4 else 0)
+            left = re.search(r"([\d.]+) (s|min) left", pace.line(now))
+            if left:
+                told.append((float(left[1]) * (60 if left[2] == "min" else 1), total - now))
+    assert len(told) == n_units - 4  # none before the first group is done
+    assert all(0.5 * truth - 30 <= said <= truth + 60 for said, truth in told)
+    by_units = Pace(n_units, 0.0)  # what a mean over units says where the cheap ones are done
+    for _ in range(50):
+        by_units.count(False, 50.0)
+    assert by_units.line(50.0) == "50 of 100 (50 %), 50.0 s left, 1.0 a second"  # of 950
 
 
 @pytest.mark.parametrize(
