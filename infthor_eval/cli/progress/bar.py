@@ -22,14 +22,7 @@ class PacedBar:
         pace: how fast it goes.
     """
 
-    def __init__(
-        self,
-        progress: Progress,
-        name: str,
-        total: int,
-        n_resumed: int = 0,
-        work: float | None = None,
-    ) -> None:
+    def __init__(self, progress: Progress, name: str, total: int, n_resumed: int = 0) -> None:
         """Start a bar.
 
         Args:
@@ -37,21 +30,14 @@ class PacedBar:
             name: name of the work.
             total: units in all.
             n_resumed: units that an earlier run had done and that `advance` is not called for.
-            work: see `Pace`.
         """
-        self.pace = Pace(total, time.monotonic(), n_resumed, work)
+        self.pace = Pace(total, time.monotonic(), n_resumed)
         self._name = name
         self._progress = progress
         self._bar = progress.add_task(name, total=total, completed=n_resumed)
 
     def advance(
-        self,
-        resumed: bool = False,
-        *,
-        context: int = 0,
-        cached: int = 0,
-        detail: str = "",
-        work: float = 1.0,
+        self, resumed: bool = False, *, context: int = 0, cached: int = 0, detail: str = ""
     ) -> None:
         """Count a unit.
 
@@ -60,10 +46,9 @@ class PacedBar:
             context: tokens of its requests to a model.
             cached: tokens of these that were not encoded again.
             detail: text beside the pace.
-            work: see `Pace.count`.
         """
         now = time.monotonic()
-        self.pace.count(resumed, now, context, cached, work)
+        self.pace.count(resumed, now, context, cached)
         name = f"{self._name}: {detail}" if detail else self._name
         self._progress.update(self._bar, advance=1, description=f"{name}  {self.pace.rest(now)}")
         if self._progress.disable and self.pace.is_due(now):

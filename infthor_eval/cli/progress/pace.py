@@ -15,30 +15,23 @@ class Pace:
         n_new: units done by this run.
     """
 
-    def __init__(
-        self, n_units: int, now: float, n_resumed: int = 0, work: float | None = None
-    ) -> None:
+    def __init__(self, n_units: int, now: float, n_resumed: int = 0) -> None:
         """Start counting.
 
         Args:
             n_units: units in all.
             now: seconds, of any monotonic clock.
             n_resumed: units that an earlier run had done.
-            work: what all units have to do, in any unit; None if each has as much.
         """
         self._n_units = n_units
-        self._work_left = n_units - n_resumed if work is None else work
-        self._work_done = 0.0  # by this run, and when the last of it was done
-        self._worked_at: float | None = None
+        self._weights: tuple[float, float, float] | None = None
         self._context_tokens = self._cached_tokens = 0
         self._started_at = self._last_line_at = now
         self.n_resumed = n_resumed
         self.n_new = 0
         self._n_done_at_last_line = n_resumed
 
-    def count(
-        self, resumed: bool, now: float, context: int = 0, cached: int = 0, work: float = 1.0
-    ) -> None:
+    def count(self, resumed: bool, now: float, context: int = 0, cached: int = 0) -> None:
         """Count a unit.
 
         Args:
@@ -46,11 +39,7 @@ class Pace:
             now: seconds.
             context: tokens of its requests.
             cached: tokens of these that were not encoded again.
-            work: what is done with it; 0 where it is a part of what a later one completes.
         """
-        self._work_left -= work
-        if work and not resumed:
-            self._work_done, self._worked_at = self._work_done + work, now
         if resumed:
             self.n_resumed += 1
             self._started_at = now if not self.n_new else self._started_at
@@ -59,10 +48,13 @@ class Pace:
             self._context_tokens += context
             self._cached_tokens += cached
 
+    def weigh(self, done: float, left: float, now: float) -> None:
+        """Take what was done by now, and what is left, where units differ in what they take."""
+        self._weights = done, left, now
+
     def go_on(self, n_new: int, n_units: int) -> None:
         """Take how many units this run has done so far, and how many there are by now in all."""
         self.n_new, self._n_units = n_new, n_units
-        self._work_done, self._work_left = n_new, n_units - n_new - self.n_resumed
 
     def speed(self, now: float) -> str:
         """Return the pace, `1.3 a second, 83 % of tokens cached`; empty before a new unit."""
@@ -82,12 +74,12 @@ class Pace:
         return f"{position}, {rest}" if rest else position
 
     def rest(self, now: float) -> str:
-        """Return time left and pace, `2 min left, 1.3 a second`; empty before a new unit."""
-        if self._rate(now) is None or not self._work_done:
+        """Return time left and pace, `2 min left, 1.3 a second`; no time before it can be told."""
+        done, left, at = self._weights or (self.n_new, self._n_units - self._n_done, now)
+        if not done or self._rate(now) is None:
             return self.speed(now)
-        worked_at = now if self._worked_at is None else self._worked_at
-        whole = (worked_at - self._started_at) * self._work_left / self._work_done
-        return f"{format_duration(max(0.0, whole - (now - worked_at)))} left, {self.speed(now)}"
+        seconds = (at - self._started_at) * left / done - (now - at)
+        return f"{format_duration(max(0.0, seconds))} left, {self.speed(now)}"
 
     def is_due(self, now: float) -> bool:
         """Return whether to print a line now.

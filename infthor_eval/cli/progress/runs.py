@@ -1,5 +1,6 @@
 """Progress of a run, on standard error."""
 
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -12,7 +13,6 @@ from infthor_eval.reasons import count_reasons
 from infthor_eval.runs import (
     PreparedRun,
     RunOutcome,
-    UnitKey,
     UnitRecord,
     Workload,
     check_runs,
@@ -30,25 +30,31 @@ class _ProgressObserver:
         self._name = name
         self._progress = progress
         self._stop = stop
-        self._work: dict[UnitKey, int] = {}
 
     def begin(self, workload: Workload, n_recovered: int) -> None:
         if n_recovered:
             set_aside = f"{n_recovered} bad line(s) of the journal set aside"
             print_note(f"{self._name}: {set_aside}; those samples are tried again")
         print_workload(workload)
-        # Tasks differ, and a group's first unit may pay for all of it: only whole groups tell how
-        # long the others take.
-        groups = workload.groups
-        if len(groups) > 1:
-            self._work = {group.units[-1].key: len(group.units) + group.frames for group in groups}
-        work = sum(self._work.values()) if self._work else None
-        self.bar = PacedBar(self._progress, self._name, workload.n_units, work=work)
+        self.bar = PacedBar(self._progress, self._name, workload.n_units)
+        # Tasks differ, and a group's first unit may pay for all of it: whole groups tell how long
+        # the others take.
+        groups = workload.groups if len(workload.groups) > 1 else ()
+        self._weights = {group.units[-1].key: len(group.units) + group.frames for group in groups}
+        self._weight = 0  # of the groups done now
+        self._weigh()
         self._stop.has_begun = True
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
-        usage, work = record.usage, self._work.get(record.key, 0) if self._work else 1
-        self.bar.advance(resumed, context=usage.context, cached=usage.cached, work=work)
+        weight = self._weights.pop(record.key, None)
+        if weight is not None:
+            self._weight += 0 if resumed else weight
+            self._weigh()
+        self.bar.advance(resumed, context=record.usage.context, cached=record.usage.cached)
+
+    def _weigh(self) -> None:
+        if self._weights:
+            self.bar.pace.weigh(self._weight, sum(self._weights.values()), time.monotonic())
 
     def note(self, text: str) -> None:
         print_note(f"{self._name}: {text}", "yellow")

@@ -118,7 +118,7 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
             if (note := repetition_note(task.format_failures, task.total.n_answered))
         ),
         *([_ALONE] if any(_is_alone(task) for *_, task in with_samples) else []),
-        *([_EQUAL] if any(_is_equal(task) for *_, task in with_samples) else []),
+        *([_EQUAL] if any(_is_alike(task) for *_, task in with_samples) else []),
         *_notes(runs),
     )
     table = Table("NIEH accuracy, %, strict scorer", (*_NAMES, *map(Column, numbers)), rows, notes)
@@ -137,9 +137,8 @@ def _is_alone(task: TaskSummary) -> bool:
     return any(score.n_trajectories == 1 for score in scores)
 
 
-def _is_equal(task: TaskSummary) -> bool:
-    score = task.total.scores.get(main_metric(task))
-    return score is not None and score.mean in (0, 1) and score.n_trajectories > 1
+def _is_alike(task: TaskSummary) -> bool:
+    return any(it.mean in (0, 1) and it.n_trajectories > 1 for it in task.total.scores.values())
 
 
 def _name_and_total(name: str, task: TaskSummary) -> tuple[str, ...]:

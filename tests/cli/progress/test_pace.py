@@ -35,16 +35,20 @@ def test_the_time_left_is_steady_where_groups_cost_more_later_and_their_first_un
     # Ten groups of five units on 5 frames, then ten on 95: a second for each frame, with the first.
     groups = [5] * 10 + [95] * 10
     n_units, total = 100, sum(groups)
-    pace, now, told = Pace(n_units, 0.0, work=sum(5 + frames for frames in groups)), 0.0, []
-    for frames in groups:
+    weights = [5 + frames for frames in groups]
+    pace, now, told = Pace(n_units, 0.0), 0.0, []
+    pace.weigh(0, sum(weights), now)
+    for at, frames in enumerate(groups):
         for number in range(5):
             now += frames if number == 0 else 0.0
-            pace.count(False, now, work=5 + frames if number == 4 else 0)
+            pace.count(False, now)
+            if number == 4:
+                pace.weigh(sum(weights[: at + 1]), sum(weights[at + 1 :]), now)
             left = re.search(r"([\d.]+) (s|min) left", pace.line(now))
             if left:
                 told.append((float(left[1]) * (60 if left[2] == "min" else 1), total - now))
     assert len(told) == n_units - 4  # none before the first group is done
-    assert all(0.5 * truth - 30 <= said <= truth + 60 for said, truth in told)
+    assert [it for it in told if not 0.5 * it[1] - 30 <= it[0] <= it[1] + 60] == []
     by_units = Pace(n_units, 0.0)  # what a mean over units says where the cheap ones are done
     for _ in range(50):
         by_units.count(False, 50.0)
