@@ -39,9 +39,9 @@ demo: $(INSTALLED)
 	$(BIN)/infthor-eval generate --scene kitchen-7 --min-steps 30 --min-subgoals 1 --seed 1 --out results/demo/trajectories
 	$(BIN)/infthor-eval replay results/demo/trajectories --out results/demo/set
 	$(BIN)/infthor-eval questions results/demo/set --out results/demo/set/qa_set_demo.csv
-	$(BIN)/infthor-eval --model oracle,blind,qwen2.5-vl-nano --tasks nieh_mini,nieh_mini_twins --output results/demo
+	$(BIN)/infthor-eval --model oracle,blind,qwen2.5-vl-nano --tasks nieh_mini,nieh_mini_twins --out results/demo
 	$(BIN)/infthor-eval --model qwen2.5-vl-nano --tasks nieh_mini_twins --context memory --memory none,uniform,oracle --budget 27 \
-		--output results/demo
+		--out results/demo
 	$(BIN)/infthor-eval report results/demo/*/nieh_mini*-* --out results/demo/report.html
 	@echo 'To type infthor-eval yourself, activate the environment: . $(BIN)/activate (or: make shell)'
 

@@ -76,7 +76,7 @@ def run_ours(checkpoint: Path, folder: Path) -> float:
         "nieh_full",
         "--data",
         str(folder / "set"),
-        "--output",
+        "--out",
         str(folder / "ours"),
     ]
     return _time_process(["-c", "from infthor_eval.cli import main; main()", *arguments], {})

@@ -195,7 +195,7 @@ def run_way(way: str, race: Race, folder: Path, limit: int | None) -> Cost:
 
 
 def _to(output: Path) -> list[str]:
-    return ["--output", str(output)]
+    return ["--out", str(output)]
 
 
 def _model(way: str, race: Race, checkpoint: Path) -> list[str]:

@@ -122,7 +122,7 @@ def accuracies(folder: Path, model: str) -> dict[str, float]:
     """Return how often a model is right on the clue frames, of all questions of a set."""
     words = ["run", "--model", model, "--tasks", "nieh_gt", "--data", str(folder / "set")]
     with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
-        command([*words, "--output", str(folder / "runs")])
+        command([*words, "--out", str(folder / "runs")])
     (scores,) = (folder / "runs").rglob("scores.jsonl")
     rows = [json.loads(line)["scores"] for line in scores.read_text().splitlines()]
     strict = mean(row.get("strict", 0.0) for row in rows)

@@ -105,7 +105,7 @@ def run(
         "--radius",
         radius,
         *settings,
-        "--output",
+        "--out",
         results,
         *scenes,
     ]

@@ -107,7 +107,7 @@ def make_runs(folder: Path, n_records: int, n_words: int) -> list[Path]:
         _TASK,
         "--data",
         small,
-        "--output",
+        "--out",
         output,
     )
     large = copy_set(small, folder / "set", n_records)

@@ -1,7 +1,7 @@
 """Draw docs/pairs.png: pairs of twins that the small model has right, by the number of frames that
 a memory shows it.
 
-    M="--model qwen2.5-vl-nano --tasks nieh_mini_twins --output runs"
+    M="--model qwen2.5-vl-nano --tasks nieh_mini_twins --out runs"
     infthor-eval $M --context memory --memory oracle,uniform,random,last --budget 27,72,180,540
     python benchmarks/pairs_by_frames.py runs
 """

@@ -75,7 +75,7 @@ def _rewards(out: Path) -> Mapping[str, float]:
         "published",
     ]
     with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
-        command([*words, "--output", str(out)])
+        command([*words, "--out", str(out)])
     suite, sums = PlansSuite(), {}
     for name in _BASELINES:
         (folder,) = (out / name).iterdir()

@@ -52,9 +52,7 @@ def run(
     """Run baselines with the command line and yield the results of each."""
     program = str(Path(sys.executable).with_name("infthor-eval"))
     command = [program, "run", "--model", ",".join(baselines), "--rewards", rules]
-    subprocess.run(
-        [*command, *options, "--output", str(out)], check=True, stdout=subprocess.DEVNULL
-    )
+    subprocess.run([*command, *options, "--out", str(out)], check=True, stdout=subprocess.DEVNULL)
     suite = PlansSuite()
     for name in baselines:
         (folder,) = (out / name).iterdir()

@@ -136,7 +136,7 @@ def run(sources: Sequence[TrajectorySource], scenes: Path, out: Path) -> dict[st
     data.write_bytes(
         b"".join(source.raw.replace(b"\n", b" ").strip() + b"\n" for source in sources)
     )
-    arguments = ["--tasks", _TASK, "--data", data, "--scenes", scenes, "--output", results]
+    arguments = ["--tasks", _TASK, "--data", data, "--scenes", scenes, "--out", results]
     runs = {}
     for name in _BASELINES:
         command = [

@@ -1,7 +1,7 @@
 """Draw the pictures of docs/published-replies.md from the published question files and three
 imported runs.
 
-    infthor-eval import-replies LOGS/eval_qa_set_*.log --data DATA --output results
+    infthor-eval import-replies LOGS/eval_qa_set_*.log --data DATA --out results
     python benchmarks/published_replies_pictures.py DATA results/Qwen2.5-VL-7B-Instruct/*
 
 Scores are those of the strict scorer; bars are 95 % intervals, clustered by trajectory.

@@ -108,7 +108,7 @@ def _ask(suite: str, arguments: list[str], output: Path) -> tuple[dict[Any, Any]
     The rest of a plan's record is not compared: tokens since a clue are not known of a server.
     """
     process = subprocess.run(
-        [*_COMMAND, *arguments, "--output", str(output)],
+        [*_COMMAND, *arguments, "--out", str(output)],
         env=ENVIRONMENT,
         capture_output=True,
         text=True,

@@ -114,14 +114,14 @@ def soak(
 ) -> None:
     """Run the same work twice, and print whether the results are equal."""
     began = time.monotonic()
-    calm = _Run([*words, "--output", str(out / name / "calm")], out / name / "calm")
+    calm = _Run([*words, "--out", str(out / name / "calm")], out / name / "calm")
     calm.start()
     calm.wait()
     calm_seconds, began = time.monotonic() - began, time.monotonic()
     if server is not None:
         server.disturbing = True
     harsh = _Run(
-        [*words, "--workers", "2", "--output", str(out / name / "harsh")], out / name / "harsh"
+        [*words, "--workers", "2", "--out", str(out / name / "harsh")], out / name / "harsh"
     )
     injected = _run_disturbed(
         harsh, itertools.cycle(faults), options.every, random.Random(options.seed)

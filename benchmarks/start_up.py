@@ -108,7 +108,7 @@ def measure(checkout: Path, name: str, output: Path, shown: Path) -> dict[str, f
     """Return seconds and processor seconds until each event, of one command by one checkout."""
     arguments = _COMMANDS[name]
     with tempfile.TemporaryDirectory(dir=output) as folder:
-        where = ("--output", folder) if "--tasks" in arguments else ()
+        where = ("--out", folder) if "--tasks" in arguments else ()
         if name == "show":
             where = tuple(map(str, shown.glob("*/*")))
         cache = folder if name.endswith("first run") else str(output / "cache")
@@ -137,7 +137,7 @@ def compare(checkouts: dict[str, Path], names: list[str], rounds: int) -> dict[s
         subprocess.run(
             [sys.executable, "-c", "from infthor_eval.cli import main; main()",
              *_COMMANDS["oracle"], "--quiet",
-             "--output", str(shown)],
+             "--out", str(shown)],
             env=os.environ | {"PYTHONPATH": str(checkouts["this"])}, stdout=subprocess.DEVNULL,
             check=True,
         )  # fmt: skip

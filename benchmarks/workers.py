@@ -112,7 +112,7 @@ def _run_all(
         "qwen2.5-vl-tiny",
         "--tasks",
         "nieh_mini_gt",
-        "--output",
+        "--out",
         str(answered),
     ]
     stages = {

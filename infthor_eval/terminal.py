@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.text import Text
 
 from infthor_eval.errors import OutputClosed
@@ -89,7 +89,7 @@ class _Description(TextColumn):
 
 def progress_bar(on: Console) -> Progress:
     """Return a bar that disappears when done; it is disabled but on a terminal or in a notebook."""
-    columns = (_Description(), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (_Description(), BarColumn(), MofNCompleteColumn())
     is_shown = on.is_terminal or on.is_jupyter
     return Progress(*columns, console=on, transient=True, disable=not is_shown)
 

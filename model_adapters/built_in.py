@@ -9,7 +9,10 @@ from typing import NamedTuple
 __all__ = ["BUILT_IN", "BuiltIn"]
 
 
-_RANDOM = "random weights, for trying the harness; scores are near 0"
+_RANDOM = "random weights, for trying the harness; scores are those of chance"
+_ANY = "any image-text model of transformers with a chat template (pretrained=NAME)"
+_SERVED = "any model behind a server of this dialect (model=NAME)"
+_HTTP = "any policy behind a server of OpenVLA's convention, /act (url=ADDRESS)"
 _PERSON = "a person, who answers on a page of this machine"
 _NANO = "small, trained, bundled with the package"
 
@@ -39,19 +42,19 @@ def _locate(adapter: str, options: str, description: str = "") -> BuiltIn:
 
 
 BUILT_IN = {
-    "anthropic": _locate("served.adapters:Anthropic", "served.options:AnthropicOptions"),
+    "anthropic": _locate("served.adapters:Anthropic", "served.options:AnthropicOptions", _SERVED),
     "deepseek-vl": _locate(
         "hf.families.deepseek_vl:DeepseekVL", "options.families:DeepseekVLOptions"
     ),
     "deepseek-vl-tiny": _locate(
         "tiny.deepseek_vl:DeepseekVLTiny", "options.tiny:TinyOptions", _RANDOM
     ),
-    "gemini": _locate("served.adapters:Gemini", "served.options:GeminiOptions"),
+    "gemini": _locate("served.adapters:Gemini", "served.options:GeminiOptions", _SERVED),
     "gemma3": _locate("hf.families.named:Gemma3", "options.named:Gemma3Options"),
     "gemma4": _locate("hf.families.named:Gemma4", "options.named:Gemma4Options"),
     "glm-4.6v": _locate("hf.families.named:Glm46V", "options.named:Glm46VOptions"),
-    "hf-vlm": _locate("hf.families.hf_vlm:HfVlm", "options.families:HfVlmOptions"),
-    "hf-vlm@vllm": _locate("vllm.adapter:HfVlmOnVllm", "vllm.options:HfVlmOnVllmOptions"),
+    "hf-vlm": _locate("hf.families.hf_vlm:HfVlm", "options.families:HfVlmOptions", _ANY),
+    "hf-vlm@vllm": _locate("vllm.adapter:HfVlmOnVllm", "vllm.options:HfVlmOnVllmOptions", _ANY),
     "human": _locate("human.adapter:Human", "human.adapter:HumanOptions", _PERSON),
     "internvl3.5": _locate("hf.families.named:InternVL35", "options.named:InternVL35Options"),
     "llama4": _locate("hf.families.named:Llama4", "options.named:Llama4Options"),
@@ -66,7 +69,7 @@ BUILT_IN = {
     ),
     "mistral-small": _locate("hf.families.named:MistralSmall", "options.named:MistralSmallOptions"),
     "molmo2": _locate("hf.families.named:Molmo2", "options.named:Molmo2Options"),
-    "openai": _locate("served.adapters:OpenAI", "served.options:OpenAIOptions"),
+    "openai": _locate("served.adapters:OpenAI", "served.options:OpenAIOptions", _SERVED),
     "openvla": _locate("policies.openvla.adapter:OpenVLA", "options.policies:OpenVLAOptions"),
     "openvla@vllm": _locate("vllm.openvla:OpenVLAOnVllm", "vllm.options:OpenVLAOnVllmOptions"),
     "openvla-tiny": _locate("tiny.openvla:OpenVLATiny", "options.tiny:OpenVLATinyOptions", _RANDOM),
@@ -91,5 +94,5 @@ BUILT_IN = {
     "spatialvla-tiny": _locate(
         "tiny.spatialvla:SpatialVLATiny", "options.tiny:SpatialVLATinyOptions", _RANDOM
     ),
-    "vla-http": _locate("policies.http.adapter:VlaHttp", "options.policies:VlaHttpOptions"),
+    "vla-http": _locate("policies.http.adapter:VlaHttp", "options.policies:VlaHttpOptions", _HTTP),
 }

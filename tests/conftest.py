@@ -105,7 +105,7 @@ def scripted_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def scripted_run(tmp_path_factory: pytest.TempPathFactory, scripted_data: Path) -> Path:
     """The folder of a run of plans: the baseline `scripted` in one trajectory."""
     output = tmp_path_factory.mktemp("scripted")
-    words = option_words(model="scripted", tasks="infthor_plans", data=scripted_data, output=output)
+    words = option_words(model="scripted", tasks="infthor_plans", data=scripted_data, out=output)
     with pytest.raises(SystemExit) as ended:
         main([str(word) for word in words])
     assert ended.value.code == 0

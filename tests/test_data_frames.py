@@ -42,7 +42,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folders = {}
     for suite, (model, task, limit) in TASKS.items():
         with pytest.raises(SystemExit) as ended:
-            main(option_words(model=model, tasks=task, limit=limit, output=str(output / suite)))
+            main(option_words(model=model, tasks=task, limit=limit, out=str(output / suite)))
         assert ended.value.code == 0
         (folders[suite],) = (output / suite / model).iterdir()
     return folders
@@ -170,14 +170,14 @@ def test_the_package_is_imported_without_pandas() -> None:
 
 
 def test_a_call_runs_what_the_command_runs(tmp_path: Path) -> None:
-    given = {"limit": 4, "output": tmp_path / "called", "frames": None, "quiet": True}
+    given = {"limit": 4, "out": tmp_path / "called", "frames": None, "quiet": True}
     frame = infthor_eval.evaluate(model="oracle,blind", tasks=["nieh_mini_gt"], **given)
     assert list(frame["run"]) == ["oracle", "blind"]
     assert list(frame["state"]) == ["whole", "whole"]
     assert frame["score"].iloc[0] == 1.0
     assert (frame["n"] == 4).all()
     assert (frame["low"] <= frame["score"]).all()
-    typed = option_words(model="oracle,blind", tasks="nieh_mini_gt", limit=4, output=tmp_path / "o")
+    typed = option_words(model="oracle,blind", tasks="nieh_mini_gt", limit=4, out=tmp_path / "o")
     with pytest.raises(SystemExit):
         main(typed)
     there = infthor_eval.load_runs(tmp_path / "o").set_index("run")
@@ -188,9 +188,9 @@ def test_a_call_runs_what_the_command_runs(tmp_path: Path) -> None:
 def test_a_call_with_what_the_command_refuses_raises(tmp_path: Path) -> None:
     for options in ({"limit": "many"}, {"no_such": 1}, {"model_args": {"nothing": 1}}):
         with pytest.raises(UsageError):
-            infthor_eval.evaluate(model="oracle", tasks="nieh_mini_gt", output=tmp_path, **options)
+            infthor_eval.evaluate(model="oracle", tasks="nieh_mini_gt", out=tmp_path, **options)
     with pytest.raises(UsageError, match="unknown model"):
-        infthor_eval.evaluate(model="orakle", tasks="nieh_mini_gt", output=tmp_path)
+        infthor_eval.evaluate(model="orakle", tasks="nieh_mini_gt", out=tmp_path)
 
 
 def test_a_run_that_cannot_be_read_is_left_out_with_a_warning(
@@ -233,7 +233,7 @@ import infthor_eval
 infthor_eval.load_run, infthor_eval.load_runs, infthor_eval.load_sample, infthor_eval.load_figure
 import infthor_eval.cli.evaluation, infthor_eval.report.sample, infthor_eval.report.named_figures
 assert state() == before, (before, state())
-infthor_eval.evaluate(model="blind", tasks="nieh_mini_gt", limit=2, output={str(tmp_path)!r})
+infthor_eval.evaluate(model="blind", tasks="nieh_mini_gt", limit=2, out={str(tmp_path)!r})
 after = state()
 for changed in ("warnings", "environment"):  # by lm-eval and others that it needs
     before.pop(changed), after.pop(changed)

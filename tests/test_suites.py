@@ -73,7 +73,7 @@ def command(package, *arguments):
 
 def test_a_suite_of_another_package_runs_with_its_task_and_its_options(package):
     done = command(
-        package, *option_words(model="adder", tasks="sums", abacus="bone", output=package / "out")
+        package, *option_words(model="adder", tasks="sums", abacus="bone", out=package / "out")
     )
     assert done.returncode == 1, done.stderr  # two of its sums cannot be done
     assert "the abacus is broken" in done.stderr

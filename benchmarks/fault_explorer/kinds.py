@@ -39,7 +39,7 @@ class Kind:
 
 
 def _run(place: Place, model: str, task: str, *more: str | Path) -> Words:
-    command = ("run", "--quiet", "--output", place.out / "runs", "--model", model)
+    command = ("run", "--quiet", "--out", place.out / "runs", "--model", model)
     return (*command, "--tasks", task, *more)
 
 
@@ -91,7 +91,7 @@ def _bundled_set() -> Path:
 
 
 def _asked(place: Place) -> tuple[Words, ...]:
-    command = ("run", "--quiet", "--output", place.inputs, "--model", "oracle")
+    command = ("run", "--quiet", "--out", place.inputs, "--model", "oracle")
     return ((*command, "--tasks", "nieh_mini_gt", "--limit", "2"),)
 
 
@@ -151,7 +151,7 @@ KINDS = (
         "import-replies",
         lambda place: (
             *("import-replies", place.inputs / "replies.jsonl", "--data", _bundled_set()),
-            *("--model", "theirs", "--output", place.out / "runs"),
+            *("--model", "theirs", "--out", place.out / "runs"),
         ),
         files=_write_replies,
     ),
@@ -160,7 +160,7 @@ KINDS = (
         "rescore",
         lambda place: (
             *("rescore", *sorted((place.inputs / "oracle").iterdir())),
-            *("--output", place.out / "runs"),
+            *("--out", place.out / "runs"),
         ),
         _asked,
     ),

@@ -100,7 +100,7 @@ def ask_on_clues(work: Work) -> Outcome:
     """Ask the real model on clue frames, in each precision and with each kernel."""
     machine = work.machine
     if machine.download and machine.data and not (machine.data / "metadata").is_dir():
-        work.command("fetch", "nieh", "--dir", str(machine.data))
+        work.command("fetch", "nieh", "--out", str(machine.data))
     tasks = ("--tasks", "nieh_mini_gt")
     if not machine.tiny:
         tasks = ("--tasks", "nieh_gt", "--data", str(machine.data), "--limit", "200")

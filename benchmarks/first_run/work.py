@@ -115,7 +115,7 @@ class Work:
         limited = self.machine.tiny and "--limit" not in words
         more = ["--limit", str(TINY_LIMIT)] if limited else []
         more += ["--fresh"] if fresh else []
-        done = self.command(*words, "--output", str(output), *more, codes=codes)
+        done = self.command(*words, "--out", str(output), *more, codes=codes)
         return read_runs(output), done
 
     def command(self, *words: str, codes: Sequence[int] = (0,)) -> Done:

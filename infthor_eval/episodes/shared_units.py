@@ -47,8 +47,11 @@ def shared_tasks(runs: Sequence[RecordedRun[Any, Any]], chosen: Sequence[str] | 
     if not shared:
         disjoint = (run for run in runs if not run.config.tasks.keys() & first.config.tasks.keys())
         other = next(disjoint, runs[-1])
+        has = ", ".join(
+            f"{run.label} has {' and '.join(run.config.tasks)}" for run in (first, other)
+        )
         raise UsageError(
-            f"{first.label} and {other.label} share no task; draw runs of the same task"
+            f"{first.label} and {other.label} share no task ({has}); draw runs of the same task"
         )
     for name in chosen or ():
         if name not in shared:
@@ -84,9 +87,12 @@ def shared_units(
     ]
     if not shared:
         which = " and ".join(tasks)
+        lacks = [_lack(names, of_run, units) for of_run in units]
+        known = [f"{run.label} has {lack}" for run, lack in zip(runs, lacks, strict=True) if lack]
         raise DataError(
-            f"the runs share no trajectory of {which} that all of them have in full; draw runs on "
-            "the same data"
+            f"the runs share no trajectory of {which} that all of them have in full ("
+            f"{', '.join(known) or 'they have other data, or each episode is left out in some'}); "
+            "finish them, or draw runs on the same data"
         )
     records = []
     for of_run in units:
@@ -106,6 +112,15 @@ def shared_units(
         notes.append(f"left out, as they failed or were not asked in a run: {n_lost}")
     notes += difference_notes("simulator", runs, [run.config.simulator for run in runs])
     return SharedUnits(tuple(tasks), tuple(shared), tuple(records), (*notes, *differences))
+
+
+def _lack(names: Sequence[str], of_run: Units[P], units: Sequence[Units[P]]) -> str:
+    """Return how much a run has of the first trajectory that it has not in full; "" if none."""
+    for name in names:
+        n, n_all = len(of_run.get(name, {})), len({k for each in units for k in each.get(name, {})})
+        if n < n_all:
+            return f"{n} of {n_all} episodes of {name}"
+    return ""
 
 
 def _in_state(name: str, units: Sequence[Units[P]], states: Collection[State]) -> set[Any]:

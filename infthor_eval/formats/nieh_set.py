@@ -48,7 +48,7 @@ class NiehSet:
     """Questions and frames of one folder. A trajectory is read when it is first needed, and cached.
 
     Attributes:
-        root: folder of the set, or one question file.
+        root: folder of the set, or one question file, also of one's own folder.
         directory: folder of the set's files.
         question_files: its files with questions, sorted.
         has_frames: False if there are question files alone.
@@ -76,7 +76,7 @@ class NiehSet:
         self.question_files = sorted(root.glob("qa_set*.csv")) if root.is_dir() else [root]
         self.has_frames = (self.directory / "metadata").is_dir()
         self._own: OwnFolder | None = None
-        if not self.question_files and not self.has_frames:
+        if not self.has_frames and (root.is_file() or not self.question_files):
             self._own = find_own_folder(root)
         if self._own is not None:
             self.question_files = [self._own.file]

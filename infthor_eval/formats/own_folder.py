@@ -95,18 +95,26 @@ class OwnFolder:
 
 
 def find_own_folder(root: Path) -> OwnFolder | None:
-    """Return the parts of a data set of one's own, or None if a folder is none.
+    """Return the parts of a data set of one's own, or None if there is none.
+
+    Args:
+        root: its folder, or its CSV file: that may be one of several there, but a question file of
+            the published form is none.
 
     Raises:
         DataError: it cannot be read, has frames but several CSV files, or frames both in itself
             and in folders.
     """
+    given = [root] if root.is_file() else None
+    root = root.parent if given else root
     with wrap_errors(f"{root}: the folder cannot be read", "check its permissions"):
-        files = sorted(path for path in root.iterdir() if path.suffix.lower() == ".csv")
+        files = given or sorted(path for path in root.iterdir() if path.suffix.lower() == ".csv")
         folders = {path.name: path for path in sorted(root.iterdir()) if path.is_dir()}
         folders = {name: path for name, path in folders.items() if find_images(path)}
         in_itself = bool(find_images(root))
     if not files or not (in_itself or folders):
+        return None
+    if given and "traj_id" in next((row.cells for row in read_rows(files[0], (), _HINT)), {}):
         return None
     if len(files) > 1:
         raise DataError(

@@ -44,7 +44,10 @@ def read_questions(path: Path) -> list[Question | SkippedQuestion]:
         DataError: the file cannot be read, is not a CSV file of this form, or no row of it is a
             question.
     """
-    hint = f"a question file is a UTF-8 CSV file with the columns {', '.join(_COLUMNS)}"
+    hint = (
+        f"a question file is a UTF-8 CSV file with the columns {', '.join(_COLUMNS)}, or question "
+        "and answer beside frames of your own"
+    )
     file = next((name for name in _CLUE_FILES if f"{name}_clue" in path.stem), None)
     entries = [_question_or_reason(row, path, file) for row in read_rows(path, _COLUMNS, hint)]
     if entries and not any(isinstance(entry, Question) for entry in entries):

@@ -1,11 +1,14 @@
 """Registers our model class with lm-eval unimported, and our tasks; tells these whether the class
 is used."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
+from infthor_eval.errors import InfthorError
 from infthor_eval.exports import LM_EVAL_MODEL as NAME
 from infthor_eval.storage.folders import packaged_folder
+from infthor_eval.terminal import print_error
 
 __all__ = [
     "NAME",
@@ -20,12 +23,20 @@ _references = False
 
 
 def register() -> None:
-    """Register the class as a "module:Class" that lm-eval imports when a person asks for it."""
+    """Register the class as a "module:Class" that lm-eval imports when a person asks for it.
+
+    lm-eval's own script catches nothing: from here on our errors are one line under it as well.
+    """
     import lm_eval.models  # noqa: F401 - before registering, or the built-in models vanish (0.4.13)
     from lm_eval.api.registry import model_registry
 
     if NAME not in model_registry:
         model_registry.register(NAME, target=_TARGET)
+    sys.excepthook = lambda kind, error, trace: (
+        print_error(str(error))
+        if isinstance(error, InfthorError)
+        else sys.__excepthook__(kind, error, trace)
+    )
 
 
 def add_tasks() -> None:

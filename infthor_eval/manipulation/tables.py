@@ -10,7 +10,7 @@ from infthor_eval.episodes.tables import (
     result_notes,
     run_name,
 )
-from infthor_eval.formats.published import published_tables
+from infthor_eval.formats.published import PUBLISHED_DATA, published_tables
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.summary import ArmTaskSummary
 from infthor_eval.rates import Rate, format_percent, paired_rate
@@ -61,7 +61,7 @@ def _success_table(runs: Sequence[RunSummary]) -> Table:
             above = [None if task is None else _above_floor(run, task, runs) for task in pair]
             cells = _cells([None if task is None else task[1] for task in pair])
             rows.append(Row((run_name(run.header), *cells, *map(format_percent, above))))
-    notes.append(_FLOOR)
+    notes += (_FLOOR, PUBLISHED_DATA)
     for table in published_tables("manipulation"):
         for row in table.rows:
             values = (f"{value:.2f}" for value in row.values)

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
+from infthor_eval.memory import read_budget
 from infthor_eval.quantities import MOST, Count, Total
 from infthor_eval.runs import RunConfig, TaskConfig
 
@@ -156,3 +157,14 @@ class NiehConfig(RunConfig[NiehTaskConfig], frozen=True, kw_only=True, omit_defa
     def simulators(self) -> list[str]:
         """Names of the simulators that rendered the frames."""
         return sorted({task.simulator for task in self.tasks.values() if task.simulator})
+
+    def in_words(self, name: str, value: str) -> str:
+        """See `RunConfig`: a budget with what it is in frames."""
+        return value + self.in_frames(read_budget(value)) if name == "budget" else value
+
+    def in_frames(self, tokens: int | None) -> str:
+        """Return " [3 frames]" for a budget in tokens that is whole frames, else an empty text."""
+        if not tokens or not self.tokens_per_frame or tokens % self.tokens_per_frame:
+            return ""
+        n = tokens // self.tokens_per_frame
+        return f" [{n} frame{'s' if n > 1 else ''}]"

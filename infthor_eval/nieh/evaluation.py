@@ -1,6 +1,6 @@
 """NIEH set up for a run: the questions of its tasks, answered a trajectory at a time."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import groupby
 from typing import Any
@@ -30,7 +30,7 @@ from infthor_eval.runs import (
     UnitSample,
     Workload,
 )
-from model_adapters import Model, Subject
+from model_adapters import Model, Subject, check_decoding
 
 __all__ = ["BoundNieh", "NiehEvaluation", "PreparedEvaluation"]
 
@@ -55,7 +55,7 @@ class NiehEvaluation:
         """See `infthor_eval.runs.Evaluation.bind`."""
         answerer = answerer_of(subject)
         _refuse_without_frames(subject, self._tasks)
-        _refuse_without_sampling(subject, self._options)
+        _refuse_incapable(subject, self._options, self._tasks)
         tokens = self._tokens_per_frame(answerer)
         tasks = {task.name: task for task in self._tasks}
         prepared = {name: task.prepare(tokens) for name, task in tasks.items()}
@@ -265,16 +265,20 @@ def _refuse_without_frames(subject: Subject, tasks: Sequence[NiehTask]) -> None:
         )
 
 
-def _refuse_without_sampling(subject: Subject, options: NiehOptions) -> None:
-    """Refuse to draw replies from a model that cannot; baselines say the same every time."""
+def _refuse_incapable(subject: Subject, options: NiehOptions, tasks: Iterable[NiehTask]) -> None:
+    """Refuse a model every reply of which would fail; baselines say the same every time."""
+    if not isinstance(subject, Model):
+        return
     for name, is_given in (
         ("repeats", options.repeats > 1),
         ("temperature", options.temperature is not None),
     ):
-        if is_given and isinstance(subject, Model) and not subject.capabilities.sampling:
+        if is_given and not subject.capabilities.sampling:
             raise UsageError(
                 f"--{name}: {subject.name} draws no replies; leave it out, or give another model"
             )
+    for task in tasks:
+        check_decoding(f"{task.name}: {subject.name}", subject.capabilities, task.decoding)
 
 
 def _refuse_empty(task_samples: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:

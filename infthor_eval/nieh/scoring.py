@@ -15,8 +15,8 @@ fixes the faults:
 * a slice is its food: "lettuce slice", "sliced lettuce", "lettucesliced" and "lettuce" are one
   thing, in keys too.
 
-To add or change a metric of NIEH: here for all tasks; for one alone, `process_results` and
-`metric_list` in its task file.
+To add or change a metric of NIEH: here and in `metric_list` of `tasks/nieh/_nieh.yaml` for all
+tasks; for one alone, `process_results` and `metric_list` in its task file.
 """
 
 import re

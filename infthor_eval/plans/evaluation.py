@@ -20,7 +20,7 @@ from infthor_eval.plans.task import PlansTask
 from infthor_eval.plans.trajectories import PlanTrajectory
 from infthor_eval.runs import Group, Session, TaskRequest, UnitRecord, UnitSample
 from infthor_eval.storage.scratch import ScratchFolder
-from model_adapters import Model, Subject
+from model_adapters import Model, Subject, check_decoding
 
 __all__ = ["BoundPlans", "PlanUnit", "PlansEvaluation"]
 
@@ -55,7 +55,7 @@ class PlansEvaluation(EpisodeEvaluation[PlansOptions, PlansTask, PlanUnit]):
             UsageError: the model cannot decode as its tasks want it.
         """
         if isinstance(subject, Model):
-            _refuse_decoding(subject, self.options, self.tasks.values())
+            _refuse_incapable(subject, self.options, self.tasks.values())
         return BoundPlans(self, actor_factory(subject, self.trajectories))
 
 
@@ -163,16 +163,22 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         )
 
 
-def _refuse_decoding(model: Model, options: PlansOptions, tasks: Iterable[PlansTask]) -> None:
+def _refuse_incapable(model: Model, options: PlansOptions, tasks: Iterable[PlansTask]) -> None:
     """Refuse a model every reply of which would fail."""
     if options.constrained and not model.capabilities.choices:
         raise UsageError(f"--constrained: {model.name} cannot be held to choices; leave it out")
     for task in tasks:
+        if task.counting and not model.capabilities.counts_tokens:
+            raise UsageError(
+                f"{task.counting}: {model.name} counts no tokens; take --history full, or leave "
+                "out the budget"
+            )
         if not (task.decoding.greedy or model.capabilities.sampling):
             raise UsageError(
                 f"{model.name} draws no replies, as {task.name} does at temperature "
                 f"{task.decoding.temperature:g}; add --greedy"
             )
+        check_decoding(f"{task.name}: {model.name}", model.capabilities, task.decoding)
 
 
 def _not_asked(unit: PlanUnit, fingerprint: str) -> UnitRecord[PlanRecord]:

@@ -13,7 +13,7 @@ from infthor_eval.episodes.tables import (
     result_notes,
     run_name,
 )
-from infthor_eval.formats.published import published_tables
+from infthor_eval.formats.published import PUBLISHED_DATA, published_tables
 from infthor_eval.plans.config import PlansTaskConfig
 from infthor_eval.plans.summary import FINAL_COLUMNS, NEVER, PlanTaskSummary
 from infthor_eval.plans.twins.tables import NET_PAIRS, format_pairs, twin_tables
@@ -87,6 +87,7 @@ def _success_table(
                     Row((row.name, f"published, {table.title}", *values), is_published=True)
                 )
             notes += (f"Published, {table.title}: {note}" for note in table.notes)
+        notes.append(PUBLISHED_DATA)
         notes.append(
             f"{_NEVER} Cannot be other than 0: the published script counts every put as failed."
         )

@@ -11,7 +11,7 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.plans.actors.model import AgentConfig
 from infthor_eval.plans.config import PlansTaskConfig
 from infthor_eval.plans.environment import MAX_STEPS
-from infthor_eval.plans.history.forms import history_named
+from infthor_eval.plans.history.forms import LastTokens, history_named
 from infthor_eval.plans.history.recalled import MemoryChoice, RecalledHistory
 from infthor_eval.plans.history.retrieved import require_retrieved
 from infthor_eval.plans.options import PlansOptions
@@ -79,6 +79,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         rules: the rules of rewards.
         words: the words of plans and actions.
         history: the part of the history that a model is given.
+        counting: the option that needs a model that counts tokens; None without one.
         final_form: the published form of final tasks; None for the default protocol.
         evaluated_trajectories: trajectories that are evaluated.
     """
@@ -102,6 +103,8 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
             kwargs = {**kwargs, "do_sample": False, "temperature": 0.0}
         self.decoding = decoding_of(kwargs, request.seed, file.name)
         self.history = history_named(settings.history, self._memory_choice())
+        windowed = isinstance(self.history, LastTokens)
+        self.counting = "--history last:N" if windowed else self._options.budget and "--budget"
         self.final_form = self._final_form(settings)
         self._form = self.final_form or chat_form(self.history)
         if self._form is not None:

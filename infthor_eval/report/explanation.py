@@ -43,7 +43,7 @@ _ADVICE = {
     "of images changed where no setting tells.",
     Effect.PIXELS: "The same frames became other pixels: they were scaled otherwise where no "
     "setting tells.",
-    Effect.REPLY: "Ask one of them again with another --output to see whether the model repeats "
+    Effect.REPLY: "Ask one of them again with another --out to see whether the model repeats "
     "itself.",
 }
 

@@ -29,6 +29,7 @@ from infthor_eval.runs.suite import (
     Workload,
 )
 from infthor_eval.runs.usage import NOTHING, Usage
+from infthor_eval.runs.work.binding import check_runs
 from infthor_eval.runs.work.driver import Observer, RunOutcome, Silent, execute
 from infthor_eval.runs.work.equality import Equality, check_equality, require_switches
 from infthor_eval.runs.work.estimate import Estimate, TaskEstimate, estimate_run
@@ -69,6 +70,7 @@ __all__ = [
     "Usage",
     "Workload",
     "check_equality",
+    "check_runs",
     "count_units",
     "estimate_run",
     "execute",

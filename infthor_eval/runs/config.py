@@ -112,6 +112,10 @@ class RunConfig(
         """Names of the simulators that the frames are from."""
         return [self.simulator] if self.simulator else []
 
+    def in_words(self, name: str, value: str) -> str:
+        """Return the value of an option, by its name, as people read it."""
+        return value
+
     @property
     def document(self) -> dict[str, Any]:
         """The config as JSON values."""

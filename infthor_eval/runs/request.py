@@ -111,10 +111,12 @@ def _check(request: RunRequest, suite: Suite[SuiteUnit, Payload]) -> None:
     if request.model not in suite.baselines:
         check_options(request.model, request.model_options)
     elif request.model_options:
+        option = next(iter(request.model_options))
         raise UsageError(
-            f"{request.model} has no option {next(iter(request.model_options))}, nor any other"
+            f"{request.model} has no option {option}, nor any other; of several models, "
+            f"MODEL:{option}=VALUE in --model gives it to one"
         )
-    require_writable(request.output / file_name(request.label), "--output")
+    require_writable(request.output / file_name(request.label), "--out")
 
 
 def _unknown_model(name: str, known: Iterable[str]) -> UsageError:

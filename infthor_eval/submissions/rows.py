@@ -93,7 +93,7 @@ def _shown(task: Expected) -> str:
     if memory is not None:
         parts.append(memory.name)
     if config.budget:
-        parts.append(f"budget {config.budget}")
+        parts.append(f"budget {config.in_words('budget', config.budget)}")
     return ", ".join(parts)
 
 

@@ -57,7 +57,10 @@ def parse(model: str, options: type, texts: Mapping[str, str]) -> Any:
         if name not in hints:
             near = difflib.get_close_matches(name, hints, n=1)
             hint = f"; did you mean {near[0]}?" if near else ";"
-            raise UsageError(f"{model} has no option {name}{hint} it takes: {describe(options)}")
+            raise UsageError(
+                f"{model} has no option {name}{hint} it takes: {describe(options)} (of several "
+                f"models, MODEL:{name}=VALUE in --model gives it to one)"
+            )
     for field in dataclasses.fields(options):
         if is_required(field) and field.name not in texts:
             raise UsageError(

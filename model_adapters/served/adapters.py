@@ -1,5 +1,6 @@
 """The adapters of models behind a server, one for each dialect."""
 
+from dataclasses import fields
 from typing import TYPE_CHECKING, ClassVar
 from urllib.parse import urlsplit
 
@@ -70,6 +71,6 @@ class Gemini:
 
 def _key(options: ServedOptions) -> Secret:
     """Return the key; the servers of the dialects' makers require one."""
-    field = type(options).__dataclass_fields__["base_url"]
-    needed = urlsplit(options.url).hostname == urlsplit(str(field.default)).hostname
-    return read_key(options.api_key_env, needed=needed)
+    defaults = {field.name: str(field.default) for field in fields(options)}
+    needed = urlsplit(options.url).hostname == urlsplit(defaults["base_url"]).hostname
+    return read_key(options.api_key_env, usual=defaults["api_key_env"], needed=needed)

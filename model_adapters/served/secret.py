@@ -25,8 +25,10 @@ class Secret:
         return text.replace(self.value, "[key]")
 
 
-def read_key(variable: str, *, needed: bool) -> Secret:
+def read_key(variable: str, *, usual: str, needed: bool) -> Secret:
     """Return the key in an environment variable; `needed` says that the server requires one.
+
+    `usual` is the variable's name unless a user gives another.
 
     Messages do not repeat the name of the variable: it may be the key, given by mistake.
 
@@ -37,8 +39,7 @@ def read_key(variable: str, *, needed: bool) -> Secret:
     if not value:
         if needed:
             raise ModelError(
-                "the environment variable that api_key_env names holds no key; set it "
-                "(OPENAI_API_KEY)"
+                f"the environment variable that api_key_env names holds no key; set it ({usual})"
             )
         return Secret(None)
     if not (value.isascii() and value.isprintable()) or " " in value:

@@ -212,7 +212,7 @@ def test_commands_of_the_real_model_are_commands_that_there_are(
             with pytest.raises(module.StepFailed):
                 step.run(module.Work(whole, tmp_path / "work", time.monotonic() + 60))
     asked = list(filter(None, typed))
-    assert ("fetch", "nieh", "--dir", str(data)) in asked
+    assert ("fetch", "nieh", "--out", str(data)) in asked
     assert {words[0] for words in asked} == {"--model", "fetch", "plan"}
     for words in asked:
         name, *rest = ("run", *words) if words[0] == "--model" else words

@@ -45,7 +45,7 @@ def rescore(
     monkeypatch.chdir(tmp_path)
 
     def rescore(folder: Path, *options: object) -> tuple[int, str, Path | None]:
-        code, out, err = run_cli("rescore", folder, "--output", tmp_path / "out", *options)
+        code, out, err = run_cli("rescore", folder, "--out", tmp_path / "out", *options)
         folders = sorted((tmp_path / "out").glob("*/*"), key=lambda path: path.stat().st_mtime)
         return code, out + err, folders[-1] if folders else None
 

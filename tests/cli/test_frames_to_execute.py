@@ -19,8 +19,8 @@ class Reached(Exception):
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["run", "--model", "random", "--tasks", "nieh_mini_gt", "--output"],
-        ["validate", str(_BUNDLED), "--models", "random", "--out"],
+        ["run", "--model", "random", "--tasks", "nieh_mini_gt", "--out"],
+        ["validate", str(_BUNDLED), "--model", "random", "--out"],
     ],
     ids=lambda arguments: arguments[0],
 )

@@ -106,7 +106,7 @@ OF_MODELS = {"torch", "transformers", "tokenizers", "accelerate", "safetensors",
 def test_the_first_question_is_asked_without_what_it_does_not_need(
     model: str, not_needed: set[str], tmp_path: Path
 ) -> None:
-    typed = ["--model", model, "--tasks", "nieh_mini", "--limit", "1", "--output", str(tmp_path)]
+    typed = ["--model", model, "--tasks", "nieh_mini", "--limit", "1", "--out", str(tmp_path)]
     done = subprocess.run(
         [sys.executable, "-c", FIRST_QUESTION, *typed],
         capture_output=True,

@@ -56,7 +56,7 @@ def test_a_folder_of_frames_and_a_csv_runs_with_no_other_file(tmp_path, run_cli,
     assert code == 0, err
     code, _, err = run_cli("--model", "blind", "--tasks", "nieh_text_state", "--data", "my_folder")
     assert (code, len(err.splitlines())) == (2, 1), "no trajectory file, no states"
-    code, _, err = run_cli("validate", "my_folder", "--models", "a,b,c,d", "--out", "out")
+    code, _, err = run_cli("validate", "my_folder", "--model", "a,b,c,d", "--out", "out")
     assert (code, len(err.splitlines())) == (2, 1)
 
 

@@ -23,9 +23,7 @@ def folders(install, tmp_path_factory):
         patched.syspath_prepend(install("sums"))
         with pytest.raises(SystemExit) as ended:
             main(
-                option_words(
-                    model=",".join(MODELS), tasks="sums_small", limit="8", output=str(output)
-                )
+                option_words(model=",".join(MODELS), tasks="sums_small", limit="8", out=str(output))
             )
         assert ended.value.code == 0
         yield [next((output / model).iterdir()) for model in MODELS]
@@ -61,9 +59,7 @@ def test_a_stopped_run_goes_on(folders, run_cli):
     (journal,) = (folders[0] / "journal").glob("*.jsonl")
     lines = journal.read_text().splitlines()
     journal.write_text("\n".join(lines[:-3]) + "\n")
-    words = option_words(
-        model="calculator", tasks="sums_small", limit=8, output=folders[0].parents[1]
-    )
+    words = option_words(model="calculator", tasks="sums_small", limit=8, out=folders[0].parents[1])
     code, _, err = run_cli(*words)
     assert (code, "3 evaluated now, 5 resumed from the journal" in err) == (0, True)
 

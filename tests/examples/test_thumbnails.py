@@ -32,7 +32,7 @@ def test_its_model_keeps_the_contract_and_refuses_what_cannot_be(run_cli):
 
 def test_its_model_is_evaluated_and_answers_from_the_frames(tmp_path, run_cli):
     words = option_words(
-        model="thumbnails", frames="shown,blank", tasks="nieh_mini_gt", output=tmp_path
+        model="thumbnails", frames="shown,blank", tasks="nieh_mini_gt", out=tmp_path
     )
     code, out, err = run_cli(*words)
     assert (code, "thumbnails" in out) == (0, True), err
@@ -43,7 +43,7 @@ def test_its_model_is_evaluated_and_answers_from_the_frames(tmp_path, run_cli):
 
 def test_its_task_runs_beside_ours(tmp_path, run_cli):
     words = option_words(
-        model="thumbnails", tasks="nieh_mini_last,nieh_mini_gt", limit=4, output=tmp_path
+        model="thumbnails", tasks="nieh_mini_last,nieh_mini_gt", limit=4, out=tmp_path
     )
     assert run_cli(*words)[0] == 0
     (samples,) = tmp_path.rglob("samples_nieh_mini_last_*.jsonl")

@@ -20,7 +20,7 @@ def _start(**options: object) -> Path:
     with pytest.raises(SystemExit) as ended:
         main([str(word) for word in option_words(**options)])
     assert ended.value.code == 0
-    (folder,) = (Path(str(options["output"])) / str(options["model"])).iterdir()
+    (folder,) = (Path(str(options["out"])) / str(options["model"])).iterdir()
     return folder
 
 
@@ -34,7 +34,7 @@ def twin_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def questions_run(tmp_path_factory: pytest.TempPathFactory, twin_set: Path) -> Path:
     """A run of questions: the baseline `random` on twins, asked twice."""
     output = tmp_path_factory.mktemp("questions")
-    return _start(model="random", tasks="nieh_gt", data=twin_set, output=output, repeats=2)
+    return _start(model="random", tasks="nieh_gt", data=twin_set, out=output, repeats=2)
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,7 @@ from tests.helpers.files import find_one
 
 def test_lm_evals_readers_take_the_files(make_nieh_set, tmp_path, run_cli):
     arguments = option_words(
-        model="oracle", tasks="nieh", data=make_nieh_set(size=56), output=tmp_path
+        model="oracle", tasks="nieh", data=make_nieh_set(size=56), out=tmp_path
     )
     assert run_cli(*arguments)[0] == 0
     names = [str(path) for path in find_one(tmp_path, "lm_eval").rglob("*.json*")]
@@ -41,7 +41,7 @@ def test_what_a_killed_run_left_of_its_files_is_gone_after_the_next(
     make_nieh_set, tmp_path, run_cli
 ):
     arguments = option_words(
-        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "out"
+        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "out"
     )
     assert run_cli(*arguments)[0] == 0
     folder = find_one(tmp_path / "out", "lm_eval") / "oracle"
@@ -56,7 +56,7 @@ def test_datasets_reads_the_samples(make_nieh_set, tmp_path, run_cli):
     from datasets import load_dataset
 
     run_cli(
-        *option_words(model="blind", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path)
+        *option_words(model="blind", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path)
     )
     rows = load_dataset(
         "json", data_files=str(find_one(tmp_path, "samples_*.jsonl")), split="train"
@@ -79,7 +79,7 @@ def test_a_failed_sample_is_exported_without_a_score(make_nieh_set, tmp_path, ru
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
-    arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path)
+    arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, out=tmp_path)
     assert run_cli(*arguments)[0] == 1
     rows = read_samples(tmp_path)["nieh_gt"]
     assert len(rows) == 5

@@ -28,7 +28,7 @@ def bring_back(twin_set, tmp_path, run_cli):
 
     def bring_back(path, *options, code=0):
         output = tmp_path / "back"
-        words = ("--data", twin_set, "--output", output, *options)
+        words = ("--data", twin_set, "--out", output, *options)
         ended, _, err = run_cli("import-replies", path, *words)
         assert ended == code, err
         (folder,) = output.glob("*/*")
@@ -94,7 +94,7 @@ def test_a_failed_question_is_a_failed_one(
 
 def test_a_control_comes_back_as_one(twin_set, tmp_path, run_cli, export, bring_back):
     words = ("--model", "blind", "--tasks", "nieh_gt", "--data", twin_set, "--frames", "blank")
-    assert run_cli(*words, "--output", tmp_path / "out")[0] == 0
+    assert run_cli(*words, "--out", tmp_path / "out")[0] == 0
     (run,) = (tmp_path / "out").glob("*/*")
     back, _ = bring_back(samples_of(export(run, "every-eval-ever")))
     assert read_run(back, RECORDS)[0].config.frames == "blank"
@@ -135,7 +135,7 @@ def _pack(source, target):
 def test_episodes_are_no_replies(scripted_run, export, twin_set, run_cli, tmp_path):
     for file_format in ("every-eval-ever", "inspect"):
         samples = samples_of(export(scripted_run, file_format))
-        words = ("--data", twin_set, "--output", tmp_path / "out")
+        words = ("--data", twin_set, "--out", tmp_path / "out")
         code, out, err = run_cli("import-replies", samples, *words)
         assert (code, out, err.count("\n")) == (2, "", 1)
         assert "no row answers a question of this set" in err
@@ -152,7 +152,7 @@ def test_episodes_are_no_replies(scripted_run, export, twin_set, run_cli, tmp_pa
 )
 def test_a_file_without_replies_is_one_line(twin_set, run_cli, tmp_path, name, content, reason):
     (tmp_path / name).write_bytes(content)
-    words = ("--data", twin_set, "--output", tmp_path / "out", "--model", "me")
+    words = ("--data", twin_set, "--out", tmp_path / "out", "--model", "me")
     code, out, err = run_cli("import-replies", tmp_path / name, *words)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert reason in err
@@ -166,7 +166,7 @@ def test_an_encrypted_log_is_one_line(questions_run, export, twin_set, run_cli, 
         content[at + 8] |= 1
         at = content.find(b"PK\x01\x02", at + 4)
     path.write_bytes(content)
-    code, _, err = run_cli("import-replies", path, "--data", twin_set, "--output", tmp_path / "out")
+    code, _, err = run_cli("import-replies", path, "--data", twin_set, "--out", tmp_path / "out")
     assert (code, err.count("\n")) == (2, 1)
     assert "is encrypted" in err
 
@@ -174,7 +174,7 @@ def test_an_encrypted_log_is_one_line(questions_run, export, twin_set, run_cli, 
 def test_a_log_without_a_header_is_one_line(twin_set, run_cli, tmp_path):
     with zipfile.ZipFile(tmp_path / "run.eval", "w") as archive:
         archive.writestr("samples/a_epoch_1.json", "{}")
-    words = ("--data", twin_set, "--output", tmp_path / "out")
+    words = ("--data", twin_set, "--out", tmp_path / "out")
     code, _, err = run_cli("import-replies", tmp_path / "run.eval", *words)
     assert (code, err.count("\n")) == (2, 1)
     assert "has no header.json" in err

@@ -12,10 +12,10 @@ from infthor_eval.storage.files import hold_folder
 from ..helpers.command_line import assert_refused, option_words
 
 RUN = ["--model", "oracle", "--tasks", "nieh_gt", "--data", "SET"]
-VIDEO = ["--model", "oracle", "--tasks", "nieh_video", "--data", "SET", "--output", "OUT"]
-PUBLISHED = option_words(model="oracle", tasks="nieh_published_full", data="SET", output="OUT")
+VIDEO = ["--model", "oracle", "--tasks", "nieh_video", "--data", "SET", "--out", "OUT"]
+PUBLISHED = option_words(model="oracle", tasks="nieh_published_full", data="SET", out="OUT")
 TINY = [
-    *option_words(model="qwen2.5-vl-tiny", tasks="nieh_gt", data="SET", output="OUT"),
+    *option_words(model="qwen2.5-vl-tiny", tasks="nieh_gt", data="SET", out="OUT"),
     "--model-args",
 ]
 GENERATE = ["generate", "--scene", "kitchen-1", "--min-steps", 1]
@@ -39,13 +39,13 @@ def typed(make_nieh_set, tmp_path, run_cli, monkeypatch):
 
 
 OUTPUTS = {
-    "run": [*RUN, "--output"],
-    "validate": ["validate", "SET", "--models", "oracle", "--out"],
+    "run": [*RUN, "--out"],
+    "validate": ["validate", "SET", "--model", "oracle", "--out"],
     "generate": [*GENERATE, "--out"],
     "replay": ["replay", "file.json", "--out"],
     "bundle": ["bundle", "manifest.json", "--out"],
     "scenes dump": ["scenes", "dump", "kitchen-1", "--embedded", "--out"],
-    "fetch": ["fetch", "nieh", "--dir"],
+    "fetch": ["fetch", "nieh", "--out"],
 }
 PLACES = {
     "a file": ("file", "cannot be written to"),
@@ -81,7 +81,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_work(
 MAKERS = {
     **{name: OUTPUTS[name] for name in ("generate", "replay", "bundle", "scenes dump", "fetch")},
     "twins": ["twins", "file.json", "--out"],
-    "look-around": ["look-around", "empty"],
+    "look-around": ["look-around", "empty", "--out"],
     "scenes fetch": ["scenes", "fetch", "--out"],
 }
 
@@ -112,17 +112,26 @@ def test_a_file_that_cannot_be_written_is_told_before_the_work(typed, monkeypatc
 
 
 TYPED = [
-    ([*RUN, "--data", "SET", "--output", "OUT"], "--data is given twice; give it once"),
-    ([*RUN, "--tasks=nieh_full", "--output", "OUT"], "--tasks is given twice"),
-    ([*RUN, "--output", "OUT", "--output", "OUT"], "--output is given twice"),
-    (["run", *RUN, "--output", "OUT", "--seed", "1", "--seed=2"], "--seed is given twice"),
+    ([*RUN, "--data", "SET", "--out", "OUT"], "--data is given twice; give it once"),
+    (
+        [*RUN, "--tasks=nieh_full", "--out", "OUT"],
+        "--tasks is given twice; give it once, with commas between several values",
+    ),
+    (
+        ["submit-check", "SET", "--allow", "frames", "--allow", "key"],
+        "--allow is given twice; give it once, with commas between several values",
+    ),
+    (["generate", "--scene", "kitchen-1,kitchn-2", "--out", "OUT"], "unknown scene 'kitchn-2'"),
+    (["generate", "--scene", ",", "--out", "OUT"], "--scene is empty; give a name"),
+    ([*RUN, "--out", "OUT", "--out", "OUT"], "--out is given twice"),
+    (["run", *RUN, "--out", "OUT", "--seed", "1", "--seed=2"], "--seed is given twice"),
     (["scenes", "show", "kitchen-1", "--size", "64", "--size", "65"], "--size is given twice"),
     (["questions", "SET", "--out", "a.csv", "--out", "b.csv"], "--out is given twice"),
     (
         [
             "validate",
             "SET",
-            *option_words(models="oracle", out="OUT", scorer="strict"),
+            *option_words(model="oracle", out="OUT", scorer="strict"),
             "--scorer",
             "strict",
         ],
@@ -135,8 +144,8 @@ TYPED = [
     ),
     ([*GENERATE, "--out", "OUT", "--count", "9" * 30], "are too many"),
     ([*GENERATE, "--out", "OUT", "--seed", "9" * 30], "--seed"),
-    ([*RUN, "--output", "OUT", "--seed", "9" * 30], "--seed"),
-    ([*RUN, "--output", "OUT", "--limit", "9" * 30], "--limit"),
+    ([*RUN, "--out", "OUT", "--seed", "9" * 30], "--seed"),
+    ([*RUN, "--out", "OUT", "--limit", "9" * 30], "--limit"),
     ([*TINY, "dtype=int8"], "dtype=int8 is not a type of weights"),
     ([*TINY, "dtype=complex64"], "dtype=complex64 is not a type of weights"),
     ([*TINY, "dtype=float8_e4m3fn"], "dtype=float8_e4m3fn is not a type of weights"),
@@ -160,14 +169,14 @@ TYPED = [
     ([*TINY, "max_pixels=-5"], "max_pixels=-5 is not between"),
     ([*TINY, f"min_pixels={10**12}"], "is not between 1 and"),
     ([*TINY, "min_pixels=40000000"], "min_pixels is 40000000 and max_pixels"),
-    (["validate", "SET", "--models", "oracle", "--out", "SET"], "is the set itself"),
+    (["validate", "SET", "--model", "oracle", "--out", "SET"], "is the set itself"),
     (
-        ["validate", "SET", "--models", "oracle", "--out", "OUT", "--decisions", "file"],
+        ["validate", "SET", "--model", "oracle", "--out", "OUT", "--decisions", "file"],
         "no column question_id",
     ),
     (
-        ["validate", "SET", "--models", "oracle,a:x=1,x=1", "--out", "OUT"],
-        "--models a: 'x' is given twice",
+        ["validate", "SET", "--model", "oracle,a:x=1,x=1", "--out", "OUT"],
+        "--model a: 'x' is given twice",
     ),
     (
         ["train", "--recipe", "infthor_32k", "--data", "SET", "--out", "OUT", "--gpus", 4],
@@ -184,21 +193,21 @@ TYPED = [
     ),
     (["bundle", "file", "--out", "OUT"], "not in its documented form"),
     (
-        ["validate", "nowhere", "--models", "oracle", "--out", "OUT"],
+        ["validate", "nowhere", "--model", "oracle", "--out", "OUT"],
         "nowhere: no such folder; give the folder of an NIEH set, or download the published one "
         "with `infthor-eval fetch nieh`",
     ),
     (
-        ["validate", ".", "--models", "oracle", "--out", "OUT"],
+        ["validate", ".", "--model", "oracle", "--out", "OUT"],
         "has no qa_set*.csv, as an NIEH set has beside metadata/; give the folder of an NIEH set, "
         "or download",
     ),
     (
-        [*RUN[:-1], "nowhere", "--output", "OUT"],
+        [*RUN[:-1], "nowhere", "--out", "OUT"],
         "nowhere: no such folder; give the folder of an NIEH set, or download",
     ),
     (
-        [*RUN, "--output", "OUT", "--prompt", "mine"],
+        [*RUN, "--out", "OUT", "--prompt", "mine"],
         "'mine' is not one of 'published-main', 'published-logs'",
     ),
     (
@@ -312,7 +321,7 @@ def test_a_dump_does_not_replace_another_recording_of_its_scene(typed, tmp_path)
 
 
 def test_a_run_outside_git_says_nothing_of_git(typed, capfd):
-    assert typed(*RUN, "--output", "OUT")[0] == 0
+    assert typed(*RUN, "--out", "OUT")[0] == 0
     assert "git" not in capfd.readouterr().err
     assert not os.path.exists(".git")  # noqa: PTH110 - of the folder that the run was started in
 

@@ -137,7 +137,7 @@ def test_what_is_damaged_in_a_set_costs_its_own_questions(make_nieh_set, tmp_pat
     damage, n_answered, n_skipped = SETS[name]
     data = make_nieh_set(size=56)
     damage(data)
-    arguments = option_words(model="oracle", tasks="nieh_gt", data=data, output=tmp_path / "out")
+    arguments = option_words(model="oracle", tasks="nieh_gt", data=data, out=tmp_path / "out")
     code, _, err = run_cli(*arguments)
     assert code == 0, err
     assert f"{n_answered} evaluated now" in err
@@ -171,7 +171,7 @@ def test_a_frame_that_no_model_can_take_fails_alone(
     arguments = option_words(
         model="qwen2.5-vl-tiny", model_args=f"batch_size={batch_size}", tasks="nieh_gt"
     )
-    code, _, err = run_cli(*arguments, "--data", data, "--output", tmp_path / "out")
+    code, _, err = run_cli(*arguments, "--data", data, "--out", tmp_path / "out")
     assert code == 1
     assert "5 evaluated now" in err
     assert "nieh_gt: 1 sample(s) failed, in no score: " in err
@@ -193,9 +193,7 @@ def test_what_an_adapter_raises_on_one_question_fails_alone(
 
     monkeypatch.setattr(TransformersModel, "answer_each", answer_each)
     arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", "batch_size=4", "--tasks", "nieh_gt"]
-    code, _, err = run_cli(
-        *arguments, "--data", make_nieh_set(size=56), "--output", tmp_path / "out"
-    )
+    code, _, err = run_cli(*arguments, "--data", make_nieh_set(size=56), "--out", tmp_path / "out")
     assert code == 1
     assert "nieh_gt: 1 sample(s) failed, in no score: qwen2.5-vl-tiny fails on the request" in err
 
@@ -208,7 +206,7 @@ def test_a_question_that_is_too_long_fails_alone(make_nieh_set, tmp_path, run_cl
     arguments = option_words(
         model="qwen2.5-vl-tiny", model_args=model_args, tasks="nieh_gt", data=data
     )
-    code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
+    code, _, err = run_cli(*arguments, "--out", tmp_path / "out")
     assert code == 1
     assert "nieh_gt: 1 sample(s) failed" in err
 
@@ -218,9 +216,7 @@ def test_a_haystack_without_a_usable_question_ends_the_same_way(
     make_nieh_set, tmp_path, run_cli, model
 ):
     data = make_nieh_set([make_question(clues=(99,))], size=56)
-    arguments = option_words(
-        model=model, tasks="nieh_haystack_8k", data=data, output=tmp_path / "out"
-    )
+    arguments = option_words(model=model, tasks="nieh_haystack_8k", data=data, out=tmp_path / "out")
     assert_refused(
         run_cli(*arguments),
         "can be asked (clue 99 is outside trajectory t (6 frames))",
@@ -233,7 +229,7 @@ def test_a_context_is_measured_by_a_frame_that_can_be_read(make_nieh_set, tmp_pa
     data = make_nieh_set(questions, size=56)
     _frame(data, "t", 1).write_bytes(b"\xff\xd8\xff\xe0")
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_truncate_head_8k", "--data", data]
-    code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
+    code, _, err = run_cli(*arguments, "--out", tmp_path / "out")
     assert code == 1
     assert "nieh_truncate_head_8k: 1 sample(s) failed" in err
 

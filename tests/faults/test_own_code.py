@@ -67,7 +67,7 @@ def run_own(tmp_path: Path, run_cli: Run) -> Run:
         source = MODEL.replace("REPLY", reply or "pass").replace("IDENTITY", identity)
         (tmp_path / "own.py").write_text(source.replace("CLOSE", close or "pass"))
         typed = ("--model", f"{tmp_path / 'own.py'}:Own", "--tasks", "nieh_mini_gt", "--limit", 3)
-        return run_cli("run", *typed, "--output", tmp_path / "out", *more)
+        return run_cli("run", *typed, "--out", tmp_path / "out", *more)
 
     return run_own
 
@@ -254,7 +254,7 @@ def stored(tmp_path: Path) -> Path:
 def test_a_scorer_that_ends_the_program_fails_its_reply_alone(stored, run_cli, tmp_path):
     (tmp_path / "own.py").write_text("def measure(reply, answers):\n    raise SystemExit(0)\n")
     scorer = f"{tmp_path / 'own.py'}:measure"
-    code, _, err = run_cli("rescore", stored, "--scorer", scorer, "--output", tmp_path / "out")
+    code, _, err = run_cli("rescore", stored, "--scorer", scorer, "--out", tmp_path / "out")
     assert code == 1
     assert "2 sample(s) failed" in err
 
@@ -264,7 +264,7 @@ def test_a_scorer_that_ends_the_program_fails_its_reply_alone(stored, run_cli, t
 
 def test_no_name_of_a_run_writes_outside_the_output(stored, run_cli, tmp_path):
     output = tmp_path / "a" / "b" / "out"
-    assert run_cli("rescore", stored, "--output", output)[0] == 0
+    assert run_cli("rescore", stored, "--out", output)[0] == 0
     (folder,) = output.iterdir()
     assert folder.name.startswith("_.._evil-rescored-")
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["b"]
@@ -282,7 +282,7 @@ def test_a_line_of_an_older_version_is_named_and_the_rest_is_shown(stored, run_c
         ("show", stored, "--per-sample", "--format", "csv"),
         ("compare", stored, stored),
         ("report", stored, "--out", tmp_path / "page.html"),
-        ("rescore", stored, "--output", tmp_path / "out"),
+        ("rescore", stored, "--out", tmp_path / "out"),
     )
     for command in commands:
         code, _, err = run_cli(*command)
@@ -297,7 +297,7 @@ def test_no_name_of_a_model_writes_outside_the_output(make_nieh_set, run_cli, tm
     log = tmp_path / "log.jsonl"
     log.write_text(json.dumps({"question_id": question, "reply": "mug"}))
     output = tmp_path / "a" / "out"
-    typed = ("--data", data, "--model", "../../evil", "--output", output)
+    typed = ("--data", data, "--model", "../../evil", "--out", output)
     assert run_cli("import-replies", log, *typed)[0] == 0
     assert [path.name for path in output.iterdir()] == [file_name("../../evil")]
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["out"]

@@ -29,7 +29,7 @@ def test_a_run_whose_folder_is_deleted_does_not_end_well(
 
     monkeypatch.setattr(Journal, "append", append_and_delete)
     arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56)]
-    code, out, err = run_cli(*arguments, "--output", tmp_path / "out")
+    code, out, err = run_cli(*arguments, "--out", tmp_path / "out")
     assert (code, out) == (2, "")
     assert "was deleted or replaced while the run wrote it" in err
 
@@ -49,11 +49,11 @@ def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(
 
     with monkeypatch.context() as patched:
         patched.setattr("infthor_eval.runs.journals.journal.os.fsync", full)
-        code, out, err = run_cli(*arguments, "--output", tmp_path / "out")
+        code, out, err = run_cli(*arguments, "--out", tmp_path / "out")
     assert (code, out) == (2, "")
     assert "cannot be written (No space left on device); make room" in err
     assert "Traceback" not in err
-    code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
+    code, _, err = run_cli(*arguments, "--out", tmp_path / "out")
     assert code == 0
     (journal,) = (tmp_path / "out").rglob("journal")
     assert len(read_run(journal.parent, RECORDS)[1]) == 5

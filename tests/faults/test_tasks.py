@@ -124,7 +124,7 @@ def test_a_task_file_that_is_not_what_it_should_be(
     (task_files / "nieh" / "own.yaml").write_text(content)
     data = make_nieh_set(size=56)
     ended = run_cli(
-        "--model", "oracle", "--tasks", "own", "--data", data, "--output", tmp_path / "out"
+        "--model", "oracle", "--tasks", "own", "--data", data, "--out", tmp_path / "out"
     )
     assert_refused(ended, expected)
 
@@ -133,7 +133,7 @@ def test_groups_in_a_circle_are_told(tmp_path, run_cli, task_files):
     (task_files / "nieh" / "one.yaml").write_text("group: one\ntask: [other]")
     (task_files / "nieh" / "other.yaml").write_text("group: other\ntask: [one]")
     assert_refused(
-        run_cli("--model", "oracle", "--tasks", "one", "--output", tmp_path), "is in itself"
+        run_cli("--model", "oracle", "--tasks", "one", "--out", tmp_path), "is in itself"
     )
 
 
@@ -144,7 +144,7 @@ def test_a_larger_document_is_read_where_the_limit_is_raised(
         CLUES + "}\nmetadata: {suite: nieh, a: &a [1, 1, 1, 1], b: [*a, *a]}\n"
     )
     arguments = option_words(
-        model="oracle", tasks="own", data=make_nieh_set(size=56), output=tmp_path / "out"
+        model="oracle", tasks="own", data=make_nieh_set(size=56), out=tmp_path / "out"
     )
     monkeypatch.setenv("INFTHOR_EVAL_MAX_YAML_NODES", "10")
     assert_refused(run_cli(*arguments), "has more than 10 values")

@@ -57,7 +57,7 @@ def test_what_is_said_of_a_skipped_question_is_text(make_nieh_set, tmp_path, run
         f"traj_id,question,gt_img_idx,answer\n{extra},q,[1],['a']\n"
     )
     code, out, err = run_cli(
-        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
+        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path / "out"
     )
     assert code == 0
     assert _as_shown(extra) in err
@@ -81,7 +81,7 @@ def test_a_folder_of_results_is_text(make_nieh_set, tmp_path, run_cli, name):
     data = make_nieh_set(size=56)
     output = tmp_path / NASTY[name].replace("/", "|")
     code, out, err = run_cli(
-        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", output
+        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--out", output
     )
     assert code == 0, err
     assert _as_shown(output.name) in out
@@ -104,7 +104,7 @@ def test_a_name_that_is_no_unicode_ends_nothing(make_nieh_set, tmp_path, run_cli
     data = make_nieh_set([make_question(clues=(1,))], size=56)
     output = tmp_path / "\udcff"
     code, out, err = run_cli(
-        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", output
+        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--out", output
     )
     assert code == 0, err
     assert "\\udcff" in out

@@ -47,7 +47,7 @@ def validate(make_nieh_set, tmp_path, run_cli, monkeypatch):
     data = make_nieh_set(ASKED, size=56)
 
     def validate(*options, data=data):
-        return run_cli("validate", data, "--models", "silent", "--out", tmp_path / "v", *options)
+        return run_cli("validate", data, "--model", "silent", "--out", tmp_path / "v", *options)
 
     return validate
 

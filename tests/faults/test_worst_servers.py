@@ -58,7 +58,7 @@ def test_a_server_gives_the_worst_replies(run_cli, tmp_path) -> None:
     def answer(_request: dict[str, Any], handler: BaseHTTPRequestHandler) -> None:
         send(handler, 200, next(bodies))
 
-    typed = ("run", "--model", "openai", "--tasks", "nieh_mini_gt", "--quiet", "--output", tmp_path)
+    typed = ("run", "--model", "openai", "--tasks", "nieh_mini_gt", "--quiet", "--out", tmp_path)
     n_values = len(FIELDS) * len(IN_JSON)
     n_failed = 0
     with serve_chat(answer) as url:
@@ -76,4 +76,4 @@ def test_a_server_gives_the_worst_replies(run_cli, tmp_path) -> None:
     # What is not needed (an id, the model's own name) may be anything.
     assert n_values // 4 < n_failed < n_values
     read_in_every_way(run_cli, folder)
-    assert run_cli("rescore", folder, "--output", tmp_path / "rescored")[0] == 0
+    assert run_cli("rescore", folder, "--out", tmp_path / "rescored")[0] == 0

@@ -205,7 +205,7 @@ def test_an_adapter_gives_the_worst_replies(own, run_cli, tmp_path) -> None:
                 own,
                 "--model-args",
                 f"start={start}",
-                "--output",
+                "--out",
                 tmp_path / "out",
             ),
             *("--tasks", "nieh_mini_gt", "--name", f"from{start}", "--quiet"),
@@ -217,7 +217,7 @@ def test_an_adapter_gives_the_worst_replies(own, run_cli, tmp_path) -> None:
         n_failed = sum(record.failure is not None for record in records)
         assert 0 < n_failed < len(records) == n_units
     read_in_every_way(run_cli, folder)
-    code, _, err = run_cli("rescore", folder, "--output", tmp_path / "rescored")
+    code, _, err = run_cli("rescore", folder, "--out", tmp_path / "rescored")
     assert code == 0, err
 
 
@@ -235,12 +235,12 @@ def source(tmp_path: Path) -> Path:
 
 
 def test_a_judge_gives_the_worst_replies(own, source, run_cli, tmp_path) -> None:
-    code, _, err = run_cli("rescore", source, "--judge", own, "--output", tmp_path / "judged")
+    code, _, err = run_cli("rescore", source, "--judge", own, "--out", tmp_path / "judged")
     assert code == 1
     assert "Traceback" not in err
     (folder,) = (tmp_path / "judged").glob("*/*")
     read_in_every_way(run_cli, folder)
-    assert run_cli("rescore", folder, "--output", tmp_path / "again")[0] == 0
+    assert run_cli("rescore", folder, "--out", tmp_path / "again")[0] == 0
 
 
 SCORER = """
@@ -264,12 +264,12 @@ def named(reply, answers):
 def test_a_scorer_gives_the_worst_scores(function, source, run_cli, tmp_path) -> None:
     (tmp_path / "scorer.py").write_text(SCORER)
     scorer = f"{tmp_path / 'scorer.py'}:{function}"
-    code, _, err = run_cli("rescore", source, "--scorer", scorer, "--output", tmp_path / "out")
+    code, _, err = run_cli("rescore", source, "--scorer", scorer, "--out", tmp_path / "out")
     assert code == 1
     assert "Traceback" not in err
     (folder,) = (tmp_path / "out").glob("*/*")
     read_in_every_way(run_cli, folder)
-    assert run_cli("rescore", folder, "--output", tmp_path / "again")[0] == 0
+    assert run_cli("rescore", folder, "--out", tmp_path / "again")[0] == 0
 
 
 MEMORY = """
@@ -299,7 +299,7 @@ def test_a_memory_recalls_the_worst(own, run_cli, tmp_path) -> None:
     plain = own.removesuffix("Own") + "PlainModel"
     typed = ("run", "--model", plain, "--tasks", "nieh_mini_memory", "--limit", len(WORST))
     memory = f"{tmp_path / 'memory.py'}:Own"
-    code, _, err = run_cli(*typed, "--memory", memory, "--output", tmp_path / "out", "--quiet")
+    code, _, err = run_cli(*typed, "--memory", memory, "--out", tmp_path / "out", "--quiet")
     assert code == 1
     assert "Traceback" not in err
     (folder,) = (tmp_path / "out").glob("*/*")
@@ -334,7 +334,7 @@ def test_a_log_has_the_worst_rows(make_nieh_set, run_cli, tmp_path) -> None:
         log = tmp_path / "log.jsonl"
         log.write_text(f"{line}\n")
         typed = ("import-replies", log, "--data", data, "--model", f"m{number}")
-        code, _, err = run_cli(*typed, "--output", tmp_path / "out")
+        code, _, err = run_cli(*typed, "--out", tmp_path / "out")
         assert code in (0, 2), line
         assert "Traceback" not in err
     folders = sorted((tmp_path / "out").glob("*/*"))

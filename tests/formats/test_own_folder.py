@@ -106,3 +106,20 @@ def test_several_csv_files_are_refused(make_folder):
     (root / "more.csv").write_text("question,answer\n")
     with pytest.raises(DataError, match=r"several CSV files \(more.csv, questions.csv\)"):
         NiehSet(root)
+
+
+def test_its_file_is_the_set_as_well_and_may_be_one_of_several(make_folder):
+    folder = make_folder(["0.png", "1.png"], "question,answer", "Is there a mug?,yes")
+    (folder / "more.csv").write_text("question,answer\nIs there a plate?,no\n")
+    for name, text in (("questions.csv", "Is there a mug?"), ("more.csv", "Is there a plate?")):
+        (question,) = NiehSet(folder / name).questions
+        assert (question.text, question.clues) == (text, (0, 1))
+
+
+def test_a_question_file_of_the_published_form_beside_pictures_is_read_as_such(make_folder):
+    folder = make_folder(["0.png"], "question,answer", "Is there a mug?,yes")
+    (folder / "qa.csv").write_text(
+        "traj_id,question,gt_img_idx,answer\nt,Is there a plate?,[3],['no']\n"
+    )
+    (question,) = NiehSet(folder / "qa.csv").questions
+    assert (question.traj_id, question.clues) == ("t", (3,))

@@ -147,7 +147,7 @@ def test_a_folder_is_written_under_the_same_names(run_cli, tmp_path):
         file = tmp_path / "given" / str(number) / "traj_data.json"
         file.parent.mkdir(parents=True)
         file.write_text(row["given"])
-    code, out, err = run_cli("look-around", tmp_path / "given", tmp_path / "new")
+    code, out, err = run_cli("look-around", tmp_path / "given", "--out", tmp_path / "new")
     assert (code, err) == (0, "")
     assert out.startswith("3 trajectories (")
     written = sorted((tmp_path / "new").rglob("*.json"))
@@ -171,7 +171,7 @@ def test_what_cannot_be_changed_is_refused_in_one_line(run_cli, tmp_path, change
     change(document)
     file = tmp_path / "given.json"
     file.write_text(json.dumps(document))
-    code, out, err = run_cli("look-around", file, tmp_path / "new.json")
+    code, out, err = run_cli("look-around", file, "--out", tmp_path / "new.json")
     assert (code, out) == (2, "")
     assert said in err
     assert err.count("\n") == 1
@@ -186,7 +186,7 @@ def test_what_is_no_trajectory_is_refused_in_one_line(run_cli, tmp_path, name, s
     (tmp_path / "empty").mkdir()
     (tmp_path / "none.json").write_text("[1]")
     (tmp_path / "a.jsonl").write_text("{}\n")
-    code, out, err = run_cli("look-around", tmp_path / name, tmp_path / "out")
+    code, out, err = run_cli("look-around", tmp_path / name, "--out", tmp_path / "out")
     assert (code, out) == (2, "")
     assert said in err
     assert err.count("\n") == 1
@@ -196,7 +196,7 @@ def test_a_file_that_cannot_be_written_is_told(run_cli, tmp_path):
     file = tmp_path / "given.json"
     file.write_text(goldens("look_around_files.jsonl.gz")[1]["given"])
     for out, said in ((tmp_path, "not a file"), (file / "x", "cannot be written to")):
-        code, _, err = run_cli("look-around", file, out)
+        code, _, err = run_cli("look-around", file, "--out", out)
         assert code == 2
         assert said in err
         assert "another place with OUT" in err

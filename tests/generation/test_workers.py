@@ -4,7 +4,7 @@ from infthor_eval.storage.digests import digest_of_file
 
 from ..helpers.command_line import option_words
 
-SCENES = ("--scene", "kitchen-1", "--scene", "bedroom-2", "--min-steps", 20, "--min-subgoals", 1)
+SCENES = ("--scene", "kitchen-1,bedroom-2", "--min-steps", 20, "--min-subgoals", 1)
 
 
 def files(folder):
@@ -43,6 +43,6 @@ def test_the_files_are_the_same_whoever_makes_them(run_cli, tmp_path):
 
 def test_gpus_are_shared_out_by_a_cluster_alone(run_cli, tmp_path):
     code, _, err = run_cli(
-        "--model", "blind", "--tasks", "nieh_mini_gt", "--gpus-per-worker", 1, "--output", tmp_path
+        "--model", "blind", "--tasks", "nieh_mini_gt", "--gpus-per-worker", 1, "--out", tmp_path
     )
     assert (code, "--gpus-per-worker is for --ray-address" in err) == (2, True)

@@ -25,16 +25,17 @@ OURS = f"{_OWN_TASKS_ALONE}\n{OURS_WITH_ALL_TASKS}"
 
 @pytest.fixture
 def start() -> Callable[..., str]:
-    """Runs a command in a process of its own; gives what it says on standard error."""
+    """Runs a command in a process of its own, which is to end with an exit code; gives what it says
+    on standard error."""
 
-    def start(program: str, *arguments: object, path: Sequence[Path] = ()) -> str:
+    def start(program: str, *arguments: object, path: Sequence[Path] = (), code: int = 0) -> str:
         environment = {**os.environ, "HF_HUB_OFFLINE": "1"}
         environment["PYTHONPATH"] = os.pathsep.join(
             [*map(str, path), *filter(None, [os.environ.get("PYTHONPATH")])]
         )
         command = [sys.executable, "-c", program, *map(str, arguments)]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr[-3000:]
+        assert done.returncode == code, done.stderr[-3000:]
         return done.stderr
 
     return start

@@ -22,7 +22,7 @@ def ours(make_nieh_set, tmp_path, run_cli):
     def ours(model, *options):
         data = make_nieh_set()
         arguments = option_words(
-            model=model, tasks="nieh_gt,nieh_full", data=data, output=tmp_path / "ours"
+            model=model, tasks="nieh_gt,nieh_full", data=data, out=tmp_path / "ours"
         )
         code, _, err = run_cli(*arguments, *options)
         assert code == 0, err
@@ -132,6 +132,40 @@ def test_what_lm_eval_raises_is_one_line(run_cli, monkeypatch):
         run_cli("lm-eval", "run"),
         "lm-eval fails (Tasks not found: nieh_mni); `infthor-eval ls tasks` lists those",
     )
+
+
+def test_a_file_that_a_task_includes_and_that_is_not_there_is_named(run_cli, monkeypatch, tmp_path):
+    import lm_eval.tasks
+    from lm_eval.tasks._yaml_loader import load_yaml
+
+    task = tmp_path / "mine.yaml"
+    task.write_text("include: _nieh.yaml\ntask: mine\n")
+    monkeypatch.setattr("lm_eval.__main__.cli_evaluate", lambda: load_yaml(task))
+    monkeypatch.setattr(lm_eval.tasks, "TaskManager", lm_eval.tasks.TaskManager)
+    assert_refused(
+        run_cli("lm-eval", "run"),
+        f"lm-eval fails ({tmp_path / '_nieh.yaml'}: No such file or directory); what a task file "
+        "includes stands beside it",
+    )
+
+
+@pytest.mark.parametrize(
+    "words, said",
+    [
+        (("--model_args", "adapter=blind"), "blind is a baseline, not a model; run it with"),
+        (("--model_args", "adapter=qwen2.5-vl-tiny,dtyp=x"), "has no option dtyp"),
+        (
+            ("--model_args", "adapter=qwen2.5-vl-tiny", "--metadata", '{"data": "nowhere"}'),
+            "nowhere: no such folder",
+        ),
+    ],
+)
+def test_lm_evals_own_script_prints_our_errors_in_one_line(start, words, said):
+    task = TASKS / "nieh" / "nieh_gt.yaml"
+    err = start(LM_EVAL, "run", "--model", "infthor", *words, "--tasks", task, code=1)
+    assert "Traceback" not in err
+    (line,) = [line for line in err.splitlines() if line.startswith("infthor-eval: ")]
+    assert said in line
 
 
 def write_adapter(site):

@@ -55,7 +55,7 @@ def short(task_files):
 def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run_cli, start):
     data = write_trajectories(tmp_path / "data", cut_trajectory(MUG, 6))
     arguments = option_words(
-        model=TINY, tasks="manipulathor_pickup", data=data, output=tmp_path / "ours"
+        model=TINY, tasks="manipulathor_pickup", data=data, out=tmp_path / "ours"
     )
     code, _, err = run_cli(*arguments)
     assert code == 0, err

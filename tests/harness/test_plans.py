@@ -31,7 +31,7 @@ def test_one_request_a_trajectory_and_what_our_own_run_finds(tmp_path, task_file
         "include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 3}\n"
     )
     data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 3), cut_trajectory(MUG, 2))
-    arguments = option_words(model=TINY, tasks="infthor_plans", data=data, output=tmp_path / "ours")
+    arguments = option_words(model=TINY, tasks="infthor_plans", data=data, out=tmp_path / "ours")
     code, _, err = run_cli(*arguments, "--greedy", "--constrained")
     assert code == 0, err
     records = read_records(tmp_path / "ours")

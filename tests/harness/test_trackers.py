@@ -16,7 +16,7 @@ from . import tracker_doubles
 def run_words(make_nieh_set, tmp_path):
     """The words of a run of five questions."""
     return option_words(
-        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "out"
+        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "out"
     )
 
 

@@ -99,7 +99,7 @@ def run_model(output: Path, **options: object) -> list[Path]:
     """Run a model; returns the folders of its runs."""
     code = None
     try:
-        main([str(word) for word in option_words(output=output, **options)])
+        main([str(word) for word in option_words(out=output, **options)])
     except SystemExit as ended:
         code = ended.code
     assert code == 0

@@ -25,7 +25,7 @@ from ..helpers.waiting import wait_until
 def start(data, output):
     return start_cli(
         *("run", "--model", "random-arm", "--tasks", "manipulathor"),
-        *("--data", data, "--output", output),
+        *("--data", data, "--out", output),
     )
 
 

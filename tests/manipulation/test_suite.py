@@ -355,7 +355,7 @@ def test_nothing_to_evaluate_is_refused_in_one_line(prepare_run, tmp_path):
 def test_an_option_that_does_not_fit_ends_the_command_in_one_line(
     run_cli, data, tmp_path, option, value, expected
 ):
-    words = ("run", "--model", "still", "--tasks", PICK, "--data", data, "--output", tmp_path / "o")
+    words = ("run", "--model", "still", "--tasks", PICK, "--data", data, "--out", tmp_path / "o")
     code, out, err = run_cli(*words, f"--{option}", value)
     assert (code, out) == (2, "")
     assert expected in " ".join(err.split()) and "Traceback" not in err

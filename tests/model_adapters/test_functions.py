@@ -169,7 +169,7 @@ def test_a_form_may_have_no_further_parameters():
 def test_it_is_evaluated_by_the_command(own, tmp_path, run_cli):
     name = f"{tmp_path}/mine.py:answer"
     typed = ("--model", name, "--tasks", "nieh_mini_gt", "--limit", 3)
-    code, out, err = run_cli(*typed, "--output", tmp_path / "out")
+    code, out, err = run_cli(*typed, "--out", tmp_path / "out")
     assert code == 0, err
     (results,) = (tmp_path / "out").rglob("results.json")
     assert "answer" in json.dumps(json.loads(results.read_text()))

@@ -248,7 +248,7 @@ def test_tiny_models_are_described_as_random_and_the_nano_model_as_trained() -> 
         assert (
             model_description(name)
             == model_note(name)
-            == "random weights, for trying the harness; scores are near 0"
+            == "random weights, for trying the harness; scores are those of chance"
         )
     assert model_description("qwen2.5-vl-nano") == "small, trained, bundled with the package"
     assert (model_note("qwen2.5-vl-nano"), model_description("qwen2.5-vl")) == ("", "")

@@ -225,7 +225,7 @@ def test_the_only_home_of_its_kind_sees_another_kind_and_the_run_says_so(tmp_pat
     root = write_twin_homes(tmp_path / "lonely", ("kitchen-501", "kitchen-502", "bedroom-501"))
     data = open_set(str(root))
     assert draw_other_home(data, data.questions[-1], 0)[0] in "01"
-    words = option_words(model="blind", tasks="nieh_twins", data=root, output=tmp_path / "out")
+    words = option_words(model="blind", tasks="nieh_twins", data=root, out=tmp_path / "out")
     code, output, err = run_cli(*words, "--controls")
     assert code == 0, err
     configs = [read_header(path.parent).config for path in tmp_path.rglob("journal")]
@@ -271,7 +271,7 @@ def test_the_flag_is_a_run_with_each_control(twins, tmp_path, run_cli):
         model="oracle",
         tasks="nieh_twins",
         data=twins,
-        output=tmp_path / "out",
+        out=tmp_path / "out",
         context="trajectory",
     )
     code, output, err = run_cli(*words, "--controls")
@@ -285,12 +285,12 @@ def test_the_flag_is_a_run_with_each_control(twins, tmp_path, run_cli):
 
 
 def test_the_flag_beside_frames_and_for_other_suites_is_refused(twins, tmp_path, run_cli):
-    words = option_words(model="oracle", tasks="nieh_twins", data=twins, output=tmp_path / "out")
+    words = option_words(model="oracle", tasks="nieh_twins", data=twins, out=tmp_path / "out")
     assert_refused(
         run_cli(*words, "--controls", "--frames", "blank"),
         "--controls and --frames: the first is --frames shown,no-clue,blank,other; give one",
     )
-    words = option_words(model="scripted", tasks="infthor_plans_mini", output=tmp_path / "out")
+    words = option_words(model="scripted", tasks="infthor_plans_mini", out=tmp_path / "out")
     assert_refused(run_cli(*words, "--controls"), "--controls is for tasks of nieh")
 
 

@@ -50,7 +50,7 @@ def answers_of(output):
 def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(QUESTIONS, size=56)
     code, _, err = run_cli(
-        "--model", "toy", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
+        "--model", "toy", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path / "out"
     )
     assert code == 0, err
     answers = answers_of(tmp_path / "out")
@@ -75,7 +75,7 @@ def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run_cli):
 
 def test_thoughts_have_a_budget_of_their_own(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(QUESTIONS, size=56)
-    arguments = option_words(model="toy", tasks="nieh_gt", data=data, output=tmp_path / "out")
+    arguments = option_words(model="toy", tasks="nieh_gt", data=data, out=tmp_path / "out")
     assert run_cli(*arguments, "--max-thinking-tokens", 1000)[0] == 0
     assert {limit for limit, _ in LIMITS} == {1050}
     assert "0 evaluated now" not in run_cli(*arguments)[2]  # another run
@@ -94,7 +94,7 @@ def test_a_stop_string_ends_the_answer_and_not_the_thoughts(
         'generation_kwargs: {until: ["\\n"], max_gen_toks: 20, do_sample: false}\n'
     )
     arguments = option_words(
-        model="toy", tasks="own", include_path=tmp_path, data=data, output=tmp_path / "out"
+        model="toy", tasks="own", include_path=tmp_path, data=data, out=tmp_path / "out"
     )
     code, _, err = run_cli(*arguments, "--max-thinking-tokens", 100)
     assert code == 0, err

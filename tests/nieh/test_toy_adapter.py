@@ -28,7 +28,7 @@ def test_it_keeps_the_contract():
 
 def test_it_runs_the_bundled_set(tmp_path, run_cli):
     n = len(NiehSet(BUNDLED).questions)
-    code, out, err = run_cli("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)
+    code, out, err = run_cli("--model", "toy", "--tasks", "nieh_mini", "--out", tmp_path)
     assert code == 0, err
     assert f"toy: {2 * n} evaluated now" in err
     (results,) = tmp_path.rglob("results.json")
@@ -39,7 +39,7 @@ def test_it_runs_the_bundled_set(tmp_path, run_cli):
     }
     row = next(line.split() for line in out.splitlines() if line.split()[:1] == ["toy"])
     assert row[-1] == str(n)
-    again = run_cli("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)[2]
+    again = run_cli("--model", "toy", "--tasks", "nieh_mini", "--out", tmp_path)[2]
     assert f"0 evaluated now, {2 * n} resumed" in again
 
 
@@ -52,7 +52,7 @@ def test_an_error_in_its_code_has_its_place_and_its_traceback_is_kept(
     monkeypatch.setattr(Talk, "reply", reply)
     data = make_nieh_set(size=56)
     code, _, err = run_cli(
-        "--model", "toy", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
+        "--model", "toy", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path / "out"
     )
     place = f"{Path(__file__).name}:{reply.__code__.co_firstlineno + 1} (reply)"
     failure = (
@@ -73,7 +73,7 @@ def test_an_error_in_its_code_has_its_place_and_its_traceback_is_kept(
 def test_a_context_that_is_measured_in_tokens_wants_their_number(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(n_frames=70, size=56)
     arguments = option_words(
-        model="toy", tasks="nieh_truncate_head_8k", data=data, output=tmp_path / "out"
+        model="toy", tasks="nieh_truncate_head_8k", data=data, out=tmp_path / "out"
     )
     assert_refused(
         run_cli(*arguments), "a size in tokens, which toy does not count; give --tokens-per-frame"

@@ -65,7 +65,7 @@ def test_the_oracle_has_all_pairs_and_blind_none(twins, tmp_path, run_cli):
     for model, expected in (("oracle", 1.0), ("blind", 0.0)):
         out = tmp_path / model
         code, printed, _ = run_cli(
-            "run", "--model", model, "--tasks", "nieh_twins", "--data", twins, "--output", out
+            "run", "--model", model, "--tasks", "nieh_twins", "--data", twins, "--out", out
         )
         assert code == 0
         assert "Twins: net pairs, %" in printed
@@ -138,7 +138,7 @@ def test_a_metric_of_ones_own_scores_the_reply_in_the_other_world_too(
 
 def test_a_run_with_each_context(twins, tmp_path, run_cli):
     words = ("run", "--model", "oracle", "--tasks", "nieh_twins", "--data", twins)
-    code, _, _ = run_cli(*words, "--context", "clues,trajectory", "--output", tmp_path)
+    code, _, _ = run_cli(*words, "--context", "clues,trajectory", "--out", tmp_path)
     contexts = [
         json.loads(file.read_text())["summary"]["tasks"]["nieh_twins"]["context"]
         for file in tmp_path.rglob("results.json")
@@ -155,7 +155,7 @@ def test_a_run_with_each_context(twins, tmp_path, run_cli):
     ],
 )
 def test_contexts_that_cannot_be(twins, tmp_path, run_cli, options, problem):
-    words = ("run", "--model", "oracle", "--data", twins, "--output", tmp_path)
+    words = ("run", "--model", "oracle", "--data", twins, "--out", tmp_path)
     code, _, err = run_cli(*words, *options)
     assert code == 2
     assert problem in err
@@ -164,7 +164,7 @@ def test_contexts_that_cannot_be(twins, tmp_path, run_cli, options, problem):
 
 def test_a_set_without_its_pairs_is_named(twins, tmp_path, run_cli):
     (tmp_path / "qa_set_twins.csv").write_bytes((twins / "qa_set_twins.csv").read_bytes())
-    words = ("run", "--model", "oracle", "--tasks", "nieh_twins", "--output", tmp_path / "out")
+    words = ("run", "--model", "oracle", "--tasks", "nieh_twins", "--out", tmp_path / "out")
     code, _, err = run_cli(*words, "--data", tmp_path)
     assert code == 2
     assert "twins.jsonl" in err

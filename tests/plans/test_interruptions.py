@@ -31,7 +31,7 @@ def read_results(output):
 def start(data, output, *more):
     return start_cli(
         *("run", "--model", "random", "--tasks", "infthor_plans"),
-        *("--data", data, "--output", output, *more),
+        *("--data", data, "--out", output, *more),
     )
 
 

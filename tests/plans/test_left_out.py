@@ -76,7 +76,7 @@ def test_where_all_is_left_out_the_exit_code_says_so(run_cli, tmp_path):
     document["scene"]["floor_plan"] = "FloorPlan7"
     data = write_trajectories(tmp_path / "elsewhere", document)
     arguments = option_words(
-        model="scripted", tasks="infthor_plans", data=str(data), output=str(tmp_path / "o")
+        model="scripted", tasks="infthor_plans", data=str(data), out=str(tmp_path / "o")
     )
     code, out, err = run_cli("run", *arguments)
     assert code == 1

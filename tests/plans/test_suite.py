@@ -195,7 +195,7 @@ def test_where_no_trajectory_has_a_final_task_that_is_said(prepare_run, run_cli,
     assert_refused(
         run_cli(
             *option_words(
-                model="planner", tasks="infthor_final", data=data, output=tmp_path / "o", limit=3
+                model="planner", tasks="infthor_final", data=data, out=tmp_path / "o", limit=3
             )
         )
     )
@@ -204,7 +204,7 @@ def test_where_no_trajectory_has_a_final_task_that_is_said(prepare_run, run_cli,
 def test_a_model_that_draws_nothing_is_refused_before_it_is_asked_to(run_cli, data, tmp_path):
     (tmp_path / "mine.py").write_text("def answer(images, text):\n    return 'MoveAhead'\n")
     words = option_words(
-        model=f"{tmp_path}/mine.py:answer", tasks="infthor_plans", data=data, output=tmp_path / "o"
+        model=f"{tmp_path}/mine.py:answer", tasks="infthor_plans", data=data, out=tmp_path / "o"
     )
     assert_refused(
         run_cli(*words),

@@ -63,7 +63,7 @@ def test_printed_it_is_what_the_command_prints(folder: Path, run_cli) -> None:
 
 
 def test_an_episode_has_its_steps(tmp_path: Path, run_cli) -> None:
-    words = option_words(model="still", tasks="manipulathor_mini", limit=1, output=tmp_path)
+    words = option_words(model="still", tasks="manipulathor_mini", limit=1, out=tmp_path)
     assert run_cli(*words)[0] == 0
     (folder,) = (tmp_path / "still").iterdir()
     name = infthor_eval.load_run(folder)["id"][0]

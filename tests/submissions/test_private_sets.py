@@ -42,7 +42,7 @@ def test_a_run_says_that_its_scores_mean_nothing(held_out, run, run_cli):
 
 def test_rescore_needs_the_key_and_counts_pairs_with_it(held_out, run, run_cli, tmp_path):
     code, output, err = run_cli(
-        "rescore", run, "--key", held_out / "key", "--output", tmp_path / "scored"
+        "rescore", run, "--key", held_out / "key", "--out", tmp_path / "scored"
     )
     assert code == 0, err
     (folder,) = (tmp_path / "scored").rglob("results.json")
@@ -58,7 +58,7 @@ def test_the_key_of_another_set_is_refused(held_out, run, run_cli, tmp_path):
     claim_for_simulator(other, "embedded")
     data = NiehSet(write_twin_set(other))
     publish(data, read_secret(held_out / "secret.txt"), tmp_path / "public")
-    ended = run_cli("rescore", run, "--key", other, "--output", tmp_path / "scored")
+    ended = run_cli("rescore", run, "--key", other, "--out", tmp_path / "scored")
     assert_refused(ended, "another set than the public part")
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH
+from infthor_eval.cli.options.values import PATH, output_option
 from infthor_eval.exports.registry import FORMATS
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def _check_hub_name(option: str, name: str | None) -> None:
 @click.command(
     "import-replies",
     cls=ExampleCommand,
-    example="infthor-eval import-replies LOG --data SET --output results",
+    example="infthor-eval import-replies LOG --data SET --out results",
 )
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=PATH)
 @click.option(
@@ -103,9 +103,7 @@ def _check_hub_name(option: str, name: str | None) -> None:
     metavar="NAME",
     help="Name of the model. Default: the one that the log names.",
 )
-@click.option(
-    "--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs."
-)
+@output_option
 def import_replies(
     logs: tuple[Path, ...], data: Path | None, model: str | None, output: Path
 ) -> int:

@@ -38,6 +38,8 @@ def command(arguments: tuple[str, ...]) -> None:
         raise
     except Exception as error:  # lm-eval tells of a misspelt task by a traceback
         reason = in_one_line(error) if isinstance(error, ValueError) else describe_exception(error)
+        if isinstance(error, OSError) and error.filename is not None:
+            reason = f"{error.filename}: {in_one_line(error)}"
         raise UsageError(f"lm-eval fails ({reason}); {_hint(error)}") from error
 
 
@@ -46,4 +48,9 @@ def _hint(error: BaseException) -> str:
         return f"lm-eval {version('lm_eval')} is not supported: pip install 'lm_eval>=0.4.13,<0.5'"
     if "Tasks not found" in in_one_line(error):
         return "`infthor-eval ls tasks` lists those of this package; --include_path adds a folder"
+    if isinstance(error, FileNotFoundError):
+        return (
+            "what a task file includes stands beside it, or has its full path (`infthor-eval ls "
+            "tasks --path`)"
+        )
     return "`infthor-eval lm-eval run --help` lists its options"

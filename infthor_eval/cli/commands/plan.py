@@ -12,11 +12,11 @@ from infthor_eval.cli.options.run import RunOptions, run_options
 from infthor_eval.cli.options.values import FiniteFloat, WholeNumber
 from infthor_eval.cli.progress.notes import NOTES, print_note, prints_as_notes
 from infthor_eval.cli.progress.pace import format_duration
-from infthor_eval.cli.progress.runs import print_workload
+from infthor_eval.cli.progress.runs import check_others, print_workload
 from infthor_eval.errors import ModelError
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.terminal import print_table, table_console
-from infthor_eval.runs import RunRequest, Suite, TaskEstimate, estimate_run
+from infthor_eval.runs import RunRequest, Suite, TaskEstimate, estimate_run, prepare_all
 from infthor_eval.tables import Column, Row, Table
 from infthor_eval.terminal import progress_bar
 
@@ -50,6 +50,7 @@ def command(measure: int, price_per_hour: float | None, **params: Any) -> int:
     Takes the options of `run`. A few units of each task are evaluated to measure, and not kept.
     """
     requests = RunOptions.from_click(params).requests()
+    check_others(prepare_all(requests))
     return max([plan(*request, measure, price_per_hour) for request in requests])
 
 

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, ModelArgs, ModelList, ModelSpec, WholeNumber
+from infthor_eval.cli.options.values import (
+    PATH,
+    ModelArgs,
+    ModelList,
+    ModelSpec,
+    WholeNumber,
+    output_option,
+)
 
 if TYPE_CHECKING:
     from infthor_eval.nieh.records import NiehAnswer
@@ -71,9 +78,7 @@ _JUDGE_PROMPT = "yes-no"
 @click.option(
     "--key", type=PATH, metavar="KEY", help="Key of a private set, for a run on its public part."
 )
-@click.option(
-    "--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs."
-)
+@output_option
 def command(
     folder: Path,
     scorer: str | None,

@@ -23,7 +23,7 @@ from infthor_eval.cli.progress.notes import (
     prints_as_notes,
     quiet_notes,
 )
-from infthor_eval.cli.progress.runs import execute_runs
+from infthor_eval.cli.progress.runs import check_others, execute_runs
 from infthor_eval.cli.results import RunResults, print_failures, print_results
 from infthor_eval.errors import DataError
 from infthor_eval.reasons import count_reasons
@@ -79,6 +79,7 @@ def _are_equal(requests: Sequence[tuple[RunRequest, Suite]], n_units: int, quiet
         require_switches(request, n_units)
     n_changing = 0
     with quiet_notes(quiet):
+        check_others(prepare_all(requests))
         for request, suite in requests:
             with NOTES.status(f"{request.label}: asking with and without its switches"):
                 equality = check_equality(request, suite, n_units)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH
+from infthor_eval.cli.options.values import PATH, split_names
 
 if TYPE_CHECKING:
     from infthor_eval.report.leaderboard.page import LeaderboardRow
@@ -28,9 +28,8 @@ def _checking_options(command: Callable[..., Any]) -> Callable[..., Any]:
         ),
         click.option(
             "--allow",
-            multiple=True,
-            metavar="CHECK",
-            help="Do not refuse by this check, as you have looked; may be repeated.",
+            metavar="CHECK,...",
+            help="Do not refuse by these checks, as you have looked.",
         ),
         click.option(
             "--key",
@@ -68,7 +67,7 @@ def submit_check(
     others: Path | None,
     sets: tuple[Path, ...],
     key: Path | None,
-    allow: tuple[str, ...],
+    allow: str | None,
     include: tuple[Path, ...],
     as_json: bool,
 ) -> int:
@@ -107,7 +106,7 @@ def leaderboard(
     no_published: bool,
     sets: tuple[Path, ...],
     key: Path | None,
-    allow: tuple[str, ...],
+    allow: str | None,
     include: tuple[Path, ...],
 ) -> int:
     """Write a page of the submissions in FOLDER that pass `submit-check`: one file, no network.
@@ -146,7 +145,7 @@ def _check(
     folder: Path,
     sets: Sequence[Path],
     key: Path | None,
-    allow: Sequence[str],
+    allow: str | None,
     include: Sequence[Path],
     others: Path | None = None,
 ) -> list[Verdict]:
@@ -155,10 +154,11 @@ def _check(
     from infthor_eval.submissions.expected import Owner
 
     names = [check.name for check in CHECKS]
-    for name in allow:
+    allowed = () if allow is None else split_names(allow, "--allow")
+    for name in allowed:
         if name not in names:
             raise unknown_name("check", name, names)
-    return check_submissions(folder, Owner(sets, include, key), others, allow)
+    return check_submissions(folder, Owner(sets, include, key), others, allowed)
 
 
 def _lines(verdict: Verdict) -> list[str]:

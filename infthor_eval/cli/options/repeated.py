@@ -26,7 +26,7 @@ def refuse_repeated_options(
             refuse_repeated_options(context, inner, arguments[1:])
         return
     options = filter(_takes_one_value, command.params)
-    with_one_value = {name for option in options for name in option.opts}
+    with_one_value = {name: option for option in options for name in option.opts}
     seen: set[str] = set()
     rest = iter(arguments)
     for argument in rest:
@@ -36,7 +36,9 @@ def refuse_repeated_options(
         if name not in with_one_value:
             continue
         if name in seen:
-            raise click.UsageError(f"{name} is given twice; give it once")
+            is_list = ",..." in str(with_one_value[name].make_metavar(context))
+            several = ", with commas between several values" if is_list else ""
+            raise click.UsageError(f"{name} is given twice; give it once{several}")
         seen.add(name)
         if not equals:
             next(rest, None)  # its value, which may look like an option

@@ -27,6 +27,7 @@ from infthor_eval.cli.options.values import (
     ModelSpec,
     WholeNumber,
     include_option,
+    output_option,
     split_names,
 )
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
@@ -54,7 +55,10 @@ _OPTIONS = (
         help="Library that runs the model; default: transformers, unless its name says otherwise.",
     ),
     click.option(
-        "--tasks", required=True, help="Task or group names with commas (see `ls tasks`)."
+        "--tasks",
+        required=True,
+        metavar="TASK,...",
+        help="Task or group names with commas (see `ls tasks`).",
     ),
     include_option,
     click.option("--data", type=PATH, help="Folder of the data set."),
@@ -102,9 +106,7 @@ _OPTIONS = (
         "evenly from all trajectories, drawn by --seed; a larger N includes these. lm-eval's own "
         "command takes the first N instead.",
     ),
-    click.option(
-        "--output", type=PATH, default=Path("results"), show_default=True, help="Results folder."
-    ),
+    output_option,
     click.option(
         "--seed",
         type=WholeNumber(),

@@ -22,6 +22,7 @@ __all__ = [
     "WholeNumber",
     "floor_plans_option",
     "include_option",
+    "output_option",
     "parse_model_args",
     "parse_pairs",
     "split_names",
@@ -35,6 +36,16 @@ floor_plans_option = click.option(
     "--data",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
     help="Folder with recorded floor plans (thor_scenes/, alfred/layouts/), for scenes among them.",
+)
+
+output_option = click.option(
+    "--out",
+    "--output",
+    "output",
+    type=PATH,
+    default=Path("results"),
+    show_default=True,
+    help="Folder of the runs.",
 )
 
 include_option = click.option(

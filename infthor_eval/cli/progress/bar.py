@@ -50,7 +50,7 @@ class PacedBar:
         now = time.monotonic()
         self.pace.count(resumed, now, context, cached)
         name = f"{self._name}: {detail}" if detail else self._name
-        self._progress.update(self._bar, advance=1, description=f"{name}  {self.pace.speed(now)}")
+        self._progress.update(self._bar, advance=1, description=f"{name}  {self.pace.rest(now)}")
         if self._progress.disable and self.pace.is_due(now):
             self._progress.console.print(
                 f"{self._name}: {self.pace.line(now)}{f'; {detail}' if detail else ''}"
@@ -78,7 +78,7 @@ class JobBar:
             self._bar,
             completed=job.n_done,
             total=job.n_units,
-            description=f"{job.name}  {self._pace.speed(now)}{detail}",
+            description=f"{job.name}  {self._pace.rest(now)}{detail}",
             visible=True,
         )
         if self._progress.disable and self._pace.is_due(now):

@@ -24,6 +24,7 @@ class Pace:
             n_resumed: units that an earlier run had done.
         """
         self._n_units = n_units
+        self._weights: tuple[float, float, float] | None = None
         self._context_tokens = self._cached_tokens = 0
         self._started_at = self._last_line_at = now
         self.n_resumed = n_resumed
@@ -47,6 +48,10 @@ class Pace:
             self._context_tokens += context
             self._cached_tokens += cached
 
+    def weigh(self, done: float, left: float, now: float) -> None:
+        """Take what was done by now, and what is left, where units differ in what they take."""
+        self._weights = done, left, now
+
     def go_on(self, n_new: int, n_units: int) -> None:
         """Take how many units this run has done so far, and how many there are by now in all."""
         self.n_new, self._n_units = n_new, n_units
@@ -64,14 +69,17 @@ class Pace:
     def line(self, now: float) -> str:
         """Return all of it: `37 of 147 (25 %), 2 min left, 1.3 a second, 83 % of tokens cached`."""
         n_done = self._n_done
-        rate = self._rate(now)
         position = f"{n_done:,} of {self._n_units:,} ({100 * n_done / self._n_units:.0f} %)"
-        if rate is None:
-            return position
-        return (
-            f"{position}, {format_duration((self._n_units - n_done) / rate)} left, "
-            f"{self.speed(now)}"
-        )
+        rest = self.rest(now)
+        return f"{position}, {rest}" if rest else position
+
+    def rest(self, now: float) -> str:
+        """Return time left and pace, `2 min left, 1.3 a second`; no time before it can be told."""
+        done, left, at = self._weights or (self.n_new, self._n_units - self._n_done, now)
+        if not done or self._rate(now) is None:
+            return self.speed(now)
+        seconds = (at - self._started_at) * left / done - (now - at)
+        return f"{format_duration(max(0.0, seconds))} left, {self.speed(now)}"
 
     def is_due(self, now: float) -> bool:
         """Return whether to print a line now.

@@ -1,5 +1,6 @@
 """Progress of a run, on standard error."""
 
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -9,10 +10,17 @@ from infthor_eval.cli.progress.bar import PacedBar
 from infthor_eval.cli.progress.notes import NOTES, print_note, prints_as_notes
 from infthor_eval.cli.progress.stopping import Stop, stop_on_sigint
 from infthor_eval.reasons import count_reasons
-from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, execute
+from infthor_eval.runs import (
+    PreparedRun,
+    RunOutcome,
+    UnitRecord,
+    Workload,
+    check_runs,
+    execute,
+)
 from infthor_eval.terminal import progress_bar
 
-__all__ = ["execute_runs", "print_workload"]
+__all__ = ["check_others", "execute_runs", "print_workload"]
 
 
 class _ProgressObserver:
@@ -29,10 +37,24 @@ class _ProgressObserver:
             print_note(f"{self._name}: {set_aside}; those samples are tried again")
         print_workload(workload)
         self.bar = PacedBar(self._progress, self._name, workload.n_units)
+        # Tasks differ, and a group's first unit may pay for all of it: whole groups tell how long
+        # the others take.
+        groups = workload.groups if len(workload.groups) > 1 else ()
+        self._weights = {group.units[-1].key: len(group.units) + group.frames for group in groups}
+        self._weight = 0  # of the groups done now
+        self._weigh()
         self._stop.has_begun = True
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
+        weight = self._weights.pop(record.key, None)
+        if weight is not None:
+            self._weight += 0 if resumed else weight
+            self._weigh()
         self.bar.advance(resumed, context=record.usage.context, cached=record.usage.cached)
+
+    def _weigh(self) -> None:
+        if self._weights:
+            self.bar.pace.weigh(self._weight, sum(self._weights.values()), time.monotonic())
 
     def note(self, text: str) -> None:
         print_note(f"{self._name}: {text}", "yellow")
@@ -49,10 +71,18 @@ def print_workload(workload: Workload) -> None:
         print_note(f"{cost.task}: {cost.description}")
 
 
+def check_others(runs: Sequence[PreparedRun]) -> None:
+    """Have the runs after the first refuse what they cannot do."""
+    with NOTES.status("checking all models"), prints_as_notes():
+        check_runs(runs[1:])
+
+
 def execute_runs(
     runs: Sequence[PreparedRun], finish: Callable[[RunOutcome], object] = lambda _: None
 ) -> tuple[list[RunOutcome], bool]:
     """Execute runs one after another, each with a bar on a terminal and lines elsewhere.
+
+    What any of them refuses is told before the first begins.
 
     Args:
         runs: the runs.
@@ -62,6 +92,7 @@ def execute_runs(
         The runs that were begun, and whether Ctrl-C left something undone: units of the last one,
         or the runs after it.
     """
+    check_others(runs)
     outcomes: list[RunOutcome] = []
     for run in runs:
         outcome, is_requested = _execute(run)

@@ -89,7 +89,7 @@ def _place(run: RunSummary, name: str) -> tuple[str, str, bool, str, int]:
 
 
 def _row(run: RunSummary, name: str, runs: Sequence[RunSummary], further: Sequence[str]) -> Row:
-    cells = _cells(run.summary, name, run.summary.tasks[name])
+    cells = _cells(run.summary, name, run.summary.tasks[name], run.header.config)
     made = {
         _PAIRS_ABOVE_NONE: _pairs_above_none,
         _ABOVE_NONE: _above_none,
@@ -156,14 +156,16 @@ def _above_blind_cell(run: RunSummary, name: str, _: Sequence[RunSummary]) -> st
     return "-" if above is None else f"{100 * above:.1f}"
 
 
-def _cells(summary: NiehSummary, name: str, task: TaskSummary) -> tuple[str, ...]:
+def _cells(
+    summary: NiehSummary, name: str, task: TaskSummary, config: NiehConfig
+) -> tuple[str, ...]:
     memory = task.memory
     times = summary.took.get(name)
     metric = main_metric(task)
     assert memory is not None
     return (
         f"{memory.name}{'*' if memory.privileged else ''}",
-        "-" if memory.budget is None else f"{memory.budget:,}",
+        "-" if memory.budget is None else f"{memory.budget:,}{config.in_frames(memory.budget)}",
         mean_cell(task.total, metric, 1),
         score_interval(task.total, metric, "{}–{}"),
         *(_recalled(task, share, metric) for share in SHOWN_CLUES),

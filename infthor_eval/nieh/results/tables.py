@@ -2,7 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 
-from infthor_eval.formats.published import PublishedRow, PublishedTable, published_tables
+from infthor_eval.formats.published import (
+    PUBLISHED_DATA,
+    PublishedRow,
+    PublishedTable,
+    published_tables,
+)
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.rescoring.report import sources_of
@@ -44,6 +49,10 @@ _LEGEND = (
     "there are few trajectories.",
     "strict takes words that are 80 % alike (most plurals in -s) and the published synonyms, and "
     "drops no article; `infthor-eval show RUN --question ID` says why a reply got its score.",
+)
+_EQUAL = (
+    "The interval of 100.00 or 0.00 tells how little a few trajectories, all alike, say of others "
+    "(Wilson's: 6 of 6 are 61.0 to 100.0)."
 )
 _ALONE = "Questions on one trajectory alone have no interval: nothing is known of others."
 _EMBEDDED = (
@@ -109,6 +118,7 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
             for note in form_notes(task.format_failures, task.total.n_answered)
         ),
         *([_ALONE] if any(_is_alone(task) for *_, task in with_samples) else []),
+        *([_EQUAL] if any(_is_alike(task) for *_, task in with_samples) else []),
         *_notes(runs),
     )
     table = Table("NIEH accuracy, %, strict scorer", (*_NAMES, *map(Column, numbers)), rows, notes)
@@ -125,6 +135,10 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
 def _is_alone(task: TaskSummary) -> bool:
     scores = task.total.scores.values()
     return any(score.n_trajectories == 1 for score in scores)
+
+
+def _is_alike(task: TaskSummary) -> bool:
+    return any(it.mean in (0, 1) and it.n_trajectories > 1 for it in task.total.scores.values())
 
 
 def _name_and_total(name: str, task: TaskSummary) -> tuple[str, ...]:
@@ -180,7 +194,7 @@ def clues_table(runs: Sequence[RunSummary]) -> Table:
         "NIEH accuracy, % by number of clues (questions)",
         columns,
         tuple(rows),
-        (*notes, *_notes(runs)),
+        (*notes, PUBLISHED_DATA, *_notes(runs)),
     )
 
 
@@ -308,7 +322,10 @@ def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
             rows.append(Row((run, name, table.metric, *means)))
     columns = (*_NAMES, _METRIC, *map(Column, table.columns))
     return Table(
-        f"{table.title}: {table.source}", columns, tuple(rows), (*table.notes, *_notes(runs))
+        f"{table.title}: {table.source}",
+        columns,
+        tuple(rows),
+        (*table.notes, PUBLISHED_DATA, *_notes(runs)),
     )
 
 

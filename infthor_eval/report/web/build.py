@@ -13,7 +13,7 @@ from infthor_eval.report.headline.results import TaskResult, task_results
 from infthor_eval.report.headline.sentence import headline
 from infthor_eval.report.headline.tables import cost_chart, results_chart, results_table
 from infthor_eval.report.presented import PresentedRun
-from infthor_eval.report.web.page import About, Page, SuiteLabels
+from infthor_eval.report.web.page import About, Page, SuiteLabels, embedded_remark
 from infthor_eval.report.web.progress import PageProgress, Silent
 from infthor_eval.report.web.replays import EpisodeReplays
 from infthor_eval.report.web.run_tables import costs_table, left_out_table
@@ -94,7 +94,7 @@ def build_page(
     return Page(
         title=_title(runs),
         is_packed=request.is_packed,
-        footnote=_footnote(runs),
+        remark=_remark(runs),
         version=infthor_eval.__version__,
         runs=[_about(run) for run in runs],
         suites={name: _labels(runs, same) for name, same in by_suite.items()},
@@ -129,13 +129,13 @@ def _title(runs: Sequence[PresentedRun]) -> str:
     return names if len(names) <= 60 else f"{len(runs)} runs"
 
 
-def _footnote(runs: Sequence[PresentedRun]) -> str:
+def _remark(runs: Sequence[PresentedRun]) -> str:
     """Return the remark on the runs of the page in the embedded simulator; empty without any."""
     embedded = [run.label for run in runs if "embedded" in run.header.config.simulators]
     if not embedded:
         return ""
     which = "" if len(embedded) == len(runs) else f" ({', '.join(embedded)})"
-    return f"Numbers from the embedded simulator{which} are not comparable with published ones."
+    return embedded_remark(which)
 
 
 def _suite_sections(runs: Sequence[PresentedRun]) -> Iterator[Section]:

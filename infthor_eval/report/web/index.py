@@ -13,7 +13,7 @@ from infthor_eval.report.headline.results import TaskResult, task_results
 from infthor_eval.report.presented import read_report_run
 from infthor_eval.report.runs import distinct_names
 from infthor_eval.report.web.build import PageRequest, build_page, results_section
-from infthor_eval.report.web.page import Page, write_page
+from infthor_eval.report.web.page import Page, embedded_remark, write_page
 from infthor_eval.report.web.processors import n_processors
 from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.sections import Section
@@ -63,7 +63,7 @@ class _Made:
 
     results: Sequence[TaskResult] = ()
     size: int = 0
-    footnote: str = ""
+    remark: str = ""
     problems: Sequence[str] = ()
     failure: str = ""
 
@@ -160,7 +160,7 @@ def _make(job: _Job, request: PageRequest) -> _Made:
         return _Made(problems=problems, failure=str(error))
     size = write_page(page, job.page)
     link = f"{job.page.parent.name}/{job.page.name}"
-    return _Made(list(task_results(run, link)), size, page.footnote, problems)
+    return _Made(list(task_results(run, link)), size, page.remark, problems)
 
 
 def _index_page(made: Iterable[_Made], failures: Sequence[tuple[str, str]]) -> Page:
@@ -171,9 +171,8 @@ def _index_page(made: Iterable[_Made], failures: Sequence[tuple[str, str]]) -> P
         columns = (Column("run", False), Column("reason", False))
         table = Table("", columns, tuple(map(Row, failures)))
         sections.append(Section("unread", "Not read", tables=(table,)))
-    n_embedded = sum(bool(one.footnote) for one in read)
+    n_embedded = sum(bool(one.remark) for one in read)
     which = "" if n_embedded == len(read) else f" ({n_embedded} of the runs)"
-    footnote = f"Numbers from the embedded simulator{which} are not comparable with published ones."
     return Page(
         title=f"{len(read)} {'run' if len(read) == 1 else 'runs'}",
         version=infthor_eval.__version__,
@@ -183,5 +182,5 @@ def _index_page(made: Iterable[_Made], failures: Sequence[tuple[str, str]]) -> P
         samples=(),
         metrics=(),
         pictures=(),
-        footnote=footnote if n_embedded else "",
+        remark=embedded_remark(which) if n_embedded else "",
     )

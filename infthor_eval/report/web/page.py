@@ -17,7 +17,7 @@ from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.web.samples import FrameFacts, Numbered, PageSample, Prompt
 from infthor_eval.report.web.sections import Section
 
-__all__ = ["About", "Page", "SuiteLabels", "write_page"]
+__all__ = ["About", "Page", "SuiteLabels", "embedded_remark", "write_page"]
 
 _SCRIPTS = (
     "wide.js",
@@ -83,6 +83,13 @@ class SuiteLabels(msgspec.Struct, frozen=True):
     member: str = ""
 
 
+def embedded_remark(which: str) -> str:
+    """Return the remark of a page on frames of the embedded simulator, in which of its runs."""
+    return (
+        f"Frames are the embedded simulator's{which}: no number is comparable with published ones."
+    )
+
+
 @dataclass(frozen=True)
 class Page:
     """Contents of the page.
@@ -99,7 +106,7 @@ class Page:
         notes: remarks on the samples.
         is_packed: whether all data of the samples are compressed, to a sixth of their size; those
             of many samples are in any case.
-        footnote: a remark at the end, on what the numbers are not comparable with; empty for none.
+        remark: what stands first, on what the numbers are not comparable with; empty for none.
         large: number of the enlarged picture by that of its thumbnail.
         frames: what is known of frames, by their numbers in the samples.
         prompts: requests as they were sent, by their numbers in the samples.
@@ -117,7 +124,7 @@ class Page:
     pictures: Sequence[str]
     notes: Sequence[str] = ()
     is_packed: bool = False
-    footnote: str = ""
+    remark: str = ""
     large: Mapping[int, int] = field(default_factory=dict)
     frames: Sequence[FrameFacts] = ()
     prompts: Sequence[Prompt] = ()

@@ -86,7 +86,7 @@ class Journal(Generic[Payload]):
             self._file: FileIO = path.open("a+b", buffering=0)
         except OSError as error:
             raise UsageError(
-                f"{path}: cannot be written ({in_one_line(error)}); give another --output"
+                f"{path}: cannot be written ({in_one_line(error)}); give another --out"
             ) from error
         self._path = path
         self.header = header
@@ -195,7 +195,7 @@ class Journal(Generic[Payload]):
         """Check the run, cut off an unfinished line, and write the header if there is none."""
         other = self._log.header
         if other is not None and other.config != self.header.config:
-            raise DataError(f"{self.folder}: is the journal of another run; give another --output")
+            raise DataError(f"{self.folder}: is the journal of another run; give another --out")
         content = self._path.read_bytes()
         end = content.rfind(b"\n") + 1
         if end < len(content):  # or the next line would continue it, and be bad too

@@ -96,7 +96,8 @@ def read_options(path: Path) -> dict[str, Any]:
         )
     if not isinstance(options.get("data") or "", str):
         raise DataError(f"{path}: data is {options['data']!r:.60}; write the name of a folder")
-    return options
+    # `out` by the name that it had in the files of earlier runs.
+    return {"out" if name == "output" else name: value for name, value in options.items()}
 
 
 def _options_of(request: RunRequest) -> dict[str, Any]:
@@ -114,7 +115,7 @@ def _options_of(request: RunRequest) -> dict[str, Any]:
         "limit": tasks.limit,
         "seed": tasks.seed,
         "name": request.name,
-        "output": str(request.output.absolute()),
+        "out": str(request.output.absolute()),
         **_non_default(tasks.options),
         **_non_default(request.worker_settings),
     }

@@ -11,7 +11,7 @@ __all__ = ["label_runs"]
 
 # Options that change no number, and the tasks, which every table has a column for.
 _NOT_SHOWN = {
-    "output",
+    "out",
     "workers",
     "ray_address",
     "gpus_per_worker",
@@ -49,7 +49,10 @@ def label_runs(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str] =
 
 def _label_alike(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str]) -> Iterator[str]:
     """Yield the labels of runs of one name."""
-    options = [_options(folder) for folder, _ in runs]
+    options = [
+        {name: header.config.in_words(name, text) for name, text in _options(folder).items()}
+        for folder, header in runs
+    ]
     names = sorted({name for of_run in options for name in of_run} - set(ignore))
     values = {name: [of_run.get(name) for of_run in options] for name in names}
     shortened = {name: _shorten(texts) for name, texts in values.items() if len(set(texts)) > 1}

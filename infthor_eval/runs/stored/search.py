@@ -84,7 +84,7 @@ def find_runs(folder: Path, tell: Tell | None = None) -> Iterator[StoredRun | Br
     """
     if not folder.is_dir():
         raise DataError(
-            f"{folder}: no such folder; give the results folder of a run (`--output`, else results)"
+            f"{folder}: no such folder; give the results folder of a run (`--out`, else results)"
         )
     for run in run_folders(folder):
         try:

@@ -1,8 +1,10 @@
 """A run whose subject is loaded: a model, a policy, or one of its suite's baselines."""
 
-from contextlib import ExitStack
+from collections.abc import Iterable
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
-from typing import Generic
+from itertools import groupby
+from typing import Any, Generic
 
 from infthor_eval.errors import UsageError, UserCodeError, wrap_user_code
 from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit
@@ -13,7 +15,7 @@ from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
 from model_adapters import Model, Policy, Subject, adapter_identity, identity_of, load
 
-__all__ = ["BoundRun", "bind_run", "require_capability"]
+__all__ = ["BoundRun", "bind_run", "check_runs", "require_capability"]
 
 
 _NEEDED: dict[Need, tuple[type, str]] = {
@@ -29,38 +31,71 @@ class BoundRun(Generic[SuiteUnit, Payload]):
     subject: Subject
     evaluation: BoundEvaluation[SuiteUnit, Payload]
     header: RunHeader
+    owns_subject: bool = True
 
     def close(self) -> None:
-        """Release the evaluation, then the subject.
+        """Release the evaluation, then the subject, if it was loaded for this run.
 
         Raises:
             UserCodeError: one of them fails; both were tried.
         """
         with ExitStack() as stack:
-            stack.callback(self.subject.close)
+            if self.owns_subject:
+                stack.callback(self.subject.close)
             problem = f"{self.header.suite}: close() fails"
             stack.enter_context(wrap_user_code(problem, "fix it"))
             stack.enter_context(limit_by(OWN_CODE_SECONDS, problem, UserCodeError))
             stack.callback(self.evaluation.close)
 
 
-def bind_run(run: PreparedRun[SuiteUnit, Payload]) -> BoundRun[SuiteUnit, Payload]:
-    """Load the subject of a run and find its work.
+def bind_run(
+    run: PreparedRun[SuiteUnit, Payload], loaded: Subject | None = None
+) -> BoundRun[SuiteUnit, Payload]:
+    """Load the subject of a run, unless it is given, and find its work.
 
     Raises:
         UsageError: the suite cannot evaluate the subject, or there is nothing to evaluate.
         ModelError: the subject cannot be loaded, or can take none of the units.
         DataError: the data do not match their format.
     """
-    subject = _load_subject(run)
+    subject = _load_subject(run) if loaded is None else loaded
     with ExitStack() as stack:  # released only if anything below raises
-        stack.callback(subject.close)
+        if loaded is None:
+            stack.callback(subject.close)
+        if run.request.model not in run.suite.baselines:
+            require_capability(subject, run.request.model, run.suite)
         evaluation = run.evaluation.bind(subject)
         stack.callback(evaluation.close)
         require_independent(subject, evaluation.workload, run.request.worker_settings)
-        bound = BoundRun(subject, evaluation, _header(run, subject, evaluation.workload))
+        header = _header(run, subject, evaluation.workload)
         stack.pop_all()
-    return bound
+    return BoundRun(subject, evaluation, header, owns_subject=loaded is None)
+
+
+def check_runs(runs: Iterable[PreparedRun[Any, Any]]) -> None:
+    """Bind each run and release it again, to raise what `bind_run` would when its turn comes.
+
+    Runs that follow each other with one subject load it once; those of a cluster are left to it.
+    """
+    here = (run for run in runs if run.request.worker_settings.ray_address is None)
+    for _, (first, *others) in groupby(here, key=_subject_of):
+        with ExitStack() as stack:
+            bound = bind_run(first)
+            stack.callback(_close_quietly, bound)
+            for run in others:
+                _close_quietly(bind_run(run, bound.subject))
+
+
+def _close_quietly(bound: BoundRun[Any, Any]) -> None:
+    with suppress(UserCodeError):  # told by the run itself, beside its results
+        bound.close()
+
+
+def _subject_of(run: PreparedRun[Any, Any]) -> tuple[Any, ...]:
+    """Return what the subject of a run is loaded by."""
+    request = run.request
+    baseline = run.suite.baselines.get(request.model)
+    return baseline, request.model, request.model_options, request.tasks.seed
 
 
 def _header(
@@ -88,16 +123,9 @@ def _header(
 
 def _load_subject(run: PreparedRun[SuiteUnit, Payload]) -> Subject:
     request = run.request
-    suite = run.suite
-    if request.model in suite.baselines:
-        return suite.baselines[request.model](request.tasks.seed)
-    subject = load(request.model, request.model_options, request.tasks.seed)
-    try:
-        require_capability(subject, request.model, suite)
-    except UsageError:
-        subject.close()
-        raise
-    return subject
+    if request.model in run.suite.baselines:
+        return run.suite.baselines[request.model](request.tasks.seed)
+    return load(request.model, request.model_options, request.tasks.seed)
 
 
 def require_capability(subject: Subject, name: str, suite: Suite[SuiteUnit, Payload]) -> None:

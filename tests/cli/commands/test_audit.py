@@ -22,7 +22,7 @@ def test_a_set_is_audited_beside_a_run(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(leaking(24), size=8)
     assert (
         run_cli(
-            "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
+            "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path / "out"
         )[0]
         == 0
     )

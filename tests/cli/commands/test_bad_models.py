@@ -36,7 +36,7 @@ def ask(make_nieh_set, tmp_path, run_cli):
             for key, value in {"pretrained": folder, "device": "cpu", **model_args}.items()
         )
         arguments = option_words(model=model, model_args=settings, tasks="nieh_gt", data=data)
-        return run_cli(*arguments, "--output", tmp_path / "out", *options)
+        return run_cli(*arguments, "--out", tmp_path / "out", *options)
 
     return ask
 
@@ -143,7 +143,7 @@ def test_a_context_beyond_the_limit_is_recorded_with_its_tokens_and_the_limit(
     arguments = option_words(
         model="qwen2.5-vl-tiny", model_args="max_tokens=600", tasks="nieh", data=data
     )
-    code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
+    code, _, err = run_cli(*arguments, "--out", tmp_path / "out")
     records = read_records(tmp_path / "out")
     failed = [record for record in records if record.failure]
     # Six frames of 123 tokens; of the clues, three at most.
@@ -162,7 +162,7 @@ def test_a_question_with_the_models_image_token_fails_alone(make_nieh_set, tmp_p
     bad = Question("traj_b", "What is <|image_pad|>?", (3,), ("mug",))
     data = make_nieh_set([*QUESTIONS, bad], size=56)
     arguments = option_words(
-        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path / "out"
+        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, out=tmp_path / "out"
     )
     assert run_cli(*arguments)[0] == 1
     (failed,) = [record for record in read_records(tmp_path / "out") if record.failure]
@@ -216,7 +216,7 @@ def test_out_of_memory_in_mid_run_costs_the_contexts_that_are_too_large(
     arguments = option_words(
         model="cramped", model_args=f"batch_size={batch_size}", tasks="nieh", data=data
     )
-    code, out, err = run_cli(*arguments, "--output", tmp_path / "out")
+    code, out, err = run_cli(*arguments, "--out", tmp_path / "out")
     assert code == 1
     assert "Traceback" not in err
     records = read_records(tmp_path / "out")

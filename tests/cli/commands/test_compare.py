@@ -15,7 +15,7 @@ from ...helpers.plan_runs import make_plan_record, make_plans_run
 
 def test_two_runs_are_compared_question_by_question(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
-    run_cli("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path)
+    run_cli("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path)
     (oracle,), (blind,) = (list((tmp_path / name).iterdir()) for name in ("oracle", "blind"))
     code, out, _ = run_cli("compare", blind, oracle)
     rows = [line.split() for line in out.splitlines()]
@@ -35,7 +35,7 @@ def test_runs_without_a_shared_unit_and_folders_without_a_run_are_refused(
 ):
     data = make_nieh_set(size=56)
     for task in ("nieh_gt", "nieh_full"):
-        run_cli("--model", "oracle", "--tasks", task, "--data", data, "--output", tmp_path)
+        run_cli("--model", "oracle", "--tasks", task, "--data", data, "--out", tmp_path)
     folders = sorted((tmp_path / "oracle").iterdir())
     assert_refused(run_cli("compare", *folders), "share no unit of the same task")
     assert_refused(
@@ -47,7 +47,7 @@ def test_runs_without_a_shared_unit_and_folders_without_a_run_are_refused(
 def test_a_run_of_an_earlier_version_is_refused_in_one_line(make_nieh_set, tmp_path, run_cli):
     run_cli(
         *option_words(
-            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "out"
+            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "out"
         )
     )
     (ours,) = (tmp_path / "out" / "oracle").iterdir()
@@ -109,7 +109,7 @@ def test_runs_of_one_name_are_told_apart_by_the_options_that_differ(
     data = make_nieh_set(size=56)
     for seed in (0, 1):
         arguments = option_words(
-            model="random", tasks="nieh_gt", data=data, output=tmp_path, seed=seed
+            model="random", tasks="nieh_gt", data=data, out=tmp_path, seed=seed
         )
         assert run_cli(*arguments)[0] == 0
     folders = sorted(
@@ -124,7 +124,7 @@ def test_runs_of_one_name_are_told_apart_by_the_options_that_differ(
 
 def test_blank_frames_are_part_of_the_name(make_nieh_set, tmp_path, run_cli):
     words = option_words(
-        tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path, frames="shown,blank"
+        tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path, frames="shown,blank"
     )
     assert run_cli("--model", "oracle", *words)[0] == 0
     folders = sorted(
@@ -139,7 +139,7 @@ def test_runs_of_other_tasks_are_compared_on_the_questions_that_they_share(
 ):
     data = make_nieh_set(size=56)
     for model, task in (("oracle", "nieh_gt"), ("blind", "nieh_full"), ("oracle", "nieh_full")):
-        run_cli("--model", model, "--tasks", task, "--data", data, "--output", tmp_path)
+        run_cli("--model", model, "--tasks", task, "--data", data, "--out", tmp_path)
     (blind,) = (tmp_path / "blind").iterdir()
     folders = sorted((tmp_path / "oracle").iterdir())
     code, out, _ = run_cli("compare", *folders, blind, "--same-questions")
@@ -161,6 +161,6 @@ def test_questions_of_other_words_are_not_the_same(make_nieh_set, tmp_path, run_
     for name, questions in (("one", QUESTIONS), ("two", others)):
         data = make_nieh_set(questions, size=56, name=name)
         out = tmp_path / f"runs-{name}"
-        run_cli("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", out)
+        run_cli("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--out", out)
         folders += (out / "oracle").iterdir()
     assert_refused(run_cli("compare", *folders, "--same-questions"), "share no question")

@@ -54,7 +54,7 @@ def run(tmp_path_factory: pytest.TempPathFactory, tasks: Path) -> Callable[..., 
         options = {"model": "qwen2.5-vl-tiny", "tasks": "nieh_mini_gt", "limit": 3} | changes
         if str(options) not in done:
             output = tmp_path_factory.mktemp("run")
-            words = option_words(**options, output=output, include_path=tasks)
+            words = option_words(**options, out=output, include_path=tasks)
             with redirect_stdout(io.StringIO()), pytest.raises(SystemExit) as ended:
                 main([*words, "--quiet"])
             assert ended.value.code == 0

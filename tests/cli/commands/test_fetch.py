@@ -34,7 +34,7 @@ def test_fetched_data_are_found_by_the_task_and_not_fetched_again(hub, tmp_path,
     assert list((tmp_path / "cache").rglob("metadata.tar")) == []
     handler.status = 500
     assert run_cli("fetch", "nieh", "--endpoint", endpoint)[0] == 0
-    code, out, _ = run_cli("--model", "oracle", "--tasks", "nieh_gt", "--output", tmp_path / "out")
+    code, out, _ = run_cli("--model", "oracle", "--tasks", "nieh_gt", "--out", tmp_path / "out")
     assert code == 0
     assert "100.00" in out
 
@@ -43,10 +43,10 @@ def test_no_access_and_no_network_are_one_line_with_a_hint(hub, tmp_path, run_cl
     endpoint, handler = hub
     handler.status = 403
     assert_refused(
-        run_cli("fetch", "nieh", "--endpoint", endpoint, "--dir", tmp_path / "d"), "hf auth login"
+        run_cli("fetch", "nieh", "--endpoint", endpoint, "--out", tmp_path / "d"), "hf auth login"
     )
     assert_refused(
-        run_cli("fetch", "nieh", "--endpoint", "http://127.0.0.1:9", "--dir", tmp_path / "d"),
+        run_cli("fetch", "nieh", "--endpoint", "http://127.0.0.1:9", "--out", tmp_path / "d"),
         "cannot be fetched",
     )
 
@@ -56,7 +56,7 @@ def test_a_long_cause_is_marked_where_it_is_cut(tmp_path, run_cli, monkeypatch):
         raise ValueError("no way to the hub " * 30)
 
     monkeypatch.setattr("huggingface_hub.HfApi.repo_info", fail)
-    assert_refused(run_cli("fetch", "nieh", "--dir", tmp_path / "d"), "...); go online")
+    assert_refused(run_cli("fetch", "nieh", "--out", tmp_path / "d"), "...); go online")
 
 
 def test_an_archive_that_points_elsewhere_is_refused(hub, tmp_path, run_cli):
@@ -64,7 +64,7 @@ def test_an_archive_that_points_elsewhere_is_refused(hub, tmp_path, run_cli):
     with tarfile.open(tmp_path / "evil.tar", "w") as tar:
         tar.add(tmp_path / "metadata.tar", "../evil")
     handler.files["metadata.tar"] = (tmp_path / "evil.tar").read_bytes()
-    code, _, err = run_cli("fetch", "nieh", "--endpoint", endpoint, "--dir", tmp_path / "d")
+    code, _, err = run_cli("fetch", "nieh", "--endpoint", endpoint, "--out", tmp_path / "d")
     assert code == 2
     assert "points outside" in err
     assert not (tmp_path / "d" / "metadata").exists()

@@ -77,9 +77,7 @@ def import_log(data, tmp_path, run_cli):
             content = gzip.compress(content, mtime=0) if name.endswith(".gz") else content
         path.write_bytes(content)
         output = tmp_path / "out"
-        code, out, err = run_cli(
-            "import-replies", path, "--data", data, "--output", output, *options
-        )
+        code, out, err = run_cli("import-replies", path, "--data", data, "--out", output, *options)
         folders = sorted(output.glob("*/*"), key=lambda folder: folder.stat().st_mtime)
         return code, out + err, read_run(folders[-1], RECORDS) if folders else None
 
@@ -121,8 +119,7 @@ def test_logs_of_one_mode_on_two_files_are_one_run(data, tmp_path, run_cli):
     single.write_text("\n".join(map(json.dumps, ROWS)))
     multi.write_text(json.dumps(row(0, "no", 1.0, OTHERS)))
     assert (
-        run_cli("import-replies", single, multi, "--data", data, "--output", tmp_path / "out")[0]
-        == 0
+        run_cli("import-replies", single, multi, "--data", data, "--out", tmp_path / "out")[0] == 0
     )
     (folder,) = (tmp_path / "out" / "Some-VL-7B").iterdir()
     by_clues = json.loads((folder / "results.json").read_text())["summary"]["tasks"]["nieh_full"][
@@ -141,7 +138,7 @@ def test_two_logs_on_the_same_questions_count_them_once(data, tmp_path, run_cli)
         (tmp_path / name).write_text(json.dumps({"question_id": question_id, "reply": "no"}))
     logs = [tmp_path / "first.jsonl", tmp_path / "second.jsonl"]
     code, _, err = run_cli(
-        "import-replies", *logs, "--model", "me", "--data", data, "--output", tmp_path / "out"
+        "import-replies", *logs, "--model", "me", "--data", data, "--out", tmp_path / "out"
     )
     assert (code, "2 replies imported, 3 of 5 questions without one" in err) == (0, True)
 
@@ -272,11 +269,9 @@ def test_the_neutral_form(import_log):
 def test_samples_of_lm_eval(make_nieh_set, tmp_path, run_cli):
     """What our own run exports in lm-eval's files comes back with the same scores."""
     data, out = make_nieh_set(size=56), tmp_path / "out"
-    assert (
-        run_cli("--model", "blind", "--tasks", "nieh_gt", "--data", data, "--output", out)[0] == 0
-    )
+    assert run_cli("--model", "blind", "--tasks", "nieh_gt", "--data", data, "--out", out)[0] == 0
     (samples,) = out.rglob("samples_nieh_gt_*.jsonl")
-    words = ("import-replies", samples, "--data", data, "--model", "again", "--output", out)
+    words = ("import-replies", samples, "--data", data, "--model", "again", "--out", out)
     assert run_cli(*words)[0] == 0
     first, again = (
         read_run(next((out / name).iterdir()), RECORDS)[1] for name in ("blind", "again")
@@ -290,7 +285,7 @@ def test_samples_of_lm_eval(make_nieh_set, tmp_path, run_cli):
 @pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published logs are not at ../shared/data")
 def test_every_published_reply_has_its_logged_score(tmp_path, run_cli):
     logs = sorted((PUBLISHED / "replies").glob("*.log.gz"))
-    code, _, err = run_cli("import-replies", *logs, "--data", PUBLISHED, "--output", tmp_path)
+    code, _, err = run_cli("import-replies", *logs, "--data", PUBLISHED, "--out", tmp_path)
     assert (code, "not imported" in err, "scored otherwise" in err) == (0, False, False)
     assert err.count("the prompt it was asked with: published-logs\n") == 3
     means = {}

@@ -57,7 +57,7 @@ def test_a_broken_memory_has_a_line_for_each_clause(tmp_path, run_cli):
     ],
 )
 def test_misuse_is_one_line(typed, words, tmp_path, run_cli):
-    more = ("--output", tmp_path) if "--tasks" in typed else ()
+    more = ("--out", tmp_path) if "--tasks" in typed else ()
     code, _, err = run_cli(*typed, *more)
     assert code == 2
     assert words in err
@@ -77,9 +77,7 @@ def test_all_are_listed_one_a_line_and_the_options_of_one(run_cli):
 
 
 def test_a_run_for_each_memory_and_budget_with_a_table_of_all(tmp_path, run_cli):
-    typed = option_words(
-        model="qwen2.5-vl-tiny", tasks="nieh_mini_memory", limit=4, output=tmp_path
-    )
+    typed = option_words(model="qwen2.5-vl-tiny", tasks="nieh_mini_memory", limit=4, out=tmp_path)
     code, out, err = run_cli(*typed, "--memory", "last,oracle", "--budget", "30,1k")
     assert code == 0, err
     assert "Memories\n" in out
@@ -112,7 +110,7 @@ def test_a_memory_that_fails_fails_its_questions_alone(tmp_path, run_cli):
     fails = "        if len(query.text) % 2:\n            raise KeyError('mug')\n        room ="
     path.write_text((EXAMPLES / "changes.py").read_text().replace("        room =", fails))
     typed = option_words(
-        model="qwen2.5-vl-tiny", tasks="nieh_mini_memory", limit=12, output=tmp_path / "out"
+        model="qwen2.5-vl-tiny", tasks="nieh_mini_memory", limit=12, out=tmp_path / "out"
     )
     _, _, err = run_cli(*typed, "--memory", f"{path}:Changes")
     (journal,) = (tmp_path / "out").rglob("worker-0.jsonl")

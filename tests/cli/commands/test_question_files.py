@@ -30,7 +30,7 @@ def results_of(output, model):
 
 def test_baselines_run_on_them(alone, tmp_path, run_cli):
     out = tmp_path / "out"
-    words = option_words(model="oracle,blind,random", tasks="nieh_gt", data=alone, output=out)
+    words = option_words(model="oracle,blind,random", tasks="nieh_gt", data=alone, out=out)
     code, _, err = run_cli(*words)
     assert code == 0, err
     by_clues = results_of(out, "oracle")["summary"]["tasks"]["nieh_gt"]["by_clues"]
@@ -56,7 +56,7 @@ def test_what_shows_frames_says_that_there_are_none(
     alone, tmp_path, run_cli, model, task, expected
 ):
     code, out, err = run_cli(
-        "--model", model, "--tasks", task, "--data", alone, "--output", tmp_path / "out"
+        "--model", model, "--tasks", task, "--data", alone, "--out", tmp_path / "out"
     )
     assert (code, out) == (2, "")
     assert expected in err.splitlines()[-1]
@@ -112,7 +112,7 @@ def test_who_sees_nothing_scores_this_on_the_published_files(
 ):
     data, out = PUBLISHED / file, tmp_path / "out"
     assert (
-        run_cli("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--output", out)[0]
+        run_cli("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--out", out)[0]
         == 0
     )
     totals = {
@@ -153,8 +153,8 @@ def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_fi
     commands = (
         (0, ["table4", tmp_path]),
         (0, ["audit", tmp_path]),
-        (1, ["import-replies", log, *option_words(data=tmp_path, model="m", output=output)]),
-        (0, option_words(model="oracle", tasks="nieh_gt", data=tmp_path, output=output)),
+        (1, ["import-replies", log, *option_words(data=tmp_path, model="m", out=output)]),
+        (0, option_words(model="oracle", tasks="nieh_gt", data=tmp_path, out=output)),
     )
     for code, command in commands:
         ended, _, err = run_cli(*command)

@@ -58,7 +58,7 @@ def test_what_is_no_run_of_plans_is_refused(folders, make_nieh_set, tmp_path, ru
     )
     run_cli(
         *option_words(
-            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "nieh"
+            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "nieh"
         )
     )
     (nieh_run,) = (tmp_path / "nieh" / "oracle").iterdir()
@@ -101,7 +101,7 @@ def test_a_page_is_written_and_its_size_is_told(make_nieh_set, tmp_path, run_cli
             model="oracle,blind",
             tasks="nieh_gt",
             data=make_nieh_set(size=56),
-            output=tmp_path / "out",
+            out=tmp_path / "out",
         )
     )
     runs = [
@@ -137,7 +137,7 @@ def test_replays_are_counted_with_the_time_left_also_where_there_is_no_terminal(
 def test_what_is_no_run_is_skipped_and_said(make_nieh_set, tmp_path, run_cli):
     run_cli(
         *option_words(
-            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "out"
+            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "out"
         )
     )
     (run,) = (tmp_path / "out" / "oracle").iterdir()

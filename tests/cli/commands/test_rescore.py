@@ -117,9 +117,9 @@ def test_a_run_of_another_suite_and_a_folder_without_a_run_are_refused_in_one_li
 def test_a_run_of_ours_has_the_scores_that_it_had(make_nieh_set, run_cli, rescore, tmp_path):
     data = make_nieh_set(size=56)
     assert (
-        run_cli(
-            *option_words(model="oracle", tasks="nieh_gt", data=data, output=tmp_path / "first")
-        )[0]
+        run_cli(*option_words(model="oracle", tasks="nieh_gt", data=data, out=tmp_path / "first"))[
+            0
+        ]
         == 0
     )
     (folder,) = (tmp_path / "first" / "oracle").iterdir()

@@ -20,7 +20,7 @@ def ask(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
 
     def ask(*options, model="qwen2.5-vl-tiny"):
-        arguments = option_words(model=model, tasks="nieh_gt", data=data, output=tmp_path / "out")
+        arguments = option_words(model=model, tasks="nieh_gt", data=data, out=tmp_path / "out")
         return run_cli(*arguments, *options)
 
     return ask

@@ -34,7 +34,7 @@ def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(
     make_nieh_set, tmp_path, run_cli
 ):
     data = make_nieh_set(size=56)
-    arguments = option_words(model="oracle,blind", tasks="nieh", data=data, output=tmp_path / "out")
+    arguments = option_words(model="oracle,blind", tasks="nieh", data=data, out=tmp_path / "out")
     code, out, _ = run_cli(*arguments, "--full")
     assert code == 0
     rows = [line.split() for line in out.splitlines()]
@@ -52,7 +52,7 @@ def test_frames_of_the_embedded_simulator_are_labelled(make_nieh_set, tmp_path, 
     data = make_nieh_set(size=56)
     (data / "set.json").write_text('{"simulator": "embedded"}')
     _, out, _ = run_cli(
-        "run", *option_words(model="oracle", tasks="nieh_gt", data=data, output=tmp_path / "out")
+        "run", *option_words(model="oracle", tasks="nieh_gt", data=data, out=tmp_path / "out")
     )
     assert "embedded simulator: not comparable" in " ".join(out.split())
 
@@ -63,7 +63,7 @@ def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(
     data = make_nieh_set([make_question(clues=(70,))], n_frames=140, size=56)
     tasks = "nieh_haystack_8k,nieh_haystack_1m"
     code, out, err = run_cli(
-        *option_words(model="oracle", tasks=tasks, data=data, output=tmp_path / "out"), "--full"
+        *option_words(model="oracle", tasks=tasks, data=data, out=tmp_path / "out"), "--full"
     )
     assert code == 0
     rows = [line.split() for line in out.splitlines()]
@@ -83,7 +83,7 @@ def test_a_context_beyond_the_models_limit_is_reported_before_it_is_refused(
 ):
     data = make_nieh_set(n_frames=20)
     arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", "max_tokens=1200", "--data", data]
-    code, _, err = run_cli(*arguments, "--tasks", "nieh", "--output", tmp_path / "out")
+    code, _, err = run_cli(*arguments, "--tasks", "nieh", "--out", tmp_path / "out")
     assert code == 1
     fits, refused = (
         next(line for line in err.splitlines() if line.startswith(name))
@@ -97,7 +97,7 @@ def test_a_context_beyond_the_models_limit_is_reported_before_it_is_refused(
 
 def test_limit_evaluates_only_so_many_of_each_task(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
-    run_cli(*option_words(model="oracle", tasks="nieh", data=data, output=tmp_path / "o", limit=2))
+    run_cli(*option_words(model="oracle", tasks="nieh", data=data, out=tmp_path / "o", limit=2))
     results = json.loads(find_one(tmp_path / "o", "results.json").read_text())
     assert {name: task["n"] for name, task in results["summary"]["tasks"].items()} == {
         "nieh_gt": 2,
@@ -115,7 +115,7 @@ def test_the_limit_counts_questions_and_what_is_skipped_follows_it(
     )
     arguments = ["--model", "oracle", "--tasks", "nieh_haystack_8k", "--data", data]
     for limit, n in ((1, 5), (2, 10)):
-        code, _, err = run_cli(*arguments, "--output", tmp_path / str(limit), "--limit", limit)
+        code, _, err = run_cli(*arguments, "--out", tmp_path / str(limit), "--limit", limit)
         assert code == 0
         task = json.loads(find_one(tmp_path / str(limit), "results.json").read_text())["summary"][
             "tasks"
@@ -136,7 +136,7 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(
         "include: _nieh.yaml\ntask: nieh_own\ndataset_kwargs: {context: clues}\n"
         "process_results: !function own.measure\nmetric_list: [{metric: letters}]\n"
     )
-    arguments = option_words(model="oracle", data=make_nieh_set(size=56), output=tmp_path / "out")
+    arguments = option_words(model="oracle", data=make_nieh_set(size=56), out=tmp_path / "out")
     code, out, err = run_cli(*arguments, "--tasks", "nieh_gt,nieh_own", "--full")
     assert code == 0, err
     rows = [line.split() for line in out.splitlines()]
@@ -182,7 +182,7 @@ def test_a_killed_run_resumes_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_
     n_answers = 2 * repeats * len(MANY)
 
     def start(output):
-        arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh", data=data, output=output)
+        arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh", data=data, out=output)
         arguments += ["--repeats", repeats]
         return start_cli(*arguments)
 
@@ -226,7 +226,7 @@ BAD = [
     ),
     (
         ["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--model-args", "a=1"],
-        "oracle has no option a",
+        "oracle has no option a, nor any other; of several models, MODEL:a=VALUE in --model gives",
     ),
     (
         option_words(model="qwen2.5-vl-tiny", tasks="nieh", data="SET", model_args="dtpe=x"),
@@ -249,7 +249,7 @@ def test_misuse_ends_in_one_line_and_exit_code_2(
     data = make_nieh_set(size=56)
     arguments = [str(data) if argument == "SET" else argument for argument in arguments]
     assert_refused(
-        run_cli(*arguments, *(["--output", tmp_path / "out"] if "--model" in arguments else [])),
+        run_cli(*arguments, *(["--out", tmp_path / "out"] if "--model" in arguments else [])),
         expected,
     )
     assert not (tmp_path / "out").exists()
@@ -260,9 +260,7 @@ def test_bad_data_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run_
     for traj_id in ("traj_a", "traj_b"):
         (data / "metadata" / traj_id / "img" / "extra.png").write_bytes(b"")
     assert_refused(
-        run_cli(
-            "--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"
-        ),
+        run_cli("--model", "oracle", "--tasks", "nieh", "--data", data, "--out", tmp_path / "out"),
         "trajectory traj_a: 7 frames but 6 entries",
     )
 
@@ -270,7 +268,7 @@ def test_bad_data_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run_
 def test_what_is_skipped_is_counted_and_named(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set([*MANY, Question("traj_a", "Where is it?", (77,), ("Shelf",))], size=56)
     code, _, err = run_cli(
-        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
+        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path / "out"
     )
     assert code == 0
     assert "nieh_gt: 1 sample(s) skipped: clue 77 is outside trajectory traj_a (6 frames)" in err
@@ -283,7 +281,7 @@ def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_s
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
     arguments = option_words(
-        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path / "out"
+        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, out=tmp_path / "out"
     )
     code, out, err = run_cli(*arguments)
     assert code == 1
@@ -308,6 +306,7 @@ def test_ls_lists_models_one_a_line_with_engine_and_usual_checkpoint(run_cli):
     rows = [line.split() for line in run_cli("ls", "models")[1].splitlines()[3:] if line.strip()]
     assert [row[0] for row in rows] == [*baseline_suites(), *names()]
     by_name = {row[0]: row[1:] for row in rows}
+    assert [name for name, (*what, _engine) in by_name.items() if not what] == []  # says what it is
     assert by_name["random"] == ["a", "baseline", "of", "nieh,", "plans", "-"]
     assert by_name["qwen2.5-vl"] == ["usually", "Qwen/Qwen2.5-VL-7B-Instruct", "transformers"]
     assert (by_name["qwen2.5-vl@vllm"][-1], by_name["openai"][-1]) == ("vllm", "-")

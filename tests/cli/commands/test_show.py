@@ -16,7 +16,7 @@ def ran(make_nieh_set, tmp_path, run_cli):
     """The folders of runs of the oracle and of the blind on five questions, and what was printed at
     their end."""
     data = make_nieh_set(size=56)
-    arguments = option_words(model="oracle,blind", tasks="nieh", data=data, output=tmp_path / "out")
+    arguments = option_words(model="oracle,blind", tasks="nieh", data=data, out=tmp_path / "out")
 
     def ran(*options):
         code, out, err = run_cli(*arguments, *options)
@@ -49,7 +49,7 @@ def test_a_task_without_samples_is_a_line(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set([make_question(clues=(70,))], n_frames=140, size=56)
     tasks = "nieh_haystack_8k,nieh_haystack_1m"
     code, out, err = run_cli(
-        "--model", "oracle", "--tasks", tasks, "--data", data, "--output", tmp_path / "out"
+        "--model", "oracle", "--tasks", tasks, "--data", data, "--out", tmp_path / "out"
     )
     assert code == 0, err
     assert not any(line.split()[1:2] == ["nieh_haystack_1m"] for line in out.splitlines())
@@ -115,7 +115,7 @@ def test_why_units_failed_is_said_again_and_of_several_runs_with_the_folder(tmp_
     model = tmp_path / "dead.py"
     model.write_text("def answer(images, text):\n    raise ValueError('is away')\n")
     words = option_words(model=f"{model}:answer,blind", tasks="nieh_mini_gt", limit=2)
-    code, _, printed = run_cli(*words, "--output", tmp_path / "out")
+    code, _, printed = run_cli(*words, "--out", tmp_path / "out")
     assert code == 1
     dead, blind = (next((tmp_path / "out" / name).iterdir()) for name in ("answer", "blind"))
     code, _, err = run_cli("show", dead)

@@ -18,7 +18,7 @@ def folders(make_nieh_set, tmp_path, run_cli):
     """The folders of runs of the oracle and of the blind on five questions."""
     data = make_nieh_set(size=56)
     code, _, err = run_cli(
-        *option_words(model="oracle,blind", tasks="nieh_gt", data=data, output=tmp_path / "out")
+        *option_words(model="oracle,blind", tasks="nieh_gt", data=data, out=tmp_path / "out")
     )
     assert code == 0, err
     return [next((tmp_path / "out" / model).iterdir()) for model in ("oracle", "blind")]

@@ -9,7 +9,7 @@ def variants(make_nieh_set, tmp_path, run_cli):
     models = "qwen2.5-vl-tiny:max_tokens=3000,qwen2.5-vl-tiny:max_tokens=4000,oracle"
     data, out = make_nieh_set(size=56), tmp_path / "out"
     code, printed, err = run_cli(
-        "--model", models, "--tasks", "nieh_gt", "--data", data, "--limit", 1, "--output", out
+        "--model", models, "--tasks", "nieh_gt", "--data", data, "--limit", 1, "--out", out
     )
     assert code == 0, err
     return printed, err, sorted((out / "qwen2.5-vl-tiny").iterdir())

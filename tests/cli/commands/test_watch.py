@@ -128,7 +128,7 @@ def test_what_cannot_be_watched_is_one_line(
     )
     run_cli(
         *option_words(
-            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "nieh"
+            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "nieh"
         )
     )
     (nieh_run,) = (tmp_path / "nieh" / "oracle").iterdir()

@@ -19,7 +19,7 @@ def arm_run(tmp_path_factory):
     """Two pick-ups and two puts of one trajectory, by an arm that moves at random: in deltas, as
     policies do."""
     output = tmp_path_factory.mktemp("arms")
-    words = option_words(model="random-arm", tasks="manipulathor_mini", limit=2, output=output)
+    words = option_words(model="random-arm", tasks="manipulathor_mini", limit=2, out=output)
     with pytest.MonkeyPatch.context() as patched, pytest.raises(SystemExit) as ended:
         # The first ones, which are of one trajectory; a limit takes them from all.
         patched.setattr(

@@ -34,7 +34,7 @@ def config(make_nieh_set, tmp_path):
             "model": "oracle",
             "tasks": ["nieh_gt"],
             "data": str(data),
-            "output": str(tmp_path / "out"),
+            "out": str(tmp_path / "out"),
         }
         path.write_text(yaml.safe_dump({**options, **changes}))
         return path
@@ -55,7 +55,7 @@ def test_the_file_of_a_run_resumes_that_run(config, tmp_path, run_cli, monkeypat
     monkeypatch.chdir(tmp_path)
     run_cli(
         "--config",
-        config(data="set", output="out", limit=4, frames="blank,shown", seed=3, name="mine"),
+        config(data="set", out="out", limit=4, frames="blank,shown", seed=3, name="mine"),
     )
     left = sorted((tmp_path / "out" / "mine").rglob("run.yaml"))
     assert len(left) == 2

@@ -47,9 +47,7 @@ def test_a_kilo_token_has_the_default_or_the_given_value(
 ):
     data = make_nieh_set(ONE, n_frames=80, size=56)
     tasks = ["nieh_haystack_8k", "nieh_truncate_head_8k"]
-    arguments = option_words(
-        model="oracle", tasks=",".join(tasks), data=data, output=tmp_path / "out"
-    )
+    arguments = option_words(model="oracle", tasks=",".join(tasks), data=data, out=tmp_path / "out")
     code, _, err = run_cli(*arguments, *options)
     assert code == 0, err
     # A baseline is counted as Qwen2.5-VL: 121 tokens a frame.
@@ -60,7 +58,7 @@ def test_a_kilo_token_has_the_default_or_the_given_value(
 def test_the_tokens_of_a_frame_can_be_given(make_nieh_set, tmp_path, run_cli, model):
     data, out = make_nieh_set(ONE, n_frames=80, size=56), tmp_path / "out"
     tasks = ["nieh_haystack_8k", "nieh_truncate_head_8k"]
-    arguments = ["--model", model, "--tasks", ",".join(tasks), "--data", data, "--output", out]
+    arguments = ["--model", model, "--tasks", ",".join(tasks), "--data", data, "--out", out]
     code, _, err = run_cli(*arguments, "--tokens-per-frame", 390)
     assert code == 0, err
     assert [set(n_frames(out, task)) for task in tasks] == [{8000 // 390}, {8192 // 390}]
@@ -76,7 +74,7 @@ def test_the_kilo_token_and_the_extension_are_part_of_the_run_config(
     for options in ((), ("--k-tokens", 1024), ("--rope", "yarn:2")):
         assert (
             run_cli(
-                *option_words(model="qwen2.5-vl-tiny", tasks=tasks, data=data, output=out), *options
+                *option_words(model="qwen2.5-vl-tiny", tasks=tasks, data=data, out=out), *options
             )[0]
             == 0
         )
@@ -95,7 +93,7 @@ def test_the_kilo_token_and_the_extension_are_part_of_the_run_config(
 def test_the_extension_is_the_same_run_whichever_way_it_is_given(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
     arguments = option_words(
-        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path / "out"
+        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, out=tmp_path / "out"
     )
     assert run_cli(*arguments, "--rope", "linear:2")[0] == 0
     _, _, err = run_cli(*arguments, "--model-args", "rope=linear:2")
@@ -109,7 +107,7 @@ def test_what_fits_only_with_rope_is_reported_with_both_limits(
     arguments = option_words(
         model="qwen2.5-vl", model_args=f"pretrained={short},device=cpu", tasks="nieh"
     )
-    arguments += ["--data", data, "--output", tmp_path / "out"]
+    arguments += ["--data", data, "--out", tmp_path / "out"]
     code, _, err = run_cli(*arguments, "--rope", "yarn:4")
     assert code == 0, err
     assert line_of(err, "nieh_gt:").endswith("(limit 6,000, 1,500 before its extension): fits")
@@ -131,7 +129,7 @@ def test_an_extension_that_is_too_small_is_reported_as_refused(
         model="qwen2.5-vl", model_args=f"pretrained={short},device=cpu", rope="linear:1.5"
     )
     code, _, err = run_cli(
-        *arguments, "--tasks", "nieh_full", "--data", data, "--output", tmp_path / "out"
+        *arguments, "--tasks", "nieh_full", "--data", data, "--out", tmp_path / "out"
     )
     assert code == 1
     full = line_of(err, "nieh_full: 2 contexts")
@@ -148,7 +146,7 @@ def test_a_context_that_is_cut_to_its_size_is_reported_as_truncated(
     metadata = data / "metadata" / "u" / "metadata.json"
     metadata.write_text(json.dumps(json.loads(metadata.read_text())[:60]))
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_truncate_head_8k", "--data", data]
-    code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
+    code, _, err = run_cli(*arguments, "--out", tmp_path / "out")
     assert code == 0, err
     line = line_of(err, "nieh_truncate_head_8k: 2 contexts")
     assert line.endswith(
@@ -161,7 +159,7 @@ def test_a_context_that_is_cut_to_its_size_is_reported_as_truncated(
 def test_the_longest_request_is_reported_as_it_is_sent(make_nieh_set, tmp_path, run_cli, family):
     data = make_nieh_set()
     arguments = option_words(
-        model=f"{family}-tiny", tasks="nieh_full", data=data, output=tmp_path / "out"
+        model=f"{family}-tiny", tasks="nieh_full", data=data, out=tmp_path / "out"
     )
     _, _, err = run_cli(*arguments)
     # And the room for the reply.
@@ -208,7 +206,7 @@ def test_options_that_exclude_each_other_are_one_line(
 ):
     data = make_nieh_set(size=56)
     assert_refused(
-        run_cli(*arguments, "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"),
+        run_cli(*arguments, "--tasks", "nieh", "--data", data, "--out", tmp_path / "out"),
         expected,
     )
     assert not (tmp_path / "out").exists()

@@ -38,7 +38,7 @@ def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(
     data, make_clip, tmp_path, run_cli
 ):
     tasks, out = "nieh_clip_retrieval,nieh_memory_frames", tmp_path / "out"
-    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", tasks, "--data", data, "--output", out]
+    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", tasks, "--data", data, "--out", out]
     first, second = make_clip(seed=0), make_clip(seed=1)
     code, _, err = run_cli(*arguments, "--retriever", first)
     assert code == 0, err
@@ -63,7 +63,7 @@ def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(
 def test_a_missing_retriever_ends_in_one_line(data, tmp_path, run_cli, monkeypatch):
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_OFFLINE", True)
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
-    arguments = ["--model", "oracle", "--data", data, "--output", tmp_path / "out"]
+    arguments = ["--model", "oracle", "--data", data, "--out", tmp_path / "out"]
     for tasks, options, expected in (
         ("nieh_clip_retrieval", (), "and give --retriever DIR"),
         ("nieh_memory_frames", ("--retriever", "./nowhere"), "there is no such folder"),
@@ -89,11 +89,11 @@ def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run
     arguments = option_words(
         model="qwen2.5-vl-tiny", tasks="nieh_interleaved,nieh_text_state", data=data
     )
-    code, _, err = run_cli(*arguments, "--output", out, "--trajectories", folder)
+    code, _, err = run_cli(*arguments, "--out", out, "--trajectories", folder)
     assert code == 0, err
     assert [doc["frames"] for doc in docs(out, "nieh_interleaved")] == [[0, 7]] * 6
     assert [doc["frames"] for doc in docs(out, "nieh_text_state")] == [[44]] * 6
-    code, _, err = run_cli(*arguments, "--output", tmp_path / "none")
+    code, _, err = run_cli(*arguments, "--out", tmp_path / "none")
     assert code == 2
     assert (
         "can be asked (the trajectory's JSON is not in metadata/; give its folder with "
@@ -128,7 +128,7 @@ def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(
     metadata, out = data / "metadata", tmp_path / "out"
     write_video(metadata / "traj_a" / "traj_a_10fps.mp4", range(0, 250, 10))
     (metadata / "traj_b" / "traj_b_10fps.mp4").write_bytes(b"no video")
-    arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh_video", data=data, output=out)
+    arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh_video", data=data, out=out)
     code, _, err = run_cli(*arguments)
     assert code == 0, err
     assert "nieh_video: 3 sample(s) skipped: " in err
@@ -168,7 +168,7 @@ def test_a_film_is_a_video_where_a_family_takes_it_and_the_run_says_so(
 ):
     out = tmp_path / "out"
     code, _, err = run_cli(
-        "--model", model, "--tasks", "nieh_video", "--data", data, "--output", out, "--limit", 1
+        "--model", model, "--tasks", "nieh_video", "--data", data, "--out", out, "--limit", 1
     )
     assert code == 0, err
     assert expected in err
@@ -183,7 +183,7 @@ def test_a_film_is_a_video_where_a_family_takes_it_and_the_run_says_so(
 def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_path):
     def start(output):
         arguments = option_words(
-            model="qwen2.5-vl-tiny", tasks="nieh_memory_notes", data=data, output=output
+            model="qwen2.5-vl-tiny", tasks="nieh_memory_notes", data=data, out=output
         )
         return start_cli(*arguments)
 

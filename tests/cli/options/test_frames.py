@@ -23,7 +23,7 @@ def tokens(folder):
 
 def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run_cli):
     data, out = make_nieh_set(size=56), tmp_path / "out"
-    arguments = ["--model", TINY, "--tasks", "nieh_full", "--data", data, "--output", out]
+    arguments = ["--model", TINY, "--tasks", "nieh_full", "--data", data, "--out", out]
     code, output, err = run_cli(*arguments, "--frames", "shown,blank,shuffled,other")
     assert code == 0, err
     assert results(out).keys() == {"shown", "blank", "shuffled", "other"}
@@ -40,7 +40,7 @@ def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run_
 
 def test_unknown_frame_ablations_are_one_line(make_nieh_set, tmp_path, run_cli):
     arguments = option_words(
-        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=8), output=tmp_path / "o"
+        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=8), out=tmp_path / "o"
     )
     for names, expected in (
         ("none", "--frames none: there are shown, blank"),

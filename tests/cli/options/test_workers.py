@@ -33,9 +33,7 @@ def test_two_workers_have_the_results_of_one_process(run_cli, make_nieh_set, tmp
     )
     words = ("--model", model, "--tasks", task, "--data", data)
     for workers in (1, 2):
-        code, output, err = run_cli(
-            *words, "--output", tmp_path / str(workers), "--workers", workers
-        )
+        code, output, err = run_cli(*words, "--out", tmp_path / str(workers), "--workers", workers)
         assert code == 0, err
         assert model in output
     one, two = tmp_path / "1", tmp_path / "2"

@@ -60,6 +60,6 @@ def test_on_a_terminal_a_bar_is_below_that_of_all_jobs(clock):
         progress.refresh()
         assert [task.description for task in progress.tasks] == [
             "generate",
-            "kitchen-1-seed0  15.0 a second",
+            "kitchen-1-seed0  18.0 s left, 15.0 a second",
         ]
         assert [(task.completed, task.total) for task in progress.tasks] == [(0, 3), (30, 300)]

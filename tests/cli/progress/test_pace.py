@@ -1,6 +1,7 @@
 """The pace of a run: in lines without a terminal, and in the bar with one."""
 
 import io
+import re
 
 import pytest
 from rich.console import Console
@@ -28,6 +29,30 @@ def test_the_pace_of_a_slow_model_is_in_seconds_for_each():
     pace.count(False, 60.0)
     assert pace.speed(60.0) == "60.0 s each"
     assert pace.line(60.0) == "1 of 3 (33 %), 2 min left, 60.0 s each"
+
+
+def test_the_time_left_is_steady_where_groups_cost_more_later_and_their_first_unit_most_of_it():
+    # Ten groups of five units on 5 frames, then ten on 95: a second for each frame, with the first.
+    groups = [5] * 10 + [95] * 10
+    n_units, total = 100, sum(groups)
+    weights = [5 + frames for frames in groups]
+    pace, now, told = Pace(n_units, 0.0), 0.0, []
+    pace.weigh(0, sum(weights), now)
+    for at, frames in enumerate(groups):
+        for number in range(5):
+            now += frames if number == 0 else 0.0
+            pace.count(False, now)
+            if number == 4:
+                pace.weigh(sum(weights[: at + 1]), sum(weights[at + 1 :]), now)
+            left = re.search(r"([\d.]+) (s|min) left", pace.line(now))
+            if left:
+                told.append((float(left[1]) * (60 if left[2] == "min" else 1), total - now))
+    assert len(told) == n_units - 4  # none before the first group is done
+    assert [it for it in told if not 0.5 * it[1] - 30 <= it[0] <= it[1] + 60] == []
+    by_units = Pace(n_units, 0.0)  # what a mean over units says where the cheap ones are done
+    for _ in range(50):
+        by_units.count(False, 50.0)
+    assert by_units.line(50.0) == "50 of 100 (50 %), 50.0 s left, 1.0 a second"  # of 950
 
 
 @pytest.mark.parametrize(
@@ -88,7 +113,7 @@ def test_where_there_is_no_terminal_no_bar_is_left():
 def test_a_run_in_a_pipe_prints_lines_without_colour(make_nieh_set, tmp_path, run_cli, monkeypatch):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
     arguments = option_words(
-        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path
+        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path
     )
     _, out, err = run_cli(*arguments)
     lines = err.splitlines()
@@ -104,7 +129,7 @@ def test_quiet_prints_only_failures(make_nieh_set, tmp_path, run_cli):
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
     arguments = option_words(
-        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path / "out"
+        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, out=tmp_path / "out"
     )
     code, _, err = run_cli(*arguments, "--quiet")
     assert code == 1

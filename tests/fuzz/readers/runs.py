@@ -37,7 +37,7 @@ def _run(model: str, task: str = "nieh_gt", *more: str) -> Path:
     _kept.append(scratch)
     root = Path(scratch.name)
     words = option_words(
-        model=model, tasks=task, data=str(make_set(root / "set")), output=str(root / "out")
+        model=model, tasks=task, data=str(make_set(root / "set")), out=str(root / "out")
     )
     with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
         main([*words, *more])

@@ -160,7 +160,7 @@ REFUSED = {
         make_arm_run("n", [make_episode_record("z", 10), make_episode_record("z", 20, "put")]),
         "share no trajectory of arm",
     ),
-    "another file": (other_digest(), "share no trajectory of arm"),
+    "another file": (other_digest(), "share no trajectory of arm.*they have other data"),
     "other rewards": (
         make_arm_run("n", [make_episode_record("a", 10, most=5.0), *EPISODES[1:]]),
         "earn different rewards in arm_pick",

@@ -44,7 +44,7 @@ class Session:
     def __init__(self, browser: Any, output: Path, *words: object) -> None:
         model = () if "--model" in words else ("--model", "human:browser=false")
         self.process = subprocess.Popen(
-            cli_words(*model, "--output", output, *words),
+            cli_words(*model, "--out", output, *words),
             stderr=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             text=True,

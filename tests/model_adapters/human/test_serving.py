@@ -101,7 +101,7 @@ def test_pages_that_wait_hold_up_no_answer(get: Get) -> None:
 def test_a_port_that_is_taken_ends_the_run_before_the_first_question(
     make_nieh_set: Callable[..., Path], tmp_path: Path, run_cli: CliRunner
 ) -> None:
-    arguments = option_words(tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "out")
+    arguments = option_words(tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "out")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         ended = run_cli(*arguments, "--model", f"human:browser=false,port={port}")

@@ -36,6 +36,6 @@ def ask(make_nieh_set: Any, tmp_path: Path, run_cli: Any) -> Ask:
         settings = {"base_url": server.url, "model": "m", "retries": 1, "batch": True, **model_args}
         typed = ",".join(f"{name}={value}" for name, value in settings.items())
         task = option_words(model=model, model_args=typed, tasks="nieh_gt", data=data)
-        return run_cli(*task, "--output", tmp_path / "out", *options)
+        return run_cli(*task, "--out", tmp_path / "out", *options)
 
     return ask

@@ -39,7 +39,7 @@ def played(task_files: Path, tmp_path: Path, run_cli: Any) -> Any:
         settings = {"base_url": url, "model": "m", "retries": 0, **more}
         typed = ",".join(f"{option}={value}" for option, value in settings.items())
         arguments = option_words(model="openai", model_args=typed, tasks="infthor_plans", data=data)
-        code, _, err = run_cli(*arguments, "--greedy", "--name", name, "--output", tmp_path / "out")
+        code, _, err = run_cli(*arguments, "--greedy", "--name", name, "--out", tmp_path / "out")
         assert "Traceback" not in err
         (results,) = (tmp_path / "out" / name).rglob("results.json")
         return code, read_run(results.parent, RECORDS)[1], json.loads(results.read_text())

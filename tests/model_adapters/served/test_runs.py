@@ -31,7 +31,7 @@ def ask(make_nieh_set: Any, tmp_path: Path, run_cli: Any) -> Any:
         settings = {"base_url": url, "model": "m", "retries": 0, **model_args}
         typed = ",".join(f"{name}={value}" for name, value in settings.items())
         arguments = option_words(model="openai", model_args=typed, tasks="nieh_gt", data=data)
-        return run_cli(*arguments, "--output", tmp_path / "out", *options)
+        return run_cli(*arguments, "--out", tmp_path / "out", *options)
 
     return ask
 
@@ -128,7 +128,7 @@ def test_a_cap_is_not_for_models_that_cost_nothing(
     run_cli: Any, make_nieh_set: Any, tmp_path: Path
 ) -> None:
     data = make_nieh_set(size=56)
-    arguments = option_words(tasks="nieh_gt", data=data, output=tmp_path / "out", max_cost=1)
+    arguments = option_words(tasks="nieh_gt", data=data, out=tmp_path / "out", max_cost=1)
     for model in ("qwen2.5-vl-tiny", "oracle"):
         code, _, err = run_cli("--model", model, *arguments)
         assert code == 2
@@ -230,7 +230,7 @@ def test_a_run_interrupted_twice_ends_at_once_in_one_line(
             *map(str, arguments),
         ]
         stopped = subprocess.Popen(
-            [*command, "--output", tmp_path / "out"],
+            [*command, "--out", tmp_path / "out"],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -258,7 +258,7 @@ def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run_cli: Any
         arguments = option_words(
             model="openai", model_args=model_args, tasks="nieh_memory_notes", data=data
         )
-        code, out, err = run_cli(*arguments, "--output", tmp_path / "out")
+        code, out, err = run_cli(*arguments, "--out", tmp_path / "out")
     assert code == 0, err
     _, results = _run(tmp_path / "out")
     assert results["usage"] == {
@@ -273,7 +273,7 @@ def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run_cli: Any
 def test_in_process_models_and_baselines_tell_what_they_read(
     make_nieh_set: Any, tmp_path: Path, run_cli: Any
 ) -> None:
-    arguments = option_words(tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "out")
+    arguments = option_words(tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "out")
     assert "requests" not in run_cli("--model", "oracle", *arguments)[1]
     assert "qwen2.5-vl-tiny: 5 requests, " in (
         out := run_cli("--model", "qwen2.5-vl-tiny", *arguments)[1]
@@ -299,7 +299,7 @@ def test_several_trajectories_are_asked_about_at_once(
         arguments = option_words(
             model="openai", model_args=model_args, tasks="nieh_full", data=data
         )
-        code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
+        code, _, err = run_cli(*arguments, "--out", tmp_path / "out")
     assert code == 0, err
 
 

@@ -94,9 +94,7 @@ def both(
         records = []
         for model, settings in (("openai", served.options | more), ("hf-vlm", here)):
             options = ",".join(f"{name}={value}" for name, value in settings.items())
-            typed = option_words(
-                model=model, model_args=options, name=model, output=tmp_path / "out"
-            )
+            typed = option_words(model=model, model_args=options, name=model, out=tmp_path / "out")
             code, _, err = run_cli(*typed, *arguments)
             assert code == 0, err
             records.append(read_records(tmp_path / "out" / model))

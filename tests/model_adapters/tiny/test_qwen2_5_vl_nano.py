@@ -47,7 +47,7 @@ def test_it_tells_worlds_apart_by_what_it_sees(tmp_path):
         tasks="nieh_mini_twins",
         frames="shown,blank",
         limit=160,
-        output=tmp_path,
+        out=tmp_path,
     )
     shown, blank = runs.score
     assert shown > 0.05

@@ -32,7 +32,7 @@ def ask(make_nieh_set: Any, checkpoints: dict[str, Path], tmp_path: Path, run_cl
         settings = {"pretrained": checkpoints["qwen2.5-vl"], "dtype": "float32", **model_args}
         typed = ",".join(f"{option}={value}" for option, value in settings.items())
         arguments = option_words(model="qwen2.5-vl", model_args=typed, tasks=task, data=data)
-        return run_cli(*arguments, "--name", name, "--output", tmp_path / "out", *options)
+        return run_cli(*arguments, "--name", name, "--out", tmp_path / "out", *options)
 
     return ask
 
@@ -123,7 +123,7 @@ def test_plans_are_carried_out_alike(
             model="qwen2.5-vl", model_args=model_args, tasks="infthor_plans", data=data
         )
         output = tmp_path / "out" / engine
-        code, _, err = run_cli(*arguments, "--engine", engine, "--constrained", "--output", output)
+        code, _, err = run_cli(*arguments, "--engine", engine, "--constrained", "--out", output)
         assert code == 0, err
         (results,) = output.rglob("results.json")
         records = read_run(results.parent, PLAN_RECORDS)[1]

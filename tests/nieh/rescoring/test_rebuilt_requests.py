@@ -26,7 +26,7 @@ def ask(run_cli, tmp_path):
 
     def ask(tasks, *options, model="oracle"):
         words = (
-            *option_words(model=model, tasks=tasks, data=DATA, limit="6", output=tmp_path),
+            *option_words(model=model, tasks=tasks, data=DATA, limit="6", out=tmp_path),
             *options,
         )
         assert run_cli(*words)[0] == 0

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 from msgspec.structs import replace
 
+from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.records import NiehRecall, ShownClues
 from infthor_eval.nieh.results.memory_summary import MemorySummary, MemoryTimes, subject_of
 from infthor_eval.nieh.results.memory_tables import memory_tables
@@ -124,6 +125,23 @@ def test_it_is_among_all_tables_only_where_there_is_a_memory():
 )
 def test_the_memory_is_not_said_twice(label, subject):
     assert subject_of(label) == subject
+
+
+@pytest.mark.parametrize(
+    ("tokens_per_frame", "budget", "said"),
+    [
+        (9, "27", "27 [3 frames]"),
+        (9, "9", "9 [1 frame]"),
+        (4, "4k", "4k [1000 frames]"),
+        (9, "28", "28"),
+        (None, "27", "27"),
+    ],
+)
+def test_a_budget_of_whole_frames_says_so_where_people_read_it(tokens_per_frame, budget, said):
+    config = NiehConfig(tasks={}, tokens_per_frame=tokens_per_frame, budget=budget)
+    assert config.in_words("budget", budget) == said
+    assert config.in_words("seed", budget) == budget
+    assert subject_of(f"nano (budget={said}, memory=last)") == "nano"
 
 
 def test_the_picture_has_a_curve_for_each_memory_over_its_budgets():

@@ -44,7 +44,7 @@ def test_each_answer_has_its_record_and_is_drawn_by_its_seed(make_nieh_set, tmp_
         ("second", ["--temperature", 1, "--seed", 1]),
         ("cold", ["--repeats", 2, "--temperature", 1e-6]),
     ):
-        assert run_cli(*MODEL, "--data", data, "--output", tmp_path / name, *options)[0] == 0
+        assert run_cli(*MODEL, "--data", data, "--out", tmp_path / name, *options)[0] == 0
     three = replies_of(tmp_path / "three")
     assert len(three) == 15 and {repeat for _, repeat in three} == {1, 2, 3}
     for repeat, name in ((1, "first"), (2, "second")):
@@ -59,9 +59,9 @@ def test_each_answer_has_its_record_and_is_drawn_by_its_seed(make_nieh_set, tmp_
 
 def test_one_repeat_is_a_run_without_the_option(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
-    assert run_cli(*MODEL, "--data", data, "--output", tmp_path)[0] == 0
+    assert run_cli(*MODEL, "--data", data, "--out", tmp_path)[0] == 0
     before = {path: path.read_bytes() for path in tmp_path.rglob("*.json*") if FOLDER in path.parts}
-    _, _, err = run_cli(*MODEL, "--data", data, "--output", tmp_path, "--repeats", 1)
+    _, _, err = run_cli(*MODEL, "--data", data, "--out", tmp_path, "--repeats", 1)
     assert "0 evaluated now, 5 resumed" in err
     assert before == {
         path: path.read_bytes() for path in tmp_path.rglob("*.json*") if FOLDER in path.parts
@@ -75,7 +75,7 @@ def test_one_repeat_is_a_run_without_the_option(make_nieh_set, tmp_path, run_cli
 def test_a_baseline_says_the_same_every_time(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
     code, out, _ = run_cli(
-        *option_words(model="oracle", tasks="nieh_gt", data=data, output=tmp_path, repeats=2)
+        *option_words(model="oracle", tasks="nieh_gt", data=data, out=tmp_path, repeats=2)
     )
     assert code == 0 and "Answers that repeat" in out
     (rows,) = tmp_path.rglob("samples_nieh_gt_*.jsonl")
@@ -98,7 +98,7 @@ def test_a_baseline_says_the_same_every_time(make_nieh_set, tmp_path, run_cli):
 )
 def test_what_draws_nothing_is_refused(make_nieh_set, tmp_path, run_cli, options, message):
     assert_refused(
-        run_cli(*MODEL, "--data", make_nieh_set(size=56), "--output", tmp_path, *options), message
+        run_cli(*MODEL, "--data", make_nieh_set(size=56), "--out", tmp_path, *options), message
     )
 
 

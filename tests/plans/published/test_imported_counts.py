@@ -41,7 +41,7 @@ def import_log(tmp_path, run_cli):
         path.write_bytes(
             gzip.compress(content.encode()) if name.endswith(".gz") else content.encode()
         )
-        code, out, err = run_cli("import-replies", path, "--output", tmp_path / "out", *options)
+        code, out, err = run_cli("import-replies", path, "--out", tmp_path / "out", *options)
         return code, out + err, next((tmp_path / "out").glob("*/*"), None)
 
     return import_log
@@ -170,7 +170,7 @@ def test_a_name_can_be_given(import_log):
 @pytest.mark.skipif(not PUBLISHED, reason="the published plan logs are not at ../shared/data")
 def test_the_published_logs_give_the_published_totals(tmp_path, run_cli):
     logs = [path for path in PUBLISHED if "yarn" not in path.name and "infini-ft" in path.name]
-    assert run_cli("import-replies", *logs, "--output", tmp_path)[0] == 0
+    assert run_cli("import-replies", *logs, "--out", tmp_path)[0] == 0
     totals = {}
     for results in tmp_path.glob("*/*/results.json"):
         success = json.loads(results.read_text())["summary"]["tasks"]["infthor_final"]["success"]

@@ -220,11 +220,15 @@ def test_runs_differ_in_simulator_and_course_in_a_note():
 REFUSED = {
     "another task": (
         make_plans_run("n", [make_plan_record("a", 0, (0, 10), task="other")], task="other"),
-        "share no task",
+        r"m and n share no task \(m has infthor_plans, n has other\)",
     ),
     "another trajectory": (
         make_plans_run("n", [make_plan_record("z", 0, (0, 10))]),
-        "share no trajectory",
+        r"share no trajectory .*\(m has 0 of 1 episodes of z, n has 0 of 2 episodes of a\); finish",
+    ),
+    "a part of the only trajectory": (
+        make_plans_run("n", [make_plan_record("a", 0, (0, 10))]),
+        r"\(n has 1 of 2 episodes of a\); finish them, or draw runs on the same data",
     ),
     "other rules": (
         make_plans_run("n", PLANS, rewards={"name": "published"}),

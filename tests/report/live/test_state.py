@@ -62,7 +62,7 @@ def test_the_metrics_at_the_end_are_those_of_the_results(run_cli, tmp_path, make
     data = make_nieh_set(size=56)
     assert (
         run_cli(
-            "--model", "blind", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
+            "--model", "blind", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path / "out"
         )[0]
         == 0
     )

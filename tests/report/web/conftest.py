@@ -22,7 +22,7 @@ def nieh_runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     data = packaged_folder("sets/nieh_mini")
     words = ("--model", "oracle,blind", "--tasks", "nieh_mini_gt,nieh_haystack_8k", "--data", data)
     with pytest.raises(SystemExit) as ended:
-        main([*map(str, words), "--tokens-per-frame", "100", "--output", str(output)])
+        main([*map(str, words), "--tokens-per-frame", "100", "--out", str(output)])
     assert ended.value.code == 0
     return sorted(folder for model in ("oracle", "blind") for folder in (output / model).iterdir())
 

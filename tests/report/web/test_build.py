@@ -104,7 +104,7 @@ def test_the_sections_have_their_pictures_and_tables(page):
 
 def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path, run_cli):
     words = option_words(model="oracle", tasks="nieh_mini_gt", limit="12", frames="shown,blank")
-    assert run_cli(*words, "--output", tmp_path)[0] == 0
+    assert run_cli(*words, "--out", tmp_path)[0] == 0
     page = make_page(*sorted((tmp_path / "oracle").iterdir()))
     (questions,) = (section for section in page.sections if section.key == "nieh")
     (chart,) = (chart for chart in questions.charts if chart.title == "Gain over blank frames")
@@ -158,9 +158,9 @@ def test_a_run_that_was_stopped_and_has_failures_says_so(make_page, nieh_runs, t
 
 def test_the_footer_names_the_embedded_simulator_only_where_it_was_used(page, make_page, nieh_runs):
     embedded = [run for run in read_report_runs(nieh_runs) if "embedded" in run.simulator]
-    assert bool(embedded) == bool(page.footnote)
+    assert bool(embedded) == bool(page.remark)
     elsewhere = replace_simulator(read_report_runs(nieh_runs)[:1], None)
-    assert build_page(elsewhere, PageRequest(pictures=0)).footnote == ""
+    assert build_page(elsewhere, PageRequest(pictures=0)).remark == ""
 
 
 def test_plans_have_their_steps_and_what_was_seen(make_page, scripted_run, scripted_data):

@@ -67,7 +67,7 @@ def hostile_runs(hostile_set: Path, tmp_path_factory: pytest.TempPathFactory) ->
     output = tmp_path_factory.mktemp("runs")
     words = ("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", str(hostile_set))
     with pytest.raises(SystemExit) as ended:
-        main([*words, "--output", str(output)])
+        main([*words, "--out", str(output)])
     assert ended.value.code == 0
     renamed = []
     for number, folder in enumerate(sorted(output.glob("*/nieh*"))):

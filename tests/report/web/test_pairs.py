@@ -24,7 +24,7 @@ def twin_runs(tmp_path_factory, twin_data):
     output = tmp_path_factory.mktemp("runs")
     words = ("--model", "oracle,blind", "--tasks", "nieh_twins", "--context", "clues")
     with pytest.raises(SystemExit) as ended:
-        main([*words, "--data", str(twin_data), "--output", str(output)])
+        main([*words, "--data", str(twin_data), "--out", str(output)])
     assert ended.value.code == 0
     return sorted(folder for model in ("oracle", "blind") for folder in (output / model).iterdir())
 

@@ -42,10 +42,10 @@ def test_every_run_leaves_it_and_equal_runs_leave_the_same(tmp_path: Path) -> No
         "model": "adder",
         "tasks": ["sums"],
         "seed": 0,
-        "output": str(tmp_path),
+        "out": str(tmp_path),
     }
     assert (
-        stored.line == "infthor-eval run --model adder --tasks sums --seed 0 --output "
+        stored.line == "infthor-eval run --model adder --tasks sums --seed 0 --out "
         f"{shlex.quote(str(tmp_path))}"
     )
     assert stored.data is None
@@ -76,7 +76,7 @@ def test_options_that_are_as_by_default_are_left_out_and_places_are_found_from_a
         "limit": 3,
         "seed": 7,
         "name": "a name",
-        "output": str(tmp_path / "out"),
+        "out": str(tmp_path / "out"),
         "scenes": str(tmp_path / "plans of floors"),
         "greedy": True,
         "workers": 2,
@@ -126,3 +126,11 @@ def test_a_file_without_options_is_named(tmp_path: Path, text: str) -> None:
 def test_the_file_is_plain_yaml(tmp_path: Path) -> None:
     write_command(tmp_path, request(tmp_path))
     assert yaml.safe_load((tmp_path / "run.yaml").read_text())["tasks"] == ["sums"]
+
+
+def test_files_of_earlier_runs_call_the_folder_by_its_former_name(tmp_path: Path) -> None:
+    (tmp_path / "run.yaml").write_text("model: adder\noutput: there\n")
+    stored = read_stored_command(tmp_path)
+    assert stored is not None
+    assert stored.options == {"model": "adder", "out": "there"}
+    assert stored.line == "infthor-eval run --model adder --out there"

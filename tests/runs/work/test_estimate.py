@@ -115,7 +115,7 @@ def test_where_every_unit_fails_nothing_is_told(tmp_path, capfd):
 
 def test_the_command_prints_units_tokens_time_memory_and_money(run_cli, tmp_path):
     words = option_words(
-        model="qwen2.5-vl-tiny", tasks="nieh_mini_gt", output=tmp_path / "out", workers=2
+        model="qwen2.5-vl-tiny", tasks="nieh_mini_gt", out=tmp_path / "out", workers=2
     )
     code, output, err = run_cli(
         "plan", *words, "--measure", 9, "--price-per-hour", 2.5, "--limit", 6
@@ -131,9 +131,7 @@ def test_the_command_prints_units_tokens_time_memory_and_money(run_cli, tmp_path
 
 
 def test_a_cap_on_what_is_spent_holds_for_one_process_and_says_so(run_cli, tmp_path):
-    words = option_words(
-        model="openai", model_args="model=m", tasks="nieh_mini_gt", output=tmp_path
-    )
+    words = option_words(model="openai", model_args="model=m", tasks="nieh_mini_gt", out=tmp_path)
     code, _, err = run_cli(*words, "--max-tokens-total", 100, "--workers", 2)
     assert code == 2
     assert (

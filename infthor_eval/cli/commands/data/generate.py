@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, SceneName, WholeNumber, floor_plans_option
+from infthor_eval.cli.options.values import (
+    PATH,
+    SceneName,
+    WholeNumber,
+    floor_plans_option,
+    split_names,
+)
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
@@ -27,11 +33,16 @@ __all__ = ["command"]
 @click.option(
     "--scene",
     "scenes",
-    type=SceneName(houses=True),
+    metavar="SCENE,...",
     multiple=True,
     required=True,
+    callback=lambda context, option, texts: tuple(
+        SceneName(houses=True).convert(name, option, context)
+        for text in texts
+        for name in split_names(text, "--scene")
+    ),
     help="kitchen-3, FloorPlan10, ... (see `ls scenes`), or the file of a ProcTHOR house "
-    "(house.json); may be repeated.",
+    "(house.json); several with commas.",
 )
 @click.option(
     "--min-steps",

@@ -14,10 +14,10 @@ __all__ = ["command"]
 @click.command(
     "look-around",
     cls=ExampleCommand,
-    example="infthor-eval look-around trajectories trajectories_level",
+    example="infthor-eval look-around trajectories --out trajectories_level",
 )
 @click.argument("trajectories", type=PATH)
-@click.argument("out", type=PATH)
+@click.option("--out", type=PATH, required=True, help="File, or folder for the files of a folder.")
 @click.option(
     "--min-run",
     type=click.IntRange(1),
@@ -26,7 +26,7 @@ __all__ = ["command"]
     help="Moves and turns in a row for which the camera is raised, at least.",
 )
 def command(trajectories: Path, out: Path, min_run: int) -> int:
-    """Write TRAJECTORIES (a .json file, or a folder of them) to OUT with a level camera in walks.
+    """Write TRAJECTORIES (a .json file, or a folder of them) with a level camera in walks.
 
     LookUp and LookDown actions are inserted as by the published script: around long walks with an
     empty hand, so that frames show the room. The object log and the names of frames stay those of
@@ -38,9 +38,9 @@ def command(trajectories: Path, out: Path, min_run: int) -> int:
 
     with ExitStack() as held:
         if trajectories.is_dir():
-            held.enter_context(hold_folder(out, "OUT"))
+            held.enter_context(hold_folder(out, "--out"))
         else:
-            prepare_file(out, "OUT")
+            prepare_file(out, "--out")
         summary = look_around_files(trajectories, out, min_run)
     print_line(
         f"{summary.trajectories} trajectories ({summary.changed} changed), {summary.inserted} "

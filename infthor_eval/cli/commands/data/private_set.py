@@ -28,7 +28,7 @@ __all__ = ["command"]
 @click.option(
     "--homes", type=click.IntRange(1), default=12, show_default=True, help="A trajectory in each."
 )
-@click.option("--kinds", help="Kinds of edits, with commas; default: all.")
+@click.option("--kinds", metavar="KIND,...", help="Kinds of edits, with commas; default: all.")
 @click.option(
     "--min-steps",
     type=click.IntRange(1),

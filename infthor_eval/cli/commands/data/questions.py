@@ -119,7 +119,7 @@ def questions(
 @click.command("twins", cls=ExampleCommand, example="infthor-eval twins trajectories --out TWINS")
 @click.argument("trajectories", nargs=-1, required=True, type=PATH)
 @click.option("--out", required=True, type=PATH, help="Folder of the set, new or to be continued.")
-@click.option("--kinds", help="Kinds of edits, with commas; default: all.")
+@click.option("--kinds", metavar="KIND,...", help="Kinds of edits, with commas; default: all.")
 @click.option(
     "--per-trajectory",
     type=click.IntRange(1),

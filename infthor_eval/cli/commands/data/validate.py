@@ -36,11 +36,13 @@ __all__ = ["command", "validate"]
 @click.command(
     "validate",
     cls=ExampleCommand,
-    example="infthor-eval validate SET --models A,B,C,D --out VALIDATED",
+    example="infthor-eval validate SET --model A,B,C,D --out VALIDATED",
 )
 @click.argument("set_folder", metavar="SET", type=PATH)
 @click.option(
+    "--model",
     "--models",
+    "models",
     type=ModelList(),
     required=True,
     metavar="MODEL,...",

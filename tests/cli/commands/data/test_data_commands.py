@@ -239,9 +239,7 @@ def test_a_set_of_another_version_is_neither_continued_nor_evaluated(
     for arguments in (
         ("replay", made_folder / "trajectories", "--out", tmp_path / "set"),
         ("questions", tmp_path / "set", "--out", tmp_path / "set/qa_set_new.csv"),
-        option_words(
-            model="oracle", tasks="nieh_gt", data=tmp_path / "set", output=tmp_path / "runs"
-        ),
+        option_words(model="oracle", tasks="nieh_gt", data=tmp_path / "set", out=tmp_path / "runs"),
     ):
         code, _, err = run_cli(*arguments)
         assert code == 2

@@ -71,7 +71,7 @@ def test_questions_that_one_model_answers_are_kept_and_the_rest_is_rejected_or_i
     data, tmp_path, run_cli
 ):
     out = tmp_path / "validated"
-    code, printed, err = run_cli("validate", data, "--models", "yes,none", "--out", out)
+    code, printed, err = run_cli("validate", data, "--model", "yes,none", "--out", out)
     assert code == 0, err
     assert kept(out) == ["Is there a mug?", "Was it there?"]
     rejected = [json.loads(line) for line in (out / "rejected.jsonl").read_text().splitlines()]
@@ -85,9 +85,9 @@ def test_questions_that_one_model_answers_are_kept_and_the_rest_is_rejected_or_i
         *("100.00", "(1)", "100.00", "(1)", "-", "100.00")
     ]
     assert (
-        run_cli(
-            "--model", "oracle", "--tasks", "nieh_gt", "--data", out, "--output", tmp_path / "o"
-        )[0]
+        run_cli("--model", "oracle", "--tasks", "nieh_gt", "--data", out, "--out", tmp_path / "o")[
+            0
+        ]
         == 0
     )
 
@@ -98,7 +98,7 @@ def test_the_bundled_set_keeps_exactly_what_a_model_of_four_can_answer(data, tmp
         tmp_path / "validated",
         ("yes", "counter", "places", "none"),
     )
-    code, printed, err = run_cli("validate", bundled, "--models", ",".join(models), "--out", out)
+    code, printed, err = run_cli("validate", bundled, "--model", ",".join(models), "--out", out)
     assert code == 0, err
     questions = [
         item for path in sorted(bundled.glob("qa_set*.csv")) for item in read_questions(path)
@@ -124,7 +124,7 @@ def test_the_bundled_set_keeps_exactly_what_a_model_of_four_can_answer(data, tmp
 
 def test_the_page_shows_frames_and_lets_no_markup_through(data, tmp_path, run_cli):
     out = tmp_path / "validated"
-    run_cli("validate", data, "--models", "none", "--out", out)
+    run_cli("validate", data, "--model", "none", "--out", out)
     page = (out / "inspection.html").read_text()
     assert "<script>wrong" not in page
     assert "&lt;script&gt;wrong" in page
@@ -135,7 +135,7 @@ def test_the_page_shows_frames_and_lets_no_markup_through(data, tmp_path, run_cl
 
 def test_decisions_are_applied(data, tmp_path, run_cli):
     out = tmp_path / "validated"
-    arguments = ["validate", data, "--models", "one-clue,none", "--out", out]
+    arguments = ["validate", data, "--model", "one-clue,none", "--out", out]
     run_cli(*arguments)
     rows = list(csv.DictReader((out / "inspection.csv").open(newline="")))
     decisions = tmp_path / "decisions.csv"
@@ -162,7 +162,7 @@ def test_decisions_that_do_not_fit_are_refused(data, tmp_path, run_cli, content,
     decisions = tmp_path / "decisions.csv"
     decisions.write_text(content)
     code, _, err = run_cli(
-        "validate", data, "--models", "none", "--out", tmp_path / "v", "--decisions", decisions
+        "validate", data, "--model", "none", "--out", tmp_path / "v", "--decisions", decisions
     )
     assert code == 2
     assert expected in err
@@ -170,7 +170,7 @@ def test_decisions_that_do_not_fit_are_refused(data, tmp_path, run_cli, content,
 
 
 def test_the_published_filter_keeps_what_is_answered_in_part(data, tmp_path, run_cli):
-    words = ("validate", str(data), "--models", "half", "--out")
+    words = ("validate", str(data), "--model", "half", "--out")
     code, out, _ = run_cli(*words, str(tmp_path / "strict"))
     assert (code, "0 kept" in out) == (0, True)
     code, out, _ = run_cli(*words, str(tmp_path / "published"), "--published")

@@ -32,7 +32,7 @@ N_KILLS = 10
 def _command(server: BatchServer, data: Path, output: Path) -> list[str]:
     model_args = f"base_url={server.url},model=m,batch=true,batch_requests=2"
     words = option_words(model="openai", model_args=model_args, tasks="nieh_gt", data=data)
-    return [sys.executable, "-c", CODE, *map(str, words), "--output", str(output)]
+    return [sys.executable, "-c", CODE, *map(str, words), "--out", str(output)]
 
 
 def _start(command: list[str]) -> "subprocess.Popen[str]":
@@ -131,7 +131,7 @@ def test_a_bundled_set_is_asked_once_however_often_the_run_is_killed(tmp_path: P
     with serve_batches(BatchServer(answer=_says, looks=3)) as server:
         given = f"base_url={server.url},{model_args}"
         words = option_words(model="openai", model_args=given, tasks="nieh_mini_gt")
-        command = [sys.executable, "-c", CODE, *words, "--output", str(tmp_path)]
+        command = [sys.executable, "-c", CODE, *words, "--out", str(tmp_path)]
         for _ in range(N_KILLS):
             _kill_after(server, command, drawn.randrange(1, 24), drawn.random() / 10)
         server.before = lambda *_: None

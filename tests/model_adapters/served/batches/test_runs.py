@@ -376,7 +376,7 @@ def test_what_cannot_be_asked_together_is_refused_in_one_line(
     task = option_words(
         model="openai", model_args="base_url=http://127.0.0.1:1/v1,model=m,batch=true", tasks=tasks
     )
-    ended = run_cli(*task, *data, *options, "--output", tmp_path / "out")
+    ended = run_cli(*task, *data, *options, "--out", tmp_path / "out")
     assert_refused(ended, message, after_notes=True)
 
 

@@ -28,7 +28,7 @@ def _arguments(engine: str, output: Path, *more: object) -> list[str]:
     model_args = f"pretrained={packaged_folder(NANO_FOLDER)},dtype=float32"
     model_args += ",enforce_eager=true" if engine == "vllm" else ",device=cpu"
     typed = [
-        *option_words(model="qwen2.5-vl", engine=engine, model_args=model_args, output=output),
+        *option_words(model="qwen2.5-vl", engine=engine, model_args=model_args, out=output),
         *more,
     ]
     return list(map(str, typed))

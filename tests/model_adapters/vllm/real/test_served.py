@@ -86,7 +86,7 @@ def both(
         for model, settings in (("openai", served | more), ("qwen2.5-vl", here)):
             options = ",".join(f"{name}={value}" for name, value in settings.items())
             code, _, err = run_cli(
-                *option_words(model=model, model_args=options, name=model, output=tmp_path / "out"),
+                *option_words(model=model, model_args=options, name=model, out=tmp_path / "out"),
                 *arguments,
             )
             assert code == 0, err
@@ -142,7 +142,7 @@ def test_a_server_that_dies_costs_nothing_that_was_answered_and_goes_on_once_it_
     port, output = free_port(), tmp_path / "out"
     model_args = f"base_url=http://127.0.0.1:{port}/v1,model={MODEL},retries=1,max_in_flight=1"
     words = option_words(model="openai", model_args=model_args, tasks="nieh_mini_full", limit="40")
-    command = cli_words(*words, "--output", output)
+    command = cli_words(*words, "--out", output)
 
     def n_answered() -> int:
         lines = [
@@ -165,7 +165,7 @@ def test_a_server_that_dies_costs_nothing_that_was_answered_and_goes_on_once_it_
     before = {record.key: record for record in read_records(output) if record.failure is None}
     assert 5 <= len(before) < 40, "it did not die in the middle"
     with _server(port, tmp_path / "second"):
-        code, _, err = run_cli(*words, "--output", output)
+        code, _, err = run_cli(*words, "--out", output)
     assert code == 0, err
     records = read_records(output)
     assert len(records) == 40
