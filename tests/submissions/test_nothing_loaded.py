@@ -59,7 +59,7 @@ def test_the_retriever_of_a_memory_is_not_opened(
 
 
 def test_a_retriever_of_ours_is_not_opened_either(material, check, tmp_path, monkeypatch):
-    monkeypatch.setattr("model_adapters.hf.retrieval.open_retriever", None)
+    monkeypatch.setitem(sys.modules, "model_adapters.hf.retrieval", None)
     run = honest(material)
     task = run.header.config.tasks["nieh_gt"]
     settings = {**task.settings, "dataset_kwargs": {"context": "clip_retrieval"}}
