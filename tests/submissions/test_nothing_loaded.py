@@ -44,7 +44,11 @@ def bait(tmp_path: Path) -> str:
 
 @pytest.mark.parametrize(
     ("memory", "memory_args"),
-    [("clip", "retriever={}"), ("clip-view", "k=3,retriever={}"), ("clip", "retriever_revision={}")],
+    [
+        ("clip", "retriever={}"),
+        ("clip-view", "k=3,retriever={}"),
+        ("clip", "retriever_revision={}"),
+    ],
 )
 def test_the_retriever_of_a_memory_is_not_opened(
     recalled, check, tmp_path, bait, memory, memory_args
@@ -68,9 +72,7 @@ def test_a_retriever_of_ours_is_not_opened_either(material, check, tmp_path, mon
         tasks={"nieh_clip_retrieval": replace(task, settings=settings, sources={"retriever": {}})},
     )
     records = [replace(it, task="nieh_clip_retrieval") for it in run.records]
-    header = replace(
-        run.header, config=config, units_by_task={"nieh_clip_retrieval": len(records)}
-    )
+    header = replace(run.header, config=config, units_by_task={"nieh_clip_retrieval": len(records)})
     verdict = check(submit(tmp_path, "sent", Source(header, records)))
     assert verdict.refusals == []
     assert any("retrieved by a model" in problem.text for problem in verdict.warnings)

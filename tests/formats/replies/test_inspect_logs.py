@@ -19,7 +19,12 @@ _ZSTANDARD = 93
 def _write(folder, content, method, declared=None):
     """Write a log with one sample, which says that it is of another length."""
     path = folder / "a.eval"
-    known = method in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
+    known = method in (
+        zipfile.ZIP_STORED,
+        zipfile.ZIP_DEFLATED,
+        zipfile.ZIP_BZIP2,
+        zipfile.ZIP_LZMA,
+    )
     packed = content if known else pyarrow.compress(content, "zstd", asbytes=True)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("header.json", _HEADER)
