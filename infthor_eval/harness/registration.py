@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.exports import LM_EVAL_MODEL as NAME
+from infthor_eval.harness.kept_requests import refuse_others
 from infthor_eval.storage.folders import packaged_folder
 
 __all__ = [
@@ -26,6 +27,7 @@ def register() -> None:
 
     if NAME not in model_registry:
         model_registry.register(NAME, target=_TARGET)
+    refuse_others()
 
 
 def add_tasks() -> None:

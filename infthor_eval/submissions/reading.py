@@ -164,16 +164,16 @@ def _read_journal(folder: Path) -> SubmittedRun:
             f"{_SUITE}"
         )
     header, records = read_run(folder, RECORDS)
-    results = [record for record in _all_records(folder) if record.payload.reply is not None]
+    results = [it for it in _all_records(folder, header) if it.payload.reply is not None]
     told = {record.key: record.payload.scores for record in records}
     return SubmittedRun(folder, header, records, results, told)
 
 
-def _all_records(folder: Path) -> Iterator[Record]:
+def _all_records(folder: Path, header: RunHeader[NiehConfig]) -> Iterator[Record]:
     decoder = RECORDS.decoder()
     for path in find_shards(folder):
         for number, line in enumerate(read_lines(path)[1:], 2):
-            record = parse_record(path, number, line, decoder)
+            record = parse_record(path, number, line, decoder, header)
             if isinstance(record, UnitRecord):
                 yield record
 

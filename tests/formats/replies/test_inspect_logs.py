@@ -82,5 +82,5 @@ def test_all_members_together_have_a_limit(tmp_path, monkeypatch):
         archive.writestr("header.json", _HEADER)
         for number in range(3):
             archive.writestr(f"samples/{number}.json", json.dumps(_SAMPLE) + " " * 400_000)
-    with pytest.raises(DataError, match="is longer than 1 MB.*INFTHOR_EVAL_MAX_FILE_MB"):
+    with pytest.raises(DataError, match=r"is longer than 1 MB.*INFTHOR_EVAL_MAX_FILE_MB"):
         list(read_reply_log(path))
