@@ -1,7 +1,6 @@
 """Code of one's own that ends the process without a word, or keeps it when the command is done."""
 
 import os
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -19,11 +18,8 @@ end_process = os._exit
 
 @contextmanager
 def noticed() -> Iterator[None]:
-    """Notice within the context what own code does to the process.
-
-    `os._exit` is `sys.exit` there, which is an error of whatever called it. Threads that are left
-    are told, and the process does not wait for them longer than `limits.OWN_CODE_SECONDS`.
-    """
+    """Make `os._exit` an error of whoever calls it within the context, as `sys.exit` is one, and
+    wait for threads that were begun in it for no longer than `limits.OWN_CODE_SECONDS`."""
     process, before = os.getpid(), set(threading.enumerate())
 
     def exit_as_error(status: int) -> NoReturn:
@@ -36,26 +32,21 @@ def noticed() -> Iterator[None]:
         yield
     except SystemExit as ended:
         left = [it for it in set(threading.enumerate()) - before if not it.daemon]
-        if left:
-            code = ended.code if isinstance(ended.code, int) else 1
-            threading.Thread(target=_end_at_last, args=(left, code), daemon=True).start()
+        threading.Thread(target=_end_at_last, args=(left, ended.code), daemon=True).start()
         raise
     finally:
         os._exit = end_process
 
 
 def _end_at_last(left: list[threading.Thread], code: int) -> None:
-    """Wait for threads once the main one has ended, as Python does, but not for ever."""
+    """Once the main thread has ended, wait for others, as Python does, but not for ever."""
     threading.main_thread().join()
     time.sleep(_SOON_S)
     alive = [thread.name for thread in left if thread.is_alive()]
-    if not alive:
-        return
-    seconds = OWN_CODE_SECONDS.value
-    print_error(
-        f"your own code left a thread that runs on ({alive[0]}); make it end, or a daemon; the "
-        f"process ends in {seconds} s ({OWN_CODE_SECONDS.name})"
-    )
-    time.sleep(seconds)
-    sys.stdout.flush()
-    end_process(code)
+    if alive:
+        print_error(
+            f"your own code left a thread that runs on ({alive[0]}); make it end, or a daemon; the "
+            f"process ends in {OWN_CODE_SECONDS.value} s ({OWN_CODE_SECONDS.name})"
+        )
+        time.sleep(OWN_CODE_SECONDS.value)
+        end_process(code)

@@ -11,7 +11,7 @@ folder of one's own frames and questions (`own_folder`).
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from itertools import chain
@@ -384,4 +384,3 @@ def _read_frames(folder: Path, shared_frames: dict[str, FrameRef]) -> dict[int, 
         step.img_idx: FrameRef(by_stem.get(name, home / Path(step.img_filename).name))
         for step, name in zip(steps, names, strict=True)
     }
-

@@ -12,7 +12,6 @@ from PIL import Image
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.harness.kept_requests import as_dataset
 from infthor_eval.harness.registration import model_takes_references, register
 from infthor_eval.harness.requests import Doc
 from infthor_eval.nieh.asking.recalling import recall_all
@@ -55,6 +54,8 @@ def dataset(**config: Any) -> dict[str, Any]:
             `find_samples`.
         DataError: the set cannot be read.
     """
+    from datasets import Dataset
+
     task_samples = find_samples(config)
     pixels = not model_takes_references()
     if not task_samples.samples:
@@ -62,7 +63,7 @@ def dataset(**config: Any) -> dict[str, Any]:
         reasons = "; ".join(f"{reason} ({n})" for reason, n in counts) or "its files are empty"
         raise UsageError(f"{task_samples.data.root}: no question of it can be asked: {reasons}")
     samples = recall_all(task_samples) if pixels else task_samples.samples
-    return as_dataset([doc_of(task_samples, sample, pixels) for sample in samples])
+    return {"test": Dataset.from_list([doc_of(task_samples, sample, pixels) for sample in samples])}
 
 
 def doc_to_text(doc: Doc) -> str:

@@ -10,7 +10,6 @@ from typing import Any
 
 from infthor_eval.errors import UsageError
 from infthor_eval.harness.episode_docs import settings_doc, task_request
-from infthor_eval.harness.kept_requests import as_dataset
 from infthor_eval.harness.registration import model_takes_references, register
 from infthor_eval.harness.requests import Doc
 from infthor_eval.plans.evaluation import PlansEvaluation
@@ -34,6 +33,8 @@ def dataset(**config: Any) -> dict[str, Any]:
         UsageError: the model is not ours, or there are no trajectories.
         DataError: no trajectory can be read.
     """
+    from datasets import Dataset
+
     if not model_takes_references():
         raise UsageError(
             "plans are carried out in a simulator, which infthor-eval's models alone do; use "
@@ -45,7 +46,7 @@ def dataset(**config: Any) -> dict[str, Any]:
     for unit in PlansEvaluation(request).units:
         texts.setdefault(unit.cluster, []).append(unit.payload.plan)
     docs = [{**doc, "traj_id": name, "plans": plans} for name, plans in texts.items()]
-    return as_dataset(docs)
+    return {"test": Dataset.from_list(docs)}
 
 
 def doc_to_text(doc: Doc) -> str:

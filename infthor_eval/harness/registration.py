@@ -4,8 +4,8 @@ is used."""
 from pathlib import Path
 from typing import Any
 
+from infthor_eval.errors import UsageError
 from infthor_eval.exports import LM_EVAL_MODEL as NAME
-from infthor_eval.harness.kept_requests import refuse_others
 from infthor_eval.storage.folders import packaged_folder
 
 __all__ = [
@@ -22,12 +22,22 @@ _references = False
 
 def register() -> None:
     """Register the class as a "module:Class" that lm-eval imports when a person asks for it."""
+    import lm_eval.api.task
     import lm_eval.models  # noqa: F401 - before registering, or the built-in models vanish (0.4.13)
     from lm_eval.api.registry import model_registry
 
     if NAME not in model_registry:
         model_registry.register(NAME, target=_TARGET)
-    refuse_others()
+    lm_eval.api.task.load_from_cache = _refuse_kept
+
+
+def _refuse_kept(file_name: str, cache: bool = False) -> None:
+    """Stand for lm-eval's reader of the requests that it keeps."""
+    if cache:
+        raise UsageError(
+            "--cache_requests: lm-eval keeps requests by the name of their task, so that those of "
+            "another set would be asked and scored by this one's answers; leave it out"
+        )
 
 
 def add_tasks() -> None:

@@ -96,7 +96,7 @@ def test_an_adapter_that_ends_the_program_fails_its_unit_alone(run_own, tmp_path
 def test_a_scorer_that_ends_the_process_fails_its_sample_alone(tmp_path, run_cli):
     scorer = tmp_path / "mine.py"
     scorer.write_text("import os\ndef end(reply, answers): os._exit(0)\n")
-    write_journal(tmp_path / "run", make_header(make_config()), [make_record(0, "mug")])
+    write_journal(tmp_path / "run", make_header(make_config()), [make_record(0, "mug")], RECORDS)
     run = ("rescore", tmp_path / "run", "--scorer", f"{scorer}:end", "--output", tmp_path / "out")
     code, _, err = run_cli(*run)
     assert code == 1
@@ -112,7 +112,7 @@ def test_a_forked_process_ends_as_it_wants(tmp_path, run_cli):
         "    child = fork.Process(target=int)\n    child.start()\n    child.join()\n"
         "    return 1.0 - child.exitcode\n"
     )
-    write_journal(tmp_path / "run", make_header(make_config()), [make_record(0, "mug")])
+    write_journal(tmp_path / "run", make_header(make_config()), [make_record(0, "mug")], RECORDS)
     run = ("rescore", tmp_path / "run", "--scorer", f"{scorer}:fine", "--output", tmp_path / "out")
     code, out, err = run_cli(*run)
     assert (code, "fine" in out) == (0, True), err
@@ -126,7 +126,7 @@ def test_a_thread_that_is_left_does_not_keep_the_process(tmp_path, is_daemon):
         f"    threading.Thread(target=time.sleep, args=(9**9,), daemon={is_daemon}).start()\n"
         "    return 1.0\n"
     )
-    write_journal(tmp_path / "run", make_header(make_config()), [make_record(0, "mug")])
+    write_journal(tmp_path / "run", make_header(make_config()), [make_record(0, "mug")], RECORDS)
     run = ("rescore", tmp_path / "run", "--scorer", f"{scorer}:leave", "--output", tmp_path / "out")
     done = subprocess.run(
         [sys.executable, "-c", "from infthor_eval.cli import main; main()", *map(str, run)],

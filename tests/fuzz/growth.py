@@ -7,6 +7,7 @@ that for half of it.
 
 import contextlib
 import copy
+import gc
 import json
 import time
 from collections.abc import Callable, Iterator
@@ -19,7 +20,8 @@ from .reader import Reader
 __all__ = ["find_growth"]
 
 _SIZE = 150_000  # characters that are added, and twice as many
-_MOST_PLACES = 60
+_SECONDS = 12.0  # of the processor for a reader: the outer parts of its input come first
+_LEAST = 6  # ways of growing that are tried, however slow the reader is
 _MOST = 2.6  # times as long for twice the size
 _QUICK_S = 0.15  # of the processor, in which even twice the size is read: nothing to compare
 _TRIES = 5  # until one is quick enough: a busy machine makes some slow, and none too quick
@@ -32,21 +34,28 @@ def find_growth(reader: Reader, folder: Path) -> Iterator[str]:
     file = reader.make(folder)
     sound = file.read_bytes()
     reader.read(folder)
-    for name, make in _grown(sound, reader.form):
+    end = time.process_time() + _SECONDS
+    for number, (name, make) in enumerate(_grown(sound, reader.form)):
+        if number >= _LEAST and time.process_time() > end:
+            break
 
-        def seconds(size: int, make: Callable[[int], bytes] = make) -> float:
+        def time_for(size: int, make: Callable[[int], bytes] = make) -> float:
             file.write_bytes(make(size))
+            gc.collect()
+            gc.disable()  # its turns are no part of the reader
             start = time.process_time()
             with contextlib.suppress(Exception):  # a refusal; fuzzing tells others from it
                 reader.read(folder)
-            return time.process_time() - start
+            seconds = time.process_time() - start
+            gc.enable()
+            return seconds
 
         ratio = 0.0
         for _ in range(_TRIES):
-            twice = seconds(2 * _SIZE)
+            twice = time_for(2 * _SIZE)
             if twice < _QUICK_S:
                 break
-            ratio = twice / seconds(_SIZE)
+            ratio = twice / time_for(_SIZE)
             if ratio <= _MOST:
                 break
         else:
@@ -92,7 +101,7 @@ def _places(document: Any) -> list[tuple[Any, ...]]:
             queue += [(*path, name) for name in list(value)[:20]]
         elif isinstance(value, list):
             queue += [(*path, at) for at in range(min(3, len(value)))]
-    return list(found.values())[:_MOST_PLACES]
+    return list(found.values())
 
 
 def _at(document: Any, path: tuple[Any, ...]) -> Any:
@@ -116,9 +125,12 @@ def _ways(value: Any) -> Iterator[tuple[str, _Grow]]:
         yield "equal entries", lambda size: value + entries(size, equal=True)
         yield "entries", lambda size: value + entries(size, equal=False)
     else:
-        yield "names", lambda size: value | {
-            f"n{at}": one for at, one in enumerate(entries(size, equal=True))
-        }
+        yield (
+            "names",
+            lambda size: (
+                value | {f"n{at}": one for at, one in enumerate(entries(size, equal=True))}
+            ),
+        )
 
 
 def _other(value: Any, number: int) -> Any:
@@ -131,6 +143,4 @@ def _other(value: Any, number: int) -> Any:
         return value + number
     if isinstance(value, list):
         return [_other(one, number) for one in value]
-    return {
-        name: one if name == "type" else _other(one, number) for name, one in value.items()
-    }
+    return {name: one if name == "type" else _other(one, number) for name, one in value.items()}

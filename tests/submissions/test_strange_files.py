@@ -43,12 +43,13 @@ def _inspect(root, name, record, **sample):
 
 def _nest(folder, depth):
     """Make folders in each other: the whole path is longer than any call takes."""
-    here = os.getcwd()
-    os.chdir(folder)
+    at = os.open(folder, os.O_RDONLY)
     for _ in range(depth):
-        os.mkdir("a")
-        os.chdir("a")
-    os.chdir(here)
+        os.mkdir("a", dir_fd=at)
+        inner = os.open("a", os.O_RDONLY, dir_fd=at)
+        os.close(at)
+        at = inner
+    os.close(at)
 
 
 def _link(path, target):

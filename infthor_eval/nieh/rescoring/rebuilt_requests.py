@@ -14,14 +14,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.asking.answering import request_fingerprint
 from infthor_eval.nieh.asking.recalling import apply_recall
 from infthor_eval.nieh.config import NiehConfig
-from infthor_eval.nieh.contexts import (
-    MEMORY,
-    RETRIEVED,
-    ContextPart,
-    ContextSettings,
-    Sample,
-    context_named,
-)
+from infthor_eval.nieh.contexts import MEMORY, ContextPart, ContextSettings, Sample, context_named
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.frame_ablations import FrameAblation
 from infthor_eval.nieh.records import NiehAnswer
@@ -30,6 +23,7 @@ from infthor_eval.runs import RunHeader, UnitRecord
 
 __all__ = ["RebuiltRequest", "RequestRebuilder"]
 
+_RETRIEVED = "clip_retrieval"
 # Settings of contexts that a run gives to all its tasks.
 _RUN_SETTINGS = ("k_tokens", "tokens_per_frame", "frames", "prompt", "seed")
 
@@ -104,7 +98,7 @@ class RequestRebuilder:
     def _variants(self, question: Question, record: UnitRecord[NiehAnswer]) -> Iterator[Sample]:
         data = self._samples.data
         name = self._samples.context_name
-        if name == RETRIEVED:  # by a model, which may not be there, and takes minutes
+        if name == _RETRIEVED:  # by a model, which may not be there, and takes minutes
             raise DataError(
                 "its frames were retrieved by a model, and the journal does not have them"
             )
