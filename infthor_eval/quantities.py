@@ -12,11 +12,13 @@ from msgspec import Meta
 
 __all__ = [
     "MOST",
+    "MOST_REPEATS",
     "Amount",
     "AmountSum",
     "Count",
     "CountSum",
     "Number",
+    "Repetition",
     "Share",
     "Total",
     "Whole",
@@ -24,9 +26,11 @@ __all__ = [
 ]
 
 MOST = 2**53  # beyond it a float skips integers
+MOST_REPEATS = 10_000  # each is a unit of its own, and units are listed
 
 Count = Annotated[int, Meta(ge=0, le=MOST)]
 Total = Annotated[int, Meta(ge=1, le=MOST)]  # what a count is a share of; also a number from 1
+Repetition = Annotated[int, Meta(ge=1, le=MOST_REPEATS)]
 Whole = Annotated[int, Meta(ge=-MOST, le=MOST)]
 Number = Annotated[float, Meta(ge=-MOST, le=MOST)]
 Amount = Annotated[float, Meta(ge=0, le=MOST)]  # of seconds, metres, dollars

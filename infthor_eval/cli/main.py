@@ -15,6 +15,7 @@ import click
 import infthor_eval
 from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.repeated import refuse_repeated_options
+from infthor_eval.cli.own_code import end_process, noticed
 from infthor_eval.cli.progress.patience import answer_ctrl_c
 from infthor_eval.cli.progress.stopping import handle_signal
 from infthor_eval.errors import (
@@ -163,6 +164,7 @@ def _infthor_eval() -> None:
     """
 
 
+@noticed()
 def main(args: list[str] | None = None) -> None:
     """Run the command line; errors meant for people are printed as one line on standard error."""
     for stream in (sys.stdout, sys.stderr):
@@ -241,7 +243,7 @@ def _end() -> None:
     """End the process as a kill would; what is finished is on disk."""
     error_console().show_cursor()  # which a progress bar has hidden
     print_error(_STOPPED)
-    os._exit(_INTERRUPTED)
+    end_process(_INTERRUPTED)
 
 
 def _discard_output() -> None:

@@ -7,7 +7,6 @@ as its datastore has them. Both are checked by its own validator in `tests/expor
 import hashlib
 import json
 import math
-import time
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from pathlib import Path
@@ -74,8 +73,8 @@ class _RunExport:
         self._facts = model_facts(run, request.model_id)
         self._measures = list(chain.from_iterable(find_measures(run).values()))
         self.reader = SampleReader(run, request.data)
-        self._ran = last_change(run)
-        self._now = f"{time.time():.3f}"
+        self._ran = last_change(run.folder)
+        self._stamp = f"{self._ran.timestamp():.3f}"
         self._collection = f"infthor-{file_name(run.suite.name)}"
 
     @property
@@ -115,7 +114,7 @@ class _RunExport:
 
     @property
     def _evaluation_id(self) -> str:
-        return f"{self._collection}/{self._facts.id}/{self._now}"
+        return f"{self._collection}/{self._facts.id}/{self._stamp}"
 
     @property
     def _uuid(self) -> UUID:
@@ -129,7 +128,7 @@ class _RunExport:
             "schema_version": SCHEMA_VERSION,
             "evaluation_id": self._evaluation_id,
             "evaluation_timestamp": self._ran.isoformat(),
-            "retrieved_timestamp": self._now,
+            "retrieved_timestamp": self._stamp,
             "source_metadata": self._source(),
             "eval_library": {
                 "name": "infthor-eval",

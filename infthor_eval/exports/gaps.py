@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -101,9 +102,12 @@ def gap_notes(run: PresentedRun) -> list[str]:
     return [f"{run.label}, {task}: {words}" for task, words in described.items() if words]
 
 
-def last_change(run: PresentedRun) -> datetime:
-    """Return when the last unit of a run was done, by its journal."""
-    changed = max(shard.stat().st_mtime for shard in find_shards(run.folder))
+def last_change(folder: Path) -> datetime:
+    """Return when the last unit of the run in a folder was done, by its journal.
+
+    Exports take it as their own time, so that those of one run are equal.
+    """
+    changed = max(shard.stat().st_mtime for shard in find_shards(folder))
     return datetime.fromtimestamp(changed, UTC)
 
 

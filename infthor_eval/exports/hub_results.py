@@ -80,7 +80,7 @@ def _entry(
         dataset_id=request.dataset,
         task_id=with_frames(measure.task, run.header),
         value=round(factor * measure.estimate.mean, 4),
-        date=last_change(run).isoformat(timespec="seconds"),
+        date=last_change(run.folder).isoformat(timespec="seconds"),
         source_url=request.source_url,
         source_name="runs of infthor-eval" if request.source_url else None,
         notes=_notes(run, facts, measure, factor),

@@ -76,7 +76,7 @@ class _Log:
         self._task = task
         self._measures = measures
         self._reader = reader
-        self._ran = last_change(run)
+        self._ran = last_change(run.folder)
         self.problems: list[str] = []
 
     def write(self, request: ExportRequest) -> Path:
@@ -93,7 +93,7 @@ class _Log:
         with (
             wrap_errors(f"{path}: cannot be written", writing_hint("")),
             write_atomically(path) as partial,
-            zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive,
+            zipfile.ZipFile(partial, "w") as archive,
         ):
             _add(archive, "_journal/start.json", start)
             for record in counted(self._run, self._task):
@@ -240,4 +240,6 @@ def _stamp(time: datetime) -> str:
 
 def _add(archive: zipfile.ZipFile, name: str, document: Any) -> None:
     content = json.dumps(document, ensure_ascii=False, allow_nan=False)
-    archive.writestr(name, content.encode("utf-8", "backslashreplace"))
+    member = zipfile.ZipInfo(name)  # of no time of its own
+    member.external_attr = 0o644 << 16
+    archive.writestr(member, content.encode("utf-8", "backslashreplace"), zipfile.ZIP_DEFLATED)

@@ -4,10 +4,8 @@ A run writes them at its end, when it still has the requests as they were sent.
 """
 
 import json
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
@@ -18,6 +16,7 @@ import msgspec
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.exports import LM_EVAL_MODEL
+from infthor_eval.exports.gaps import last_change
 from infthor_eval.runs import RunOutcome, TaskFile, UnitCounts, UnitRecord, UnitSample
 from infthor_eval.statistics import clustered_mean
 from infthor_eval.storage.digests import canonical_json
@@ -70,16 +69,18 @@ def export(outcome: RunOutcome) -> Path:
     """
     converted = convert_run(outcome)
     folder = outcome.folder / FOLDER / file_name(converted.model)
-    stamp = datetime.now().isoformat().replace(":", "-")
+    # In local time and without its zone, as lm-eval has it.
+    stamp = last_change(outcome.folder).astimezone().replace(tzinfo=None)
+    ending = stamp.isoformat(timespec="microseconds").replace(":", "-")
     hint = writing_hint("; the journal holds it all")
     with wrap_errors(f"{folder}: cannot be written", hint):
         folder.mkdir(parents=True, exist_ok=True)
         for task, rows in converted.samples.items():
             name = f"samples_{file_name(task)}"
-            with write_atomically(folder / f"{name}_{stamp}.jsonl", name) as partial:
+            with write_atomically(folder / f"{name}_{ending}.jsonl", name) as partial:
                 lines = (json.dumps(row, ensure_ascii=False) + "\n" for row in rows)
                 partial.write_text("".join(lines), encoding="utf-8")
-        with write_atomically(folder / f"results_{stamp}.json", "results") as partial:
+        with write_atomically(folder / f"results_{ending}.json", "results") as partial:
             partial.write_text(
                 json.dumps(converted.results, indent=2, ensure_ascii=False), encoding="utf-8"
             )
@@ -233,7 +234,7 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
             "version": outcome.summary.header.config.infthor_eval,
             "units": msgspec.to_builtins(outcome.summary.units),
         },
-        "date": time.time(),
+        "date": last_change(outcome.folder).timestamp(),
         "lm_eval_version": version("lm_eval"),
         "transformers_version": version("transformers"),
         "model_source": LM_EVAL_MODEL,

@@ -21,6 +21,7 @@ __all__ = ["unpack_tar"]
 _MAX_FILES = 2_000_000
 _MAX_FILE_BYTES = 2 * 2**30
 _MAX_HEADER_BYTES = 2**20  # of a long name or of attributes, which are read into memory at once
+_LONGEST_END = 2**24  # a tape's record, which `tar -b` may ask for, is shorter
 _HEADERS = (
     tarfile.XHDTYPE,
     tarfile.XGLTYPE,
@@ -79,8 +80,9 @@ def _check_end(tar: tarfile.TarFile) -> None:
     tar.fileobj.seek(tar.offset)
     if tar.fileobj.read(tarfile.BLOCKSIZE) != bytes(tarfile.BLOCKSIZE):
         raise tarfile.ReadError(f"no header and no end at byte {tar.offset:,}")
-    while tar.fileobj.read(2**20):
-        pass  # to the end, where compressed files have a checksum
+    # To the end, where compressed files have a checksum; before it are zeros up to a whole record.
+    if len(tar.fileobj.read(_LONGEST_END + 1)) > _LONGEST_END:
+        raise tarfile.ReadError(f"more than {_LONGEST_END:,} bytes after its end")
 
 
 def _check_members(

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.reading import read_text, require_file
+from infthor_eval.formats.reading import first_duplicate, read_text, require_file
 from infthor_eval.storage.files import write_atomically
 from infthor_eval.storage.limits import CSV_LINE_MB
 
@@ -27,11 +27,13 @@ class CsvRow:
 
     Attributes:
         line: number of its last line in the file, from 1.
-        cells: its cells by column; empty where it has fewer.
+        columns: names of all columns of the file.
+        cells: its cells by column; where it has fewer, those that the file must have are empty.
         problem: the reason why the row cannot be used, and how to fix it; None if it can.
     """
 
     line: int
+    columns: Sequence[str]
     cells: dict[str, str]
     problem: str | None
 
@@ -61,7 +63,7 @@ def read_rows(
         for cells in reader:
             if not cells:
                 continue
-            row = dict.fromkeys(header, "") | dict(zip(header, cells, strict=False))
+            row = dict.fromkeys(columns, "") | dict(zip(header, cells, strict=False))
             problem = None
             broken = next(
                 (name for name, cell in row.items() if "\n" in cell or "\r" in cell), None
@@ -70,7 +72,7 @@ def read_rows(
                 problem = f"has {len(cells)} cells for {len(header)} columns; {hint}"
             elif broken is not None and not line_breaks:
                 problem = f"{broken} has several lines; close its quote before the end of the line"
-            yield CsvRow(reader.line_num, row, problem)
+            yield CsvRow(reader.line_num, header, row, problem)
 
 
 def _check_lines(path: Path, hint: str) -> None:
@@ -90,7 +92,7 @@ def _check_header(path: Path, header: Sequence[str], columns: Sequence[str], hin
     missing = [name for name in columns if name not in header]
     if missing:
         raise DataError(f"{path}: no column {', '.join(missing)}; {hint}")
-    twice = next((name for name in header if name and header.count(name) > 1), None)
+    twice = first_duplicate(filter(None, header))
     if twice is not None:
         raise DataError(f"{path}: column {twice!r} is there twice; remove one")
 

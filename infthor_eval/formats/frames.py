@@ -138,8 +138,15 @@ class FrameRef:
         """
         with _open(self.path) as image:
             frame = as_shown(image)
+        n_pixels = frame.width * frame.height
         for patch in self.patches:
             with _open(patch.path) as image:
+                n_pixels += image.width * image.height
+                if n_pixels > IMAGE_MEGAPIXELS.value * 1_000_000:
+                    raise DataError(
+                        f"{patch.path}: with it, the picture and its patches have more than "
+                        f"{IMAGE_MEGAPIXELS.value} million pixels; {IMAGE_MEGAPIXELS.hint}"
+                    )
                 layer = image.convert("RGBA")
             right = patch.left + layer.width
             bottom = patch.top + layer.height

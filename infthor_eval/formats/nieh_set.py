@@ -11,7 +11,7 @@ folder of one's own frames and questions (`own_folder`).
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from itertools import chain
@@ -26,10 +26,11 @@ from infthor_eval.formats.own_folder import OwnFolder, find_own_folder
 from infthor_eval.formats.pictures.video import Video, read_video
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question, SkippedQuestion
+from infthor_eval.formats.reading import first_duplicate
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.shared_frames import read_shared_frames
 from infthor_eval.formats.step_log import log_file, read_steps
-from infthor_eval.formats.twins import TwinPair, read_pairs
+from infthor_eval.formats.twins import TwinPair, pairs_file, read_pairs
 
 __all__ = ["NiehSet"]
 
@@ -149,12 +150,15 @@ class NiehSet:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Hash of questions, step logs, and names and sizes of the frames (hex, 32 characters)."""
+        """Hash of questions, pairs of worlds, step logs, and names and sizes of the frames (hex, 32
+        characters)."""
         # Not the content of frames, which would mean reading all of it: a record has the digests of
         # its own frames.
         digest = hashlib.blake2b(digest_size=16)
         for file in self.question_files:
             digest.update(file.read_bytes())
+        if any(question.pair for question in self.questions):  # the pair tells a question's cluster
+            digest.update(pairs_file(self.directory).read_bytes())
         for traj_id in sorted({question.traj_id for question in self.questions if self.has_frames}):
             if self._own is None:  # one's own frames have no log
                 digest.update(log_file(self.folder(traj_id)).read_bytes())
@@ -357,8 +361,8 @@ def _read_frames(folder: Path, shared_frames: dict[str, FrameRef]) -> dict[int, 
     names = [Path(step.img_filename).stem for step in steps]
     numbers = [step.img_idx for step in steps]
     for duplicate, what in (
-        (_first_duplicate(names), "img_filename"),
-        (_first_duplicate(numbers), "img_idx"),
+        (first_duplicate(names), "img_filename"),
+        (first_duplicate(numbers), "img_idx"),
     ):
         if duplicate is not None:
             raise DataError(
@@ -380,7 +384,3 @@ def _read_frames(folder: Path, shared_frames: dict[str, FrameRef]) -> dict[int, 
         step.img_idx: FrameRef(by_stem.get(name, home / Path(step.img_filename).name))
         for step, name in zip(steps, names, strict=True)
     }
-
-
-def _first_duplicate(values: Sequence[T]) -> T | None:
-    return next((value for value, count in Counter(values).items() if count > 1), None)

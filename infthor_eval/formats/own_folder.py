@@ -48,7 +48,7 @@ class OwnFolder:
                 a question.
         """
         rows = list(read_rows(self.file, _COLUMNS, _HINT))
-        self._refuse_misspelt(rows[0].cells.keys() if rows else ())
+        self._refuse_misspelt(rows[0].columns if rows else ())
         images = {name: find_images(folder) for name, folder in self.folders.items()}
         entries = [self._entry(row, images) for row in rows]
         if not any(isinstance(entry, Question) for entry in entries):

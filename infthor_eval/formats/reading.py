@@ -15,7 +15,8 @@ import stat
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
@@ -31,6 +32,7 @@ __all__ = [
     "NOT_JSON",
     "file_problem",
     "find_packed",
+    "first_duplicate",
     "json_lines_of",
     "json_value",
     "lines_of",
@@ -212,3 +214,8 @@ def json_lines_of(path: Path, hint: str) -> Iterator[dict[str, Any]]:
         if not isinstance(entry, dict):
             raise DataError(f"{path}, line {number}: not a JSON object; {hint}")
         yield entry
+
+
+def first_duplicate(values: Iterable[T]) -> T | None:
+    """Return the first value that is there more than once, None if there is none."""
+    return next((value for value, n in Counter(values).items() if n > 1), None)

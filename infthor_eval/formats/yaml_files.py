@@ -6,7 +6,7 @@ from typing import Any
 import yaml
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.reading import read_text
+from infthor_eval.formats.reading import first_duplicate, read_text
 from infthor_eval.storage.limits import ALIAS_NODES
 
 __all__ = ["PlainLoader", "read_yaml"]
@@ -73,7 +73,7 @@ def _children(node: yaml.Node, path: Path) -> list[yaml.Node]:
     if not isinstance(node, yaml.MappingNode):
         return []
     names = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
-    duplicate = next((name for name in names if names.count(name) > 1), None)
+    duplicate = first_duplicate(names)
     if duplicate is not None:
         raise DataError(f"{path}: the key {duplicate!r} is there twice in one mapping; remove one")
     return [child for pair in node.value for child in pair]

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.errors import InfthorError
+from infthor_eval.errors import InfthorError, UsageError
 from infthor_eval.exports import LM_EVAL_MODEL as NAME
 from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.terminal import print_error
@@ -27,6 +27,7 @@ def register() -> None:
 
     lm-eval's own script catches nothing: from here on our errors are one line under it as well.
     """
+    import lm_eval.api.task
     import lm_eval.models  # noqa: F401 - before registering, or the built-in models vanish (0.4.13)
     from lm_eval.api.registry import model_registry
 
@@ -37,6 +38,16 @@ def register() -> None:
         if isinstance(error, InfthorError)
         else sys.__excepthook__(kind, error, trace)
     )
+    lm_eval.api.task.load_from_cache = _refuse_kept
+
+
+def _refuse_kept(file_name: str, cache: bool = False) -> None:
+    """Stand for lm-eval's reader of the requests that it keeps."""
+    if cache:
+        raise UsageError(
+            "--cache_requests: lm-eval keeps requests by the name of their task, so that those of "
+            "another set would be asked and scored by this one's answers; leave it out"
+        )
 
 
 def add_tasks() -> None:

@@ -6,7 +6,7 @@ import msgspec
 from msgspec import Meta
 
 from infthor_eval.memory import read_budget
-from infthor_eval.quantities import MOST, Count, Total
+from infthor_eval.quantities import MOST, Count, Repetition, Total
 from infthor_eval.runs import RunConfig, TaskConfig
 
 __all__ = [
@@ -150,7 +150,7 @@ class NiehConfig(RunConfig[NiehTaskConfig], frozen=True, kw_only=True, omit_defa
     memory: str | None = None
     memory_args: str | None = None
     budget: str | None = None
-    repeats: Total = 1
+    repeats: Repetition = 1
     rescored: RescoredConfig | None = None
 
     @property

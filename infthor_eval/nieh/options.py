@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from infthor_eval.errors import UsageError
 from infthor_eval.memory.options import MemoryOptions
 from infthor_eval.nieh.prompts import PROMPTS, PUBLISHED_MAIN
+from infthor_eval.quantities import MOST_REPEATS
 
 __all__ = ["BLANK", "FRAMES", "NO_CLUE", "OTHER", "SHOWN", "NiehOptions", "check_frames"]
 
@@ -130,6 +131,8 @@ class NiehOptions(MemoryOptions):
             )
         if self.repeats < 1:
             raise UsageError(f"--repeats {self.repeats}: a question is asked once at least")
+        if self.repeats > MOST_REPEATS:
+            raise UsageError(f"--repeats {self.repeats}: give {MOST_REPEATS:,} at most")
         if self.temperature is not None and not 0 < self.temperature < float("inf"):
             raise UsageError(
                 f"--temperature {self.temperature}: replies are drawn at a temperature above 0"

@@ -46,10 +46,10 @@ def count_units(header: RunHeader, records: Sequence[UnitRecord[Any]]) -> dict[s
     several tasks and of those that no driver made.
     """
     states = Counter((record.task, record.state) for record in records)
+    recorded = Counter(record.task for record in records)
     counts = {}
     for task in header.config.tasks:
-        n_recorded = sum(n for (name, _), n in states.items() if name == task)
-        n_missing = max(0, _units_of_task(header, task, n_recorded) - n_recorded)
+        n_missing = max(0, _units_of_task(header, task, recorded[task]) - recorded[task])
         counts[task] = UnitCounts(
             answered=states[task, "answered"],
             failed=states[task, "failed"],

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from infthor_eval.errors import InfthorError
 from infthor_eval.submissions.case import Case, Check
 from infthor_eval.submissions.checks.copies import CopiedRecords, CopiedReplies
 from infthor_eval.submissions.checks.floors import AboveBlind, AboveOtherHome
@@ -25,7 +24,7 @@ from infthor_eval.submissions.checks.questions import (
 from infthor_eval.submissions.checks.requests import SameRequests
 from infthor_eval.submissions.checks.scores import SameResults, SameScorers, SameScores
 from infthor_eval.submissions.expected import Expected, Owner
-from infthor_eval.submissions.reading import Problem, Submission, read_submission
+from infthor_eval.submissions.reading import Problem, Submission, describe, read_submission
 from infthor_eval.submissions.statement import find_submissions
 
 __all__ = ["CHECKS", "Verdict", "check_submissions"]
@@ -122,8 +121,8 @@ def _open(folder: Path, owner: Owner) -> Case:
     for run in submission.runs:
         try:
             tasks += owner.expect(run)
-        except InfthorError as error:
-            problems.append(Problem("readable", f"{run.path.name}: {error}"))
+        except Exception as error:  # noqa: BLE001 - see `describe`
+            problems.append(Problem("readable", f"{run.path.name}: {describe(error)}"))
     known: Submission = replace(submission, problems=problems)
     return Case(known, tasks)
 
@@ -132,8 +131,8 @@ def _problems(check: Check, case: Case, others: Sequence[Case]) -> Iterator[Prob
     """Yield the problems of a check; one that cannot be made refuses, and stops no other."""
     try:
         yield from check.problems(case, others)
-    except InfthorError as error:
-        yield Problem(check.name, f"cannot be checked: {error}")
+    except Exception as error:  # noqa: BLE001 - see `describe`
+        yield Problem(check.name, f"cannot be checked: {describe(error)}")
 
 
 def _allow(problem: Problem, allowed: Sequence[str]) -> Problem:

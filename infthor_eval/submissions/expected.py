@@ -12,6 +12,8 @@ from msgspec.structs import replace
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.replies.answer_key import AnswerKey, read_key
+from infthor_eval.memory import MEMORIES
+from infthor_eval.nieh import contexts
 from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig
 from infthor_eval.nieh.guessing.blind import find_floor, visible_knowledge
 from infthor_eval.nieh.options import NiehOptions
@@ -28,6 +30,7 @@ __all__ = ["Expected", "Owner"]
 
 Record = UnitRecord[NiehAnswer]
 _SUITE = "nieh"
+_MOST_UNITS = 10_000  # that a run may lack nearly all of, which the checks then say
 # Options that a run's config keeps, as it was given them.
 _OPTIONS = ("k_tokens", "tokens_per_frame", "frames", "prompt", "memory", "memory_args", "budget")
 
@@ -156,26 +159,26 @@ class Owner:
         return file
 
     def _expect(self, run: SubmittedRun, name: str, config: NiehTaskConfig) -> Expected:
-        _refuse_code(name, run.header.config)
+        config_of_run = run.header.config
+        _refuse_others_memory(name, config_of_run)
         data = self.find_set(name, config.data)
+        file = self._file(name)
+        options = _options(config_of_run, config, file)
         request = TaskRequest(
-            tasks=[self._file(name)],
-            options=_options(run.header.config, config, self._file(name)),
+            tasks=[_without_models(file, options)],
+            options=options,
             data=data.root,
-            seed=run.header.config.seed or 0,
+            seed=config_of_run.seed or 0,
         )
         task = NiehTask(request.tasks[0], request)
-        ready = task.prepare(run.header.config.tokens_per_frame)
+        ready = task.prepare(config_of_run.tokens_per_frame)
         if not ready.task_samples.samples:
             raise DataError(f"{data.root}: no question of it can be asked in {name}; fix the set")
-        return Expected(
-            name,
-            run,
-            None if run.is_export else task.config(ready, _video_input(config)),
-            _units(name, ready, _n_repeats(run)),
-            data,
-            self._key_of(data),
-        )
+        ours = None
+        if not run.is_export:
+            film = None if config.film is None else config.film == "video"
+            ours = replace(task.config(ready, film), settings=_settings(file, options))
+        return Expected(name, run, ours, _units(name, ready, run), data, self._key_of(data))
 
     def _key_of(self, data: NiehSet) -> AnswerKey | None:
         """Return the key of a set that withholds its answers; None for any other."""
@@ -189,13 +192,33 @@ class Owner:
         return self._key
 
 
-def _refuse_code(name: str, run: NiehConfig) -> None:
-    """Refuse a memory in a file: what strangers send is read, and never run."""
-    if run.memory is not None and (":" in run.memory or "/" in run.memory):
+def _refuse_others_memory(name: str, run: NiehConfig) -> None:
+    """Refuse a memory that has no name here: what strangers send is read, and never run."""
+    if run.memory is not None and run.memory not in MEMORIES.names:
         raise UsageError(
-            f"{name}: its memory {run.memory!r:.60} is code in a file, which is not run here; "
-            "send replies with a memory of `ls memories`"
+            f"{name}: its memory {run.memory!r:.60} is code in a file, which is not run here, or "
+            "not installed; send replies with a memory of `ls memories`"
         )
+
+
+def _without_models(file: TaskFile, options: NiehOptions) -> TaskFile:
+    """Return a task that is set up without the model that chooses its frames, which a stranger may
+    have named: what a memory recalled is in the records, and retrieved frames are nowhere."""
+    own = file.settings["dataset_kwargs"]
+    stand_in: dict[str, Any] = {}
+    match own.get("context", options.context):
+        case contexts.RETRIEVED:
+            stand_in = {"context": "trajectory"}
+        case contexts.MEMORY:
+            stand_in = {"memory": "none", "memory_args": {}}
+    return dataclasses.replace(file, settings={**file.settings, "dataset_kwargs": own | stand_in})
+
+
+def _settings(file: TaskFile, options: NiehOptions) -> dict[str, Any]:
+    """Return the settings of a task as a run of it has them."""
+    given = {"context": options.context, "ctx_size": options.ctx_size}
+    known = {name: value for name, value in given.items() if value is not None}
+    return {**file.settings, "dataset_kwargs": known | file.settings["dataset_kwargs"]}
 
 
 def _options(run: NiehConfig, task: NiehTaskConfig, file: TaskFile) -> NiehOptions:
@@ -208,21 +231,22 @@ def _options(run: NiehConfig, task: NiehTaskConfig, file: TaskFile) -> NiehOptio
     return NiehOptions(**given)
 
 
-def _video_input(config: NiehTaskConfig) -> bool | None:
-    return None if config.film is None else config.film == "video"
-
-
-def _n_repeats(run: SubmittedRun) -> int:
-    """Return how often each question was asked; exports say it by their rows alone."""
-    if not run.is_export:
-        return run.header.config.repeats
-    return max((record.repeat for record in run.records), default=1)
-
-
-def _units(name: str, ready: PreparedTask, n_repeats: int) -> dict[UnitKey, NiehUnit]:
+def _units(name: str, ready: PreparedTask, run: SubmittedRun) -> dict[UnitKey, NiehUnit]:
+    """Return the units that a run should have; exports say by their rows alone how often each
+    question was asked."""
+    n_repeats = run.header.config.repeats
+    if run.is_export:
+        n_repeats = max((record.repeat for record in run.records), default=1)
+    samples = ready.task_samples.samples
+    # Of a number alone nothing is listed: there are records for it.
+    if n_repeats > 1 and len(samples) * n_repeats > _MOST_UNITS + 2 * len(run.records):
+        raise DataError(
+            f"{name}: says that {len(samples):,} questions were asked {n_repeats:,} times, and has "
+            f"{len(run.records):,} replies; send all of them, or say how often"
+        )
     units = [
         NiehUnit.of(name, ready.task_samples, sample, repeat)
-        for sample in ready.task_samples.samples
+        for sample in samples
         for repeat in range(1, n_repeats + 1)
     ]
     return {unit.key: unit for unit in units}

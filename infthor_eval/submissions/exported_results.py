@@ -15,6 +15,7 @@ from typing import Any
 
 from infthor_eval.formats.reading import read_json
 from infthor_eval.nieh.scoring import SCORERS
+from infthor_eval.submissions.exported_scores import told_score
 
 __all__ = ["read_exported_means"]
 
@@ -50,15 +51,15 @@ def _every_eval_ever(document: Mapping[str, Any]) -> Iterator[tuple[tuple[str, s
             continue
         task, _, metric = str(result.get("evaluation_result_id")).rpartition("/")
         details = result.get("score_details")
-        score = details.get("score") if isinstance(details, Mapping) else None
-        if metric in SCORERS and isinstance(score, int | float):
-            yield (task, metric), float(score)
+        score = told_score(details.get("score") if isinstance(details, Mapping) else None)
+        if metric in SCORERS and score is not None:
+            yield (task, metric), score
 
 
 def _lm_eval(document: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str], float]]:
     results = document.get("results")
     for task, values in results.items() if isinstance(results, Mapping) else ():
         for metric in SCORERS:
-            score = values.get(f"{metric},none") if isinstance(values, Mapping) else None
-            if isinstance(score, int | float):
-                yield (str(task), metric), float(score)
+            told = values.get(f"{metric},none") if isinstance(values, Mapping) else None
+            if (score := told_score(told)) is not None:
+                yield (str(task), metric), score

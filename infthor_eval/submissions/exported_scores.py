@@ -9,6 +9,7 @@
 lm-eval has the task in the name of the file.
 """
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -20,9 +21,10 @@ from infthor_eval.formats.reading import json_lines_of
 from infthor_eval.formats.replies.exported_samples import told_of
 from infthor_eval.formats.replies.inspect_logs import INSPECT_SUFFIX, inspect_documents
 from infthor_eval.nieh.scoring import SCORERS
+from infthor_eval.quantities import MOST
 from infthor_eval.runs import UnitKey
 
-__all__ = ["ExportedScores", "read_exported_scores"]
+__all__ = ["ExportedScores", "read_exported_scores", "told_score"]
 
 _HINT = "give the samples of the run"
 _LM_EVAL_NAME = re.compile(r"samples_(?P<task>.+)_\d{4}-\d\d-\d\dT.*\.jsonl(?:\.gz)?")
@@ -51,8 +53,17 @@ class ExportedScores:
 
     def add(self, unit: _Unit, metric: str, score: object) -> None:
         """Add a score, if it is a number under one of our scorers."""
-        if metric in SCORERS and isinstance(score, int | float):
-            self.by_unit.setdefault(unit, {})[metric] = float(score)
+        told = told_score(score)
+        if metric in SCORERS and told is not None:
+            self.by_unit.setdefault(unit, {})[metric] = told
+
+
+def told_score(value: object) -> float | None:
+    """Return a score that others tell, None for what is no number; whatever no float holds, and
+    what is none itself, is infinite, as it is the score of no reply."""
+    if not isinstance(value, int | float):
+        return None
+    return float(value) if -MOST <= value <= MOST else math.inf
 
 
 def read_exported_scores(path: Path) -> ExportedScores:

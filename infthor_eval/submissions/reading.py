@@ -6,7 +6,13 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from infthor_eval.errors import DataError, InfthorError, UsageError
+from infthor_eval.errors import (
+    DataError,
+    InfthorError,
+    UsageError,
+    describe_exception,
+    wrap_errors,
+)
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.published.imported_replies import ImportedRun, import_logs
@@ -22,7 +28,7 @@ from infthor_eval.runs.stored.search import run_folders
 from infthor_eval.submissions.exported_scores import ExportedScores, read_exported_scores
 from infthor_eval.submissions.statement import Statement, read_statement
 
-__all__ = ["Problem", "Submission", "SubmittedRun", "read_submission"]
+__all__ = ["Problem", "Submission", "SubmittedRun", "describe", "read_submission"]
 
 Record = UnitRecord[NiehAnswer]
 _EXPORTS = (".jsonl", ".jsonl.gz", ".eval")
@@ -100,25 +106,54 @@ def read_submission(folder: Path, find_set: FindSet) -> Submission:
     runs: list[SubmittedRun] = []
     statement = None
     try:
+        files = _files(folder)
+        folders = list(run_folders(folder))
+    except InfthorError as error:
+        return Submission(folder, None, problems=[Problem("readable", str(error))])
+    try:
         statement = read_statement(folder)
     except InfthorError as error:
         problems.append(Problem("identity", str(error)))
-    folders = list(run_folders(folder))
     readers = [lambda path=path: [_read_journal(path)] for path in folders]
     if statement is not None:
         known = statement
         readers += [
             lambda path=path: _read_export(path, known, find_set)
-            for path in _exports(folder, folders)
+            for path in files
+            if path.name.endswith(_EXPORTS) and set(folders).isdisjoint(path.parents)
         ]
     for read in readers:
         try:
             runs += read()
-        except InfthorError as error:
-            problems.append(Problem("readable", str(error)))
+        except Exception as error:  # noqa: BLE001 - see `describe`
+            problems.append(Problem("readable", describe(error)))
     if not runs and not problems:
         problems.append(Problem("readable", f"{folder}: no run and no export in it; add them"))
     return Submission(folder, statement, runs, problems)
+
+
+def describe(error: Exception) -> str:
+    """Return an error as a reason, whatever it is: a stranger's file ends nobody else's check."""
+    return str(error) if isinstance(error, InfthorError) else describe_exception(error)
+
+
+def _files(folder: Path) -> list[Path]:
+    """Return all files of a submission, sorted.
+
+    Raises:
+        DataError: a folder cannot be searched, or there is a link, which may lead out of it.
+    """
+    files = []
+    found = [folder]
+    with wrap_errors(f"{folder}: cannot be searched", "make it readable, and less deep"):
+        for path in found:  # which grows: folders may be nested deeper than functions
+            if path.is_symlink():
+                raise DataError(f"{path}: is a link, which is not followed; send what it leads to")
+            if path.is_dir():
+                found += path.iterdir()
+            elif path.is_file():
+                files.append(path)
+    return sorted(files)
 
 
 def _read_journal(folder: Path) -> SubmittedRun:
@@ -129,28 +164,18 @@ def _read_journal(folder: Path) -> SubmittedRun:
             f"{_SUITE}"
         )
     header, records = read_run(folder, RECORDS)
-    results = [record for record in _all_records(folder) if record.payload.reply is not None]
+    results = [it for it in _all_records(folder, header) if it.payload.reply is not None]
     told = {record.key: record.payload.scores for record in records}
     return SubmittedRun(folder, header, records, results, told)
 
 
-def _all_records(folder: Path) -> Iterator[Record]:
+def _all_records(folder: Path, header: RunHeader[NiehConfig]) -> Iterator[Record]:
     decoder = RECORDS.decoder()
     for path in find_shards(folder):
         for number, line in enumerate(read_lines(path)[1:], 2):
-            record = parse_record(path, number, line, decoder)
+            record = parse_record(path, number, line, decoder, header)
             if isinstance(record, UnitRecord):
                 yield record
-
-
-def _exports(folder: Path, runs: Sequence[Path]) -> list[Path]:
-    """Return the files with samples, outside of runs."""
-    files = [
-        path
-        for path in sorted(folder.rglob("*"))
-        if path.name.endswith(_EXPORTS) and path.is_file() and not path.is_symlink()
-    ]
-    return [path for path in files if not any(path.is_relative_to(run) for run in runs)]
 
 
 def _read_export(path: Path, statement: Statement, find_set: FindSet) -> list[SubmittedRun]:

@@ -4,7 +4,6 @@ The Trainer is given what it does not know: batches of sequences, the format of 
 loss per token.
 """
 
-import json
 import math
 import shutil
 import time
@@ -14,10 +13,12 @@ from typing import Any, cast
 
 import torch
 import transformers
-from safetensors import SafetensorError
+from safetensors import SafetensorError, safe_open
 from safetensors.torch import load_model, save_model
+from transformers.trainer_pt_utils import safe_globals
 
-from infthor_eval.errors import UsageError, wrap_errors
+from infthor_eval.errors import UsageError, in_one_line, wrap_errors
+from infthor_eval.terminal import print_error
 from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.loop import Progress
 from infthor_eval.training.network import SequenceModel
@@ -27,6 +28,7 @@ from infthor_eval.training.schedule import linear_share
 __all__ = ["train_with_trainer"]
 
 _WEIGHTS = "model.safetensors"
+_STATE = "trainer_state.json"
 
 
 class _SequenceTrainer(transformers.Trainer):
@@ -132,31 +134,45 @@ def train_with_trainer(
         callbacks=[_ReportSteps(on_step, recipe.sequences_per_step * n_tokens / len(sequences))],
     )
     trainer.remove_callback(transformers.trainer_callback.PrinterCallback)
-    last = _last_complete_checkpoint(out)
+    last = _last_whole_checkpoint(out)
     problem = f"{last}: the checkpoint cannot be read"
     hint = "remove it to resume from the one before"
     with wrap_errors(problem, hint, catch=(OSError, ValueError, KeyError)):
         trainer.train(resume_from_checkpoint=last)
 
 
-def _last_complete_checkpoint(out: Path) -> str | None:
-    """Return the last checkpoint written completely, and remove later ones.
+def _last_whole_checkpoint(out: Path) -> str | None:
+    """Return the last checkpoint that can be read, and remove later ones.
 
-    A run may be killed while writing one. The Trainer itself would use the last folder, whatever it
-    contains, and continue without the optimizer if that is missing. The state file is the last to
-    be written.
+    A run may be killed while writing one, and a disk may lose a part of one. The Trainer itself
+    would use the last folder, whatever it contains, and continue without the optimizer if that is
+    missing. The state file is the last to be written.
     """
     for folder in sorted(
         out.glob("checkpoint-*"), key=lambda path: int(path.name.rpartition("-")[2]), reverse=True
     ):
         try:
-            json.loads((folder / "trainer_state.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            _check_files(folder)
+        except Exception as error:  # noqa: BLE001 - whatever the readers raise on a damaged file
+            if (folder / _STATE).exists():  # else it was not written completely
+                print_error(f"{folder}: cannot be read ({in_one_line(error)}); left out")
             # With all that is in it: parts of weights have a new name each time.
             shutil.rmtree(folder, ignore_errors=True)  # another process of the run may, too
             continue
         return str(folder)
     return None
+
+
+def _check_files(folder: Path) -> None:
+    """Read the files of a checkpoint as the Trainer will: no code in them is run."""
+    _ = transformers.TrainerState.load_from_json(str(folder / _STATE)).global_step + 1
+    for path in folder.iterdir():
+        if path.suffix == ".safetensors":
+            with safe_open(path, "pt"):
+                pass
+        elif path.suffix in (".pt", ".pth"):
+            with safe_globals():
+                torch.load(path, map_location="cpu", weights_only=True)
 
 
 def _arguments(recipe: Recipe, out: Path, network: SequenceModel) -> transformers.TrainingArguments:

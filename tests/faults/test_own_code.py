@@ -1,6 +1,9 @@
 """Code of one's own that does what it should not: one failed unit, or one line and exit code 2."""
 
 import json
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -55,7 +58,13 @@ class Own:
     def close(self):
         CLOSE
 """
-RAISES = ("raise SystemExit(0)", "raise GeneratorExit", "raise Odd('x')", "import sys; sys.exit()")
+RAISES = (
+    "raise SystemExit(0)",
+    "raise GeneratorExit",
+    "raise Odd('x')",
+    "import sys; sys.exit()",
+    "import os; os._exit(0)",
+)
 Run = Callable[..., tuple[int, str, str]]
 
 
@@ -82,6 +91,53 @@ def test_an_adapter_that_ends_the_program_fails_its_unit_alone(run_own, tmp_path
     records = read_run(folder, RECORDS)[1]
     assert sorted(record.failure is not None for record in records) == [False, False, True]
     assert "nieh_mini_gt" in out
+
+
+def test_a_scorer_that_ends_the_process_fails_its_sample_alone(tmp_path, run_cli):
+    scorer = tmp_path / "mine.py"
+    scorer.write_text("import os\ndef end(reply, answers): os._exit(0)\n")
+    write_journal(tmp_path / "run", make_header(make_config()), [make_record(0, "mug")], RECORDS)
+    run = ("rescore", tmp_path / "run", "--scorer", f"{scorer}:end", "--output", tmp_path / "out")
+    code, _, err = run_cli(*run)
+    assert code == 1
+    assert "end fails: SystemExit in own_code.py" in err
+    assert "os._exit(0)" in err
+
+
+def test_a_forked_process_ends_as_it_wants(tmp_path, run_cli):
+    scorer = tmp_path / "mine.py"
+    scorer.write_text(
+        "import multiprocessing\nfork = multiprocessing.get_context('fork')\n"
+        "def fine(reply, answers):\n"
+        "    child = fork.Process(target=int)\n    child.start()\n    child.join()\n"
+        "    return 1.0 - child.exitcode\n"
+    )
+    write_journal(tmp_path / "run", make_header(make_config()), [make_record(0, "mug")], RECORDS)
+    run = ("rescore", tmp_path / "run", "--scorer", f"{scorer}:fine", "--output", tmp_path / "out")
+    code, out, err = run_cli(*run)
+    assert (code, "fine" in out) == (0, True), err
+
+
+@pytest.mark.parametrize("is_daemon", [False, True])
+def test_a_thread_that_is_left_does_not_keep_the_process(tmp_path, is_daemon):
+    scorer = tmp_path / "mine.py"
+    scorer.write_text(
+        "import threading, time\ndef leave(reply, answers):\n"
+        f"    threading.Thread(target=time.sleep, args=(9**9,), daemon={is_daemon}).start()\n"
+        "    return 1.0\n"
+    )
+    write_journal(tmp_path / "run", make_header(make_config()), [make_record(0, "mug")], RECORDS)
+    run = ("rescore", tmp_path / "run", "--scorer", f"{scorer}:leave", "--output", tmp_path / "out")
+    done = subprocess.run(
+        [sys.executable, "-c", "from infthor_eval.cli import main; main()", *map(str, run)],
+        env={**os.environ, OWN_CODE_SECONDS.name: "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "100.00" in done.stdout
+    assert ("your own code left a thread that runs on" in done.stderr) is not is_daemon
 
 
 @pytest.mark.parametrize("statement", ["raise SystemExit(0)", "raise ValueError('x')", "1 / 0"])

@@ -1,8 +1,10 @@
 """The file of pairs, and the columns of paired questions."""
 
+import msgspec
 import pytest
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import encode_questions, read_questions, write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.twins import (
@@ -12,6 +14,7 @@ from infthor_eval.formats.twins import (
     read_pairs,
     write_pairs,
 )
+from tests.helpers.twin_sets import write_twin_set
 
 QUESTION = PairedQuestion(
     "Was the fridge open?", "Was {} open?", "open_state", "open_state: Fridge",
@@ -51,3 +54,13 @@ def test_both_questions_of_a_pair_name_it(tmp_path):
 def test_other_files_have_no_such_columns():
     header = encode_questions([Question("a", "Was it open?", (1,), ("yes",))]).splitlines()[0]
     assert header == b"traj_id,question,gt_img_idx,answer,question_type,absence"
+
+
+def test_the_pairs_are_in_the_sets_fingerprint(tmp_path):
+    root = write_twin_set(tmp_path / "set")
+    before = NiehSet(root).fingerprint
+    pairs = read_pairs(root)
+    write_pairs(root, [msgspec.structs.replace(pairs[0], base="another"), *pairs[1:]])
+    assert NiehSet(root).fingerprint != before
+    write_pairs(root, pairs)
+    assert NiehSet(root).fingerprint == before

@@ -17,7 +17,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-__all__ = ["Form", "damaged"]
+__all__ = ["CODECS", "Form", "damaged"]
 
 
 class Form(StrEnum):
@@ -97,7 +97,7 @@ def _damaged_bytes(draw: st.DrawFn, content: bytes) -> bytes:
 
 
 def _damaged_values(content: bytes, form: Form) -> st.SearchStrategy[bytes]:
-    read, write = _CODECS[form]
+    read, write = CODECS[form]
     return _damaged_document(read(content)).map(write)
 
 
@@ -175,7 +175,7 @@ def _csv(document: Any) -> bytes:
 
 
 _Codec = tuple[Callable[[bytes], Any], Callable[[Any], bytes]]
-_CODECS: dict[Form, _Codec] = {
+CODECS: dict[Form, _Codec] = {
     Form.JSON: (json.loads, _json),
     Form.JSON_LINES: (lambda content: [json.loads(line) for line in content.splitlines()], _lines),
     Form.PACKED_LINES: (

@@ -74,6 +74,23 @@ def code_in_place_of_a_memory(material, root):
     return submit(root, "forged", with_config(honest(material), memory=f"{code}:Memory"))
 
 
+@forgery("readable", "a line of a journal")
+def a_number_of_repeats_beyond_any(material, root):
+    folder = submit(root, "forged", honest(material))
+    return edit_journal(folder, lambda lines: lines[1].update(repeat=20_000_000))
+
+
+@forgery("readable", "not the config of a run of nieh")
+def a_header_of_repeats_beyond_any(material, root):
+    folder = submit(root, "forged", honest(material))
+    return edit_journal(folder, lambda lines: lines[0]["config"].update(repeats=10**9))
+
+
+@forgery("readable", "were asked 10,000 times, and has 60 replies")
+def more_repeats_than_replies(material, root):
+    return submit(root, "forged", with_config(honest(material), repeats=10_000))
+
+
 @forgery("questions", "are of no question of the set")
 def easy_questions_added(material, root):
     run = honest(material)

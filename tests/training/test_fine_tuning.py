@@ -2,17 +2,20 @@
 refuse."""
 
 import json
+import os
 import shutil
 import signal
 import subprocess
 import sys
 
 import pytest
+import torch
 from safetensors import SafetensorError
 
 from infthor_eval.errors import InfthorError
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.samples import find_samples
+from infthor_eval.training import trainer
 from infthor_eval.training.fine_tuning import fine_tune, prepare_run
 from infthor_eval.training.recipe import read_recipe
 from model_adapters import Decoding, load
@@ -219,3 +222,61 @@ def test_what_cannot_be_is_refused(recipe, data, tmp_path, changes, message):
     with pytest.raises(InfthorError, match=message):
         train(recipe, data, tmp_path / "out", **changes)
     assert not (tmp_path / "out").exists()
+
+
+def _half(path):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+class _Evil:
+    def __reduce__(self):
+        return os.mkdir, ("evil",)
+
+
+def _code(path):
+    torch.save(_Evil(), path)
+
+
+DAMAGED = {
+    "weights": ("model.safetensors", _half),
+    "optimizer": ("optimizer.pt", _half),
+    "schedule": ("scheduler.pt", _half),
+    "random numbers": ("rng_state.pth", _half),
+    "state": ("trainer_state.json", _half),
+    "another state": ("trainer_state.json", lambda path: path.write_text("[]")),
+    "code in the optimizer": ("optimizer.pt", _code),
+    "code in the schedule": ("scheduler.pt", _code),
+    "code in random numbers": ("rng_state.pth", _code),
+    "empty": ("optimizer.pt", lambda path: path.write_bytes(b"")),
+}
+
+
+def test_a_damaged_checkpoint_is_one_line_and_the_one_before_is_taken(
+    recipe, data, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    train(recipe, data, tmp_path / "out", epochs=2, save_every=2)
+    whole = tmp_path / "out" / "states"
+    *_, before, last = sorted(whole.glob("checkpoint-*"), key=lambda it: int(it.name[11:]))
+    for name, (file, damage) in DAMAGED.items():
+        states = shutil.copytree(whole, tmp_path / name)
+        assert trainer._last_whole_checkpoint(states) == str(states / last.name)
+        damage(states / last.name / file)
+        capsys.readouterr()
+        assert trainer._last_whole_checkpoint(states) == str(states / before.name), name
+        (line,) = capsys.readouterr().err.splitlines()
+        assert f"{states / last.name}: cannot be read (" in line
+        assert not (states / last.name).exists()
+    assert not (tmp_path / "evil").exists()
+
+
+def test_a_run_goes_on_from_the_one_before(recipe, data, tmp_path, capsys):
+    train(recipe, data, tmp_path / "out", epochs=2, save_every=2)
+    weights = read_weights(tmp_path / "out")
+    shutil.rmtree(tmp_path / "out" / "checkpoint")
+    last = max((tmp_path / "out" / "states").glob("checkpoint-*"), key=lambda it: int(it.name[11:]))
+    _half(last / "optimizer.pt")
+    _, steps = train(recipe, data, tmp_path / "out", epochs=2, save_every=2)
+    assert steps[0].step == int(last.name[11:]) - 1
+    assert same(read_weights(tmp_path / "out"), weights)
+    assert "cannot be read (" in capsys.readouterr().err

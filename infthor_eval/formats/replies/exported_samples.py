@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.formats.replies.logged import LoggedReply
+from infthor_eval.formats.replies.logged import LoggedReply, Texts
 from infthor_eval.quantities import Amount, Count
 
 __all__ = ["EveryEvalEverRows", "told_of"]
@@ -20,7 +20,7 @@ _LONGEST_STRETCH = 1_000_000  # frames
 
 
 class _Output(msgspec.Struct, frozen=True):
-    raw: tuple[str, ...]
+    raw: Texts
     reasoning_trace: tuple[str, ...] | None = None
 
 

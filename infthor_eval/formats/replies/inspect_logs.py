@@ -1,7 +1,8 @@
 """inspect_ai's logs (`.eval`): a zip with a JSON document for each sample, as replies.
 
 The package writes them packed with zstandard, which Python's own zip reader does not know before
-3.14; pyarrow unpacks it.
+3.14; pyarrow unpacks it. Other packings than that, deflate and none are refused: Python's reader
+unpacks theirs without a limit, whatever length a member has by its own word.
 """
 
 import struct
@@ -17,8 +18,8 @@ from infthor_eval.errors import DataError, in_one_line
 from infthor_eval.formats.reading import DAMAGED_ZIP, json_value, require_file
 from infthor_eval.formats.replies.exported_samples import told_of
 from infthor_eval.formats.replies.logged import LoggedReply
-from infthor_eval.quantities import Amount, Count
-from infthor_eval.storage.limits import FILE_MB
+from infthor_eval.quantities import Amount, Count, Repetition
+from infthor_eval.storage.limits import FILE_MB, LINE_MB
 
 __all__ = ["INSPECT_SUFFIX", "inspect_documents", "inspect_rows"]
 
@@ -27,6 +28,7 @@ _HEADER = ("header.json", "_journal/start.json")  # the second of a run that was
 _SAMPLES = "samples/"
 _HINT = "give a log as inspect_ai writes it"
 _ZSTANDARD = 93
+_PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, _ZSTANDARD)
 _LOCAL = struct.Struct("<26xHH")  # up to the lengths of a member's name and extra field
 _MB = 1_000_000
 
@@ -67,7 +69,7 @@ class _Sample(msgspec.Struct, frozen=True):
     """A sample; fields that do not matter here are not read."""
 
     id: str | int
-    epoch: int = 1
+    epoch: Repetition = 1
     output: _Output = _Output()
     metadata: dict[str, Any] = {}
     model_usage: dict[str, _Usage] = {}
@@ -103,9 +105,11 @@ def _samples(path: Path) -> Iterator[tuple[_Spec, Any]]:
             if header is None:
                 raise DataError(f"{path}: has no {_HEADER[0]}; {_HINT}")
             spec = msgspec.convert(_document(archive, header), _Header).eval
-            for name, member in members.items():
-                if name.startswith(_SAMPLES):
-                    yield spec, _document(archive, member)
+            samples = [it for name, it in members.items() if name.startswith(_SAMPLES)]
+            if sum(member.file_size for member in samples) > FILE_MB.value * _MB:
+                raise ValueError(f"is longer than {FILE_MB.value} MB; {FILE_MB.hint}")
+            for member in samples:
+                yield spec, _document(archive, member)
     except (*DAMAGED_ZIP, ValueError) as error:  # msgspec's errors are ValueErrors
         raise DataError(f"{path}: not a log of inspect_ai ({in_one_line(error)}); {_HINT}") from (
             error
@@ -113,11 +117,19 @@ def _samples(path: Path) -> Iterator[tuple[_Spec, Any]]:
 
 
 def _document(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Any:
-    if member.file_size > FILE_MB.value * _MB:
-        raise ValueError(f"{member.filename} is longer than {FILE_MB.value} MB; {FILE_MB.hint}")
-    if member.compress_type != _ZSTANDARD:
-        return json_value(archive.read(member))
-    return json_value(_unpack(archive, member))
+    name, length = member.filename, member.file_size
+    if length > LINE_MB.value * _MB:
+        raise ValueError(f"{name} is longer than {LINE_MB.value} MB; {LINE_MB.hint}")
+    if member.compress_type not in _PACKINGS:
+        raise ValueError(f"{name} is packed in another way than deflate or zstandard")
+    if member.compress_type == _ZSTANDARD:
+        content = _unpack(archive, member)
+    else:
+        with archive.open(member) as file:
+            content = file.read(length + 1)  # of a longer one the check sum is another
+    if len(content) != length:
+        raise ValueError(f"{name} has another length than the archive says")
+    return json_value(content)
 
 
 def _unpack(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
@@ -131,7 +143,7 @@ def _unpack(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
     file.seek(n_name + n_extra, 1)
     packed = pyarrow.BufferReader(file.read(member.compress_size))
     with pyarrow.CompressedInputStream(packed, "zstd") as stream:
-        return bytes(stream.read(member.file_size))
+        return bytes(stream.read(member.file_size + 1))
 
 
 def _read(number: int, document: Any, spec: _Spec) -> list[LoggedReply]:

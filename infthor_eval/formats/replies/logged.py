@@ -1,10 +1,16 @@
 """Replies to NIEH questions as logs of others have them, whatever the form of the log."""
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta
 
 from infthor_eval.formats.question import Question
+from infthor_eval.quantities import MOST_REPEATS
 
-__all__ = ["LoggedReply", "UnreadRow"]
+__all__ = ["LoggedReply", "Texts", "UnreadRow"]
+
+Texts = Annotated[tuple[str, ...], Meta(max_length=MOST_REPEATS)]  # of one question, in one row
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,8 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import json_value, lines_of
 from infthor_eval.formats.replies.exported_samples import EveryEvalEverRows
 from infthor_eval.formats.replies.inspect_logs import INSPECT_SUFFIX, inspect_rows
-from infthor_eval.formats.replies.logged import LoggedReply, UnreadRow
-from infthor_eval.quantities import Amount, Count, Number, Whole
+from infthor_eval.formats.replies.logged import LoggedReply, Texts, UnreadRow
+from infthor_eval.quantities import MOST_REPEATS, Amount, Count, Number, Whole
 
 __all__ = ["read_reply_log"]
 
@@ -72,7 +72,7 @@ class _Doc(msgspec.Struct, frozen=True):
 
 class _LmEvalRow(msgspec.Struct, frozen=True):
     doc: _Doc
-    resps: tuple[tuple[str, ...], ...]
+    resps: tuple[Texts, ...]
 
 
 def read_reply_log(path: Path) -> Iterator[LoggedReply | UnreadRow]:
@@ -107,16 +107,18 @@ def _each(
             yield UnreadRow(number, f"is not a reply ({in_one_line(error)})")
             continue
         for reply in replies:
-            yield _of_some_length(reply)
+            yield _within_limits(reply)
 
 
-def _of_some_length(reply: LoggedReply) -> LoggedReply | UnreadRow:
-    if len(reply.text) <= _LONGEST:
+def _within_limits(reply: LoggedReply) -> LoggedReply | UnreadRow:
+    length = len(reply.text)
+    if length > _LONGEST:
+        problem = f"has a reply of {length:,} characters; at most {_LONGEST:,} can be scored"
+    elif reply.repeat > MOST_REPEATS:
+        problem = f"is repetition {reply.repeat:,}; at most {MOST_REPEATS:,} are read"
+    else:
         return reply
-    return UnreadRow(
-        reply.line,
-        f"has a reply of {len(reply.text):,} characters; at most {_LONGEST:,} can be scored",
-    )
+    return UnreadRow(reply.line, problem)
 
 
 def _read_row(number: int, line: bytes, rows: EveryEvalEverRows) -> Sequence[LoggedReply]:

@@ -20,6 +20,7 @@ __all__ = [
     "CONTEXTS",
     "DEFAULT_CONTEXT",
     "MEMORY",
+    "RETRIEVED",
     "Context",
     "ContextPart",
     "ContextSettings",
@@ -30,6 +31,7 @@ __all__ = [
 
 DEFAULT_CONTEXT = "clues"  # of tasks and docs that leave it open
 MEMORY = "memory"  # the context that a memory recalls
+RETRIEVED = "clip_retrieval"  # whose frames a model chooses: a journal does not have them
 _INTERLEAVED = "Answer the question given the state and action sequence of the embodied agent."
 
 CONTEXTS = {
@@ -53,7 +55,7 @@ CONTEXTS = {
         parts=views.state_parts,
         sources=trajectories_identity,
     ),
-    "clip_retrieval": Context(
+    RETRIEVED: Context(
         retrieval.clip_retrieval, prompts=PROMPTS, sources=retrieval.retriever_identity
     ),
     "video": Context(

@@ -110,7 +110,8 @@ class FollowedJournal:
         assert self._decoder is not None  # the first line of a shard is its header
         if number > 1:
             try:
-                record = parse_record(path, number, line, self._decoder)
+                assert self.log.header is not None
+                record = parse_record(path, number, line, self._decoder, self.log.header)
             except DataError as error:
                 self.bad_lines.append(str(error))
                 return

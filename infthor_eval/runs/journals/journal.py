@@ -40,6 +40,7 @@ from infthor_eval.runs.journals.shards import (
     RunLog,
     check_format,
     find_shards,
+    is_of_run,
     read_lines,
     read_shard,
     read_shards,
@@ -268,7 +269,7 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes[Any]) -> in
         lines = read_lines(path)
         check_format(path, lines[0] if lines else b"")
         for number, line in enumerate(lines):
-            (good if _is_good(line, decoder, is_first=number == 0) else bad).append(line)
+            (good if _is_good(line, decoder, header, number == 0) else bad).append(line)
         if not bad:
             return 0
         if not (good and isinstance(decoder.decode(good[0]), RunHeader)):
@@ -281,11 +282,12 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes[Any]) -> in
         return len(bad)
 
 
-def _is_good(line: bytes, decoder: Decoder, *, is_first: bool) -> bool:
+def _is_good(line: bytes, decoder: Decoder, header: RunHeader, is_first: bool) -> bool:
     try:
-        return isinstance(decoder.decode(line), RunHeader) == is_first
+        record = decoder.decode(line)
     except NOT_JSON:
         return False
+    return isinstance(record, RunHeader) == is_first and is_of_run(record, header)
 
 
 def set_aside(run: Path) -> None:

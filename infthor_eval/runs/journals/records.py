@@ -11,7 +11,7 @@ from typing import Annotated, Any, Generic, Literal, NamedTuple, TypeVar
 import msgspec
 
 from infthor_eval.errors import InfthorError, describe_exception
-from infthor_eval.quantities import Amount, Count, Total
+from infthor_eval.quantities import Amount, Count, Repetition, Total
 from infthor_eval.runs.config import Config, RunConfig
 from infthor_eval.runs.usage import NOTHING, Usage
 
@@ -145,7 +145,7 @@ class UnitRecord(
     fingerprint: str
     payload: Payload
     variant: str = ""
-    repeat: Total = 1
+    repeat: Repetition = 1
     attempt: Total = 1
     failure: str | None = None
     asked: bool = True

@@ -31,6 +31,7 @@ __all__ = [
     "Tell",
     "check_format",
     "find_shards",
+    "is_of_run",
     "parse_header",
     "parse_record",
     "read_header",
@@ -234,7 +235,7 @@ def read_shard(
     decoder = types.decoder()
     for number, line in enumerate(lines[1:], 2):
         with _told(tell):
-            log.add(parse_record(path, number, line, decoder))
+            log.add(parse_record(path, number, line, decoder, header))
 
 
 @contextmanager
@@ -253,12 +254,12 @@ def _naming(path: Path, number: int) -> AbstractContextManager[None]:
 
 
 def parse_record(
-    path: Path, number: int, line: bytes, decoder: Decoder
+    path: Path, number: int, line: bytes, decoder: Decoder, header: RunHeader[Any]
 ) -> UnitRecord[Any] | ArtifactRecord[Any]:
     """Return the record in a line of a shard; `number` is the line's, from 1.
 
     Raises:
-        DataError: the line is bad, or a header.
+        DataError: the line is bad, a header, or of a task that the shard's header lacks.
     """
     with _naming(path, number):
         record: UnitRecord[Any] | ArtifactRecord[Any] | RunHeader = decoder.decode(line)
@@ -266,7 +267,16 @@ def parse_record(
         raise DataError(
             f"{path}, line {number}: a second header in the middle of the records; {_HINT}"
         )
+    if not is_of_run(record, header):
+        raise DataError(f"{path}, line {number}: of a task that the run's header lacks; {_HINT}")
     return record
+
+
+def is_of_run(record: Any, header: RunHeader[Any]) -> bool:
+    """Return whether a record is of a task of the run; that of another harness's requests names
+    none in its header."""
+    tasks = header.config.tasks
+    return not isinstance(record, UnitRecord) or not tasks or record.task in tasks
 
 
 def read_lines(path: Path) -> list[bytes]:

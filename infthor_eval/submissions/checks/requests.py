@@ -7,15 +7,13 @@ from typing import ClassVar
 from msgspec.structs import replace
 
 from infthor_eval.errors import InfthorError
-from infthor_eval.nieh.contexts import MEMORY
+from infthor_eval.nieh.contexts import MEMORY, RETRIEVED
 from infthor_eval.nieh.rescoring.rebuilt_requests import RequestRebuilder
 from infthor_eval.submissions.case import Case
 from infthor_eval.submissions.expected import Expected
 from infthor_eval.submissions.reading import Problem
 
 __all__ = ["SameRequests"]
-
-_RETRIEVED = "clip_retrieval"  # frames that a model chose: its journal does not have them
 
 
 class SameRequests:
@@ -35,7 +33,7 @@ class SameRequests:
             elif task.run.header.config.model.get("imported"):
                 text = f"{task.name}: imported replies have no hashes of frames; not checked"
                 yield Problem(self.name, text, is_warning=True)
-            elif task.config.context == _RETRIEVED:
+            elif task.config.context == RETRIEVED:
                 text = f"{task.name}: its frames were retrieved by a model; they are not checked"
                 yield Problem(self.name, text, is_warning=True)
             else:

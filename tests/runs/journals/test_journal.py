@@ -309,3 +309,21 @@ def test_a_worker_waits_for_one_that_is_still_ending(tmp_path):
     with Journal(tmp_path, HEADER, TYPES, worker=1, wait_s=600.0) as journal:
         journal.append(record())
     assert read_run(tmp_path, TYPES)[1] == [record()]
+
+
+def test_a_record_of_a_task_that_the_header_lacks_is_a_bad_line(tmp_path):
+    config = RunConfig(model={"name": "m"}, seed=0, tasks={"t": {}})
+    header = msgspec.structs.replace(HEADER, config=config)
+    with opened(tmp_path, header) as journal:
+        journal.append(record())
+        journal.append(record("q2", task="another"))
+    with pytest.raises(DataError, match="line 3: of a task that the run's header lacks"):
+        read_run(tmp_path, TYPES)
+    told = []
+    assert [it.id for it in read_run(tmp_path, TYPES, told.append)[1]] == ["q1"]
+    assert len(told) == 1
+    with pytest.raises(DataError, match="--recover"):
+        opened(tmp_path, header)
+    assert recover(tmp_path, header, TYPES) == 1
+    with opened(tmp_path, header) as journal:
+        assert [it.id for it in journal.records] == ["q1"]
