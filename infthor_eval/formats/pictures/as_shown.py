@@ -1,6 +1,7 @@
 """Pictures as a browser shows them on white: nothing shows of colours under transparency, 16 bits
 of grey are read as 8, and EXIF data turn the picture."""
 
+import struct
 from contextlib import suppress
 
 import numpy as np
@@ -45,7 +46,7 @@ def orientation(image: Image.Image) -> int:
     """Return the EXIF orientation of an opened picture, 1 to 8; 1 where none is."""
     exif = Image.Exif()
     if "exif" in image.info:
-        with suppress(SyntaxError, ValueError, LookupError, TypeError, ArithmeticError):
+        with suppress(SyntaxError, ValueError, LookupError, TypeError, struct.error):
             exif.load(image.info["exif"])
     stored = exif.get(ExifTags.Base.Orientation)
     return stored if stored in _TURNS else 1

@@ -137,6 +137,7 @@ def test_what_needs_nothing_is_left_as_it_is(save: Save) -> None:
         save(SMOOTH, exif=_turned(1)),
         save(SMOOTH, exif=_turned(9)),
         save(SMOOTH, exif=b"no data"),
+        save(SMOOTH, exif=b"MM"),
         save(SMOOTH, "JPEG", exif=b"Exif\0\0no data"),
         late,
     ):
