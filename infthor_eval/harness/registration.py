@@ -28,7 +28,7 @@ def register() -> None:
     lm-eval's own script catches nothing: from here on our errors are one line under it as well.
     """
     import lm_eval.api.task
-    import lm_eval.models  # noqa: F401 - before registering, or the built-in models vanish (0.4.13)
+    import lm_eval.models
     from lm_eval.api.registry import model_registry
 
     if NAME not in model_registry:

@@ -6,7 +6,7 @@ import msgspec
 from msgspec import Meta
 
 from infthor_eval.memory import read_budget
-from infthor_eval.quantities import MOST, Count, Repetition, Total
+from infthor_eval.quantities import MOST, Count, Repetition
 from infthor_eval.runs import RunConfig, TaskConfig
 
 __all__ = [
