@@ -41,7 +41,7 @@ def register() -> None:
     lm_eval.api.task.load_from_cache = _refuse_kept
 
 
-def _refuse_kept(file_name: str, cache: bool = False) -> None:
+def _refuse_kept(file_name: str, cache: bool = False) -> None:  # noqa: ARG001 - lm-eval names it
     """Stand for lm-eval's reader of the requests that it keeps."""
     if cache:
         raise UsageError(

@@ -14,9 +14,9 @@ from infthor_eval.report.presented import read_report_run
 from infthor_eval.report.runs import distinct_names
 from infthor_eval.report.web.build import PageRequest, build_page, results_section
 from infthor_eval.report.web.page import Page, embedded_remark, write_page
-from infthor_eval.report.web.processors import n_processors
 from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.sections import Section
+from infthor_eval.report.web.thumbnails import n_processors
 from infthor_eval.runs import RunHeader, read_header
 from infthor_eval.safe_path import safe_path
 from infthor_eval.storage.files import file_name, prepare_folder

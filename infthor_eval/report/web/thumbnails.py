@@ -2,6 +2,7 @@
 
 import base64
 import io
+import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -12,10 +13,9 @@ from typing import NamedTuple, TypeVar
 from PIL import Image
 
 from infthor_eval.errors import DataError
-from infthor_eval.report.web.processors import n_processors
 from infthor_eval.report.web.progress import PageProgress, Silent
 
-__all__ = ["ThumbnailStore"]
+__all__ = ["ThumbnailStore", "n_processors"]
 
 _QUALITY = 55  # of WebP: 1 to 3 kB for a frame of 132 pixels, so that thousands fit into a page
 _EFFORT = 2  # of WebP: twice as fast as 4, pictures are 5 % larger
@@ -163,3 +163,10 @@ def _encode(picture: Image.Image, side: int, quality: int) -> str:
     encoded = io.BytesIO()
     small.save(encoded, format="webp", quality=quality, method=_EFFORT)
     return base64.b64encode(encoded.getvalue()).decode("ascii")
+
+
+def n_processors() -> int:
+    """Return the processors that this process may use, which may be fewer than there are."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
