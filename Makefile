@@ -33,16 +33,17 @@ COMPILE_LOCK = $(TOOLS)/bin/uv --no-config pip compile --quiet --upgrade --unive
 
 .PHONY: demo shell test test-all test-times test-transformers test-lm-eval test-vllm fuzz vitals lint docs lock audit release clean
 
-# A trajectory in a procedural kitchen, its frames and questions; then the bundled sets, by the bounds and a small model,
-# which is also asked twins behind memories of three frames.
+# A trajectory in a procedural kitchen, its frames and questions, which a small model is asked; then the bundled sets, by
+# the bounds and that model, which is also asked twins behind memories of three frames.
 demo: $(INSTALLED)
 	$(BIN)/infthor-eval generate --scene kitchen-7 --min-steps 30 --min-subgoals 1 --seed 1 --out results/demo/trajectories
 	$(BIN)/infthor-eval replay results/demo/trajectories --out results/demo/set
 	$(BIN)/infthor-eval questions results/demo/set --out results/demo/set/qa_set_demo.csv
+	$(BIN)/infthor-eval --model oracle,qwen2.5-vl-nano --tasks nieh_gt --data results/demo/set --out results/demo
 	$(BIN)/infthor-eval --model oracle,blind,qwen2.5-vl-nano --tasks nieh_mini,nieh_mini_twins --out results/demo
 	$(BIN)/infthor-eval --model qwen2.5-vl-nano --tasks nieh_mini_twins --context memory --memory none,uniform,oracle --budget 27 \
 		--out results/demo
-	$(BIN)/infthor-eval report results/demo/*/nieh_mini*-* --out results/demo/report.html
+	$(BIN)/infthor-eval report results/demo/*/nieh_*-* --out results/demo/report.html
 	@echo 'To type infthor-eval yourself, activate the environment: . $(BIN)/activate (or: make shell)'
 
 # A shell with the environment active; `exit` leaves it.
