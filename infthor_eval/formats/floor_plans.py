@@ -2,7 +2,7 @@
 
 `thor_scenes/objects.jsonl.gz` has one `{"scene", "objects"}` per line: the metadata of every object
 as AI2-THOR 5.x reports it (boxes without corner points). `alfred/layouts/FloorPlan<N>-layout.npy`
-has the reachable (x, z), in metres.
+has the reachable (x, z), in metres. Of houses of ProcTHOR there are files, too.
 """
 
 import gzip
@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.reading import json_lines_of
-from infthor_eval.storage.digests import digest_of_files
+from infthor_eval.formats.reading import json_lines_of, read_json
+from infthor_eval.storage.digests import canonical_json, digest, digest_of_files
 from infthor_eval.storage.files import (
     OVERWRITE_HINT,
     file_name,
@@ -24,9 +24,11 @@ from infthor_eval.storage.files import (
     write_atomically,
 )
 
-__all__ = ["floor_plan_names", "floor_plans_digest", "write_floor_plan"]
+__all__ = ["floor_plan_names", "floor_plans_digest", "read_house", "write_floor_plan"]
 
 _OBJECTS = Path("thor_scenes") / "objects.jsonl.gz"
+_PARTS = ("rooms", "walls", "objects")
+_HOUSE_HINT = "give the JSON of one house, as ProcTHOR generates it"
 
 
 def floor_plan_names(root: Path) -> list[str]:
@@ -127,3 +129,15 @@ def _without_corners(metadata: dict[str, Any]) -> dict[str, Any]:
     box = metadata.get("axisAlignedBoundingBox") or {}
     kept = {key: value for key, value in box.items() if key != "cornerPoints"}
     return {**metadata, "axisAlignedBoundingBox": kept}
+
+
+def read_house(path: Path) -> tuple[str, dict[str, Any]]:
+    """Return a house's name as a scene, by its content, and its JSON.
+
+    Raises:
+        DataError: the file cannot be read, or is no house.
+    """
+    house = read_json(path, _HOUSE_HINT)
+    if not isinstance(house, dict) or not all(isinstance(house.get(part), list) for part in _PARTS):
+        raise DataError(f"{path}: has not the lists {', '.join(_PARTS)} of a house; {_HOUSE_HINT}")
+    return f"procthor-{digest(canonical_json(house), 5)}", house

@@ -132,7 +132,7 @@ def command(
     Trajectories in the folder are not generated again. Exit code 1 if one cannot be generated.
     """
     from infthor_eval.cli.progress.bar import JobBar, PacedBar
-    from infthor_eval.formats.houses import read_house
+    from infthor_eval.formats.floor_plans import read_house
     from infthor_eval.formats.object_ids import Words
     from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
