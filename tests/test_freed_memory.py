@@ -9,7 +9,7 @@ import pytest
 
 _FAULTS = """
 import resource, numpy as np
-from infthor_eval.freed_memory import keep_freed_memory
+from infthor_eval.process_settings import keep_freed_memory
 if {kept}:
     keep_freed_memory()
 

@@ -2,7 +2,7 @@
 
 `thor_scenes/objects.jsonl.gz` has one `{"scene", "objects"}` per line: the metadata of every object
 as AI2-THOR 5.x reports it (boxes without corner points). `alfred/layouts/FloorPlan<N>-layout.npy`
-has the reachable (x, z), in metres.
+has the reachable (x, z), in metres. Of houses of ProcTHOR there are files, too.
 """
 
 import gzip
@@ -27,8 +27,8 @@ from infthor_eval.storage.files import (
 __all__ = ["floor_plan_names", "floor_plans_digest", "read_house", "write_floor_plan"]
 
 _OBJECTS = Path("thor_scenes") / "objects.jsonl.gz"
-_HOUSE = ("rooms", "walls", "objects")
-_GIVE_A_HOUSE = "give the JSON of one house, as ProcTHOR generates it"
+_PARTS = ("rooms", "walls", "objects")
+_HOUSE_HINT = "give the JSON of one house, as ProcTHOR generates it"
 
 
 def floor_plan_names(root: Path) -> list[str]:
@@ -137,9 +137,7 @@ def read_house(path: Path) -> tuple[str, dict[str, Any]]:
     Raises:
         DataError: the file cannot be read, or is no house.
     """
-    house = read_json(path, _GIVE_A_HOUSE)
-    if not isinstance(house, dict) or not all(isinstance(house.get(part), list) for part in _HOUSE):
-        raise DataError(
-            f"{path}: has not the lists {', '.join(_HOUSE)} of a house; {_GIVE_A_HOUSE}"
-        )
+    house = read_json(path, _HOUSE_HINT)
+    if not isinstance(house, dict) or not all(isinstance(house.get(part), list) for part in _PARTS):
+        raise DataError(f"{path}: has not the lists {', '.join(_PARTS)} of a house; {_HOUSE_HINT}")
     return f"procthor-{digest(canonical_json(house), 5)}", house

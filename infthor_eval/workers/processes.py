@@ -12,7 +12,7 @@ from threading import Lock, Thread
 from typing import Any
 
 from infthor_eval.errors import Terminated
-from infthor_eval.safe_path import leave_safe_path, safe_path
+from infthor_eval.process_settings import leave_safe_path, safe_path
 from infthor_eval.workers.host import WorkerHost, to_portable_error
 from infthor_eval.workers.link import Connect, OpenWorker, WorkerLostError
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import infthor_eval
 from infthor_eval.errors import InfthorError
+from infthor_eval.process_settings import safe_path
 from infthor_eval.report.headline.results import TaskResult, task_results
 from infthor_eval.report.presented import read_report_run
 from infthor_eval.report.runs import distinct_names
@@ -18,7 +19,6 @@ from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import n_processors
 from infthor_eval.runs import RunHeader, read_header
-from infthor_eval.safe_path import safe_path
 from infthor_eval.storage.files import file_name, prepare_folder
 from infthor_eval.tables import Column, Row, Table
 

@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 import torch
 
-from infthor_eval.freed_memory import keep_freed_memory
+from infthor_eval.process_settings import keep_freed_memory
 from infthor_eval.reasons import count_reasons
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.training.checkpoints import Checkpoints
