@@ -23,7 +23,7 @@ _references = False
 def register() -> None:
     """Register the class as a "module:Class" that lm-eval imports when a person asks for it."""
     import lm_eval.api.task
-    import lm_eval.models  # noqa: F401 - before registering, or the built-in models vanish (0.4.13)
+    import lm_eval.models  # before registering, or the built-in models vanish (0.4.13)
     from lm_eval.api.registry import model_registry
 
     if NAME not in model_registry:
@@ -31,7 +31,7 @@ def register() -> None:
     lm_eval.api.task.load_from_cache = _refuse_kept
 
 
-def _refuse_kept(file_name: str, cache: bool = False) -> None:
+def _refuse_kept(*, cache: bool, **_: object) -> None:
     """Stand for lm-eval's reader of the requests that it keeps."""
     if cache:
         raise UsageError(
