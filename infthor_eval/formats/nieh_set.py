@@ -18,6 +18,8 @@ from itertools import chain
 from pathlib import Path
 from typing import TypeVar
 
+import msgspec
+
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.action_log import logged_action_frames, read_action_log
 from infthor_eval.formats.frames import FrameRef, find_images
@@ -30,7 +32,7 @@ from infthor_eval.formats.reading import first_duplicate
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.shared_frames import read_shared_frames
 from infthor_eval.formats.step_log import log_file, read_steps
-from infthor_eval.formats.twins import TwinPair, pairs_file, read_pairs
+from infthor_eval.formats.twins import TwinPair, read_pairs
 
 __all__ = ["NiehSet"]
 
@@ -158,7 +160,7 @@ class NiehSet:
         for file in self.question_files:
             digest.update(file.read_bytes())
         if any(question.pair for question in self.questions):  # the pair tells a question's cluster
-            digest.update(pairs_file(self.directory).read_bytes())
+            digest.update(msgspec.json.encode(self.twins))
         for traj_id in sorted({question.traj_id for question in self.questions if self.has_frames}):
             if self._own is None:  # one's own frames have no log
                 digest.update(log_file(self.folder(traj_id)).read_bytes())

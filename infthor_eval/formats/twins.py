@@ -22,7 +22,6 @@ __all__ = [
     "TwinPair",
     "TwinPlace",
     "TwinWorld",
-    "pairs_file",
     "read_pairs",
     "write_pairs",
 ]
@@ -127,18 +126,13 @@ class TwinWorld(msgspec.Struct, frozen=True):
     places: tuple[TwinPlace, TwinPlace]
 
 
-def pairs_file(folder: Path) -> Path:
-    """Return the file of the pairs of the set in a folder."""
-    return folder / _TWINS
-
-
 def read_pairs(folder: Path) -> list[TwinPair]:
     """Read the pairs of a set.
 
     Raises:
         DataError: the file cannot be read, or a line is no pair.
     """
-    path = pairs_file(folder)
+    path = folder / _TWINS
     pairs = []
     for number, line in enumerate(read_bytes(path, _HINT).splitlines(), 1):
         try:
@@ -150,5 +144,5 @@ def read_pairs(folder: Path) -> list[TwinPair]:
 
 def write_pairs(folder: Path, pairs: Iterable[TwinPair]) -> None:
     """Write the pairs of a set, atomically."""
-    with write_atomically(pairs_file(folder)) as partial:
+    with write_atomically(folder / _TWINS) as partial:
         partial.write_bytes(b"".join(msgspec.json.encode(pair) + b"\n" for pair in pairs))

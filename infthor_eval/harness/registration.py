@@ -28,7 +28,7 @@ def register() -> None:
     lm-eval's own script catches nothing: from here on our errors are one line under it as well.
     """
     import lm_eval.api.task
-    import lm_eval.models
+    import lm_eval.models  # before registering, or the built-in models vanish (0.4.13)
     from lm_eval.api.registry import model_registry
 
     if NAME not in model_registry:
@@ -41,7 +41,7 @@ def register() -> None:
     lm_eval.api.task.load_from_cache = _refuse_kept
 
 
-def _refuse_kept(file_name: str, cache: bool = False) -> None:  # noqa: ARG001 - lm-eval names it
+def _refuse_kept(*, cache: bool, **_: object) -> None:
     """Stand for lm-eval's reader of the requests that it keeps."""
     if cache:
         raise UsageError(

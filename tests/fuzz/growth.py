@@ -20,7 +20,7 @@ from .reader import Reader
 __all__ = ["find_growth"]
 
 _SIZE = 150_000  # characters that are added, and twice as many
-_SECONDS = 12.0  # of the processor for a reader: the outer parts of its input come first
+_SECONDS = 6.0  # of the processor for a reader: the outer parts of its input come first
 _LEAST = 6  # ways of growing that are tried, however slow the reader is
 _MOST = 2.6  # times as long for twice the size
 _QUICK_S = 0.15  # of the processor, in which even twice the size is read: nothing to compare
