@@ -1,5 +1,6 @@
 """The config of a run of NIEH."""
 
+import re
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -160,7 +161,9 @@ class NiehConfig(RunConfig[NiehTaskConfig], frozen=True, kw_only=True, omit_defa
 
     def in_words(self, name: str, value: str) -> str:
         """See `RunConfig`: a budget with what it is in frames."""
-        return value + self.in_frames(read_budget(value)) if name == "budget" else value
+        # What stands in the `run.yaml` of others need be no budget.
+        is_budget = name == "budget" and re.fullmatch(r"[1-9]\d{0,5}k?", value, re.ASCII)
+        return value + self.in_frames(read_budget(value)) if is_budget else value
 
     def in_frames(self, tokens: int | None) -> str:
         """Return " [3 frames]" for a budget in tokens that is whole frames, else an empty text."""

@@ -135,6 +135,8 @@ def test_the_memory_is_not_said_twice(label, subject):
         (4, "4k", "4k [1000 frames]"),
         (9, "28", "28"),
         (None, "27", "27"),
+        (9, "-9", "-9"),
+        (9, "9" * 30, "9" * 30),
     ],
 )
 def test_a_budget_of_whole_frames_says_so_where_people_read_it(tokens_per_frame, budget, said):
