@@ -96,7 +96,8 @@ __all__ = ["command"]
     "--final-task-memory",
     is_flag=True,
     help="Add a final task on one object seen in the first fifth of the steps alone and one in the "
-    "last alone; up to 8 more tasks come before it, until there is one. Houses have it most often.",
+    "last alone; up to 8 more tasks come before it, until there is one. In a room there often is "
+    "none.",
 )
 @click.option(
     "--test-set",
