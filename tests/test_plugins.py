@@ -1,6 +1,7 @@
 """Importing by name, and what happens to garbage collection meanwhile."""
 
 import gc
+import inspect
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -69,7 +70,7 @@ def test_a_command_collects_seldom_while_it_imports_and_then_as_before(
         during.append(import_target(f"{own_module}:threshold"))
         return import_target(target)
 
-    monkeypatch.setitem(command_line.__globals__, "import_target", note)
+    monkeypatch.setitem(inspect.unwrap(command_line).__globals__, "import_target", note)
     with pytest.raises(SystemExit):
         command_line(["ls", "--help"])
     assert during

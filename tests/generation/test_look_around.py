@@ -199,7 +199,7 @@ def test_a_file_that_cannot_be_written_is_told(run_cli, tmp_path):
         code, _, err = run_cli("look-around", file, "--out", out)
         assert code == 2
         assert said in err
-        assert "another place with OUT" in err
+        assert "another place with --out" in err
 
 
 def test_what_a_file_tells_of_its_generation_may_be_null(tmp_path):

@@ -139,7 +139,7 @@ def test_the_live_page(planted: Path) -> None:
     assert [sample.outcome for sample in state.failures] == ["not asked", "failed"]
 
 
-def exported(records: list[Any]) -> Any:
+def exported(records: list[Any], folder: Path) -> Any:
     """A run in lm-eval's form, of which only what the conversion reads is there."""
     task = TaskFile("nieh_gt", "nieh", Path("nieh_gt.yaml"), {})
     tasks = SimpleNamespace(tasks=[task], limit=None, seed=0)
@@ -150,13 +150,12 @@ def exported(records: list[Any]) -> Any:
     ]
     run = SimpleNamespace(request=request, suite=NiehSuite())
     summary = RunSummary.of(NiehSuite(), header_of("m"), records)
-    return convert_run(
-        SimpleNamespace(run=run, records=records, samples=samples, summary=summary, n_missing=2)  # type: ignore[arg-type]
-    )
+    outcome = {"run": run, "records": records, "samples": samples, "summary": summary}
+    return convert_run(SimpleNamespace(**outcome, n_missing=2, folder=folder))  # type: ignore[arg-type]
 
 
-def test_the_folder_for_lm_eval() -> None:
-    run = exported(PLANTED)
+def test_the_folder_for_lm_eval(planted: Path) -> None:
+    run = exported(PLANTED, planted)
     assert run.results["n-samples"] == {"nieh_gt": {"original": 8, "effective": 4}}
     assert run.results["infthor_eval"]["units"] == {"nieh_gt": UNITS}
     means = run.results["results"]["nieh_gt"]
@@ -180,7 +179,7 @@ def test_a_run_that_failed_on_everything_has_no_score(
     cells = [row.cells for row in page.sections[0].tables[0].rows]
     assert ("dead (incomplete)", "none answered") in [(row[0], row[3]) for row in cells]
     assert LiveRun(nothing).state().metrics == {}
-    results = exported(NOTHING).results
+    results = exported(NOTHING, nothing).results
     assert "strict,none" not in results["results"]["nieh_gt"]
     assert results["n-samples"] == {"nieh_gt": {"original": 8, "effective": 0}}
     code, _, err = run_cli("compare", nothing, whole)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from transformers.image_processing_backends import PilBackend
 
 from infthor_eval.errors import ModelError
-from infthor_eval.freed_memory import keep_freed_memory
+from infthor_eval.process_settings import keep_freed_memory
 from model_adapters.hf.loading.resampling import FILTERS, Resize, find_resize
 from model_adapters.options.checkpoints import FrameScaling
 
