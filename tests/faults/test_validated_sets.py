@@ -31,10 +31,10 @@ class Silent:
     def close(self):
         pass
 
-    def fit(self, questions):
+    def fit(self, _data, _context):
         return self.answer
 
-    def answer(self, question):
+    def answer(self, _sample, _shown=()):
         Silent.n_asked += 1
         return "=1+1"
 
