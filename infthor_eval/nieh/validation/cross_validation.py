@@ -101,10 +101,10 @@ def judge_questions(
     verdicts = Verdicts()
     for question in questions:
         by_model = {model: _reply(question, model, of_model) for model, of_model in replies.items()}
-        scores = {
+        of_models = {
             m: scores(t, question.answers)[scorer] for m, t in by_model.items() if t is not None
         }
-        right = judge_scores(scores, partial_credit=partial_credit)
+        right = judge_scores(of_models, partial_credit=partial_credit)
         judged = JudgedQuestion(question, by_model, right, decisions.get(question.id))
         verdicts.add(judged)
     return verdicts
