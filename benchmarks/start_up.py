@@ -40,6 +40,7 @@ _COMMANDS: dict[str, tuple[str, ...]] = {
     "ls tasks": ("ls", "tasks"),
     "show": ("show",),
 }
+_END = os._exit  # which the command makes an error while it runs
 _ANSWERING = "infthor_eval.nieh.asking.answering"
 
 
@@ -86,7 +87,7 @@ class _Stopwatch(MetaPathFinder, Loader):
         """Print the times as the last line, and end the process."""
         # While a model is asked, what is printed goes to standard error.
         print(f"\n{json.dumps(self.times)}", file=sys.__stdout__, flush=True)
-        os._exit(0)
+        _END(0)
 
 
 def execute(arguments: list[str]) -> None:
