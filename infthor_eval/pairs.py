@@ -6,8 +6,9 @@ does: net pairs are 0 on average. Pairs right alone are not: whoever says someth
 world, by a hash of the frames or because it was asked before, is both right and exchanged.
 """
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from statistics import fmean
 
 from infthor_eval.rates import Rate, resampled_rate
 
@@ -27,6 +28,12 @@ class PairShares:
 
     right: float
     exchanged: float
+
+    @classmethod
+    def mean(cls, shares: Iterable["PairShares"]) -> "PairShares":
+        """Return the means of some shares, at least one."""
+        rights, exchanged = zip(*((it.right, it.exchanged) for it in shares), strict=True)
+        return cls(fmean(rights), fmean(exchanged))
 
     @property
     def net(self) -> float:

@@ -3,11 +3,12 @@
 from collections.abc import Iterator, Sequence
 from statistics import fmean
 
+from msgspec.structs import replace
+
 from infthor_eval.exports.subjects import engine_of
 from infthor_eval.formats.published import published_tables
 from infthor_eval.nieh.results.above_blind import above_blind
-from infthor_eval.nieh.results.pair_summary import find_pairs
-from infthor_eval.pairs import PairShares, net_pairs
+from infthor_eval.nieh.results.pair_summary import summarise_pairs
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.report.leaderboard.page import LeaderboardRow
 from infthor_eval.submissions.checking import Verdict
@@ -66,18 +67,9 @@ def _row(statement: Statement, task: Expected, remarks: Sequence[str]) -> Leader
 
 def _pairs(task: Expected) -> Rate | None:
     """Return the net pairs; one without both replies is neither right nor exchanged."""
-    shares: dict[tuple[str, str, int], PairShares] = {}
-    clusters = {}
-    for record in task.graded:
-        if record.payload.twin is not None:
-            key = record.payload.twin.pair, record.variant, record.repeat
-            shares[key] = PairShares(0.0, 0.0)
-            clusters[key] = record.cluster
-    for pair in find_pairs(task.graded)[0]:
-        side = pair.sides[0]
-        key = side.twin.pair, side.record.variant, side.record.repeat
-        shares[key] = pair.shares(_SCORER)
-    return net_pairs(list(shares.values()), list(clusters.values()))
+    replied = [replace(record, failure=None) for record in task.graded]
+    summary = summarise_pairs(replied, _SCORER)
+    return None if summary is None else summary.net_pairs
 
 
 def _above(task: Expected) -> Rate | None:

@@ -11,6 +11,7 @@ from infthor_eval.nieh.scoring import scores
 from infthor_eval.nieh.twins import twin_of_reply
 from infthor_eval.runs import Tokens, Unit, UnitKey, UnitRecord
 from infthor_eval.storage.digests import fingerprint
+from model_adapters import Reply, answer_of
 
 __all__ = ["WHOLE", "Known", "imported_record"]
 
@@ -49,9 +50,10 @@ def imported_record(
     if reply.failure is not None:
         made_of = {"question": question.id, "failure": reply.failure}
         return unit.record_failure(reply.failure, fingerprint(made_of), seconds=reply.seconds)
+    thinking, answer = answer_of(Reply(reply.text, thinking=reply.thinking))
     return unit.record(
         fingerprint({"question": question.id, "reply": reply.text}),
-        payload.with_reply(reply.text, scores(reply.text, question.answers), reply.thinking),
+        payload.with_reply(answer, scores(answer, question.answers), thinking),
         seconds=reply.seconds,
         tokens=tokens,
     )

@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from statistics import fmean
 from typing import NamedTuple
 
 import msgspec
@@ -16,8 +15,8 @@ import msgspec
 from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
 from infthor_eval.nieh.records import NiehAnswer, TwinSide
 from infthor_eval.nieh.scoring import SCORERS, compared_form, scores
-from infthor_eval.pairs import PAIR_BOUNDS, PairShares
-from infthor_eval.rates import Rate, clustered_rate, resampled_rate
+from infthor_eval.pairs import PAIR_BOUNDS, PairShares, net_pairs
+from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.runs import UnitRecord
 
 __all__ = [
@@ -223,9 +222,11 @@ class _Pairs:
             n_facts=len({it.fact for it in scores}),
             n_trajectories=len({it.cluster for it in scores}),
             n_incomplete=n_incomplete,
-            net_pairs=_net([it.shares.net for it in scores], clusters),
-            pair_accuracy=_certain([it.shares.right for it in scores], clusters),
-            pairs_exchanged=_certain([it.shares.exchanged for it in scores], clusters),
+            net_pairs=_certain(net_pairs([it.shares for it in scores], clusters)),
+            pair_accuracy=_certain(clustered_rate([it.shares.right for it in scores], clusters)),
+            pairs_exchanged=_certain(
+                clustered_rate([it.shares.exchanged for it in scores], clusters)
+            ),
             by_fact=_by_fact(scores),
             single=self._of_sides(lambda side: _is_right(side.record, self.metric)),
             flipped=_mean(self.pairs, lambda pair: pair.is_flipped),
@@ -248,7 +249,8 @@ class _Pairs:
     def _of_sides(self, value: Callable[[_Side], bool]) -> Rate:
         """Return the mean over single answers."""
         values = [float(value(side)) for pair in self.pairs for side in pair.sides]
-        return _certain(values, [pair.cluster for pair in self.pairs for _ in pair.sides])
+        clusters = [pair.cluster for pair in self.pairs for _ in pair.sides]
+        return _certain(clustered_rate(values, clusters))
 
     def _by(
         self, name_of: Callable[[TwinRecords], str | None], order: Sequence[str] = ()
@@ -260,7 +262,9 @@ class _Pairs:
             if name is not None:
                 groups.setdefault(name, []).append(pair)
         return {
-            name: _net([it.shares(self.metric).net for it in same], [it.cluster for it in same])
+            name: _certain(
+                net_pairs([it.shares(self.metric) for it in same], [it.cluster for it in same])
+            )
             for name, same in ((name, groups.get(name)) for name in order or sorted(groups))
             if same
         }
@@ -298,10 +302,7 @@ def _scores(pairs: Sequence[TwinRecords], metric: str) -> Iterator[PairScore]:
             variant,
             repetitions[0].sides[0].twin.fact,
             repetitions[0].cluster,
-            PairShares(
-                right=fmean(pair.is_right(metric) for pair in repetitions),
-                exchanged=fmean(pair.is_exchanged(metric) for pair in repetitions),
-            ),
+            PairShares.mean(pair.shares(metric) for pair in repetitions),
         )
 
 
@@ -315,24 +316,19 @@ def _by_trajectory(scores: Iterable[PairScore]) -> dict[str, dict[str, float]]:
 
 def _by_fact(scores: Sequence[PairScore]) -> Rate:
     """Return the mean over facts, of which each is one observation."""
-    facts: dict[tuple[str, str], list[float]] = {}
+    facts: dict[tuple[str, str], list[PairShares]] = {}
     for it in scores:
-        facts.setdefault((it.cluster, it.fact), []).append(it.shares.net)
-    return _net([fmean(values) for values in facts.values()], [key[0] for key in facts])
-
-
-def _net(values: Sequence[float], clusters: Sequence[str]) -> Rate:
-    rate = resampled_rate(values, clusters)
-    assert rate is not None  # there are values
-    return rate
+        facts.setdefault((it.cluster, it.fact), []).append(it.shares)
+    shares = list(map(PairShares.mean, facts.values()))
+    return _certain(net_pairs(shares, [cluster for cluster, _ in facts]))
 
 
 def _mean(pairs: Sequence[TwinRecords], value: Callable[[TwinRecords], float]) -> Rate:
-    return _certain([float(value(pair)) for pair in pairs], [pair.cluster for pair in pairs])
+    values = [float(value(pair)) for pair in pairs]
+    return _certain(clustered_rate(values, [pair.cluster for pair in pairs]))
 
 
-def _certain(values: Sequence[float], clusters: Sequence[str]) -> Rate:
-    rate = clustered_rate(values, clusters)
+def _certain(rate: Rate | None) -> Rate:
     assert rate is not None  # there are values
     return rate
 

@@ -90,6 +90,22 @@ def test_the_end_of_a_trajectory_tells_its_length_and_what_was_shown(imported):
     )
 
 
+@pytest.mark.parametrize(
+    ("said", "thinking"),
+    [
+        ("<answer>Bed</answer>", None),
+        ("<think>A bed?</think>\\boxed{\\text{bed}}", "A bed?"),
+        ("<think>A bed?</think>bed", "A bed?"),
+    ],
+)
+def test_thoughts_and_marks_are_no_part_of_an_answer(imported, said, thinking):
+    (run,) = imported(full_traj=[row(0, llm_response=said)])
+    (record,) = run.records
+    assert record.payload.reply.lower() == "bed"
+    assert record.payload.thinking == thinking
+    assert record.payload.scores == {"reference": 1.0, "strict": 1.0}
+
+
 def test_lengths_serve_the_logs_of_other_modes(imported):
     retrieved_columns = {"eval_mode": "clip_retrieval", "n_imgs": 2}
     retrieved = [

@@ -6,6 +6,7 @@ from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.report.comparison import compare
 from infthor_eval.report.suites.nieh import NiehPresenter
 from infthor_eval.report.terminal import print_table
+from infthor_eval.statistics import clustered_mean
 
 from ...helpers.nieh_runs import make_config, make_record, make_run
 
@@ -99,6 +100,21 @@ def test_a_single_trajectory_says_why_it_has_no_interval(n_trajectories):
     records = [make_record(at, "yes", cluster=f"t{at % n_trajectories}") for at in range(4)]
     notes = overview([make_run(make_config(), records)])[0].notes
     assert any("no interval" in note for note in notes) == (n_trajectories == 1)
+
+
+@pytest.mark.parametrize(("replies", "is_told"), [("mug", True), ("cup", True), ("mix", False)])
+def test_the_interval_of_all_alike_is_explained_where_it_stands(replies, is_told):
+    said = ["mug", "cup"] * 3 if replies == "mix" else [replies] * 6
+    records = [make_record(i, reply, cluster=f"t{i}") for i, reply in enumerate(said)]
+    notes = overview([make_run(make_config(), records)])[0].notes
+    assert any("6 of 6 are 61.0 to 100.0" in note for note in notes) == is_told
+    six_of_six = clustered_mean([1.0] * 6, range(6))
+    assert (round(100 * six_of_six.low, 1), six_of_six.high) == (61.0, 1.0)
+
+
+def test_published_rows_are_said_to_be_of_published_data():
+    table = clues_table([make_run(make_config(), [make_record(0, "mug")])])
+    assert any("not comparable" in note and "published data" in note for note in table.notes)
 
 
 def test_a_run_of_a_published_checkpoint_is_set_against_its_row_unless_its_frames_are_simulated():
