@@ -31,7 +31,7 @@ BY_HARDWARE := torch triton cuda-bindings cuda-pathfinder cuda-toolkit $(addpref
 COMPILE_LOCK = $(TOOLS)/bin/uv --no-config pip compile --quiet --upgrade --universal --python-version 3.11 \
 	--generate-hashes --no-annotate --custom-compile-command 'make lock'
 
-.PHONY: demo shell test test-all test-times test-transformers test-lm-eval test-vllm fuzz vitals lint docs lock audit release clean
+.PHONY: demo shell test test-all test-times test-transformers test-lm-eval test-vllm fuzz vitals lint docs lock audit changes release clean
 
 # A trajectory in a procedural kitchen, its frames and questions, which a small model is asked; then the bundled sets, by
 # the bounds and that model, which is also asked twins behind memories of three frames.
@@ -58,9 +58,10 @@ $(COMPILED): $(DEVELOPED) $(wildcard infthor_sim/render/*.py)
 test: $(COMPILED) $(PEERS) $(INSPECT)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
-# The slow ones too; 2.3 hours of one core, so more than an hour on two.
+# The slow ones too; 2.3 hours of one core, so more than an hour on two. TESTS: some of them.
+TESTS ?= tests
 test-all: $(COMPILED) $(PEERS) $(INSPECT)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(TESTS)
 
 # Measures all tests, and lists those that are slow in tests/slow_tests.txt.
 test-times: $(COMPILED) $(PEERS) $(INSPECT)
@@ -94,10 +95,10 @@ FUZZ_SECONDS ?= 60
 fuzz: $(DEVELOPED)
 	OMP_NUM_THREADS=1 $(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS)
 
-# The figures that no change may move unseen (benchmarks/vitals.py); six minutes. DATA: recorded data, if there is any.
+# The figures that no change may move unseen (benchmarks/vitals.py); six minutes. DATA: recorded data, empty for none.
 DATA ?= ../shared/data
 vitals: $(DEVELOPED)
-	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/vitals.py --data $(DATA)
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/vitals.py $(addprefix --data ,$(DATA))
 
 lint: $(DEVELOPED)
 	$(BIN)/ruff check .
@@ -120,6 +121,10 @@ audit: $(TOOLS)/.installed
 	mkdir -p build && grep '^torch==' constraints.txt > build/torch.txt
 	for file in requirements.lock .ci/release-tools.lock build/torch.txt; do \
 		$(TOOLS)/bin/pip-audit --strict --no-deps --disable-pip --progress-spinner off -r $$file || exit 1; done
+
+# What the files of changes/ say, as the section of a version in CHANGELOG.md.
+changes: $(TOOLS)/.installed
+	$(TOOLS)/bin/towncrier build --yes --version $(VERSION)
 
 # Wheel, source distribution and list of what is in them (SBOM, CycloneDX) of the last commit: dist.
 release: $(DEVELOPED) $(TOOLS)/.installed

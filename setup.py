@@ -14,8 +14,9 @@ setup(
     ],
     package_dir={"infthor_eval.tasks": "tasks", "infthor_eval.results": "results"},
     package_data={
-        "infthor_eval": ["models/**/*", "sets/**/*"],
-        "infthor_sim": ["README.md"],
+        "infthor_eval": ["py.typed", "models/**/*", "sets/**/*"],
+        "infthor_sim": ["py.typed", "README.md"],
+        "model_adapters": ["py.typed"],
         "infthor_eval.plans": ["*.yaml"],
         "infthor_eval.plans.published": ["*.yaml"],
         "infthor_eval.household": ["*.yaml"],

@@ -13,9 +13,9 @@ def _read(name):
 
 
 def commands_of(workflow):
-    """The commands of a workflow's only job."""
-    (job,) = yaml.safe_load((ROOT / ".github/workflows" / workflow).read_text())["jobs"].values()
-    return [step["run"] for step in job["steps"] if "run" in step]
+    """The commands of a workflow's jobs."""
+    jobs = yaml.safe_load((ROOT / ".github/workflows" / workflow).read_text())["jobs"].values()
+    return [step["run"] for job in jobs for step in job["steps"] if "run" in step]
 
 
 def test_a_commit_is_checked_by_the_ruff_of_the_environment():
@@ -26,7 +26,7 @@ def test_a_commit_is_checked_by_the_ruff_of_the_environment():
 
 
 def test_the_workflows_do_what_a_contributor_does():
-    assert commands_of("ci.yml") == [".ci/run"]
+    assert commands_of("ci.yml") == [".ci/run", "make test"]
     assert commands_of("docs.yml") == ["make docs"]
     assert commands_of("audit.yml") == ["make audit"]
 
@@ -42,6 +42,20 @@ def test_each_week_runs_the_versions_of_transformers_that_may_be_installed():
     bounds = [int(part) for part in allowed.groups()]
     assert [*oldest, newest[0], newest[1] + 1] == bounds
     assert f"\ntransformers=={tried[1]}\n" in _read("constraints.txt")
+
+
+def test_each_week_runs_every_test_the_fuzzer_and_the_vitals():
+    jobs = yaml.safe_load(_read(".github/workflows/whole.yml"))["jobs"].values()
+    commands = [job["steps"][-1]["run"] for job in jobs]
+    typed = [re.fullmatch(r'make test-all TESTS="(.*)"', command) for command in commands]
+    named = [path for found in filter(None, typed) for path in found[1].split()]
+    matched = [path for name in named for path in ROOT.glob(name)]
+    assert len(matched) == len(set(matched))
+    tests = {path for kind in ("*_test.py", "test_*.py") for path in (ROOT / "tests").rglob(kind)}
+    of_jobs = {test for path in matched for test in tests if test.is_relative_to(path)}
+    assert tests - of_jobs == set()
+    assert [it for it in commands if "test-all" not in it] == ["make fuzz", "make vitals DATA="]
+    assert all(job["timeout-minutes"] <= 60 for job in jobs)
 
 
 def test_the_site_is_kept_from_where_it_is_built():
