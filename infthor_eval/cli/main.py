@@ -150,9 +150,7 @@ class _Commands(ExampleGroup):
         assert run is not None
         usual = (option.get_help_record(ctx) for option in run.params if option.name in _USUAL)
         with formatter.section("Options of a run (`infthor-eval run --help` has all)"):
-            formatter.write_dl(
-                [(name, _first_clause(text)) for name, text in filter(None, records)]
-            )
+            formatter.write_dl([(name, _first_clause(text)) for name, text in filter(None, usual)])
 
 
 def _first_clause(text: str) -> str:
