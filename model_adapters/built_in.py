@@ -1,10 +1,14 @@
 """Built-in models by name.
 
+To add a name for a model that `hf-vlm` runs: a line here, by `_named`, and in `docs/nieh.md`.
+
 To add or change the description of a model in `ls models`: `description` of its line here; without
 one, its usual checkpoint is shown.
 """
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 __all__ = ["BUILT_IN", "BuiltIn"]
 
@@ -24,11 +28,15 @@ class BuiltIn(NamedTuple):
         adapter: adapter of the model.
         options: `Options` of the adapter, in a module that imports nothing slow.
         description: what the model is, in a few words, if its name does not say so.
+        defaults: defaults of options that are the model's own, such as its usual checkpoint.
+        model_types: supported values of `model_type` in configs, where the adapter has no own ones.
     """
 
     adapter: str
     options: str
     description: str = ""
+    defaults: Mapping[str, Any] = MappingProxyType({})
+    model_types: tuple[str, ...] = ()
 
     @property
     def note(self) -> str:
@@ -41,6 +49,21 @@ def _locate(adapter: str, options: str, description: str = "") -> BuiltIn:
     return BuiltIn(f"model_adapters.{adapter}", f"model_adapters.{options}", description)
 
 
+def _named(
+    pretrained: str, *model_types: str, options: str = "HfVlmOptions", **defaults: Any
+) -> BuiltIn:
+    """Return a model that runs as `hf-vlm` does.
+
+    Its usual checkpoint is the one of its public documents that is nearest to eight billion weights
+    in use, as those of the paper are; of Mistral Small and Llama 4 it is the smallest. Image sizes,
+    system prompts, end tokens and penalties are those of the checkpoint's own files.
+    """
+    located = _locate("hf.families.hf_vlm:HfVlm", f"options.families:{options}")
+    return located._replace(
+        defaults={"pretrained": pretrained, **defaults}, model_types=model_types
+    )
+
+
 BUILT_IN = {
     "anthropic": _locate("served.adapters:Anthropic", "served.options:AnthropicOptions", _SERVED),
     "deepseek-vl": _locate(
@@ -50,14 +73,14 @@ BUILT_IN = {
         "tiny.deepseek_vl:DeepseekVLTiny", "options.tiny:TinyOptions", _RANDOM
     ),
     "gemini": _locate("served.adapters:Gemini", "served.options:GeminiOptions", _SERVED),
-    "gemma3": _locate("hf.families.named:Gemma3", "options.named:Gemma3Options"),
-    "gemma4": _locate("hf.families.named:Gemma4", "options.named:Gemma4Options"),
-    "glm-4.6v": _locate("hf.families.named:Glm46V", "options.named:Glm46VOptions"),
+    "gemma3": _named("google/gemma-3-12b-it", "gemma3"),
+    "gemma4": _named("google/gemma-4-E4B-it", "gemma4", options="Gemma4Options"),
+    "glm-4.6v": _named("zai-org/GLM-4.6V-Flash", "glm4v", "glm4v_moe", "glm46v"),
     "hf-vlm": _locate("hf.families.hf_vlm:HfVlm", "options.families:HfVlmOptions", _ANY),
     "hf-vlm@vllm": _locate("vllm.adapter:HfVlmOnVllm", "vllm.options:HfVlmOnVllmOptions", _ANY),
     "human": _locate("human.adapter:Human", "human.adapter:HumanOptions", _PERSON),
-    "internvl3.5": _locate("hf.families.named:InternVL35", "options.named:InternVL35Options"),
-    "llama4": _locate("hf.families.named:Llama4", "options.named:Llama4Options"),
+    "internvl3.5": _named("OpenGVLab/InternVL3_5-8B-HF", "internvl"),
+    "llama4": _named("meta-llama/Llama-4-Scout-17B-16E-Instruct", "llama4"),
     "llava-onevision": _locate(
         "hf.families.llava_onevision:LlavaOnevision", "options.families:LlavaOnevisionOptions"
     ),
@@ -67,8 +90,9 @@ BUILT_IN = {
     "llava-onevision-tiny": _locate(
         "tiny.llava_onevision:LlavaOnevisionTiny", "options.tiny:TinyOptions", _RANDOM
     ),
-    "mistral-small": _locate("hf.families.named:MistralSmall", "options.named:MistralSmallOptions"),
-    "molmo2": _locate("hf.families.named:Molmo2", "options.named:Molmo2Options"),
+    "mistral-small": _named("mistralai/Mistral-Small-3.1-24B-Instruct-2503", "mistral3"),
+    # All its images are seen together, so that prefixes cannot be shared.
+    "molmo2": _named("allenai/Molmo2-8B", "molmo2", share_prefix=False),
     "openai": _locate("served.adapters:OpenAI", "served.options:OpenAIOptions", _SERVED),
     "openvla": _locate("policies.openvla.adapter:OpenVLA", "options.policies:OpenVLAOptions"),
     "openvla@vllm": _locate("vllm.openvla:OpenVLAOnVllm", "vllm.options:OpenVLAOnVllmOptions"),
@@ -84,10 +108,12 @@ BUILT_IN = {
     "qwen2.5-vl-tiny": _locate(
         "tiny.qwen2_5_vl:Qwen25VLTiny", "options.tiny:Qwen25VLTinyOptions", _RANDOM
     ),
-    "qwen3-vl": _locate("hf.families.named:Qwen3VL", "options.named:Qwen3VLOptions"),
-    "qwen3-vl-moe": _locate("hf.families.named:Qwen3VLMoe", "options.named:Qwen3VLMoeOptions"),
-    "qwen3.5": _locate("hf.families.named:Qwen35", "options.named:Qwen35Options"),
-    "smolvlm2": _locate("hf.families.named:SmolVLM2", "options.named:SmolVLM2Options"),
+    "qwen3-vl": _named("Qwen/Qwen3-VL-8B-Instruct", "qwen3_vl", options="PixelVlmOptions"),
+    "qwen3-vl-moe": _named(
+        "Qwen/Qwen3-VL-30B-A3B-Instruct", "qwen3_vl_moe", options="PixelVlmOptions"
+    ),
+    "qwen3.5": _named("Qwen/Qwen3.5-9B", "qwen3_5", "qwen3_5_moe", options="PixelVlmOptions"),
+    "smolvlm2": _named("HuggingFaceTB/SmolVLM2-2.2B-Instruct", "smolvlm"),
     "spatialvla": _locate(
         "policies.spatialvla.adapter:SpatialVLA", "options.policies:SpatialVLACheckpointOptions"
     ),

@@ -21,7 +21,7 @@ from model_adapters.built_in import BUILT_IN
 from model_adapters.check.clauses import ContractError, check_members
 from model_adapters.functions import function_adapter
 from model_adapters.guarded import guard
-from model_adapters.options import describe, parse
+from model_adapters.options import describe, parse, with_defaults
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
 from model_adapters.protocols import Adapter, Model, Policy
 from model_adapters.refusals import wrap_adapter_errors
@@ -153,7 +153,7 @@ def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
 def build(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
     """Build the model or the policy of this name without checking its members; see `load`."""
     adapter = _adapter(name)
-    parsed = parse(name, adapter.Options, options)
+    parsed = parse(name, _options(name) if name in BUILT_IN else adapter.Options, options)
     if name in BUILT_IN:
         return adapter.build(name, parsed, seed)
     with wrap_adapter_errors(f"model {name}: build() fails"):
@@ -268,7 +268,8 @@ def _options(name: str) -> type:
     import torch."""
     if name not in BUILT_IN:
         return _adapter(name).Options
-    return cast(type, import_target(BUILT_IN[name].options))
+    built_in = BUILT_IN[name]
+    return with_defaults(cast(type, import_target(built_in.options)), built_in.defaults)
 
 
 def _adapter(name: str) -> type[Adapter]:

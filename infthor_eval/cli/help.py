@@ -1,10 +1,20 @@
-"""Commands whose help begins with an example."""
+"""Commands whose help begins with an example, and has their options by what they are for."""
 
 from typing import Any
 
 import click
 
-__all__ = ["ExampleCommand", "ExampleGroup"]
+__all__ = ["ExampleCommand", "ExampleGroup", "SuiteOption"]
+
+
+class SuiteOption(click.Option):
+    """An option for tasks of some suites alone, named in its `suites`."""
+
+    suites: tuple[str, ...] = ()
+
+    def __init__(self, *arguments: Any, suites: tuple[str, ...], **settings: Any) -> None:
+        super().__init__(*arguments, **settings)
+        self.suites = suites
 
 
 class _WithExample(click.Command):
@@ -24,6 +34,19 @@ class _WithExample(click.Command):
 
 class ExampleCommand(_WithExample):
     """A command with an example."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options, those of suites by suite."""
+        sections: dict[str, list[tuple[str, str]]] = {}
+        for option in self.get_params(ctx):
+            record = option.get_help_record(ctx)
+            if record is not None:
+                suites = option.suites if isinstance(option, SuiteOption) else ()
+                title = f"Options of {' and '.join(suites)}" if suites else "Options"
+                sections.setdefault(title, []).append(record)
+        for title, records in sections.items():
+            with formatter.section(title):
+                formatter.write_dl(records)
 
 
 class ExampleGroup(_WithExample, click.Group):

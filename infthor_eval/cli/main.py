@@ -4,6 +4,7 @@ import difflib
 import gc
 import io
 import os
+import re
 import signal
 import sys
 from collections.abc import Iterator
@@ -40,37 +41,37 @@ _COMMANDS = {
         "ls": "List models, tasks, scenes, or the runs in a folder.",
     },
     "Look at results": {
-        "show": "Print the results of runs, also as CSV, LaTeX, Markdown or JSON.",
+        "show": "Print the results of runs, also as CSV or LaTeX.",
         "compare": "Compare two runs on the same data.",
         "explain": "Say why two runs of the same questions differ.",
-        "report": "Write a page with results and all samples, or a figure of the paper.",
+        "report": "Write a page of results and samples, or a figure.",
         "watch-run": "Open a page on a run as it goes.",
         "watch": "Write a video of an agent or an arm.",
         "export": "Write runs in the formats of others.",
-        "import-replies": "Store replies and counts of plans that others made, as runs.",
+        "import-replies": "Store replies that others made as runs.",
         "submit-check": "Check submissions of others before they are believed.",
         "leaderboard": "Write a page of the submissions that pass.",
-        "rescore": "Score the replies of a run again, also with your own scorer or a judge.",
+        "rescore": "Score replies again, also with a judge.",
         "audit": "Print what a question set gives away without a frame.",
-        "table4": "Compute the paper's Table 4 from the published question files.",
-        "table-final": "Compute the paper's table of final tasks from the published plan logs.",
+        "table4": "Compute the paper's Table 4 from published files.",
+        "table-final": "Compute the paper's table of final tasks.",
     },
     "Make data": {
         "generate": "Generate long-horizon trajectories in a scene.",
         "look-around": "Level the camera in the long walks of trajectories.",
-        "replay": "Replay trajectories in the simulator into frames and metadata.",
+        "replay": "Replay trajectories into frames and metadata.",
         "questions": "Generate NIEH questions on replayed trajectories.",
-        "twins": "Make twins of trajectories: questions with another answer in another world.",
+        "twins": "Make twins: the same episode with one thing changed.",
         "private-set": "Make a set of twins whose answers stay secret.",
-        "validate": "Keep the questions of a set that one of several models answers.",
-        "bundle": "Build a question set from a manifest of scenes and seeds.",
+        "validate": "Keep the questions that one of several models answers.",
+        "bundle": "Build a question set from a manifest.",
         "card": "Write a data set card and a Croissant file of a set.",
         "scenes": "Draw a scene, or export it for machines without Unity.",
     },
     "Own models": {
         "check-adapter": "Check a model adapter against the adapter contract.",
         "check-memory": "Check a memory against the contract of memories.",
-        "check-parity": "Compare a policy's actions with another implementation's.",
+        "check-parity": "Compare a policy's actions with another's.",
         "train": "Fine-tune a model on trajectories and questions.",
         "import-checkpoint": "Convert a checkpoint of the published trainer.",
     },
@@ -98,6 +99,8 @@ _SHARED_MODULES = {
 }
 _NAMES = tuple(name for group in _COMMANDS.values() for name in group)
 _DEFAULT = "run"
+# The options of a run in the overview.
+_USUAL = {"models", "tasks", "data", "model_args", "context", "memory", "frames", "limit", "output"}
 _INTERRUPTED, _TERMINATED = 130, 143  # exit codes
 _STOPPED = "stopped; run the same command to continue"
 _COLLECT_AFTER = 50_000  # new objects between two collections of garbage
@@ -138,16 +141,20 @@ class _Commands(ExampleGroup):
         return name, command, rest
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the commands, then the options, with those of the default command."""
+        """Write the commands, then the options, with those that most runs are given."""
         for group, commands in _COMMANDS.items():
             with formatter.section(group):  # not click's own list, which would import every command
                 formatter.write_dl(list(commands.items()))
         click.Command.format_options(self, ctx, formatter)
         run = self.get_command(ctx, _DEFAULT)
         assert run is not None
-        with formatter.section("Options of a run"):
-            records = (option.get_help_record(ctx) for option in run.params)
-            formatter.write_dl(list(filter(None, records)))
+        usual = (option.get_help_record(ctx) for option in run.params if option.name in _USUAL)
+        with formatter.section("Options of a run (`infthor-eval run --help` has all)"):
+            formatter.write_dl([(name, _first_clause(text)) for name, text in filter(None, usual)])
+
+
+def _first_clause(text: str) -> str:
+    return re.split(r"[;,(]| \[|\.(?: |$)", text)[0].strip() + "."
 
 
 @click.group(

@@ -4,6 +4,6 @@ Nothing here imports torch or transformers, so that listing models and reporting
 no time.
 """
 
-from model_adapters.options.parsing import NoOptions, describe, parse
+from model_adapters.options.parsing import NoOptions, describe, parse, with_defaults
 
-__all__ = ["NoOptions", "describe", "parse"]
+__all__ = ["NoOptions", "describe", "parse", "with_defaults"]

@@ -1,19 +1,24 @@
 """Options of the model families of transformers, each with its default checkpoint."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from infthor_eval.storage.limits import IMAGE_MEGAPIXELS
 from model_adapters.options.checkpoints import CheckpointOptions, FrameScaling
 
 __all__ = [
     "DeepseekVLOptions",
+    "Gemma4Options",
     "HfVlmOptions",
     "LlavaOnevisionOptions",
     "PixelLimits",
+    "PixelVlmOptions",
     "PixtralOptions",
     "Qwen25VLNanoOptions",
     "Qwen25VLOptions",
 ]
+
+_SOFT_TOKENS = (70, 140, 280, 560, 1120)  # that Gemma 4 was trained with
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,3 +100,31 @@ class HfVlmOptions(FrameScaling, CheckpointOptions):
     def __post_init__(self) -> None:
         super().__post_init__()
         CheckpointOptions.__post_init__(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PixelVlmOptions(PixelLimits, HfVlmOptions):
+    """Options of models that `hf-vlm` runs, whose frames have limits of their area."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gemma4Options(HfVlmOptions):
+    """Options of `gemma4`.
+
+    Attributes:
+        soft_tokens: most tokens of a frame: 70, 140, 280, 560 or 1120; the checkpoint's setting
+            where None (280).
+    """
+
+    soft_tokens: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.soft_tokens not in (None, *_SOFT_TOKENS):
+            raise ValueError(
+                f"soft_tokens={self.soft_tokens} is not {', '.join(map(str, _SOFT_TOKENS))}"
+            )
+        super().__post_init__()
+
+    def image_settings(self) -> dict[str, Any]:
+        """Return the image processor settings that differ from the checkpoint's."""
+        return {} if self.soft_tokens is None else {"max_soft_tokens": self.soft_tokens}

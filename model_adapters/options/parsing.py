@@ -9,7 +9,7 @@ from typing import Any
 
 from infthor_eval.errors import UsageError
 
-__all__ = ["NoOptions", "describe", "is_required", "parse", "read_pairs"]
+__all__ = ["NoOptions", "describe", "is_required", "parse", "read_pairs", "with_defaults"]
 
 _LARGEST = 2**63  # limit of the numbers in a run config
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
@@ -37,6 +37,20 @@ def is_required(field: dataclasses.Field[Any]) -> bool:
     """Return whether an option has no default."""
     missing = dataclasses.MISSING
     return field.init and field.default is missing and field.default_factory is missing
+
+
+def with_defaults(options: type, defaults: Mapping[str, Any]) -> type:
+    """Return the options with other defaults for some of them."""
+    if not defaults:
+        return options
+    hints = typing.get_type_hints(options)
+    return dataclasses.make_dataclass(
+        options.__name__,
+        [(name, hints[name], value) for name, value in defaults.items()],
+        bases=(options,),
+        frozen=True,
+        kw_only=True,
+    )
 
 
 def parse(model: str, options: type, texts: Mapping[str, str]) -> Any:

@@ -52,11 +52,23 @@ def test_the_overview_has_commands_in_groups(run_cli):
     code, out, _ = run_cli("--help")
     assert code == 0
     assert out.startswith("Example:\n  infthor-eval --model ")
-    headings = re.findall(r"^(\w[\w ]*):$", out, re.MULTILINE)
-    assert headings == ["Example", *GROUPS, "Options", "Options of a run"]
+    headings = re.findall(r"^(\w[^:\n]*):$", out, re.MULTILINE)
+    assert headings[:-1] == ["Example", *GROUPS, "Options"]
+    assert headings[-1] == "Options of a run (`infthor-eval run --help` has all)"
+    assert "  --model MODEL,... " in out
+    assert "--check-equality" not in out
     assert (
         out.index("compare")
         > out.index("Look at results:")
         > out.index("  plan ")
         > out.index("Evaluate:")
     )
+
+
+def test_the_options_of_a_run_are_by_suite(run_cli):
+    code, out, _ = run_cli("run", "--help")
+    assert code == 0
+    headings = re.findall(r"^(Options.*):$", out, re.MULTILINE)
+    assert headings[0] == "Options"
+    assert {"Options of nieh", "Options of plans", "Options of manipulation"} <= set(headings)
+    assert out.index("--limit") < out.index("Options of nieh:") < out.index("--k-tokens")

@@ -10,6 +10,7 @@ from typing import Any
 import click
 import msgspec
 
+from infthor_eval.cli.help import SuiteOption
 from infthor_eval.cli.options.values import WholeNumber, split_names
 from infthor_eval.errors import UsageError
 from infthor_eval.suites import options_class, suite_names
@@ -26,7 +27,12 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
     for name, by_suite in _shorthands().items():
         _, help_text = next(iter(by_suite.values())).metadata["shorthands"][name]
         command = click.option(
-            f"--{name}", is_flag=True, default=None, help=f"{help_text} [{', '.join(by_suite)}]"
+            f"--{name}",
+            cls=SuiteOption,
+            suites=tuple(by_suite),
+            is_flag=True,
+            default=None,
+            help=help_text,
         )(command)
     for name, by_suite in reversed(_options_by_name().items()):
         first, option = next(iter(by_suite.items()))
@@ -35,6 +41,8 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
         types = {bool: None, int: WholeNumber()}
         command = click.option(
             f"--{name.replace('_', '-')}",
+            cls=SuiteOption,
+            suites=tuple(by_suite),
             type=click.Choice(choices) if choices else types.get(kind, kind),
             is_flag=kind is bool,
             default=None,
@@ -150,10 +158,12 @@ def _refuse_unused(params: Mapping[str, Any], used: Collection[str]) -> None:
 
 
 def _help(by_suite: Mapping[str, Field[Any]]) -> str:
-    """The text of each suite with the suites' names; equal texts once."""
+    """The text of all suites, or those of each with its name."""
     suites: dict[str, list[str]] = {}
     for suite, option in by_suite.items():
         suites.setdefault(option.metadata.get("help", ""), []).append(suite)
+    if len(suites) == 1:
+        return next(iter(suites))
     return " ".join(f"{text} [{', '.join(names)}]" for text, names in suites.items())
 
 

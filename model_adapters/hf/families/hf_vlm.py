@@ -17,7 +17,8 @@ from PIL import Image
 from transformers.models.auto.modeling_auto import MODEL_FOR_IMAGE_TEXT_TO_TEXT_MAPPING_NAMES
 
 from infthor_eval.errors import ModelError, UsageError
-from model_adapters.hf.adapter import load_model
+from model_adapters.built_in import BUILT_IN
+from model_adapters.hf.adapter import load_model, require_model_type
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.families.deepseek_vl import DeepseekVLFamily
 from model_adapters.hf.families.llava_onevision import LlavaOnevisionFamily
@@ -178,7 +179,7 @@ def _markers(config: Any) -> tuple[int, int] | None:
 
 
 class HfVlm:
-    """The adapter `hf-vlm`."""
+    """The adapter `hf-vlm`, and of models with a name of their own that run as it does."""
 
     Options: ClassVar[type] = HfVlmOptions
 
@@ -211,7 +212,8 @@ class HfVlm:
 
         Raises:
             UsageError: no checkpoint is given.
-            ModelError: the checkpoint does not exist, or has no vision.
+            ModelError: the checkpoint does not exist, has no vision, or is of another model than a
+                built-in name says.
         """
         if not options.pretrained:
             raise UsageError(f"{name} needs pretrained=..., a hub id or a folder")
@@ -224,6 +226,9 @@ class HfVlm:
             raise ModelError(
                 f"{options.pretrained} is a {model_type} checkpoint, which has no vision"
             )
+        named = BUILT_IN.get(name)
+        if named is not None and named.model_types:
+            require_model_type(located, named.model_types)
         return located
 
 
