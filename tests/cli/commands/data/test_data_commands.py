@@ -17,23 +17,32 @@ from infthor_eval.formats.qa_csv import read_questions
 from ....helpers.command_line import option_words
 from ....infthor_sim.test_houses import furnished_house
 
+_FEW = ("--per-trajectory", 5)
 
-def _print(*arguments: object) -> dict:
-    """What our command prints with --json, in a fixture of the module, which has no `run`."""
+
+def _type(*arguments: object) -> str:
+    """What our command prints, in a fixture of the module, which has no `run_cli`."""
     output = io.TextIOWrapper(io.BytesIO())
     with contextlib.redirect_stdout(output), pytest.raises(SystemExit) as ended:
-        main([*map(str, arguments), "--json"])
+        main([*map(str, arguments)])
     assert ended.value.code == 0
     output.seek(0)
-    return json.load(output)
+    return output.read()
+
+
+def _print(*arguments: object) -> dict:
+    """What it prints with --json."""
+    return json.loads(_type(*arguments, "--json"))
 
 
 @pytest.fixture(scope="module")
 def printed(work):
-    """What `generate` and `replay` print when they make the set of this module."""
+    """What `generate`, `replay` and `questions` print when they make the set of this module."""
     scene = ("--scene", "kitchen-5", "--min-steps", 60, "--min-subgoals", 2, "--seed", 1)
     generated = _print("generate", *scene, "--out", work / "trajectories")
-    return generated, _print("replay", work / "trajectories", "--out", work / "set")
+    replayed = _print("replay", work / "trajectories", "--out", work / "set")
+    csv = work / "set/qa_set_mine.csv"
+    return generated, replayed, _type("questions", work / "set", "--out", csv, *_FEW)
 
 
 @pytest.fixture(scope="module")
@@ -91,19 +100,17 @@ def test_a_file_that_is_no_house_is_one_line(tmp_path, run_cli, content, message
 
 
 def test_the_three_commands_make_a_set(printed, work, run_cli):
-    generated, replayed = printed
+    generated, replayed, asked = printed
     assert generated["trajectories"] == 1
     assert replayed["whole"] == replayed["trajectories"] == 1
     assert replayed["actions"]["MoveAhead"]["refused"] == 0
     assert {"iou", "seconds"} <= set(replayed)
 
     csv = work / "set/qa_set_mine.csv"
-    code, out, _ = run_cli("questions", work / "set", "--out", csv, "--per-trajectory", 5)
-    assert code == 0
-    assert "5 questions on 1 trajectories" in out
+    assert "5 questions on 1 trajectories" in asked
     assert len(read_questions(csv)) == 5
     first = csv.read_bytes()
-    run_cli("questions", work / "set", "--out", csv, "--per-trajectory", 5)
+    run_cli("questions", work / "set", "--out", csv, *_FEW)
     assert csv.read_bytes() == first
 
 
@@ -255,6 +262,6 @@ def test_bathrooms_are_left_out_of_test_sets(tmp_path, run_cli):
     assert "bathrooms are left out" in err
 
 
-def test_a_replayed_set_is_an_nieh_set(made_folder, run_cli):
+def test_a_replayed_set_is_an_nieh_set(made_folder):
     shutil.rmtree(made_folder / "set/metadata/.nothing", ignore_errors=True)
     assert NiehSet(made_folder / "set")
