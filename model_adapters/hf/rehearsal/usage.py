@@ -235,14 +235,17 @@ class Rehearsal:
 
     def _measure(self, n_context: int) -> Usage:
         device = self._device
+        # A context may be shorter than a chunk.
+        size = max(self.frame_tokens, n_context - _QUESTION - 2)
+        chunk = next(chunks(self._chunk, size))
         with self._running():
             self._prefix.reset()
             held = device.allocated  # weights, and features of the frames below
-            self._start(n_context, n_tokens(self._chunk) + _QUESTION + 1)
+            self._start(n_context, n_tokens(chunk) + _QUESTION + 1)
             device.reset_peak()
             kernels = {
                 name: self._attention(partial(self._prefix.feed, pieces))
-                for name, pieces in self.parts.items()
+                for name, pieces in {**self.parts, "frames": chunk}.items()
             }
             cache = device.allocated - held
             activations = max(device.peak - held - cache, self._vision)
