@@ -55,13 +55,14 @@ def test_listings_and_help_are_printed_at_once(typed: str) -> None:
 
 # Runs a command up to its first question, and prints what is imported by then.
 FIRST_QUESTION = """
-import os, sys
+import sys
 from infthor_eval.cli import main
+from infthor_eval.cli.own_code import end_process
 from infthor_eval.nieh.asking import answering
 
 def print_modules(*_):
     print(*sorted(sys.modules), file=sys.__stdout__, flush=True)  # not that of a run
-    os._exit(0)
+    end_process(0)
 
 answering.OpenModel.answer = answering.OpenBaseline.answer = print_modules
 main(sys.argv[1:])

@@ -4,7 +4,6 @@ of grey are read as 8, and EXIF data turn the picture."""
 import struct
 from contextlib import suppress
 
-import numpy as np
 from PIL import ExifTags, Image
 from PIL.Image import Transpose
 
@@ -20,6 +19,8 @@ def as_shown(image: Image.Image) -> Image.Image:
     """Return an opened picture in RGB, as it is shown."""
     turn = _TURNS.get(orientation(image))  # before decoding: browsers ignore EXIF data behind it
     if image.mode.startswith("I"):
+        import numpy as np  # which commands without frames need not load
+
         values, key = np.asarray(image), image.info.get("transparency")
         image = Image.fromarray((values >> 8).astype(np.uint8))  # Pillow cuts what is above 255
         if key is not None:
