@@ -22,7 +22,6 @@ from infthor_eval.exports.gaps import (
     dataset_name,
     describe_gaps,
     gap_notes,
-    last_change,
     task_document,
     task_gaps,
 )
@@ -32,6 +31,7 @@ from infthor_eval.exports.samples import SampleReader
 from infthor_eval.exports.subjects import UNKNOWN, ModelFacts, model_facts
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.runs import with_frames
+from infthor_eval.runs.journals.shards import last_change
 from infthor_eval.runs.results import results_document
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint

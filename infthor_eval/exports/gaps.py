@@ -2,8 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -11,14 +9,12 @@ import msgspec
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.runs import TaskConfig
-from infthor_eval.runs.journals.shards import find_shards
 
 __all__ = [
     "TaskGaps",
     "dataset_name",
     "describe_gaps",
     "gap_notes",
-    "last_change",
     "task_config",
     "task_document",
     "task_gaps",
@@ -100,15 +96,6 @@ def gap_notes(run: PresentedRun) -> list[str]:
     """Return a line for each task of which something is left out."""
     described = {task: describe_gaps(task_gaps(run, task)) for task in run.tasks}
     return [f"{run.label}, {task}: {words}" for task, words in described.items() if words]
-
-
-def last_change(folder: Path) -> datetime:
-    """Return when the last unit of the run in a folder was done, by its journal.
-
-    Exports take it as their own time, so that those of one run are equal.
-    """
-    changed = max(shard.stat().st_mtime for shard in find_shards(folder))
-    return datetime.fromtimestamp(changed, UTC)
 
 
 def _count(reasons: Iterable[str | None]) -> dict[str, int]:

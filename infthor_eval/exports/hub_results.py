@@ -13,12 +13,13 @@ from typing import Any
 import yaml
 
 from infthor_eval.errors import UsageError, wrap_errors
-from infthor_eval.exports.gaps import describe_gaps, gap_notes, last_change, task_gaps
+from infthor_eval.exports.gaps import describe_gaps, gap_notes, task_gaps
 from infthor_eval.exports.measures import Measure, find_measures
 from infthor_eval.exports.request import ExportRequest, Written
 from infthor_eval.exports.subjects import UNKNOWN, ModelFacts, model_facts
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.runs import with_frames
+from infthor_eval.runs.journals.shards import last_change
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
 __all__ = ["write"]

@@ -18,7 +18,6 @@ from infthor_eval.exports.gaps import (
     dataset_name,
     describe_gaps,
     gap_notes,
-    last_change,
     task_config,
     task_document,
     task_gaps,
@@ -31,6 +30,7 @@ from infthor_eval.exports.subjects import ModelFacts, model_facts
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.runs import with_frames
+from infthor_eval.runs.journals.shards import last_change
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 

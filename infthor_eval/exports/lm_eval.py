@@ -16,8 +16,8 @@ import msgspec
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.exports import LM_EVAL_MODEL
-from infthor_eval.exports.gaps import last_change
 from infthor_eval.runs import RunOutcome, TaskFile, UnitCounts, UnitRecord, UnitSample
+from infthor_eval.runs.journals.shards import last_change
 from infthor_eval.statistics import clustered_mean
 from infthor_eval.storage.digests import canonical_json
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from itertools import chain
 from pathlib import Path
 from typing import Any, Generic
@@ -32,6 +33,7 @@ __all__ = [
     "check_format",
     "find_shards",
     "is_of_run",
+    "last_change",
     "parse_header",
     "parse_record",
     "read_header",
@@ -203,6 +205,15 @@ def find_shards(run: Path) -> list[Path]:
     for path in shards:
         require_file(path, "take it out of the run's folder")
     return shards
+
+
+def last_change(folder: Path) -> datetime:
+    """Return when the last unit of the run in a folder was done, by its journal.
+
+    Exports take it as their own time, so that those of one run are equal.
+    """
+    changed = max(shard.stat().st_mtime for shard in find_shards(folder))
+    return datetime.fromtimestamp(changed, UTC)
 
 
 def read_shards(
