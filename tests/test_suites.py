@@ -86,7 +86,7 @@ def test_a_suite_of_another_package_runs_with_its_task_and_its_options(package):
         done = command(package, "export", results.parent, *words)
         assert (done.returncode, "2 of 4 failed" in done.stderr) == (0, True), done.stderr
     helped = command(package, "run", "--help").stdout
-    assert "What it is made of. [sums]" in " ".join(helped.split())
+    assert "Options of sums: --abacus TEXT What it is made of." in " ".join(helped.split())
 
 
 def test_it_is_found_by_name_behind_the_built_in_ones(package):
