@@ -75,8 +75,7 @@ def test_another_model_of_lm_evals_is_refused_in_one_line(tmp_path):
         check=False,
     )
     assert done.returncode != 0
-    last = done.stderr.strip().splitlines()[-1]
-    assert last.endswith(
-        "UsageError: plans are carried out in a simulator, which infthor-eval's models alone do; "
+    assert done.stderr.strip().splitlines()[-1] == (
+        "infthor-eval: plans are carried out in a simulator, which infthor-eval's models alone do; "
         "use --model infthor"
     )
