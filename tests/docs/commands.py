@@ -50,7 +50,8 @@ CANNOT_RUN = {
     r"--model hf-multimodal ": WEIGHTS,
     r"--model (openai|anthropic|gemini) ": KEY,
     r"--rehearse|--count 100": HOURS,
-    r"results/MODEL/|MyModel|my_task$|=PATH\b|DATA$|import-replies exported|lm-eval run \.\.\.": READERS,
+    r"results/MODEL/|MyModel|my_task$|=PATH\b|DATA$": READERS,
+    r"import-replies exported|lm-eval run \.\.\.": READERS,
 }
 PROGRAMS = ("infthor-eval", "make", "lm-eval", "pip", "python", "hf", "torchrun", "export")
 _RUN_HERE = ("infthor-eval", "lm-eval")
