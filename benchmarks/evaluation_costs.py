@@ -1,7 +1,7 @@
 """Seconds, memory and GPUs that requests to a model take.
 
-`published_evaluation.py` sums them up; docs/cost.md has the formulae. Units are tokens, seconds,
-bytes and FLOP. The numbers of a machine are per GPU.
+`published_evaluation.py` sums them up; benchmarks/cost.md has the formulae. Units are tokens,
+seconds, bytes and FLOP. The numbers of a machine are per GPU.
 """
 
 import heapq

@@ -12,7 +12,7 @@ has as many GPUs as its longest context requires.
 
 The second command uses measurements on a GPU (benchmarks/gpu.md): tokens/s of encoding at two
 lengths, and tokens/s of decoding at a short one. Rates without measurements are estimated from the
-machine's numbers. docs/cost.md has the formulae.
+machine's numbers. benchmarks/cost.md has the formulae.
 """
 
 from collections.abc import Sequence

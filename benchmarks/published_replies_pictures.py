@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/published-replies.md from the published question files and three
+"""Draw the pictures of docs/paper.md from the published question files and three
 imported runs.
 
     infthor-eval import-replies LOGS/eval_qa_set_*.log --data DATA --out results

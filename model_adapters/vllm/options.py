@@ -1,7 +1,7 @@
-"""Options of models that vLLM runs; docs/vllm.md lists the corresponding arguments of vLLM.
+"""Options of models that vLLM runs; docs/engines.md lists the corresponding arguments of vLLM.
 
 To add an option of models in vLLM: a field here, its effect in `arguments.py`, its line in
-`docs/vllm.md`.
+`docs/engines.md`.
 """
 
 from dataclasses import dataclass, fields

@@ -23,29 +23,22 @@ ELSEWHERE = "needs the example package installed; tests/examples does that"
 # Pages whose commands are parsed and not run.
 PARSED_PAGES = {
     "CONTRIBUTING.md": CLONE,
-    "docs/batches.md": KEY,
-    "docs/cost.md": HOURS,
     "docs/engines.md": GPU,
     "docs/figures.md": HOURS,
-    "docs/howto/long-contexts.md": GPU,
     "docs/howto/own-scenes.md": HOURS,
     "docs/howto/publish-a-set.md": READERS,
-    "docs/howto/published-data.md": "downloads the published set",
     "docs/howto/trackers.md": "needs an account of a tracker",
     "docs/howto/unity.md": UNITY,
     "docs/manipulation.md": HOURS,
     "docs/memories.md": HOURS,
     "docs/nieh.md": HOURS,
-    "docs/openai.md": KEY,
+    "docs/paper.md": HOURS,
     "docs/people.md": PERSON,
     "docs/plans.md": HOURS,
     "docs/policies.md": KEY,
     "docs/report.md": READERS,
-    "docs/reproduce.md": HOURS,
     "docs/submit.md": READERS,
     "docs/twins.md": HOURS,
-    "docs/vllm.md": GPU,
-    "docs/workers.md": HOURS,
     "examples/sums/README.md": ELSEWHERE,
     "examples/thumbnails/README.md": ELSEWHERE,
 }
@@ -56,7 +49,9 @@ CANNOT_RUN = {
     r"import-checkpoint PEARLS-Lab/": WEIGHTS,
     r"--model hf-multimodal ": WEIGHTS,
     r"--model (openai|anthropic|gemini) ": KEY,
-    r"MyModel|my_task$|=PATH\b|DATA$|import-replies exported|lm-eval run \.\.\.": READERS,
+    r"--rehearse|--count 100": HOURS,
+    r"results/MODEL/|MyModel|my_task$|=PATH\b|DATA$": READERS,
+    r"import-replies exported|lm-eval run \.\.\.": READERS,
 }
 PROGRAMS = ("infthor-eval", "make", "lm-eval", "pip", "python", "hf", "torchrun", "export")
 _RUN_HERE = ("infthor-eval", "lm-eval")

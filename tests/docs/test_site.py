@@ -49,9 +49,9 @@ def site(tmp_path_factory):
 @pytest.mark.parametrize(
     ("place", "link", "expected"),
     [
-        ("cost.md", "../benchmarks/gpu.md", "benchmarks/gpu.md"),
-        ("howto/long-contexts.md", "../../benchmarks/gpu.md", "../benchmarks/gpu.md"),
-        ("benchmarks/gpu.md", "../docs/cost.md", "../cost.md"),
+        ("running.md", "../benchmarks/gpu.md", "benchmarks/gpu.md"),
+        ("howto/unity.md", "../../benchmarks/gpu.md", "../benchmarks/gpu.md"),
+        ("benchmarks/gpu.md", "../docs/running.md", "../running.md"),
         (
             "benchmarks/README.md",
             "../docs/own-models.md#as-a-package",

@@ -152,7 +152,7 @@ def test_old_keys_are_there_and_empty(kitchen):
 
 
 def test_every_action_is_described():
-    text = (Path(__file__).resolve().parents[2] / "docs" / "simulator.md").read_text(
+    text = (Path(__file__).resolve().parents[2] / "infthor_sim" / "ACTIONS.md").read_text(
         encoding="utf-8"
     )
     assert [

@@ -34,8 +34,8 @@ __all__ = ["rehearse"]
 _GIGABYTES = (24, 48, 80, 141)  # of common GPUs
 _CONTEXTS = (8_192, 32_768, 131_072, 524_288, 1_048_576)  # tokens
 _STEP = 1024  # tokens that the largest context is found to
-# Of docs/cost.md, for an H100: share of the memory that is used, operations in a second in products
-# of matrices and in attention.
+# Of benchmarks/cost.md, for an H100: share of the memory that is used, operations in a second in
+# products of matrices and in attention.
 _USABLE = 0.9
 _MATRIX_FLOP = 400e12
 _ATTENTION_FLOP = 200e12

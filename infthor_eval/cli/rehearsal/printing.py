@@ -102,7 +102,7 @@ def _images(images: Images) -> str:
     return (
         f"pictures     {images.here:.0f} frames/s are read and scaled on a core here "
         f"({images.measured} timed); an H100 encodes about {images.by_gpu:.1f} half-way along the "
-        f"longest context (rates of docs/cost.md): {waits}"
+        f"longest context (rates of benchmarks/cost.md): {waits}"
     )
 
 

@@ -28,7 +28,7 @@ from model_adapters.hf.rehearsal.model import RehearsedModel
 
 __all__ = ["FrameWork", "Kernels", "Rehearsal", "Usage"]
 
-_QUESTION = 60  # tokens of a question and what is around it, as in docs/cost.md
+_QUESTION = 60  # tokens of a question and what is around it, as in benchmarks/cost.md
 _TOGETHER = 25  # most questions on a trajectory of the published set
 _MIB = 2**20
 _FIRST_STEPS = (32, 512)
