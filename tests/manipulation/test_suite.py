@@ -65,7 +65,8 @@ def test_the_planner_does_what_the_expert_did(prepare_run, data):
     (table, *_) = outcome.run.suite.tables([outcome.summary])
     (row,) = [row for row in table.rows if not row.is_published]
     assert [cell.partition(" ")[0] for cell in row.cells] == [
-        "planner-arm", "0.5", "100.0", "100.0", "2", "1", "2", "0", "0", "0", "0", "-", "-",
+        "planner-arm", "0.5", "100.0", "100.0", "2", "1", "2", "0", "0", "0", "0",
+        "100.0", "100.0", "-", "-",
     ]  # fmt: skip
 
 
