@@ -108,7 +108,7 @@ def _heads(grid: int) -> tuple[tuple[_Head, ...], ...]:
 
 
 # Scales of the first weights, chosen by how well an untrained decoder finds what happened and where
-# things are (docs/training.md, "First weights that hold").
+# things are (README.md).
 _WORD_NOISE = 0.01
 _NAME_REST = 0.4  # of the part for all else, in the code of a name
 _NAME_NOISE = 0.02
