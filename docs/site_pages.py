@@ -41,6 +41,7 @@ _OUTSIDE = {  # where a file lies in the repository: where its page stands in th
     "examples/thumbnails/README.md": "examples/thumbnails/README.md",
     "infthor_sim/ACTIONS.md": "infthor_sim/ACTIONS.md",
     "infthor_sim/README.md": "infthor_sim/README.md",
+    "recipes/nano/README.md": "recipes/nano/README.md",
     "results/README.md": "results/README.md",
 }
 _LINK = re.compile(r"(?<=\]\()(?![a-z]+:|#)([^)#\s]+)")

@@ -22,7 +22,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "where-things-go.md"
-ROOMS = ("infthor_eval", "infthor_sim", "model_adapters", "tests")
+ROOMS = ("infthor_eval", "infthor_sim", "model_adapters", "recipes", "tests")
 WORDS = 30  # of a cell, as tests/docs/test_tables.py has it
 
 # Headings in the order of the page; a module belongs to the longest path that it begins with.
@@ -63,7 +63,7 @@ _SECTIONS = {
         "infthor_eval/storage/",
         "infthor_eval/submissions/",
     ),
-    "Training": ("infthor_eval/training/",),
+    "Training": ("infthor_eval/training/", "recipes/"),
 }
 _BEGINNING = "To add "
 _PARAGRAPH = re.compile(r"To add (?:or change )?([^:|]+): ([^|]+)\.")

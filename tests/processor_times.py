@@ -40,7 +40,7 @@ KEPT = (
     "tests/plans/actors/test_model.py::test_the_experts_own_words_carry_every_plan_out",
     "tests/nieh/asking/test_notebook.py::test_a_note_is_what_the_model_says_to_its_window_alone",
     "tests/training/test_fine_tuning.py::test_adapters_are_trained_and_merged",
-    "tests/training/nano/test_nano.py::"
+    "tests/recipes/nano/test_nano.py::"
     "test_a_stopped_training_continues_to_the_same_weights[vision]",
     "tests/harness/test_host.py::test_our_model_under_lm_evals_own_command_gives_the_samples_of_our_own",
     "tests/cli/commands/data/test_data_commands.py::test_the_three_commands_make_a_set",

@@ -38,20 +38,6 @@ class Segmentation:
             if code in self.names
         }
 
-    def cell_pixels(self, grid: int) -> dict[str, NDArray[np.int64]]:
-        """Return how many pixels of each cell of the frame show an object, by its id.
-
-        Args:
-            grid: cells along each side of the frame; numbers of pixels are [grid, grid], the top
-                row first.
-        """
-        rows, columns = (np.arange(extent) * grid // extent for extent in self.codes.shape)
-        codes, index = np.unique(self.codes, return_inverse=True)
-        places = index.reshape(self.codes.shape) * grid**2 + rows[:, None] * grid + columns
-        pixels = np.bincount(places.ravel(), minlength=len(codes) * grid**2)
-        by_code = dict(zip(codes.tolist(), pixels.reshape(-1, grid, grid), strict=True))
-        return {self.names[code]: cells for code, cells in by_code.items() if code in self.names}
-
 
 def segmentation_of(event: Any) -> Segmentation | None:
     """Return the segmentation of an `ai2thor.server.Event`, None if it was not rendered."""

@@ -17,7 +17,7 @@ from infthor_eval.plans.plan import plans_of, tasks_of
 from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
 from model_adapters.hf.prompting.prompt import n_tokens
 
-__all__ = ["recorded_segments", "single_plans", "windows"]
+__all__ = ["recorded_segments", "windows"]
 
 
 def recorded_segments(
@@ -93,24 +93,9 @@ def windows(
             first += 1
             continue
         numbers = f"plan {end}" if end == first + 1 else f"plans {first + 1} to {end}"
-        yield encoder.actions(f"{name}, {numbers}", restart_at(segments, first, end))
+        parts = segment_parts(restart_at(segments, first, end))
+        yield encoder.actions(f"{name}, {numbers}", parts)
         first = end
-
-
-def single_plans(
-    encoder: Encoder, name: str, segments: Sequence[PlanSegment]
-) -> Iterator[TrainingSequence]:
-    """Cut a history into sequences of one plan each, with its goal and the frame it begins with.
-
-    Raises:
-        DataError: a frame cannot be read, or a text of the history contains a mark.
-        ModelError: the template refuses the history.
-    """
-    for number, segment in enumerate(segments):
-        if segment.steps:
-            yield encoder.actions(
-                f"{name}, plan {number + 1}", restart_at(segments, number, number + 1)
-            )
 
 
 def _window_end(encoder: Encoder, segments: Sequence[PlanSegment], first: int, limit: int) -> int:

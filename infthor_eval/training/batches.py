@@ -9,9 +9,9 @@ from torch.nn.utils.rnn import pad_sequence
 from infthor_eval.errors import DataError
 from infthor_eval.training.encoding import TrainingSequence
 from model_adapters.hf.family import Family
-from model_adapters.hf.prompting.prompt import Frame, n_tokens, token_ids
+from model_adapters.hf.prompting.prompt import Frame, token_ids
 
-__all__ = ["IGNORED", "Batch", "collate", "n_labels"]
+__all__ = ["IGNORED", "Batch", "collate", "n_labels", "pad_positions"]
 
 IGNORED = -100  # label of tokens without loss, in PyTorch's cross entropy
 
@@ -25,7 +25,7 @@ class Batch(TypedDict):
             axes.
         attention_mask: 0 for padding and 1 for tokens, (batch, tokens). None without padding,
             because attention kernels with a built-in causal mask are faster than those that read
-            one. With branches, true where a token sees another, (batch, 1, tokens, tokens).
+            one.
         labels: the token where loss is computed on it, else -100, (batch, tokens).
         slots: true for slots of frames' features, (batch, tokens).
         frames: frames of the whole batch, in the order of their slots.
@@ -51,7 +51,7 @@ def collate(sequences: Sequence[TrainingSequence], family: Family, pad_id: int) 
     return Batch(
         input_ids=pad_sequence(ids, batch_first=True, padding_value=pad_id),
         position_ids=_positions(sequences, ids, family),
-        attention_mask=_attention_mask(sequences, ids),
+        attention_mask=_attention_mask(ids),
         labels=pad_sequence(labels, batch_first=True, padding_value=IGNORED),
         slots=pad_sequence(
             [_slots(sequence, family.slot_id) for sequence in sequences], batch_first=True
@@ -65,29 +65,9 @@ def n_labels(batch: Batch) -> int:
     return int((batch["labels"] != IGNORED).sum())
 
 
-def _attention_mask(
-    sequences: Sequence[TrainingSequence], ids: Sequence[torch.Tensor]
-) -> torch.Tensor | None:
-    if not any(sequence.branches for sequence in sequences):
-        masks = pad_sequence([torch.ones_like(own) for own in ids], batch_first=True)
-        return None if bool(masks.all()) else masks
-    spans = pad_sequence(
-        [_span_numbers(sequence) for sequence in sequences], batch_first=True, padding_value=-1
-    )
-    of_query, of_key = spans[:, :, None], spans[:, None, :]
-    is_seen = ((of_key == 0) | (of_key == of_query)).tril()
-    # A row that sees nothing has no softmax; padding sees other padding.
-    return is_seen[:, None]
-
-
-def _span_numbers(sequence: TrainingSequence) -> torch.Tensor:
-    """Return 0 for tokens before all branches, and the number of its branch for each other."""
-    sizes = _span_sizes(sequence)
-    return torch.arange(len(sizes)).repeat_interleave(torch.tensor(sizes))
-
-
-def _span_sizes(sequence: TrainingSequence) -> list[int]:
-    return [n_tokens(sequence.pieces[span]) for span in sequence.spans]
+def _attention_mask(ids: Sequence[torch.Tensor]) -> torch.Tensor | None:
+    masks = pad_sequence([torch.ones_like(own) for own in ids], batch_first=True)
+    return None if bool(masks.all()) else masks
 
 
 def _labels(sequence: TrainingSequence, ids: torch.Tensor) -> torch.Tensor:
@@ -104,28 +84,19 @@ def _labels(sequence: TrainingSequence, ids: torch.Tensor) -> torch.Tensor:
 def _positions(
     sequences: Sequence[TrainingSequence], ids: Sequence[torch.Tensor], family: Family
 ) -> torch.Tensor:
-    """Return the positions of sequences, each from 0; padding has 0, which never lengthens RoPE.
+    return pad_positions(
+        [
+            family.positions(own, [frame.size for frame in sequence.frames], 0)
+            for sequence, own in zip(sequences, ids, strict=True)
+        ]
+    )
 
-    Each branch goes on where what is before all branches ends.
-    """
-    rows = [
-        _row_of_positions(sequence, own, family)
-        for sequence, own in zip(sequences, ids, strict=True)
-    ]
+
+def pad_positions(rows: Sequence[torch.Tensor]) -> torch.Tensor:
+    """Return the positions of sequences, each from 0; padding has 0, which never lengthens RoPE."""
     longest = max(row.shape[-1] for row in rows)
     padded = [torch.nn.functional.pad(row, (0, longest - row.shape[-1])) for row in rows]
     return torch.cat(padded, dim=-2)
-
-
-def _row_of_positions(
-    sequence: TrainingSequence, ids: torch.Tensor, family: Family
-) -> torch.Tensor:
-    parts: list[torch.Tensor] = []
-    for span, own in zip(sequence.spans, ids.split(_span_sizes(sequence)), strict=True):
-        sizes = [piece.size for piece in sequence.pieces[span] if isinstance(piece, Frame)]
-        start = int(parts[0].max()) + 1 if parts else 0
-        parts.append(family.positions(own, sizes, start))
-    return torch.cat(parts, dim=-1)
 
 
 def _slots(sequence: TrainingSequence, slot_id: int) -> torch.Tensor:

@@ -58,8 +58,8 @@ def goal_windows(
         if ACT in "".join(_texts(parts))
     ]
     for number, parts in enumerate(windows, start=1):
-        yield encoder.chat_actions(
-            f"{name}, window {number} of {len(windows)}", system_prompt("goals"), parts
+        yield encoder.actions(
+            f"{name}, window {number} of {len(windows)}", parts, system_prompt("goals")
         )
 
 

@@ -14,7 +14,7 @@ from infthor_eval.training.batches import IGNORED
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.prompt import Frame
 
-__all__ = ["PARTS", "SequenceModel", "decay_groups", "freeze", "next_labels", "parameters_by_part"]
+__all__ = ["PARTS", "SequenceModel", "freeze", "next_labels", "parameters_by_part"]
 
 PARTS = ("vision", "embeddings", "decoder", "head")
 # Frames in the vision tower at once; 1,000 frames would need more memory than the decoder.
@@ -209,21 +209,6 @@ def parameters_by_part(model: SequenceModel) -> dict[str, list[Parameter]]:
     language = in_embeddings | set(map(id, decoder)) | set(map(id, head))
     vision = [parameter for parameter in model.model.parameters() if id(parameter) not in language]
     return {"vision": vision, "embeddings": embeddings, "decoder": decoder, "head": head}
-
-
-def decay_groups(parameters: Sequence[Parameter], weight_decay: float) -> list[dict[str, Any]]:
-    """Return parameter groups of an optimizer: matrices decay, biases and norms do not."""
-    groups = [
-        {
-            "params": [parameter for parameter in parameters if parameter.ndim > 1],
-            "weight_decay": weight_decay,
-        },
-        {
-            "params": [parameter for parameter in parameters if parameter.ndim <= 1],
-            "weight_decay": 0.0,
-        },
-    ]
-    return [group for group in groups if group["params"]]
 
 
 def freeze(model: SequenceModel, parts: Collection[str]) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import msgspec
 
@@ -10,7 +10,6 @@ from infthor_eval.errors import DataError, UsageError, unknown_name, wrap_errors
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.storage.folders import packaged_folder
-from infthor_eval.training.nano.settings import NanoRecipe
 
 __all__ = [
     "ActionData",
@@ -20,10 +19,13 @@ __all__ = [
     "QuestionData",
     "Recipe",
     "read_recipe",
+    "read_recipe_file",
     "recipe_names",
 ]
 
 _FOLDER = "training/recipes"
+_EXAMPLES = "see infthor_eval/training/recipes for examples"
+_Form = TypeVar("_Form", bound=msgspec.Struct)
 
 
 class ActionData(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -203,14 +205,13 @@ def recipe_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in packaged_folder(_FOLDER).glob("*.yaml")))
 
 
-def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe | NanoRecipe:
+def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe:
     """Read a recipe by its name, or from a file.
 
     Args:
         name: one of `recipe_names()`, or a path that ends in .yaml.
-        changes: settings that replace those of the file, with dots for nested ones
-            (`optimizer.lr`). Another model does not get the `model_args` of the file, which are
-            options of the file's model.
+        changes: settings that replace those of the file, as for `read_recipe_file`. Another model
+            does not get the `model_args` of the file, which are options of the file's model.
 
     Raises:
         UsageError: the recipe does not exist, or a setting is unknown or not valid.
@@ -219,22 +220,26 @@ def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe |
     path = Path(name) if name.endswith(".yaml") else packaged_folder(_FOLDER) / f"{name}.yaml"
     if not path.is_file() and not name.endswith(".yaml"):
         raise unknown_name("recipe", name, recipe_names())
-    document = read_yaml(path, "see infthor_eval/training/recipes for examples")
+    return read_recipe_file(path, changes or {}, Recipe)
+
+
+def read_recipe_file(path: Path, changes: Mapping[str, Any], form: type[_Form]) -> _Form:
+    """Read a recipe of some form, with changed settings: dots for nested ones (`optimizer.lr`).
+
+    Raises:
+        UsageError: a setting is unknown or not valid.
+        DataError: the file is not YAML, or no mapping.
+    """
+    document = read_yaml(path, _EXAMPLES)
     if not isinstance(document, dict):
-        raise DataError(
-            f"{path}: not a recipe (no mapping of settings); see infthor_eval/training/recipes for "
-            "examples"
-        )
+        raise DataError(f"{path}: not a recipe (no mapping of settings); {_EXAMPLES}")
     wrong = (msgspec.ValidationError, TypeError)
-    settings = changes or {}
     with wrap_errors(f"{path}: not a recipe", "fix the setting", catch=wrong, raise_as=UsageError):
-        if settings.get("model", document.get("model")) != document.get("model"):
+        if changes.get("model", document.get("model")) != document.get("model"):
             document.pop("model_args", None)
-        for key, value in settings.items():
+        for key, value in changes.items():
             _set_nested(document, key.split("."), value)
-        if "architecture" in document:
-            return msgspec.convert(document, NanoRecipe, strict=False)
-        return msgspec.convert(document, Recipe, strict=False)
+        return msgspec.convert(document, form, strict=False)
 
 
 def _set_nested(document: Any, keys: list[str], value: Any) -> None:

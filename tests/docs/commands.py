@@ -41,6 +41,7 @@ PARSED_PAGES = {
     "docs/twins.md": HOURS,
     "examples/sums/README.md": ELSEWHERE,
     "examples/thumbnails/README.md": ELSEWHERE,
+    "recipes/nano/README.md": HOURS,
 }
 # On the other pages a command that matches is parsed and not run. One that matches nothing any more
 # fails a test.
@@ -125,8 +126,12 @@ def code_of(page: str) -> list[Code]:
 
 
 def all_pages() -> list[str]:
-    """The pages for readers: of the repository, the documentation and the examples."""
-    paths = (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md"))
+    """The pages for readers: of the repository, the documentation, the examples, the recipes."""
+    folders = ("docs", "examples", "recipes")
+    paths = [
+        *ROOT.glob("*.md"),
+        *(path for name in folders for path in ROOT.glob(f"{name}/**/*.md")),
+    ]
     return sorted(str(path.relative_to(ROOT)) for path in paths)
 
 

@@ -14,7 +14,7 @@ PAGES = (
     "CONTRIBUTING.md",
     "infthor_sim/README.md",
 )
-PACKAGES = ("infthor_eval", "infthor_sim", "model_adapters")
+PACKAGES = ("infthor_eval", "infthor_sim", "model_adapters", "recipes")
 PLACE = re.compile(r"`([\w./-]+?(?:/|\.(?:py|yaml|md|js|html|css|txt|gz)))(?:: ?(\w+))?`")
 # Files of runs and of recorded data, which are not in the tree.
 WRITTEN = {

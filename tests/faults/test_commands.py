@@ -183,10 +183,6 @@ TYPED = [
         "--gpus and --tflops are for --dry-run; add it",
     ),
     (
-        ["train", "--recipe", "questions", "--data", "SET", "--out", "OUT", "--workers", 2],
-        "share the generation of data, which only the recipes small and tiny without --data do",
-    ),
-    (
         ["train", *option_words(recipe="final_text", data="SET", out="OUT", set="prompt=plain")],
         "final_text.yaml: not a recipe (actions of the form text follow a system prompt; set "
         "prompt to chat); fix the",

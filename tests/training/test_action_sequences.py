@@ -16,7 +16,7 @@ from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.sequence_text import ACT
 from infthor_eval.plans.history.segments import PlanSegment, segment_parts
-from infthor_eval.training.action_sequences import recorded_segments, single_plans, windows
+from infthor_eval.training.action_sequences import recorded_segments, windows
 from infthor_eval.training.encoding import SkippedSequence, TrainingSequence
 from model_adapters.hf.prompting.prompt import Frame
 
@@ -82,25 +82,6 @@ def test_windows_have_every_action_once_and_each_begins_as_a_trajectory_does(bun
         ]
 
 
-def test_single_plans_have_every_action_once_and_each_begins_as_a_trajectory_does(
-    bundled_set, encoder
-):
-    for name in names_in(bundled_set):
-        segments = segments_of(bundled_set, name)
-        alone = list(single_plans(encoder, name, segments))
-        assert len(alone) == sum(bool(segment.steps) for segment in segments)
-        actions = [
-            _ACTION.findall(
-                text_of_ids(encoder, [one for one in plan.pieces if isinstance(one, int)])
-            )
-            for plan in alone
-        ]
-        assert actions == [
-            [action for action, _ in segment.steps] for segment in segments if segment.steps
-        ]
-        assert all(text_of_ids(encoder, plan.pieces[:1]) == "<|goal|>" for plan in alone)
-
-
 def test_windows_cannot_hold_another_plan(bundled_set, encoder):
     name = names_in(bundled_set)[0]
     history = segments_of(bundled_set, name)
@@ -137,9 +118,9 @@ def test_an_agent_is_asked_with_what_it_was_trained_on(bundled_set, encoder):
     it."""
     name = names_in(bundled_set)[1]
     history = segments_of(bundled_set, name)[:3]
-    window = encoder.actions(name, history)
-    opens = [at for at, piece in enumerate(window.pieces) if piece == encoder._mark][::2]
     parts = segment_parts(history)
+    window = encoder.actions(name, parts)
+    opens = [at for at, piece in enumerate(window.pieces) if piece == encoder._mark][::2]
     requests = [
         at for at, part in enumerate(parts) if isinstance(part, str) and part.startswith(ACT)
     ]
@@ -150,9 +131,8 @@ def test_an_agent_is_asked_with_what_it_was_trained_on(bundled_set, encoder):
 
 def test_ids_and_labels_of_a_short_history(tmp_path, encoder, bundled_set):
     first, second = NiehSet(bundled_set).frames(names_in(bundled_set)[0])[:2]
-    window = encoder.actions(
-        "one", [PlanSegment("go to the sink", "wash a mug", first, (("MoveAhead", second),))]
-    )
+    segment = PlanSegment("go to the sink", "wash a mug", first, (("MoveAhead", second),))
+    window = encoder.actions("one", [*segment.parts()])
     ids = encoder._tokenizer
     goal, plan, act = ids.convert_tokens_to_ids(["<|goal|>", "<|plan|>", ACT])
     start, end = ids.convert_tokens_to_ids(["<|vision_start|>", "<|vision_end|>"])
@@ -176,8 +156,9 @@ def test_ids_and_labels_of_a_short_history(tmp_path, encoder, bundled_set):
 
 def test_a_text_that_holds_a_mark_is_refused(encoder, bundled_set):
     first, second = NiehSet(bundled_set).frames(names_in(bundled_set)[0])[:2]
+    segment = PlanSegment(f"go {ACT}", "goal", first, (("MoveAhead", second),))
     with pytest.raises(DataError, match=r"bad: a goal, a plan or an action contains <\|act\|>"):
-        encoder.actions("bad", [PlanSegment(f"go {ACT}", "goal", first, (("MoveAhead", second),))])
+        encoder.actions("bad", [*segment.parts()])
 
 
 @settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -7,8 +7,7 @@ import torch
 
 from infthor_eval.errors import DataError
 from infthor_eval.training.batches import IGNORED, collate, n_labels
-from infthor_eval.training.encoding import TrainingSequence, join_branches
-from infthor_eval.training.network import SequenceModel
+from infthor_eval.training.encoding import TrainingSequence
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.prompt import token_ids
 
@@ -103,65 +102,3 @@ def test_a_sequence_without_labels_is_refused(
     masked = replace(two[1], has_loss=(False,) * len(two[1].has_loss))
     with pytest.raises(DataError, match="short: no token has loss"):
         collate([two[0], masked], model.family, PAD)
-
-
-@pytest.fixture(scope="module")
-def branched(
-    model: LoadedCheckpoint, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[list[TrainingSequence], TrainingSequence]:
-    """Three answers on the same frames, and all of them in one sequence."""
-    frames = write_frames(tmp_path_factory.mktemp("frames"), 2)
-    apart = [sequence(model, frames, answer) for answer in ("a mug", "a fork and a spoon", "no")]
-    return apart, join_branches("joined", apart)
-
-
-def test_branches_have_their_beginning_once(
-    branched: tuple[list[TrainingSequence], TrainingSequence],
-) -> None:
-    apart, joined = branched
-    before, *rest = joined.spans
-    assert len(rest) == 3
-    for one, span in zip(apart, rest, strict=True):
-        assert (*joined.pieces[before], *joined.pieces[span]) == one.pieces
-        assert (*joined.has_loss[before], *joined.has_loss[span]) == one.has_loss
-        assert not joined.has_loss[span.start]
-    assert joined.n_tokens < sum(one.n_tokens for one in apart) / 2
-
-
-def test_a_branch_has_the_place_that_it_has_alone_and_sees_no_other(
-    model: LoadedCheckpoint, branched: tuple[list[TrainingSequence], TrainingSequence]
-) -> None:
-    apart, joined = branched
-    batch = collate([joined, apart[0]], model.family, PAD)
-    seen = batch["attention_mask"]
-    assert seen is not None
-    n_before = len(list(token_ids(joined.pieces[joined.spans[0]])))
-    start = n_before
-    for one in apart:
-        n_own = one.n_tokens - n_before
-        at = [*range(n_before), *range(start, start + n_own)]
-        alone = collate([one], model.family, PAD)
-        assert torch.equal(batch["position_ids"][..., 0, at], alone["position_ids"][..., 0, :])
-        last = seen[0, 0, start + n_own - 1]
-        assert last.nonzero()[:, 0].tolist() == at
-        start += n_own
-    n_short = apart[0].n_tokens
-    assert torch.equal(
-        seen[1, 0, :n_short, :n_short], torch.ones(n_short, n_short, dtype=torch.bool).tril()
-    )
-    assert seen.any(-1).all()
-
-
-def test_the_loss_of_branches_is_that_of_their_sequences(
-    model: LoadedCheckpoint, branched: tuple[list[TrainingSequence], TrainingSequence]
-) -> None:
-    apart, joined = branched
-    network = SequenceModel(model)
-
-    def loss(*sequences: TrainingSequence) -> float:
-        batch = collate(sequences, model.family, PAD)
-        with torch.no_grad():
-            return float(network(**batch, num_items_in_batch=1)["loss"])
-
-    assert loss(joined) == pytest.approx(sum(map(loss, apart)), rel=1e-4)
-    assert loss(joined, apart[1]) == pytest.approx(loss(joined) + loss(apart[1]), rel=1e-4)

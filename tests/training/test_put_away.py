@@ -4,9 +4,9 @@ sequences."""
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.generation.replay_set import replay_set, select
+from infthor_eval.plans.history.segments import restart_at, segment_parts
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.training.action_sequences import single_plans
 from infthor_eval.training.data import read_history
 
 from ..helpers.trajectories import write_trajectories
@@ -33,6 +33,6 @@ def test_it_is_a_plan_with_its_goal(tmp_path, encoder):
         22,
     )
     assert away.steps[-1][0] == "PutObject Pen DiningTable"
-    alone = list(single_plans(encoder, PEN, history))[4]
+    alone = encoder.actions(PEN, segment_parts(restart_at(history, 4, 5)))
     text = encoder._tokenizer.decode([piece for piece in alone.pieces if isinstance(piece, int)])
     assert text.startswith("<|goal|>Your main goal: put the Pen on the DiningTable<|goal|>")

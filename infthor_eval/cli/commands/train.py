@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH, FiniteFloat, parse_model_args, parse_pairs
-from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.cli.progress.bar import StepBars
 from infthor_eval.cli.progress.notes import NOTES, print_note
 from infthor_eval.formats.object_ids import Words
@@ -20,16 +19,12 @@ from infthor_eval.terminal import console, progress_bar
 if TYPE_CHECKING:
     from infthor_eval.training.fine_tuning import TrainingRun
     from infthor_eval.training.loop import Progress
-    from infthor_eval.training.nano.settings import NanoRecipe
-    from infthor_eval.training.nano.steps import NanoProgress
     from infthor_eval.training.recipe import Recipe
-    from infthor_eval.workers import WorkerSettings
 
 __all__ = ["command"]
 
 _GPUS = 8
 _TFLOPS = 400.0
-_STAGES = {"vision": "recognising objects", "reading": "answering and acting"}
 
 
 @click.command(
@@ -48,10 +43,11 @@ _STAGES = {"vision": "recognising objects", "reading": "answering and acting"}
     "--data",
     "folders",
     multiple=True,
+    required=True,
     type=PATH,
     metavar="SET",
     help="Replayed set (`replay`) to train on, with a question file if the recipe needs questions; "
-    "may be repeated. The recipes tiny and small generate their own by default.",
+    "may be repeated.",
 )
 @click.option(
     "--model", metavar="NAME", help="Model to use instead of the recipe's, without its options."
@@ -96,7 +92,6 @@ _STAGES = {"vision": "recognising objects", "reading": "answering and acting"}
     help="TFLOP/s that a GPU reaches, for --dry-run (an H100 has 989 in bfloat16).  [default: "
     f"{_TFLOPS:g}]",
 )
-@worker_options
 def command(
     name: str,
     folders: tuple[Path, ...],
@@ -108,22 +103,18 @@ def command(
     dry_run: bool,
     gpus: int | None,
     tflops: float | None,
-    **workers: Any,
 ) -> None:
     """Fine-tune a model, and write a checkpoint that its family's adapter loads.
 
     Recipes of the package: infthor_32k, infthor_64k and infthor_130k (the paper's, Table 5),
-    questions, and two that train a small model from scratch: tiny, and small, which is larger and
-    takes longer. Others are YAML files of the same form.
+    final_goals, final_text and final_frames (behind its final tasks), and questions. Others are
+    YAML files of the same form.
 
-    If it is stopped, the same command continues. Workers share the generation of the data of small
-    and tiny.
+    If it is stopped, the same command continues.
     Several processes: torchrun --nproc-per-node N --no-python infthor-eval train ...
     """
-    from infthor_eval.training.nano.settings import NanoRecipe
     from infthor_eval.training.recipe import read_recipe
 
-    worker_settings = parse_worker_settings(**workers)
     settings = parse_pairs(changes, "--set")
     settings |= {} if model is None else {"model": model}
     settings |= {} if words is None else {"words": words}
@@ -132,22 +123,7 @@ def command(
     recipe = read_recipe(name, settings)
     if not dry_run and (gpus is not None or tflops is not None):
         raise click.UsageError("--gpus and --tflops are for --dry-run; add it, or leave them out")
-    if not worker_settings.is_local and (folders or not isinstance(recipe, NanoRecipe)):
-        raise click.UsageError(
-            "--workers and --ray-address share the generation of data, which only the recipes "
-            "small and tiny without --data do; leave them out, and train in several processes with "
-            "torchrun"
-        )
-    if isinstance(recipe, NanoRecipe):
-        if model is not None or model_args is not None or dry_run:
-            raise click.UsageError(
-                "--model, --model-args and --dry-run are for recipes that start from a model"
-            )
-        _train_small_model(recipe, folders, out, worker_settings)
-    elif not folders:
-        raise click.UsageError("give --data, a replayed set to train on")
-    else:
-        _fine_tune(recipe, folders, out, (gpus or _GPUS, tflops or _TFLOPS) if dry_run else None)
+    _fine_tune(recipe, folders, out, (gpus or _GPUS, tflops or _TFLOPS) if dry_run else None)
 
 
 def _fine_tune(
@@ -207,34 +183,3 @@ def _print_estimate(run: TrainingRun, n_gpus: int, tflops: float) -> None:
     parts = ("weights", "gradients", "optimizer", "activations")
     sizes = ", ".join(f"{name} {getattr(cost, name) / 1e9:,.1f}" for name in parts)
     console().print(f"memory of a process: {cost.memory / 1e9:,.1f} GB ({sizes})")
-
-
-def _train_small_model(
-    recipe: NanoRecipe, folders: Sequence[Path], out: Path, worker_settings: WorkerSettings
-) -> None:
-    """Train the small model on replayed sets with questions; without any, generate one in `out`.
-
-    The views that it learns to see from are generated in any case.
-    """
-    from infthor_eval.cli.training_data import generate_training_data, generate_training_views
-    from infthor_eval.storage.files import hold_folder
-    from infthor_eval.training.export import export
-    from infthor_eval.training.nano.stages import TrainingData, train_small_model
-
-    with hold_folder(out):
-        sets = list(folders) or generate_training_data(
-            recipe.scenes, recipe.seed, out / "data", worker_settings
-        )
-        views = generate_training_views(
-            recipe.views, recipe.seed, out / "data" / "views", worker_settings
-        )
-        with progress_bar(NOTES) as progress:
-            bars = StepBars(progress)
-
-            def observe(step: NanoProgress) -> None:
-                bars.advance(_STAGES[step.stage], step.step, step.n_steps, f"loss {step.loss:.3f}")
-
-            data = TrainingData(sets, views)
-            loaded = train_small_model(recipe, data, out / "states", observe, print_note)
-        export(loaded, out / "checkpoint", title=recipe.title, words=recipe.words)
-        console().print(f"{out / 'checkpoint'}")

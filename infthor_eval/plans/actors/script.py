@@ -6,14 +6,15 @@ from collections.abc import Sequence
 from infthor_eval.household.affordances import KNOWN_TYPES
 from infthor_eval.household.wording import compact_name
 
-__all__ = ["read_plan", "replace_objects", "scripted_action"]
+__all__ = ["PLAN", "read_plan", "scripted_action"]
 
 _TYPES = {compact_name(name): name for name in sorted(KNOWN_TYPES)}
 _TYPES |= {"sink": "SinkBasin", "bathtub": "BathtubBasin"}  # things are put into the basin
 # At first, as a rule.
 _CLOSED = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Laptop", "Microwave", "Safe"})
 _VERBS = ("go to", "open", "close", "pick up", "put", "wash", "heat", "cool", "toggle", "slice")
-_PLAN = re.compile(rf"({'|'.join(_VERBS)}) (?:the )?(\S+)(?: in the (\S+))?")
+# The usual form: a verb, an object, and the receptacle of some verbs.
+PLAN = re.compile(rf"({'|'.join(_VERBS)}) (?:the )?(\S+)(?: in the (\S+))?")
 
 
 def read_plan(plan: str) -> tuple[str, tuple[str, ...]]:
@@ -29,23 +30,11 @@ def read_plan(plan: str) -> tuple[str, tuple[str, ...]]:
         ("put", ("Mug", "SinkBasin")), or ("put", ("Mug", "Sink")); the whole text and no objects if
         it is not of the usual form.
     """
-    match = _PLAN.fullmatch(plan)
+    match = PLAN.fullmatch(plan)
     if match is None:
         return plan, ()
     verb, *words = match.groups()
     return verb, tuple(_TYPES.get(word, word) for word in words if word is not None)
-
-
-def replace_objects(plan: str, types: Sequence[str]) -> str:
-    """Return a plan of the usual form with other objects, in the order in which it names them."""
-    match = _PLAN.fullmatch(plan)
-    assert match is not None
-    # From the end, so that earlier spans stay valid.
-    for group, name in reversed([*enumerate(types, start=2)]):
-        start, end = match.span(group)
-        word = compact_name(name) if match.group(group).islower() else name
-        plan = plan[:start] + word + plan[end:]
-    return plan
 
 
 def scripted_action(plan: str, done: Sequence[str]) -> str:

@@ -17,12 +17,6 @@ from infthor_eval.formats.archive import unpack_tar
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.pictures.blank import blank_like
-from infthor_eval.formats.pictures.labelled_views import (
-    ThingInView,
-    read_views,
-    views_of,
-    write_views,
-)
 from infthor_eval.formats.pictures.video import read_video
 from infthor_eval.formats.plan_logs import is_plan_log, read_plan_log
 from infthor_eval.generation.bundle import read_manifest
@@ -155,19 +149,6 @@ def _read_plan_log(folder: Path) -> None:
     import_counts(read_plan_log(path), None)
 
 
-def _make_views(folder: Path) -> Path:
-    cells = np.arange(9).reshape(3, 3)
-    things = [ThingInView(0, "Mug", "CounterTop", True, False, False, cells)]
-    write_views(folder / "a.npz", views_of([np.zeros((4, 4, 3), np.uint8)], things))
-    return folder / "a.npz"
-
-
-def _read_views(folder: Path) -> None:
-    views = read_views(folder / "a.npz")
-    assert views.pixels.sum(dtype=float) >= 0
-    assert [str(views.names[at]) for at in views.type]
-
-
 def _make_manifest(folder: Path) -> Path:
     recipe = {"scene": "kitchen-1", "seed": 0, "min_steps": 1}
     (folder / "manifest.json").write_text(
@@ -182,7 +163,6 @@ READERS = (
     Reader("film", Form.BYTES, _make_film, _read_film),
     Reader("archive", Form.BYTES, partial(_make_archive, "w"), _unpack),
     Reader("packed archive", Form.BYTES, partial(_make_archive, "w:gz"), _unpack),
-    Reader("labelled views", Form.BYTES, _make_views, _read_views),
     Reader("reply log", Form.JSON_LINES, _make_replies, partial(_import, "log.jsonl")),
     Reader("inspect log", Form.BYTES, _make_inspect_log, partial(_import, "log.eval")),
     Reader("plan log", Form.JSON_LINES, _make_plan_log, _read_plan_log),

@@ -108,7 +108,7 @@ READERS = (
             partial(_make_recipe, name),
             lambda folder: read_recipe(str(folder / "a.yaml")),
         )
-        for name in ("infthor_32k", "questions", "tiny", "small")
+        for name in ("infthor_32k", "questions")
     ),
     Reader(
         "panels",
