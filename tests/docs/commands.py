@@ -48,6 +48,7 @@ PARSED_PAGES = {
     "docs/workers.md": HOURS,
     "examples/sums/README.md": ELSEWHERE,
     "examples/thumbnails/README.md": ELSEWHERE,
+    "infthor_board/README.md": READERS,
 }
 # On the other pages a command that matches is parsed and not run. One that matches nothing any more
 # fails a test.
@@ -58,7 +59,8 @@ CANNOT_RUN = {
     r"--model (openai|anthropic|gemini) ": KEY,
     r"MyModel|my_task$|=PATH\b|DATA$|import-replies exported|lm-eval run \.\.\.": READERS,
 }
-PROGRAMS = ("infthor-eval", "make", "lm-eval", "pip", "python", "hf", "torchrun", "export")
+OURS = ("infthor-eval", "infthor-board")
+PROGRAMS = (*OURS, "make", "lm-eval", "pip", "python", "hf", "torchrun", "export")
 _RUN_HERE = ("infthor-eval", "lm-eval")
 
 
@@ -79,8 +81,8 @@ class Command:
 
     @property
     def is_ours(self) -> bool:
-        """Whether it is `infthor-eval`, with all its words written out."""
-        return self.words[0] == "infthor-eval" and "..." not in self.words
+        """Whether it is a program of ours, with all its words written out."""
+        return self.words[0] in OURS and "..." not in self.words
 
     @property
     def needs_shell(self) -> bool:
@@ -130,8 +132,9 @@ def code_of(page: str) -> list[Code]:
 
 
 def all_pages() -> list[str]:
-    """The pages for readers: of the repository, the documentation and the examples."""
-    paths = (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md"))
+    """The pages for readers: of the repository, the documentation, the board and the examples."""
+    patterns = ("*.md", "docs/**/*.md", "infthor_board/*.md", "examples/**/*.md")
+    paths = [path for pattern in patterns for path in ROOT.glob(pattern)]
     return sorted(str(path.relative_to(ROOT)) for path in paths)
 
 
