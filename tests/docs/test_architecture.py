@@ -22,6 +22,7 @@ WRITTEN = {
     "results.json",
     "usage.json",
     "run.yaml",
+    "submission.yaml",
     "alfred/layouts/",
     "thor_scenes/objects.jsonl.gz",
     "DIR/procthor/asset-database.json.gz",
