@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 # Modules are compiled when they are first imported, and most never are: a minute less.
 PIP := pip install --quiet --disable-pip-version-check --no-compile
-# What the package itself needs; and beside it what its tests, linters and documentation need.
+# What the packages themselves need; and beside it what their tests, linters and documentation need.
 INSTALLED := $(VENV)/.installed
 DEVELOPED := $(VENV)/.developed
 # lm-eval's own multimodal model insists on torchvision, which has no CPU build; one test loads its Python half from
@@ -137,11 +137,11 @@ $(TOOLS)/.installed: .ci/release-tools.lock
 	$(TOOLS)/bin/$(PIP) --require-hashes -r .ci/release-tools.lock
 	touch $@
 
-$(INSTALLED): pyproject.toml setup.py constraints.txt
+$(INSTALLED): pyproject.toml setup.py infthor_board/pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.11 ...")'
 	@echo 'Packages are fetched: minutes with a fast network. They take 2 GB, on Linux 7 GB with CUDA (docs/tutorial.md).'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/$(PIP) -c constraints.txt -e .
+	$(BIN)/$(PIP) -c constraints.txt -e . -e ./infthor_board
 	touch $@
 
 $(DEVELOPED): $(INSTALLED)

@@ -24,9 +24,6 @@ setup(
         "infthor_eval.pages": ["*.css", "*.js"],
         "infthor_eval.report": [
             "inspection.*",
-            "leaderboard/*.html",
-            "leaderboard/*.css",
-            "leaderboard/*.js",
             "sample.html",
             "web/*.html",
             "web/*.css",

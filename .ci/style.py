@@ -11,7 +11,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-PACKAGES = ("infthor_eval", "infthor_sim", "model_adapters", "recipes")
+PACKAGES = ("infthor_board", "infthor_eval", "infthor_sim", "model_adapters", "recipes")
 WIDTH = 100
 TINY = 40  # lines; a shorter module is a concept of its own, or belongs to the one that uses it
 _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from infthor_board.cli import _infthor_board
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
 from infthor_eval.cli.main import _infthor_eval
 
@@ -21,8 +22,8 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 
 def commands() -> str:
     """Return a section for each command: example, usage, help, options."""
-    top = click.Context(_infthor_eval, info_name="infthor-eval")
-    return "\n\n".join(_section(context) for context in _all(top))
+    tops = [click.Context(it, info_name=it.name) for it in (_infthor_eval, _infthor_board)]
+    return "\n\n".join(_section(context) for top in tops for context in _all(top))
 
 
 def _all(parent: click.Context) -> Iterator[click.Context]:

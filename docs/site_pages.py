@@ -39,6 +39,7 @@ _OUTSIDE = {  # where a file lies in the repository: where its page stands in th
     "benchmarks/twins_agents.md": "benchmarks/twins_agents.md",
     "examples/sums/README.md": "examples/sums/README.md",
     "examples/thumbnails/README.md": "examples/thumbnails/README.md",
+    "infthor_board/README.md": "infthor_board/README.md",
     "infthor_sim/ACTIONS.md": "infthor_sim/ACTIONS.md",
     "infthor_sim/README.md": "infthor_sim/README.md",
     "recipes/nano/README.md": "recipes/nano/README.md",

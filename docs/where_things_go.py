@@ -22,7 +22,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "where-things-go.md"
-ROOMS = ("infthor_eval", "infthor_sim", "model_adapters", "recipes", "tests")
+ROOMS = ("infthor_board", "infthor_eval", "infthor_sim", "model_adapters", "recipes", "tests")
 WORDS = 30  # of a cell, as tests/docs/test_tables.py has it
 
 # Headings in the order of the page; a module belongs to the longest path that it begins with.
@@ -52,6 +52,7 @@ _SECTIONS = {
         "infthor_sim/",
     ),
     "Command line, report, data": (
+        "infthor_board/",
         "infthor_eval/cli/",
         "infthor_eval/errors.py",
         "infthor_eval/exports/",
@@ -61,7 +62,6 @@ _SECTIONS = {
         "infthor_eval/report/",
         "infthor_eval/statistics.py",
         "infthor_eval/storage/",
-        "infthor_eval/submissions/",
     ),
     "Training": ("infthor_eval/training/", "recipes/"),
 }

@@ -102,6 +102,6 @@ def print_line(text: str) -> None:
         raise OutputClosed(1) from error
 
 
-def print_error(text: str) -> None:
-    """Print the error that ends the command, as one line on standard error."""
-    click.echo(f"infthor-eval: {printable(' '.join(text.split()))}", err=True)
+def print_error(text: str, program: str = "infthor-eval") -> None:
+    """Print the error that ends a program, as one line on standard error."""
+    click.echo(f"{program}: {printable(' '.join(text.split()))}", err=True)

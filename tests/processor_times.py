@@ -58,8 +58,8 @@ KEPT = (
     "tests/infthor_sim/test_snapshots.py::"
     "test_nothing_saved_and_a_saved_state_of_another_scene_are_refused",
     "tests/plans/twins/test_suite.py::test_who_does_not_remember_has_no_pair[history]",
-    "tests/submissions/test_honest.py::test_the_bundled_model_passes",
-    "tests/report/leaderboard/test_page.py::test_it_is_as_wide_as_the_page_and_readable[light-1400]",
+    "tests/infthor_board/test_honest.py::test_the_bundled_model_passes",
+    "tests/infthor_board/test_page.py::test_it_is_as_wide_as_the_page_and_readable[light-1400]",
     "tests/report/web/test_pairs.py::"
     "test_both_replies_stand_beside_each_other_and_filters_are_of_pairs",
 )

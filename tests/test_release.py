@@ -13,6 +13,8 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from infthor_eval import __version__
+
 from .docs.blocks import ROOT
 
 # Builds of it differ by hardware; make's BY_HARDWARE is what it brings.
@@ -25,6 +27,13 @@ def load_release():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def test_the_board_is_of_the_same_version_and_needs_it():
+    text = (ROOT / "infthor_board" / "pyproject.toml").read_text(encoding="utf-8")
+    project = tomllib.loads(text)["project"]
+    assert project["version"] == __version__
+    assert f"infthor-eval=={__version__}" in project["dependencies"]
 
 
 @pytest.fixture(scope="module")

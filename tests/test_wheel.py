@@ -65,6 +65,7 @@ def test_all_data_of_the_packages_is_in_it(wheel):
     }
     missing = {path for path in moved - packed if "__pycache__" not in path}
     assert missing == set()
+    assert not [name for name in packed if name.startswith("infthor_board")]
 
 
 def test_what_runs_is_the_installed_code(installed, tmp_path):

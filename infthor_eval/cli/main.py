@@ -9,7 +9,9 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from types import FrameType
+from typing import Any
 
 import click
 
@@ -31,7 +33,7 @@ from infthor_eval.plugins import import_target
 from infthor_eval.storage.scratch import remove_abandoned
 from infthor_eval.terminal import error_console, print_error
 
-__all__ = ["collecting_seldom", "main"]
+__all__ = ["Program", "collecting_seldom", "main", "run_program"]
 
 # By group: the name of each command and its line in the overview.
 _COMMANDS = {
@@ -49,8 +51,6 @@ _COMMANDS = {
         "watch": "Write a video of an agent or an arm.",
         "export": "Write runs in the formats of others.",
         "import-replies": "Store replies that others made as runs.",
-        "submit-check": "Check submissions of others before they are believed.",
-        "leaderboard": "Write a page of the submissions that pass.",
         "rescore": "Score replies again, also with a judge.",
         "audit": "Print what a question set gives away without a frame.",
         "table4": "Compute the paper's Table 4 from published files.",
@@ -62,7 +62,6 @@ _COMMANDS = {
         "replay": "Replay trajectories into frames and metadata.",
         "questions": "Generate NIEH questions on replayed trajectories.",
         "twins": "Make twins: the same episode with one thing changed.",
-        "private-set": "Make a set of twins whose answers stay secret.",
         "validate": "Keep the questions that one of several models answers.",
         "bundle": "Build a question set from a manifest.",
         "card": "Write a data set card and a Croissant file of a set.",
@@ -89,8 +88,6 @@ _SHARED_MODULES = {
     "twins": "data.questions:twins",
     "export": "exchange:export",
     "import-replies": "exchange:import_replies",
-    "submit-check": "submissions:submit_check",
-    "leaderboard": "submissions:leaderboard",
     "table4": "tables:table4",
     "table-final": "tables:table_final",
     "check-adapter": "checks:check_adapter",
@@ -106,7 +103,28 @@ _STOPPED = "stopped; run the same command to continue"
 _COLLECT_AFTER = 50_000  # new objects between two collections of garbage
 
 
-class _Commands(ExampleGroup):
+class Program(ExampleGroup):
+    """The commands of a program: an unknown one is named, and no option of one is taken twice."""
+
+    def __init__(self, *arguments: Any, **settings: Any) -> None:
+        settings["context_settings"] = {"help_option_names": ["-h", "--help"]}
+        super().__init__(*arguments, no_args_is_help=True, **settings)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """See `click.Group.resolve_command`."""
+        names = self.list_commands(ctx)
+        # Completion asks for parts of names.
+        if args and args[0] not in names and not ctx.resilient_parsing:
+            raise unknown_name("command", args[0], names)
+        name, command, rest = super().resolve_command(ctx, args)
+        if command is not None:
+            refuse_repeated_options(ctx, command, rest)
+        return name, command, rest
+
+
+class _Commands(Program):
     """Commands imported on demand; options without a command are those of `run`."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -129,17 +147,6 @@ class _Commands(ExampleGroup):
             args = [_DEFAULT, *args]
         return super().parse_args(ctx, args)
 
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        # Completion asks for parts of names.
-        if args and args[0] not in _NAMES and not ctx.resilient_parsing:
-            raise unknown_name("command", args[0], _NAMES)
-        name, command, rest = super().resolve_command(ctx, args)
-        if command is not None:
-            refuse_repeated_options(ctx, command, rest)
-        return name, command, rest
-
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands, then the options, with those that most runs are given."""
         for group, commands in _COMMANDS.items():
@@ -158,9 +165,8 @@ def _first_clause(text: str) -> str:
 
 
 @click.group(
+    "infthor-eval",
     cls=_Commands,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    no_args_is_help=True,
     example="infthor-eval --model oracle,blind,qwen2.5-vl-nano --tasks nieh_mini_gt",
 )
 @click.version_option(infthor_eval.__version__, prog_name="infthor-eval")
@@ -171,9 +177,16 @@ def _infthor_eval() -> None:
     """
 
 
-@noticed()
 def main(args: list[str] | None = None) -> None:
-    """Run the command line; errors meant for people are printed as one line on standard error."""
+    """Run the command line."""
+    run_program(_infthor_eval, args)
+
+
+@noticed()
+def run_program(program: click.Group, args: list[str] | None) -> None:
+    """Run the commands of a program; errors meant for people are printed as one line on standard
+    error."""
+    name = str(program.name)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             # No name in the data may end a run, whatever the encoding.
@@ -183,41 +196,42 @@ def main(args: list[str] | None = None) -> None:
         with (
             handle_signal(signal.SIGTERM, _raise_terminated),
             handle_signal(signal.SIGINT, signal.default_int_handler),
-            answer_ctrl_c(_tell_patience, _end),
+            answer_ctrl_c(partial(_tell_patience, name), partial(_end, name)),
             collecting_seldom(),
         ):
             remove_abandoned()
-            code = _infthor_eval.main(args, prog_name="infthor-eval", standalone_mode=False)
+            code = program.main(args, prog_name=name, standalone_mode=False)
         # Here and not at Python's exit, so that a full disk is an error like any other.
         sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         sys.exit(2)
     except click.NoSuchOption as error:
-        _exit(_unknown_option(error), error.exit_code)
+        _exit(name, _unknown_option(error), error.exit_code)
     except click.MissingParameter as error:
         assert error.ctx is not None
         message = error.format_message().rstrip(".")
-        _exit(f"{message}; see `{error.ctx.command_path} --help`", error.exit_code)
+        _exit(name, f"{message}; see `{error.ctx.command_path} --help`", error.exit_code)
     except click.ClickException as error:
-        _exit(error.format_message(), error.exit_code)
+        _exit(name, error.format_message(), error.exit_code)
     except InfthorError as error:
-        _exit(str(error), error.exit_code)
+        _exit(name, str(error), error.exit_code)
     except (click.Abort, KeyboardInterrupt, Terminated) as error:
         code = _TERMINATED if isinstance(error, Terminated) else _INTERRUPTED
-        _exit(_STOPPED, code)
+        _exit(name, _STOPPED, code)
     except OSError as error:  # that no command expects: a full disk, a file removed during the work
         _discard_output()
         path = error.filename if error.filename is not None else "standard output or a file"
         problem = f"{path}: cannot be read or written ({in_one_line(error)})"
-        _exit(f"{problem}; fix that and run the same command again", 2)
+        _exit(name, f"{problem}; fix that and run the same command again", 2)
     except (SystemExit, GeneratorExit) as error:
         # click ends the program, too, if nobody reads its help, and replaces the output.
         if isinstance(error, OutputClosed) or sys.stdout is not output:
             _discard_output()
             sys.exit(1)
         # Of code of others, where no command expects it.
-        _exit(f"{describe_exception(error)}; your own code must not end the program: fix it", 2)
+        problem = describe_exception(error)
+        _exit(name, f"{problem}; your own code must not end the program: fix it", 2)
     else:
         sys.exit(code if isinstance(code, int) else 0)
 
@@ -242,14 +256,15 @@ def _raise_terminated(_number: int, _frame: FrameType | None) -> None:
     raise Terminated(_TERMINATED)
 
 
-def _tell_patience() -> None:
-    print_error("a calculation has to end first; press Ctrl-C again to end the program now")
+def _tell_patience(program: str) -> None:
+    text = "a calculation has to end first; press Ctrl-C again to end the program now"
+    print_error(text, program)
 
 
-def _end() -> None:
+def _end(program: str) -> None:
     """End the process as a kill would; what is finished is on disk."""
     error_console().show_cursor()  # which a progress bar has hidden
-    print_error(_STOPPED)
+    print_error(_STOPPED, program)
     end_process(_INTERRUPTED)
 
 
@@ -273,6 +288,6 @@ def _unknown_option(error: click.NoSuchOption) -> str:
     return f"unknown option {error.option_name}; {hint}"
 
 
-def _exit(message: str, code: int) -> None:
-    print_error(message)
+def _exit(program: str, message: str, code: int) -> None:
+    print_error(message, program)
     sys.exit(code)

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 import pytest
 
+from infthor_board.cli import _infthor_board
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
 from infthor_eval.cli.main import _infthor_eval
 
@@ -27,7 +28,8 @@ def _commands(parent: click.Context) -> Iterator[click.Context]:
 
 COMMANDS = [
     context
-    for context in _commands(click.Context(_infthor_eval, info_name="infthor-eval"))
+    for program in (_infthor_eval, _infthor_board)
+    for context in _commands(click.Context(program, info_name=program.name))
     if context.info_name != "lm-eval"  # whose help is lm-eval's own
 ]
 

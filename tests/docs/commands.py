@@ -41,6 +41,7 @@ PARSED_PAGES = {
     "docs/twins.md": HOURS,
     "examples/sums/README.md": ELSEWHERE,
     "examples/thumbnails/README.md": ELSEWHERE,
+    "infthor_board/README.md": READERS,
     "recipes/nano/README.md": HOURS,
 }
 # On the other pages a command that matches is parsed and not run. One that matches nothing any more
@@ -54,7 +55,8 @@ CANNOT_RUN = {
     r"results/MODEL/|MyModel|my_task$|=PATH\b|DATA$": READERS,
     r"import-replies exported|lm-eval run \.\.\.": READERS,
 }
-PROGRAMS = ("infthor-eval", "make", "lm-eval", "pip", "python", "hf", "torchrun", "export")
+OURS = ("infthor-eval", "infthor-board")
+PROGRAMS = (*OURS, "make", "lm-eval", "pip", "python", "hf", "torchrun", "export")
 _RUN_HERE = ("infthor-eval", "lm-eval")
 
 
@@ -75,8 +77,8 @@ class Command:
 
     @property
     def is_ours(self) -> bool:
-        """Whether it is `infthor-eval`, with all its words written out."""
-        return self.words[0] == "infthor-eval" and "..." not in self.words
+        """Whether it is a program of ours, with all its words written out."""
+        return self.words[0] in OURS and "..." not in self.words
 
     @property
     def needs_shell(self) -> bool:
@@ -126,12 +128,12 @@ def code_of(page: str) -> list[Code]:
 
 
 def all_pages() -> list[str]:
-    """The pages for readers: of the repository, the documentation, the examples, the recipes."""
-    folders = ("docs", "examples", "recipes")
-    paths = [
-        *ROOT.glob("*.md"),
-        *(path for name in folders for path in ROOT.glob(f"{name}/**/*.md")),
-    ]
+    """The pages for readers: the repository's, the documentation, and beside the packages."""
+    patterns = (
+        *("*.md", "docs/**/*.md", "infthor_board/*.md"),
+        *("examples/**/*.md", "recipes/**/*.md"),
+    )
+    paths = [path for pattern in patterns for path in ROOT.glob(pattern)]
     return sorted(str(path.relative_to(ROOT)) for path in paths)
 
 

@@ -12,15 +12,17 @@ PAGES = (
     "docs/architecture.md",
     "docs/where-things-go.md",
     "CONTRIBUTING.md",
+    "infthor_board/README.md",
     "infthor_sim/README.md",
 )
-PACKAGES = ("infthor_eval", "infthor_sim", "model_adapters", "recipes")
+PACKAGES = ("infthor_eval", "infthor_board", "infthor_sim", "model_adapters", "recipes")
 PLACE = re.compile(r"`([\w./-]+?(?:/|\.(?:py|yaml|md|js|html|css|txt|gz)))(?:: ?(\w+))?`")
 # Files of runs and of recorded data, which are not in the tree.
 WRITTEN = {
     "results.json",
     "usage.json",
     "run.yaml",
+    "submission.yaml",
     "alfred/layouts/",
     "thor_scenes/objects.jsonl.gz",
     "DIR/procthor/asset-database.json.gz",
@@ -68,7 +70,7 @@ def test_every_package_and_module_has_its_row() -> None:
 
 def test_the_row_of_a_package_names_its_rooms() -> None:
     lines = (ROOT / "docs/architecture.md").read_text().splitlines()
-    folders = ["infthor_sim", "model_adapters"]
+    folders = [*PACKAGES[1:]]
     folders += [f"infthor_eval/{name}" for name in rooms("infthor_eval")]
     for folder in folders:
         (row,) = (line for line in lines if line.startswith(f"| `{folder}/` |"))

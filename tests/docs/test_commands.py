@@ -12,6 +12,7 @@ import click
 import pytest
 from PIL import Image
 
+from infthor_board.cli import _infthor_board
 from infthor_eval.cli.main import _infthor_eval
 from infthor_eval.runs import Catalog
 from infthor_eval.suites import baseline_suites
@@ -112,7 +113,8 @@ def test_the_options_of_every_command_are_known(command, monkeypatch):
     words = list(command.words[1:])
     if ">" in words:  # the shell's
         words = words[: words.index(">")]
-    context = _infthor_eval.make_context("infthor-eval", words)
+    program = {it.name: it for it in (_infthor_eval, _infthor_board)}[command.words[0]]
+    context = program.make_context(program.name, words)
     while isinstance(context.command, click.Group):
         name, inner, rest = context.command.resolve_command(
             context, [*context._protected_args, *context.args]

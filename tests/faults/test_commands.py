@@ -117,10 +117,6 @@ TYPED = [
         [*RUN, "--tasks=nieh_full", "--out", "OUT"],
         "--tasks is given twice; give it once, with commas between several values",
     ),
-    (
-        ["submit-check", "SET", "--allow", "frames", "--allow", "key"],
-        "--allow is given twice; give it once, with commas between several values",
-    ),
     (["generate", "--scene", "kitchen-1,kitchn-2", "--out", "OUT"], "unknown scene 'kitchn-2'"),
     (["generate", "--scene", ",", "--out", "OUT"], "--scene is empty; give a name"),
     ([*RUN, "--out", "OUT", "--out", "OUT"], "--out is given twice"),

@@ -7,7 +7,7 @@ import pytest
 
 from infthor_eval.cli import main
 
-__all__ = ["CliRunner", "assert_refused", "option_words", "read_remarks", "run_cli"]
+__all__ = ["CliRunner", "assert_refused", "option_words", "read_remarks", "run_cli", "runner_of"]
 
 CliRunner = Callable[..., tuple[int, str, str]]
 
@@ -17,13 +17,18 @@ _PROGRESS = re.compile(r".*: [\d,]+ of [\d,]+ \(\d+ %\)(, .* left, .*)?")
 @pytest.fixture
 def run_cli(capfd: pytest.CaptureFixture[str]) -> CliRunner:
     """Runs our command in this process; gives its exit code, standard output and standard error."""
+    return runner_of(main, capfd)
 
-    def run_cli(*arguments: object) -> tuple[int, str, str]:
+
+def runner_of(program: Callable[[list[str]], None], capfd: pytest.CaptureFixture[str]) -> CliRunner:
+    """Give what `run_cli` is of a program, by its main function."""
+
+    def run(*arguments: object) -> tuple[int, str, str]:
         with pytest.raises(SystemExit) as ended:
-            main([str(argument) for argument in arguments])
+            program([str(argument) for argument in arguments])
         return ended.value.code, *capfd.readouterr()
 
-    return run_cli
+    return run
 
 
 def option_words(**options: object) -> list[str]:
@@ -44,7 +49,11 @@ def read_remarks(error_text: str) -> list[str]:
 
 
 def assert_refused(
-    ended: tuple[int, str, str], *expected: str, code: int = 2, after_notes: bool = False
+    ended: tuple[int, str, str],
+    *expected: str,
+    code: int = 2,
+    after_notes: bool = False,
+    program: str = "infthor-eval",
 ) -> None:
     """Hold that a command ended with an exit code, without output, and with one line that says
     all that is expected.
@@ -54,13 +63,14 @@ def assert_refused(
         expected: parts of the line.
         code: the exit code that it is to have.
         after_notes: whether it may have written other lines before.
+        program: the program that was run.
     """
     ended_with, output, error_text = ended
     assert (ended_with, output) == (code, "")
     assert "Traceback" not in error_text
     *notes, line = error_text.splitlines()
     assert after_notes or not notes
-    assert line.startswith("infthor-eval: ")
-    assert not any(note.startswith("infthor-eval: ") for note in notes)
+    assert line.startswith(f"{program}: ")
+    assert not any(note.startswith(f"{program}: ") for note in notes)
     for words in expected:
         assert words in line

@@ -1,0 +1,1 @@
+"""Submissions of results, checked; a page of those that pass; sets whose answers stay secret."""

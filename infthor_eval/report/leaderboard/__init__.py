@@ -1,1 +1,0 @@
-"""A page of checked submissions, in one file."""

@@ -1,1 +1,0 @@
-"""Submissions of others: read, checked before they are believed, and put into rows."""
