@@ -1,9 +1,9 @@
 """Serve OpenVLA and SpatialVLA with the libraries of their publication, behind `/act`, for
-`check-parity`.
+`check parity`.
 
 pip install --no-deps --target OLD timm==0.9.16 transformers==4.47.0 tokenizers==0.21.0
 huggingface_hub==0.27.0 PYTHONPATH=OLD python benchmarks/reference_policies.py openvla CHECKPOINT
---port 8000 infthor-eval check-parity openvla --model-args pretrained=CHECKPOINT,dtype=float32
+--port 8000 infthor-eval check parity openvla --model-args pretrained=CHECKPOINT,dtype=float32
 --reference-url http://127.0.0.1:8000
 
 This implementation shares no code with `model_adapters`. Towers are timm's, all else is from

@@ -37,7 +37,7 @@ def _is_equal(work: Work, policy: str) -> bool:
     with work.server(words, port, {"PYTHONPATH": work.machine.old_libraries or ""}):
         arguments = f"pretrained={checkpoint},dtype=float32,device={work.machine.device}"
         done = work.command(
-            *("check-parity", policy, "--model-args", arguments),
+            *("check", "parity", policy, "--model-args", arguments),
             *("--reference-url", f"http://127.0.0.1:{port}"),
             codes=(0, 1),
         )

@@ -53,8 +53,7 @@ _COMMANDS = {
         "import-replies": "Store replies that others made as runs.",
         "rescore": "Score replies again, also with a judge.",
         "audit": "Print what a question set gives away without a frame.",
-        "table4": "Compute the paper's Table 4 from published files.",
-        "table-final": "Compute the paper's table of final tasks.",
+        "table": "Compute a table of the paper from its published files.",
     },
     "Make data": {
         "generate": "Generate long-horizon trajectories in a scene.",
@@ -68,9 +67,7 @@ _COMMANDS = {
         "scenes": "Draw a scene, or export it for machines without Unity.",
     },
     "Own models": {
-        "check-adapter": "Check a model adapter against the adapter contract.",
-        "check-memory": "Check a memory against the contract of memories.",
-        "check-parity": "Compare a policy's actions with another's.",
+        "check": "Check a model, a memory or a policy of your own.",
         "train": "Fine-tune a model on trajectories and questions.",
         "import-checkpoint": "Convert a checkpoint of the published trainer.",
     },
@@ -88,11 +85,6 @@ _SHARED_MODULES = {
     "twins": "data.questions:twins",
     "export": "exchange:export",
     "import-replies": "exchange:import_replies",
-    "table4": "tables:table4",
-    "table-final": "tables:table_final",
-    "check-adapter": "checks:check_adapter",
-    "check-memory": "checks:check_memory",
-    "check-parity": "checks:check_parity",
 }
 _NAMES = tuple(name for group in _COMMANDS.values() for name in group)
 _DEFAULT = "run"

@@ -46,7 +46,7 @@ def rows(heading):
 
 
 def test_the_pages_adapter_keeps_the_contract(folder, run_cli):
-    code, out, err = run_cli("check-adapter", NAME)
+    code, out, err = run_cli("check", "adapter", NAME)
     assert (code, err) == (0, "")
     assert out.splitlines()[-1] == f"{NAME}: keeps the contract"
     assert [line.split()[0] for line in out.splitlines()[:-1]] == ["holds"] * 14
@@ -106,7 +106,7 @@ def test_the_table_of_capabilities_has_all_of_them_with_their_defaults():
         ),
     ],
 )
-@pytest.mark.parametrize("command", [("check-adapter",), ("--tasks", "nieh_mini_gt", "--model")])
+@pytest.mark.parametrize("command", [("check", "adapter"), ("--tasks", "nieh_mini_gt", "--model")])
 def test_a_file_that_is_no_adapter_is_refused_in_one_line(
     tmp_path, run_cli, monkeypatch, command, source, name, said
 ):
@@ -125,7 +125,7 @@ def test_a_broken_clause_and_an_exception_are_reported_with_the_others(folder, r
         .replace("return Reply(text if", "return Reply('same' if")
         .replace('question = "".join(', 'question = None + "".join(')
     )
-    code, out, err = run_cli("check-adapter", NAME)
+    code, out, err = run_cli("check", "adapter", NAME)
     assert (code, err) == (1, "")
     clauses = {
         line.split()[1]: line for line in out.splitlines() if line.startswith(("holds", "broken"))
@@ -135,7 +135,7 @@ def test_a_broken_clause_and_an_exception_are_reported_with_the_others(folder, r
     assert "it raises TypeError in my_adapter.py:" in clauses["reply"]
     assert out.splitlines()[-1].endswith("broken")
     source.write_text(source.read_text().replace("def close", "def shut"))
-    code, out, err = run_cli("check-adapter", NAME)
+    code, out, err = run_cli("check", "adapter", NAME)
     assert (code, out.splitlines()[0]) == (
         1,
         "broken  members         Brightness lacks a member of Model: close",
@@ -184,7 +184,7 @@ def test_an_error_in_an_adapter_says_where_and_keeps_its_traceback(folder, run_c
 
 
 def test_a_policy_is_checked_by_the_same_command(run_cli):
-    code, out, err = run_cli("check-adapter", "openvla-tiny")
+    code, out, err = run_cli("check", "adapter", "openvla-tiny")
     assert (code, err) == (0, "")
     assert [line.split()[1] for line in out.splitlines()[:-1]] == [
         "members",

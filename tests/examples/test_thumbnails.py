@@ -25,7 +25,7 @@ def installed(target, monkeypatch):
 def test_its_model_keeps_the_contract_and_refuses_what_cannot_be(run_cli):
     assert "thumbnails" in names()
     check_adapter(build("thumbnails", {"side": "2"}, 0))
-    assert run_cli("check-adapter", "thumbnails", "--model-args", "side=3")[0] == 0
+    assert run_cli("check", "adapter", "thumbnails", "--model-args", "side=3")[0] == 0
     with pytest.raises(UsageError, match="side=0: a thumbnail has one colour at least"):
         load("thumbnails", {"side": "0"}, 0)
     assert adapter_identity("thumbnails").keys() == {"package", "version", "source"}

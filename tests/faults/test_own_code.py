@@ -167,9 +167,15 @@ def test_a_close_that_does_not_end_is_one_line_below_the_results(run_own, monkey
     [
         ("run", "--tasks", "nieh_mini_gt", "--limit", 1, "--model"),
         ("run", "--model", "blind", "--tasks", "nieh_mini_memory", "--budget", 200, "--memory"),
-        ("check-adapter",),
-        ("check-memory",),
-        ("check-parity", "--reference-url", "http://127.0.0.1:9"),
+        (
+            "check",
+            "adapter",
+        ),
+        (
+            "check",
+            "memory",
+        ),
+        ("check", "parity", "--reference-url", "http://127.0.0.1:9"),
     ],
     ids=lambda typed: typed[-1],
 )
@@ -215,7 +221,7 @@ def test_what_own_code_prints_is_not_among_the_results(run_own):
 )
 def test_check_adapter_never_ends_well_after_a_failure(run_own, run_cli, tmp_path, parts):
     run_own(**parts)
-    code, _, err = run_cli("check-adapter", f"{tmp_path / 'own.py'}:Own")
+    code, _, err = run_cli("check", "adapter", f"{tmp_path / 'own.py'}:Own")
     assert code in (1, 2)
     assert "Traceback" not in err
 
@@ -256,7 +262,7 @@ def test_check_parity_never_ends_well_after_a_failure(run_cli, tmp_path, act, cl
     (tmp_path / "own.py").write_text(source)
     with serve(policy_answers(load_policy("openvla-tiny", {}))) as url:
         name = f"{tmp_path / 'own.py'}:Own"
-        code, _, err = run_cli("check-parity", name, "--reference-url", url)
+        code, _, err = run_cli("check", "parity", name, "--reference-url", url)
     assert code in (1, 2)
     assert "Traceback" not in err
     assert "own" in err
@@ -291,7 +297,7 @@ class Own:
 )
 def test_check_memory_never_ends_well_after_a_failure(run_cli, tmp_path, begin, recall):
     (tmp_path / "own.py").write_text(MEMORY.replace("INIT", begin).replace("RECALL", recall))
-    code, _, err = run_cli("check-memory", f"{tmp_path / 'own.py'}:Own")
+    code, _, err = run_cli("check", "memory", f"{tmp_path / 'own.py'}:Own")
     assert code in (1, 2)
     assert "Traceback" not in err
 

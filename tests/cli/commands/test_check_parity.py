@@ -1,4 +1,4 @@
-"""`infthor-eval check-parity`, against a server that a tiny twin answers for."""
+"""`infthor-eval check parity`, against a server that a tiny twin answers for."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,7 +20,7 @@ def url() -> Iterator[str]:
 
 
 def test_equal_policies_end_with_0(run_cli: Run, url: str) -> None:
-    code, out, _ = run_cli("check-parity", "openvla-tiny", "--reference-url", url)
+    code, out, _ = run_cli("check", "parity", "openvla-tiny", "--reference-url", url)
     assert code == 0
     assert "openvla-tiny and its reference" in out
     assert "counts as equal: equal." in out
@@ -31,9 +31,10 @@ def test_different_policies_end_with_1(run_cli: Run, tmp_path: Path) -> None:
     Image.new("RGB", (64, 64), "red").save(tmp_path / "red.png")
     words = ("--frames", tmp_path, "--instruction", "open the drawer")
     with serve(policy_answers(load_policy("openvla-tiny", {}), change=0.125)) as other:
-        code, out, _ = run_cli("check-parity", "openvla-tiny", "--reference-url", other, *words)
+        code, out, _ = run_cli("check", "parity", "openvla-tiny", "--reference-url", other, *words)
         tolerated, _, _ = run_cli(
-            "check-parity", "openvla-tiny", "--reference-url", other, *words, "--tolerance", "0.2"
+            *("check", "parity", "openvla-tiny", "--reference-url", other, *words),
+            *("--tolerance", "0.2"),
         )
     assert (code, tolerated) == (1, 0)
     assert "0.12" in out
@@ -61,7 +62,7 @@ def test_different_policies_end_with_1(run_cli: Run, tmp_path: Path) -> None:
     ],
 )
 def test_misuse_is_one_line(run_cli: Run, words: tuple[str, ...], expected: str) -> None:
-    code, out, err = run_cli("check-parity", *words)
+    code, out, err = run_cli("check", "parity", *words)
     assert (code, out) == (2, "")
     assert expected in err
     assert "Traceback" not in err

@@ -1,4 +1,4 @@
-"""`check-memory`, `ls memories` and `--memory` as a user types them."""
+"""`check memory`, `ls memories` and `--memory` as a user types them."""
 
 import json
 from pathlib import Path
@@ -15,7 +15,7 @@ EXAMPLES = Path(__file__).parents[3] / "examples" / "memories"
 
 @pytest.mark.parametrize("name", ["changes.py:Changes", "longmemeval.py:LongMemEval"])
 def test_the_examples_keep_the_contract(name, run_cli):
-    code, out, err = run_cli("check-memory", EXAMPLES / name)
+    code, out, err = run_cli("check", "memory", EXAMPLES / name)
     assert (code, err) == (0, "")
     assert [line.split()[0] for line in out.splitlines()[:-1]] == ["holds"] * 7
     assert out.splitlines()[-1].endswith(f"{name}: keeps the contract")
@@ -24,7 +24,7 @@ def test_the_examples_keep_the_contract(name, run_cli):
 def test_a_broken_memory_has_a_line_for_each_clause(tmp_path, run_cli):
     path = tmp_path / "mine.py"
     path.write_text((EXAMPLES / "changes.py").read_text().replace("order[:room]", "order"))
-    code, out, _ = run_cli("check-memory", f"{path}:Changes")
+    code, out, _ = run_cli("check", "memory", f"{path}:Changes")
     assert code == 1
     assert "broken  budget          it recalls 2783 tokens where the budget is 0" in out
     assert out.splitlines()[-1] == f"{path}:Changes: 1 broken"
@@ -33,9 +33,9 @@ def test_a_broken_memory_has_a_line_for_each_clause(tmp_path, run_cli):
 @pytest.mark.parametrize(
     ("typed", "words"),
     [
-        (("check-memory", "nothing"), "unknown memory 'nothing'"),
+        (("check", "memory", "nothing"), "unknown memory 'nothing'"),
         (
-            ("check-memory", "last", "--memory-args", "k"),
+            ("check", "memory", "last", "--memory-args", "k"),
             "--memory-args: 'k' is not of the form key=value",
         ),
         (
@@ -138,6 +138,6 @@ def test_a_memory_that_does_not_end_is_not_waited_for(tmp_path, run_cli, monkeyp
         f"    def {where}(self, *arguments):\n"
         "        time.sleep(600)\n"
     )
-    code, out, _ = run_cli("check-memory", f"{path}:Slow")
+    code, out, _ = run_cli("check", "memory", f"{path}:Slow")
     assert code == 1
     assert "it is not done after 1 s" in out

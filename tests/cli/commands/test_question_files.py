@@ -89,13 +89,13 @@ def test_table4_is_printed_from_the_files_scores(tmp_path, run_cli):
             for n in n_clues
         ]  # fmt: skip
         write_questions(tmp_path / name, questions)
-    code, out, err = run_cli("table4", tmp_path)
+    code, out, err = run_cli("table", "4", tmp_path)
     assert (code, err) == (0, "")
     assert [line.split()[-6:] for line in out.splitlines() if "match3" in line] == [
         ["(1)", "50.00", "(1)", "50.00", "(3)", "5.0–95.0"]
     ]
     (tmp_path / FILES[1]).unlink()
-    code, out, err = run_cli("table4", tmp_path)
+    code, out, err = run_cli("table", "4", tmp_path)
     assert (code, out) == (2, "")
     assert "no question for the column 2; give a folder with both published question files" in err
 
@@ -151,7 +151,7 @@ def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_fi
     expected = f"{FILES[0]}, line 3: answer is empty; fill it or remove the row"
     output = tmp_path / "out"
     commands = (
-        (0, ["table4", tmp_path]),
+        (0, ["table", "4", tmp_path]),
         (0, ["audit", tmp_path]),
         (1, ["import-replies", log, *option_words(data=tmp_path, model="m", out=output)]),
         (0, option_words(model="oracle", tasks="nieh_gt", data=tmp_path, out=output)),

@@ -1,4 +1,4 @@
-"""`table-final`: what is printed, and what is said of a log that is damaged."""
+"""`table final`: what is printed, and what is said of a log that is damaged."""
 
 import json
 
@@ -15,12 +15,12 @@ def test_the_table_is_printed_and_bad_lines_are_named(tmp_path, run_cli):
     path.write_text(
         "".join(json.dumps({"traj_id": name, "metric": ROW}) + "\n" for name in ("t0", "t1"))
     )
-    code, out, err = run_cli("table-final", path)
+    code, out, err = run_cli("table", "final", path)
     assert (code, err) == (0, "")
     assert "25.0 (2 of 8)" in out
     assert "printed cells follow from these logs" in out
     path.write_text(path.read_text() + "half a\n" * 5)
-    code, out, err = run_cli("table-final", path)
+    code, out, err = run_cli("table", "final", path)
     assert (code, "25.0 (2 of 8)" in out) == (1, True)
     assert f"{LOG}: 5 row(s) not read" in err
     assert f"{LOG}, line 3: has no counts of plans (" in err
@@ -30,6 +30,6 @@ def test_the_table_is_printed_and_bad_lines_are_named(tmp_path, run_cli):
 def test_a_log_of_replies_is_one_line(tmp_path, run_cli):
     path = tmp_path / "eval_qa_set.log"
     path.write_text('{"qidx": 0, "llm_response": "yes"}\n')
-    code, out, err = run_cli("table-final", path)
+    code, out, err = run_cli("table", "final", path)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "no line has counts of plans" in err

@@ -1,4 +1,4 @@
-"""`check-adapter`, `check-memory` and `check-parity`: checks of anybody's models and memories."""
+"""`check adapter`, `check memory` and `check parity`: checks of anybody's models and memories."""
 
 from __future__ import annotations
 
@@ -9,19 +9,26 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import ExampleCommand, ExampleGroup
 from infthor_eval.cli.options.values import PATH, FiniteFloat, parse_model_args
 
 if TYPE_CHECKING:
     from model_adapters.check import CheckResult
 
-__all__ = ["check_adapter", "check_memory", "check_parity"]
+__all__ = ["command"]
 
 
-@click.command(
-    "check-adapter",
+@click.group(
+    "check", cls=ExampleGroup, example="infthor-eval check adapter ./my_adapter.py:MyModel"
+)
+def command() -> None:
+    """Check a model, a memory or a policy of your own."""
+
+
+@command.command(
+    "adapter",
     cls=ExampleCommand,
-    example="infthor-eval check-adapter ./my_adapter.py:MyModel",
+    example="infthor-eval check adapter ./my_adapter.py:MyModel",
 )
 @click.argument("model")
 @click.option(
@@ -47,8 +54,8 @@ def check_adapter(model: str, model_args: str) -> int:
     return code
 
 
-@click.command(
-    "check-memory", cls=ExampleCommand, example="infthor-eval check-memory ./my_memory.py:MyMemory"
+@command.command(
+    "memory", cls=ExampleCommand, example="infthor-eval check memory ./my_memory.py:MyMemory"
 )
 @click.argument("memory")
 @click.option(
@@ -73,10 +80,10 @@ def check_memory(memory: str, memory_args: str) -> int:
     return _print_checks(memory, check.check_memory(opened))
 
 
-@click.command(
-    "check-parity",
+@command.command(
+    "parity",
     cls=ExampleCommand,
-    example="infthor-eval check-parity openvla --reference-url http://HOST:8000",
+    example="infthor-eval check parity openvla --reference-url http://HOST:8000",
 )
 @click.argument("model")
 @click.option(

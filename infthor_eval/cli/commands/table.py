@@ -1,16 +1,21 @@
-"""`table4` and `table-final`: tables of the paper from its published files."""
+"""`table 4` and `table final`: tables of the paper from its published files."""
 
 from pathlib import Path
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import ExampleCommand, ExampleGroup
 from infthor_eval.cli.options.values import PATH
 
-__all__ = ["table4", "table_final"]
+__all__ = ["command"]
 
 
-@click.command("table4", cls=ExampleCommand, example="infthor-eval table4 SET")
+@click.group("table", cls=ExampleGroup, example="infthor-eval table 4 SET")
+def command() -> None:
+    """Compute a table of the paper from its published files."""
+
+
+@command.command("4", cls=ExampleCommand, example="infthor-eval table 4 SET")
 @click.argument("set_folder", metavar="SET", type=PATH)
 def table4(set_folder: Path) -> None:
     """Compute the paper's Table 4 from the scores in the published question files, beside the
@@ -28,8 +33,8 @@ def table4(set_folder: Path) -> None:
     print_table(published.table4(data), table_console())
 
 
-@click.command(
-    "table-final", cls=ExampleCommand, example="infthor-eval table-final LOGS/eval_longhrz_*.log"
+@command.command(
+    "final", cls=ExampleCommand, example="infthor-eval table final LOGS/eval_longhrz_*.log"
 )
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=PATH)
 def table_final(logs: tuple[Path, ...]) -> int:
