@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Density and scatter of the packages, held to limits: `make lint` calls it.
+"""Density and lengths of the packages, held to limits: `make lint` calls it.
 
-Comprehensions within comprehensions and tuples assigned to tuples are hard to read aloud; a folder
-of many files, or of tiny ones, is hard to find one's way in. Exit code 1 if a limit is passed.
+Comprehensions within comprehensions and tuples assigned to tuples are hard to read aloud, and so
+are long functions and modules. `__all__` says what a package's face has; elsewhere an underscore
+does. Exit code 1 if a limit is passed.
 """
 
 import ast
@@ -13,15 +14,16 @@ from pathlib import Path
 
 PACKAGES = ("infthor_board", "infthor_eval", "infthor_sim", "model_adapters", "recipes")
 WIDTH = 100
-TINY = 40  # lines; a shorter module is a concept of its own, or belongs to the one that uses it
+LONGEST_MODULE = 600  # lines
+LONGEST_FUNCTION = 80
 _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
-_UNCOUNTED = {"__init__.py", "__main__.py"}
 _LIMITS = {
     "nested comprehensions in 1,000 lines": 0.5,
     "tuples assigned to tuples in 1,000 lines": 1.5,
     f"lines over {WIDTH} columns": 0,
-    f"files under {TINY} lines": 30,
-    "folders over 25 files": 0,
+    f"modules over {LONGEST_MODULE} lines": 0,
+    f"functions over {LONGEST_FUNCTION} lines": 0,
+    "modules with __all__ that are no face": 0,
 }
 
 
@@ -42,22 +44,29 @@ def main() -> int:
     return any(figures[name] > limit for name, limit in _LIMITS.items())
 
 
-def _measure(paths: list[Path]) -> tuple[float, float, int, int, int]:
-    n_lines = n_nested = n_tuples = n_long = n_tiny = 0
-    folders: Counter[Path] = Counter()
+def _measure(paths: list[Path]) -> list[float]:
+    n_lines = 0
+    found: Counter[str] = Counter()
     for path in paths:
         source = path.read_text(encoding="utf-8")
         lines = source.splitlines()
         n_lines += len(lines)
-        n_long += sum(len(line) > WIDTH for line in lines)
-        n_tiny += len(lines) < TINY and path.name not in _UNCOUNTED
-        folders[path.parent] += path.name != "__init__.py"
+        found["wide"] += sum(len(line) > WIDTH for line in lines)
+        found["long"] += len(lines) > LONGEST_MODULE
+        found["all"] += path.name != "__init__.py" and "\n__all__ = " in source
         for node in ast.walk(ast.parse(source)):
-            n_nested += _is_nested(node)
-            n_tuples += _assigns_tuple(node)
+            found["nested"] += _is_nested(node)
+            found["tuples"] += _assigns_tuple(node)
+            found["functions"] += _is_long(node)
     thousands = n_lines / 1000
-    crowded = sum(n > 25 for n in folders.values())
-    return n_nested / thousands, n_tuples / thousands, n_long, n_tiny, crowded
+    densities = [found[name] / thousands for name in ("nested", "tuples")]
+    return [*densities, *(found[name] for name in ("wide", "long", "functions", "all"))]
+
+
+def _is_long(node: ast.AST) -> bool:
+    if not isinstance(node, ast.FunctionDef):
+        return False
+    return (node.end_lineno or node.lineno) - node.lineno >= LONGEST_FUNCTION
 
 
 def _is_nested(node: ast.AST) -> bool:

@@ -4,8 +4,6 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import pairwise
 
-__all__ = ["DISTANCES", "LENGTHS", "distance_class", "length_class"]
-
 # Bins double in width: they serve trajectories of hundreds and of thousands of frames alike.
 _FRAMES = (0, 50, 100, 200, 400, 800, 1600, 3200)
 DISTANCES = (*(f"{low}-{high - 1}" for low, high in pairwise(_FRAMES)), f">={_FRAMES[-1]}")

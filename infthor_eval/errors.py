@@ -14,26 +14,6 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = [
-    "STOPS",
-    "AdapterError",
-    "DataError",
-    "InfthorError",
-    "ModelError",
-    "NotAskedError",
-    "OutputClosed",
-    "SceneError",
-    "SimulatorError",
-    "Terminated",
-    "UsageError",
-    "UserCodeError",
-    "describe_exception",
-    "in_one_line",
-    "unknown_name",
-    "wrap_errors",
-    "wrap_user_code",
-]
-
 _LONGEST = 200  # characters of another library's message
 # characters of a message of ours, and of its ends if it is longer
 _LONGEST_MESSAGE = 1000

@@ -12,8 +12,6 @@ from statistics import fmean
 
 from infthor_eval.rates import Rate, resampled_rate
 
-__all__ = ["PAIR_BOUNDS", "PairShares", "net_pairs"]
-
 PAIR_BOUNDS: Mapping[str, tuple[float, float]] = {
     "net_pairs": (-1.0, 1.0),
     "pair_accuracy": (0.0, 1.0),

@@ -12,8 +12,6 @@ from typing import Any
 
 from infthor_eval.errors import STOPS, UsageError, describe_exception, in_one_line, unknown_name
 
-__all__ = ["PluginTable", "import_target"]
-
 
 @dataclass(frozen=True)
 class PluginTable:

@@ -8,8 +8,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import RLock
 
-__all__ = ["keep_freed_memory", "leave_safe_path", "safe_path"]
-
 _SETTINGS = (  # numbers of <malloc.h>, and bytes
     (-1, 2**28),  # M_TRIM_THRESHOLD: kept at the end of the heap
     (-2, 2**26),  # M_TOP_PAD: asked for ahead; a thread's heap is not given back when it is empty

@@ -10,21 +10,6 @@ from typing import Annotated, Any
 
 from msgspec import Meta
 
-__all__ = [
-    "MOST",
-    "MOST_REPEATS",
-    "Amount",
-    "AmountSum",
-    "Count",
-    "CountSum",
-    "Number",
-    "Repetition",
-    "Share",
-    "Total",
-    "Whole",
-    "require_number",
-]
-
 MOST = 2**53  # beyond it a float skips integers
 MOST_REPEATS = 10_000  # each is a unit of its own, and units are listed
 

@@ -14,16 +14,6 @@ from infthor_eval.tables import TableCell, answered_cell, interval_cell
 if TYPE_CHECKING:
     from infthor_eval.statistics import MeanEstimate
 
-__all__ = [
-    "Rate",
-    "clustered_rate",
-    "format_number",
-    "format_percent",
-    "paired_rate",
-    "rate_over_clusters",
-    "resampled_rate",
-]
-
 
 class Rate(msgspec.Struct, frozen=True, omit_defaults=True):
     """The mean of n values and its 95 % interval by trajectory (None with fewer than two).

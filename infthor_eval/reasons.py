@@ -5,8 +5,6 @@ from collections import defaultdict
 from collections.abc import Iterable
 from typing import TypeVar
 
-__all__ = ["count_reasons"]
-
 _Where = TypeVar("_Where", str, tuple[str, str])  # a task, or a task and the outcome of its units
 
 # A number that is a word of its own. Numbers in paths, names and ids are not merged: they tell

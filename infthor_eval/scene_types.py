@@ -2,8 +2,6 @@
 
 import re
 
-__all__ = ["BATHROOM", "scene_type"]
-
 BATHROOM = "Bathroom"
 _PROCEDURAL = {
     "kitchen": "Kitchen",

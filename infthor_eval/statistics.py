@@ -17,15 +17,6 @@ import scipy  # its submodules are imported at their first use
 
 from infthor_eval.errors import DataError
 
-__all__ = [
-    "Difference",
-    "MeanEstimate",
-    "bootstrap_interval",
-    "clustered_mean",
-    "mean_over_clusters",
-    "paired_difference",
-]
-
 _LEVEL = 0.95
 _ROUNDING = 1e-12
 

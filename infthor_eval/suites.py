@@ -39,17 +39,6 @@ if TYPE_CHECKING:
     ]
     _PROTOCOL = NiehSuite(), ManipulationSuite(), PlansSuite()
 
-__all__ = [
-    "baseline_suites",
-    "find_presenter",
-    "find_request_adapter",
-    "find_suite",
-    "options_class",
-    "split_by_suite",
-    "suite_code",
-    "suite_names",
-]
-
 
 class _BuiltIn(NamedTuple):
     """A suite here: "module:Class" of its parts, and its baselines, listed without an import."""

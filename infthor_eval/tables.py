@@ -5,16 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
-__all__ = [
-    "Column",
-    "Row",
-    "Table",
-    "TableCell",
-    "answered_cell",
-    "interval_cell",
-    "left_out_notes",
-]
-
 _N_REASONS = 5  # reasons that a table lists
 
 Reasons = Mapping[str, int]

@@ -15,16 +15,6 @@ from rich.text import Text
 
 from infthor_eval.errors import OutputClosed
 
-__all__ = [
-    "PlainConsole",
-    "console",
-    "error_console",
-    "print_error",
-    "print_line",
-    "printable",
-    "progress_bar",
-]
-
 _KEPT = "\n\t"
 _HIDDEN = {
     "Cc",

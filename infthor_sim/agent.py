@@ -6,18 +6,6 @@ import numpy as np
 
 from infthor_sim.geometry import Array, euler_matrix, yaw_matrix
 
-__all__ = [
-    "AGENT_HEIGHT",
-    "AGENT_RADIUS",
-    "CAMERA_HEIGHT",
-    "CROUCH",
-    "HAND_AT_REST",
-    "MAX_DOWN",
-    "MAX_UP",
-    "Agent",
-    "Grip",
-]
-
 AGENT_HEIGHT = 0.9009992  # agent.y of AI2-THOR's default agent on a floor at 0
 AGENT_RADIUS = 0.2  # of the agent's capsule, metres
 CAMERA_HEIGHT = 0.675  # camera above agent.y, fitted to the boxes recorded in ALFRED

@@ -14,8 +14,6 @@ from ai2thor.fifo_server import FifoServer
 from infthor_sim.errors import SimulatorError
 from infthor_sim.launch import own_player, player_command
 
-__all__ = ["Controller"]
-
 _DEFAULT_SCENE = "kitchen-1"
 _ANY_DISPLAY = "0"  # ai2thor looks for an X server if it is given none; the simulator opens none
 _WATCH_SECONDS = 0.1  # interval at which the wait for the first state checks the process

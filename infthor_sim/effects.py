@@ -7,8 +7,6 @@ from infthor_sim.object_types import type_named
 from infthor_sim.objects import SimObject
 from infthor_sim.world import World
 
-__all__ = ["apply_sources", "break_object", "slice_object", "toggle"]
-
 _TAP_REACH = 0.5  # metres from the middle of a tap to the basin that it fills
 
 

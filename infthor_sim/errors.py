@@ -2,8 +2,6 @@
 
 from enum import StrEnum
 
-__all__ = ["ActionError", "DataError", "ErrorCode", "SimulatorError", "UsageError", "in_one_line"]
-
 _LONGEST_REASON = 200  # characters of another library's message
 # characters of a message of ours, and of its ends if it is longer
 _LONGEST = 1000

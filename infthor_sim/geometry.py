@@ -7,12 +7,6 @@ from decimal import ROUND_HALF_UP, Decimal
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "Array", "aabb_gap", "aabb_overlap", "axis_angle", "axis_rotation", "convex_hull", "corners",
-    "cross", "euler_matrix", "level_gaps", "matrix_euler", "object_id", "round_vector", "round_xyz",
-    "to_array", "to_xyz", "wrap_degrees", "yaw_matrix",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 
 _VERTICAL = 1e-6  # cosine of a pitch below which yaw and roll turn about the same axis

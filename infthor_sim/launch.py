@@ -5,8 +5,6 @@ import shlex
 import sys
 from pathlib import Path
 
-__all__ = ["own_player", "player_command"]
-
 
 def player_command(data: Path | str | None = None, supplement: Path | str | None = None) -> str:
     """Return the command line of the simulator, for ai2thor's `local_executable_path`.

@@ -13,8 +13,6 @@ from infthor_sim.pictures.cameras import ThirdPartyCamera, map_camera
 from infthor_sim.simulation import Simulation
 from infthor_sim.world import World
 
-__all__ = ["Outcome", "agent_metadata", "object_metadata", "third_party_metadata"]
-
 _ITHOR = re.compile(r"FloorPlan\d+")
 _LEGACY: dict[str, Any] = {
     "colorBounds": None, "visibleRange": None, "flatSurfacesOnGrid": [], "distances": [],

@@ -8,16 +8,6 @@ from infthor_sim.geometry import Array, corners, euler_matrix, object_id
 from infthor_sim.object_types import ObjectType, type_named
 from infthor_sim.physics.footprints import Rect
 
-__all__ = [
-    "DOOR_SWING",
-    "DRAWER_SLIDE",
-    "WALL",
-    "SimObject",
-    "SimObjectState",
-    "default_object",
-    "style_of",
-]
-
 DOOR_SWING = 85.0  # degrees that a door opens
 DRAWER_SLIDE = 0.8  # share of its depth that a drawer comes out
 WALL = 0.02  # thickness in metres of the sides and floors of hollow things

@@ -13,8 +13,6 @@ from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.receptacles import find_parent
 from infthor_sim.world import World
 
-__all__ = ["NamedPose", "assign_parents", "ids_by_position", "set_poses", "spawn_randomly"]
-
 _SUNK = 0.2  # metres below a surface; what lies deeper is inside the furniture
 
 

@@ -13,8 +13,6 @@ import numpy as np
 from infthor_sim.object_types import ObjectType, type_named
 from infthor_sim.world import World
 
-__all__ = ["SavedState"]
-
 
 class SavedState:
     """A copy of a world and of the random numbers that its actions draw."""

@@ -15,8 +15,6 @@ import ai2thor.controller
 from infthor_sim.controller import Controller
 from infthor_sim.errors import DataError, in_one_line
 
-__all__ = ["prepare_script", "use_simulator"]
-
 
 def use_simulator(data: Path | None = None, supplement: Path | None = None) -> None:
     """Put this simulator's Controller in the place of ai2thor's, for the rest of the process.

@@ -2,18 +2,6 @@
 
 from dataclasses import dataclass
 
-__all__ = [
-    "AGENT_MODES",
-    "ARM_MODES",
-    "HAND_MODES",
-    "LOCOBOT",
-    "PHYSICS_STEP",
-    "SMOOTH_LEVELS",
-    "SMOOTH_QUALITIES",
-    "MotionNoise",
-    "SimulatorSettings",
-]
-
 ARM_MODES = ("arm", "stretch")
 HAND_MODES = ("default", *ARM_MODES)  # of the agents that can do something to objects
 LOCOBOT = "locobot"

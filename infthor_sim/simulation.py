@@ -16,8 +16,6 @@ from infthor_sim.scenes.catalogue import Catalogue
 from infthor_sim.settings import SimulatorSettings
 from infthor_sim.world import World
 
-__all__ = ["Simulation"]
-
 
 @dataclass
 class Simulation:

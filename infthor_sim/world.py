@@ -13,8 +13,6 @@ from infthor_sim.objects import SimObject
 from infthor_sim.physics.navigation import NavGrid
 from infthor_sim.pictures.appearance import Appearance
 
-__all__ = ["FLOOR_STYLES", "RoomShell", "Wall", "World"]
-
 FLOOR_STYLES = ("wood", "tiles", "carpet")
 
 

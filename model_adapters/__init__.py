@@ -6,6 +6,7 @@ To add an engine: a package here whose model keeps `protocols.py` and passes `ch
 its line in `built_in.py`. In another package: `docs/own-models.md`.
 """
 
+from infthor_eval.formats.pictures.video import Video
 from model_adapters.backend import Backend, BackendConversation
 from model_adapters.check import CheckResult, ContractError, check_adapter, run_checks
 from model_adapters.guarded import identity_of
@@ -28,7 +29,6 @@ from model_adapters.protocols import (
     Role,
     Subject,
     Turn,
-    Video,
 )
 from model_adapters.refusals import (
     check_decoding,

@@ -9,8 +9,6 @@ from typing import Any
 from infthor_eval.errors import ModelError
 from infthor_eval.storage.digests import digest_of_file, fingerprint
 
-__all__ = ["package_identity"]
-
 
 def package_identity(point: EntryPoint) -> dict[str, Any]:
     """Return an entry point's package, version and digest of its source, as JSON values.

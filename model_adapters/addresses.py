@@ -3,8 +3,6 @@
 from ipaddress import ip_address
 from urllib.parse import SplitResult, urlsplit
 
-__all__ = ["act_url", "is_local", "server_address"]
-
 
 def server_address(option: str, url: str) -> SplitResult:
     """Return the parts of an address; the message names the option that gives it.

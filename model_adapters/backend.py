@@ -7,8 +7,6 @@ from model_adapters.protocols import Capabilities, Decoding, Part, Reply, Turn
 from model_adapters.refusals import check_decoding, check_turns
 from model_adapters.transcript import Transcript
 
-__all__ = ["Backend", "BackendConversation"]
-
 
 class Backend(Protocol):
     """A stateless answering model: it gets all turns with every request and does its own caching.

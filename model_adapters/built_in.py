@@ -10,9 +10,6 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-__all__ = ["BUILT_IN", "BuiltIn"]
-
-
 _RANDOM = "random weights, for trying the harness; scores are those of chance"
 _ANY = "any image-text model of transformers with a chat template (pretrained=NAME)"
 _SERVED = "any model behind a server of this dialect (model=NAME)"

@@ -20,8 +20,6 @@ from model_adapters.own_function import OwnFunction, read_function
 from model_adapters.protocols import Capabilities, Decoding, Model, Policy, Reply, Turn
 from model_adapters.thinking import cut_at_stop
 
-__all__ = ["FunctionAdapter", "FunctionModel", "function_adapter"]
-
 _IMAGES, _PARTS, _ACTION = ("images", "text"), ("parts",), ("image", "instruction")
 _POLICY = "model_adapters.policies.function:FunctionPolicy"  # imported when there is one
 

@@ -32,8 +32,6 @@ from model_adapters.protocols import (
 )
 from model_adapters.refusals import wrap_adapter_errors, wrap_closing, wrap_request_errors
 
-__all__ = ["guard", "identity_of"]
-
 
 class _ReplyLimits(msgspec.Struct):
     """The fields of a `Reply` as a journal can hold them."""

@@ -12,8 +12,6 @@ from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.digests import digest
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
 
-__all__ = ["file_identity", "load_from_file", "name_in_file", "names_a_file"]
-
 
 def names_a_file(name: str) -> bool:
     """Return whether a name has the form FILE.py:NAME."""

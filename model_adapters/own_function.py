@@ -13,8 +13,6 @@ from typing import Any
 from infthor_eval.errors import ModelError
 from model_adapters.own_file import name_in_file
 
-__all__ = ["OwnFunction", "read_function"]
-
 _TYPES: dict[str, type] = {kind.__name__: kind for kind in (str, int, float, bool)}
 _BY_PLACE = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 

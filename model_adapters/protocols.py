@@ -15,28 +15,6 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.pictures.video import Video
 
-__all__ = [
-    "ROLES",
-    "Adapter",
-    "ArmDelta",
-    "Attended",
-    "Batches",
-    "Capabilities",
-    "Conversation",
-    "Decoding",
-    "Deferring",
-    "Mark",
-    "Model",
-    "Notice",
-    "Part",
-    "Policy",
-    "Reply",
-    "Role",
-    "Subject",
-    "Turn",
-    "Video",
-]
-
 Part = str | FrameRef | Video
 Role = Literal["system", "user", "assistant"]
 ROLES: tuple[Role, ...] = ("system", "user", "assistant")

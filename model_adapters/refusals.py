@@ -4,27 +4,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 
 from infthor_eval.errors import AdapterError, ModelError, UsageError, wrap_user_code
+from infthor_eval.formats.pictures.video import Video
 from infthor_eval.quantities import MOST
 from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
-from model_adapters.protocols import (
-    ArmDelta,
-    Capabilities,
-    Decoding,
-    Deferring,
-    Subject,
-    Turn,
-    Video,
-)
-
-__all__ = [
-    "check_chunk",
-    "check_decoding",
-    "check_turns",
-    "refuse_deferring",
-    "wrap_adapter_errors",
-    "wrap_request_errors",
-]
+from model_adapters.protocols import ArmDelta, Capabilities, Decoding, Deferring, Subject, Turn
 
 _N_NUMBERS = 7  # of a policy's step
 

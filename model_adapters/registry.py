@@ -26,25 +26,6 @@ from model_adapters.own_file import file_identity, load_from_file, name_in_file,
 from model_adapters.protocols import Adapter, Model, Policy
 from model_adapters.refusals import wrap_adapter_errors
 
-__all__ = [
-    "ENTRY_POINTS",
-    "adapter_identity",
-    "build",
-    "check_options",
-    "has_option",
-    "is_known",
-    "label",
-    "load",
-    "model_description",
-    "model_note",
-    "name_on_engine",
-    "names",
-    "options",
-    "read_options",
-    "switched_on",
-    "switches",
-]
-
 ENTRY_POINTS = "infthor_eval.models"
 
 _TRANSFORMERS = "transformers"  # the engine of names without `@ENGINE`

@@ -20,8 +20,6 @@ from typing import NamedTuple
 
 from model_adapters.protocols import Reply
 
-__all__ = ["MARKERS", "Thought", "answer_of", "cut_at_stop", "opening_marker", "split_thinking"]
-
 # Before and behind what a model thinks, by the families that write them.
 MARKERS = {
     "Qwen3-VL, QwQ, QVQ, DeepSeek-R1, GLM-4.1V, InternVL3.5, MiMo-VL": ("<think>", "</think>"),

@@ -5,8 +5,6 @@ from itertools import groupby
 
 from model_adapters.protocols import ROLES, Conversation, Decoding, Mark, Part, Reply, Role, Turn
 
-__all__ = ["Transcript"]
-
 
 class Transcript:
     """An append-only list of turns with marks to rewind to.

@@ -12,8 +12,6 @@ from infthor_eval.errors import UsageError
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-__all__ = ["evaluate"]
-
 
 def evaluate(options: Mapping[str, Any]) -> DataFrame:
     """See `infthor_eval.evaluate`."""

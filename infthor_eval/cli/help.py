@@ -4,8 +4,6 @@ from typing import Any
 
 import click
 
-__all__ = ["ExampleCommand", "ExampleGroup", "SuiteOption"]
-
 
 class SuiteOption(click.Option):
     """An option for tasks of some suites alone, named in its `suites`."""

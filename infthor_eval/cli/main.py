@@ -33,8 +33,6 @@ from infthor_eval.plugins import import_target
 from infthor_eval.storage.scratch import remove_abandoned
 from infthor_eval.terminal import error_console, print_error
 
-__all__ = ["Program", "collecting_seldom", "main", "run_program"]
-
 # By group: the name of each command and its line in the overview.
 _COMMANDS = {
     "Evaluate": {

@@ -10,8 +10,6 @@ from typing import NoReturn
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
 from infthor_eval.terminal import print_error
 
-__all__ = ["end_process", "noticed"]
-
 _SOON_S = 1.0  # in which most threads end by themselves
 end_process = os._exit
 

@@ -32,8 +32,6 @@ from infthor_eval.suites import find_suite
 from infthor_eval.tables import Table
 from infthor_eval.terminal import print_line
 
-__all__ = ["RunResults", "print_failures", "print_results", "read_run_results"]
-
 _SHOWN_BY_TABLES = {"frames"}  # the options that the suites' tables show beside a run's name
 
 

@@ -13,8 +13,6 @@ import msgspec
 if TYPE_CHECKING:
     from infthor_eval.nieh.set_contents import SetContents
 
-__all__ = ["Check", "set_checks"]
-
 _SHOWN = 5  # reasons that are named one by one
 
 

@@ -6,8 +6,6 @@ import msgspec
 
 from infthor_eval.runs import RunConfig, TaskConfig
 
-__all__ = ["EpisodeTaskConfig", "EpisodesConfig"]
-
 
 class EpisodeTaskConfig(TaskConfig, frozen=True, kw_only=True, omit_defaults=True):
     """The config of a task.

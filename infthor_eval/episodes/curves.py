@@ -16,18 +16,6 @@ from infthor_eval.episodes.shared_units import SharedUnits
 from infthor_eval.runs.journals.records import UnitRecord
 from infthor_eval.statistics import MeanEstimate, mean_over_clusters
 
-__all__ = [
-    "AT_MOST",
-    "Curve",
-    "Earned",
-    "Facet",
-    "Functions",
-    "RewardCurves",
-    "RunCurves",
-    "StepFunction",
-    "compute_curves",
-]
-
 P = TypeVar("P", bound=EpisodeRecord)
 AT_MOST = "at most"  # label of the bound if no planner is among the runs
 _MAX_POINTS = 400  # of a grid; a picture resolves no more

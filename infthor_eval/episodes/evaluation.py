@@ -29,8 +29,6 @@ from infthor_eval.runs import (
 )
 from infthor_eval.storage.digests import fingerprint
 
-__all__ = ["BoundEpisodes", "EpisodeEvaluation", "EpisodeUnit"]
-
 P = TypeVar("P", bound=EpisodeRecord)
 T = TypeVar("T", bound=TaskTrajectory)
 E = TypeVar("E")

@@ -4,8 +4,6 @@ from dataclasses import dataclass, field
 
 from infthor_eval.errors import UsageError
 
-__all__ = ["SimulatorOptions"]
-
 _FRAMES = ("shown", "blank")
 
 

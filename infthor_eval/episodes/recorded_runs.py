@@ -9,8 +9,6 @@ from infthor_eval.episodes.config import EpisodesConfig
 from infthor_eval.episodes.records import P
 from infthor_eval.runs import RecordTypes, RunHeader, UnitRecord, read_run
 
-__all__ = ["RecordedRun"]
-
 _EMBEDDED = "embedded"  # as the option --simulator names it
 
 

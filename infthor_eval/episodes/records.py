@@ -7,8 +7,6 @@ import msgspec
 from infthor_eval.errors import DataError
 from infthor_eval.quantities import Count, Number
 
-__all__ = ["DONE", "NOT_ATTEMPTED", "EpisodeRecord", "InfeasibleError", "P"]
-
 # Two of the ways in which an episode ends.
 DONE = "done"
 NOT_ATTEMPTED = "not attempted"

@@ -24,15 +24,6 @@ from infthor_eval.formats.trajectory import TrajectorySource
 from infthor_eval.runs.journals.records import UnitRecord
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = [
-    "EpisodeInReplay",
-    "EpisodeReplay",
-    "RecordedTrajectory",
-    "ending_of",
-    "records_of_trajectory",
-    "restore_trajectory",
-]
-
 P = TypeVar("P", bound=EpisodeRecord)
 R = TypeVar("R", bound=RecordedRun[Any, Any])
 T = TypeVar("T", bound=TaskTrajectory)

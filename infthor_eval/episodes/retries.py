@@ -6,8 +6,6 @@ from typing import TypeVar
 from infthor_eval.errors import SceneError, SimulatorError
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["with_retries"]
-
 T = TypeVar("T")
 _MAX_TRIES = 3
 

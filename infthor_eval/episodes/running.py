@@ -11,8 +11,6 @@ from infthor_eval.errors import InfthorError, NotAskedError, SceneError
 from infthor_eval.runs import NOTHING, Session, Tokens, Unit, UnitRecord, Usage
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["EpisodeResult", "EpisodeRunner"]
-
 P = TypeVar("P")
 E = TypeVar("E")
 

@@ -9,8 +9,6 @@ from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.errors import DataError, UsageError, unknown_name
 from infthor_eval.runs.journals.records import State, UnitRecord
 
-__all__ = ["SharedUnits", "difference_notes", "only_name", "shared_tasks", "shared_units"]
-
 P = TypeVar("P", bound=EpisodeRecord)
 Units = Mapping[str, Mapping[Any, UnitRecord[P]]]  # by trajectory, then by their order in time
 
@@ -117,7 +115,8 @@ def shared_units(
 def _lack(names: Sequence[str], of_run: Units[P], units: Sequence[Units[P]]) -> str:
     """Return how much a run has of the first trajectory that it has not in full; "" if none."""
     for name in names:
-        n, n_all = len(of_run.get(name, {})), len({k for each in units for k in each.get(name, {})})
+        n = len(of_run.get(name, {}))
+        n_all = len({key for each in units for key in each.get(name, {})})
         if n < n_all:
             return f"{n} of {n_all} episodes of {name}"
     return ""

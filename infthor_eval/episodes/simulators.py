@@ -12,8 +12,6 @@ from infthor_eval.thor import launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import supplement_file
 
-__all__ = ["Simulators"]
-
 _COPIES = 512  # of the simulator's state: one for each plan of a long trajectory
 
 

@@ -11,16 +11,6 @@ from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.runs import UnitRecord
 
-__all__ = [
-    "EpisodeTaskSummary",
-    "EpisodesSummary",
-    "answered_records",
-    "common_results",
-    "counted_records",
-    "success_rate",
-    "summarise_episodes",
-]
-
 
 class EpisodeTaskSummary(msgspec.Struct, frozen=True, kw_only=True):
     """Results of one task, as far as plans and arms have them alike.

@@ -7,8 +7,6 @@ from infthor_eval.episodes.summary import EpisodeTaskSummary
 from infthor_eval.runs import RunHeader, RunSummary
 from infthor_eval.tables import Column, Row, Table, left_out_notes
 
-__all__ = ["NAME_COLUMNS", "endings_table", "named_tasks", "result_notes", "run_name"]
-
 NAME_COLUMNS = (Column("model", False), Column("task", False))
 _EMBEDDED = (
     "Made in the embedded simulator: not comparable with the published rows, which are of AI2-THOR "

@@ -8,8 +8,6 @@ from typing import Any, TypeVar, get_type_hints
 from infthor_eval.errors import DataError
 from infthor_eval.runs.catalog import TaskFile
 
-__all__ = ["task_settings"]
-
 T = TypeVar("T")
 _TYPES: dict[type, str] = {
     bool: "true or false",

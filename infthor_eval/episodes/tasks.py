@@ -9,8 +9,6 @@ from infthor_eval.episodes.trajectory_sets import TaskTrajectory, TrajectorySet,
 from infthor_eval.formats.trajectory import TrajectorySource
 from infthor_eval.runs import TaskFile, TaskRequest
 
-__all__ = ["EpisodeTask"]
-
 
 class _Settings(Protocol):
     @property

@@ -14,8 +14,6 @@ from infthor_eval.formats.trajectory import (
 )
 from infthor_eval.storage.folders import packaged_folder
 
-__all__ = ["TaskTrajectory", "TrajectorySet", "find_recorded_trajectory", "find_trajectories"]
-
 _Broken = list[tuple[str, str]]
 
 

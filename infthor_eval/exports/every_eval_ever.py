@@ -36,8 +36,6 @@ from infthor_eval.runs.results import results_document
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
-__all__ = ["write"]
-
 _NO_PLACE = (
     "frames (their numbers are told), summaries by question type, distance and the like other than "
     "as text, and artifacts of memories"

@@ -12,8 +12,6 @@ from infthor_eval.report.runs import with_frames
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["SCHEMA_VERSION", "result_id", "sample_rows"]
-
 SCHEMA_VERSION = "0.3.0"
 Row = dict[str, Any]
 

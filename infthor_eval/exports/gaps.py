@@ -10,16 +10,6 @@ from infthor_eval.reasons import count_reasons
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.runs import TaskConfig
 
-__all__ = [
-    "TaskGaps",
-    "dataset_name",
-    "describe_gaps",
-    "gap_notes",
-    "task_config",
-    "task_document",
-    "task_gaps",
-]
-
 
 @dataclass(frozen=True)
 class TaskGaps:

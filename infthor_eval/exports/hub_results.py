@@ -22,8 +22,6 @@ from infthor_eval.report.runs import with_frames
 from infthor_eval.runs.journals.shards import last_change
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
-__all__ = ["write"]
-
 _FOLDER = ".eval_results"
 _FRAMEWORK = "infthor-eval"
 _NO_PLACE = (
@@ -62,7 +60,8 @@ def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
 
 def _write_results(run: PresentedRun, facts: ModelFacts, request: ExportRequest) -> Path:
     measures = chain.from_iterable(find_measures(run).values())
-    owner, name = file_name(facts.developer), file_name(facts.short_name.replace("/", "_"))
+    owner = file_name(facts.developer)
+    name = file_name(facts.short_name.replace("/", "_"))
     path = request.out / owner / name / _FOLDER / f"{_FRAMEWORK}_{file_name(run.folder.name)}.yaml"
     entries = [_entry(run, facts, measure, request) for measure in measures if measure.is_primary]
     _write_yaml(path, entries)

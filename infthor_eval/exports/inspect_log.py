@@ -34,8 +34,6 @@ from infthor_eval.runs.journals.shards import last_change
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
-__all__ = ["write"]
-
 _VERSION = 2  # of inspect_ai's logs
 _PROVIDERS = {"transformers": "hf", "vllm": "vllm"}  # its names of engines, which begin a model's
 _NO_PLACE = "excluded samples (their reasons are told), and pairs of twins other than as a mean"

@@ -18,8 +18,6 @@ from infthor_eval.exports.samples import ACT, Sample, TokenCounts, describe_resu
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.report.web.samples import PromptFrames
 
-__all__ = ["SampleWriter", "model_usage", "sample_summary"]
-
 Document = dict[str, Any]
 FindFrames = Callable[[Any], Sequence[FrameRef]]
 

@@ -22,8 +22,6 @@ from infthor_eval.statistics import clustered_mean
 from infthor_eval.storage.digests import canonical_json
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
-__all__ = ["FOLDER", "Exported", "convert_run", "export"]
-
 _FILTER = "none"
 FOLDER = "lm_eval"  # in a run's folder
 

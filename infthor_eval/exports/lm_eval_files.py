@@ -12,8 +12,6 @@ from infthor_eval.formats.reading import lines_of
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
-__all__ = ["write"]
-
 _HINT = "run its command again"
 _NO_PLACE = (
     "intervals, seconds, tokens, the frames that were shown, thoughts, and steps of episodes"

@@ -15,8 +15,6 @@ from infthor_eval.report.presented import PresentedRun
 from infthor_eval.runs import UnitRecord
 from infthor_eval.statistics import MeanEstimate, bootstrap_interval, clustered_mean
 
-__all__ = ["LEVEL", "Measure", "Scored", "counted", "find_measures", "scored"]
-
 LEVEL = 0.95  # of all intervals
 
 Record = UnitRecord[Any]

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from infthor_eval.exports.request import ExportRequest, Written
     from infthor_eval.report.presented import PresentedRun
 
-__all__ = ["FORMATS", "find_writer"]
-
 _WRITERS = {
     "every-eval-ever": "infthor_eval.exports.every_eval_ever:write",
     "hf-eval-results": "infthor_eval.exports.hub_results:write",

@@ -15,8 +15,6 @@ from infthor_eval.report.presenter import THOUGHT
 from infthor_eval.report.web.samples import Prompt, StepRow
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["ACT", "FRAME", "Sample", "SampleReader", "TokenCounts", "describe_result"]
-
 ACT = "act"  # the tool that an agent's or an arm's steps are calls of
 FRAME = "<image>"  # stands for a frame in a text, as in lm-eval's files
 

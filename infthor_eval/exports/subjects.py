@@ -9,8 +9,6 @@ from infthor_eval.errors import UsageError
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.runs import RunHeader, read_header
 
-__all__ = ["UNKNOWN", "ModelFacts", "engine_of", "model_facts", "require_one_model"]
-
 UNKNOWN = "unknown"
 _OWN = "infthor-eval"  # developer of baselines
 _LOCAL = ("localhost", "127.0.0.1", "::1")

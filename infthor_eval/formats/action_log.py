@@ -12,8 +12,6 @@ from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.step_log import Step
 
-__all__ = ["logged_action_frames", "read_action_log"]
-
 _HINT = "replay it again"
 
 

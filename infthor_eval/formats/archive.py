@@ -16,8 +16,6 @@ from infthor_eval.formats.reading import DAMAGED, require_file
 from infthor_eval.storage.files import writing_hint
 from infthor_eval.storage.scratch import ScratchFolder
 
-__all__ = ["unpack_tar"]
-
 _MAX_FILES = 2_000_000
 _MAX_FILE_BYTES = 2 * 2**30
 _MAX_HEADER_BYTES = 2**20  # of a long name or of attributes, which are read into memory at once

@@ -13,8 +13,6 @@ from infthor_eval.formats.reading import first_duplicate, read_text, require_fil
 from infthor_eval.storage.files import write_atomically
 from infthor_eval.storage.limits import CSV_LINE_MB
 
-__all__ = ["CsvRow", "read_rows", "shield", "unshield", "write_sheet"]
-
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a cell that begins so is a formula to a spreadsheet
 _SHIELD = "'"  # a cell that begins so is text to a spreadsheet
 # A number, or a sign alone, is no formula.

@@ -24,8 +24,6 @@ from infthor_eval.storage.files import (
     write_atomically,
 )
 
-__all__ = ["floor_plan_names", "floor_plans_digest", "read_house", "write_floor_plan"]
-
 _OBJECTS = Path("thor_scenes") / "objects.jsonl.gz"
 _PARTS = ("rooms", "walls", "objects")
 _HOUSE_HINT = "give the JSON of one house, as ProcTHOR generates it"

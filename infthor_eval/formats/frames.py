@@ -25,8 +25,6 @@ from infthor_eval.formats.reading import file_problem, read_bytes, require_file
 from infthor_eval.storage.digests import digest, digest_of_file
 from infthor_eval.storage.limits import IMAGE_ASPECT, IMAGE_MEGAPIXELS
 
-__all__ = ["FrameRef", "Patch", "find_images"]
-
 Image.MAX_IMAGE_PIXELS = None  # `_wrong_size` has the limit, which users can raise
 
 _PNG = b"\x89PNG\r\n\x1a\n"

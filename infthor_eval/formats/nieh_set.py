@@ -34,8 +34,6 @@ from infthor_eval.formats.shared_frames import read_shared_frames
 from infthor_eval.formats.step_log import log_file, read_steps
 from infthor_eval.formats.twins import TwinPair, read_pairs
 
-__all__ = ["NiehSet"]
-
 T = TypeVar("T")
 K = TypeVar("K")
 _LONGEST = 40  # characters of a name in a message

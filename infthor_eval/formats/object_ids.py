@@ -6,8 +6,6 @@ a number after an underscore ("Apple|...|AppleSliced_2").
 
 from enum import StrEnum
 
-__all__ = ["Words", "modern_type", "object_type_of"]
-
 # Types of AI2-THOR 2.1.0, as in ALFRED and the published trajectories, that 5.x calls otherwise.
 _RENAMED = {
     "Glassbottle": "Bottle",

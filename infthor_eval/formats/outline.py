@@ -10,8 +10,6 @@ import msgspec
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import NOT_JSON, read_bytes
 
-__all__ = ["Outline", "find_outline", "read_outline", "read_states"]
-
 _SUFFIXES = (".json", ".txt")  # both hold JSON; the published scripts accept either
 
 

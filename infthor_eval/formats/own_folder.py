@@ -20,8 +20,6 @@ from infthor_eval.formats.csv_files import CsvRow, read_rows, unshield
 from infthor_eval.formats.frames import find_images
 from infthor_eval.formats.question import Question, SkippedQuestion
 
-__all__ = ["OwnFolder", "find_own_folder"]
-
 _COLUMNS = ("question", "answer")
 _OPTIONAL = ("clue_frames", "trajectory")
 _HINT = f"it is a UTF-8 CSV file with the columns {', '.join(_COLUMNS)} and clue_frames"

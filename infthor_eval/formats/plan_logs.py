@@ -25,8 +25,6 @@ from infthor_eval.formats.reading import json_value, lines_of
 from infthor_eval.formats.replies.logs import UnreadRow
 from infthor_eval.storage.digests import digest
 
-__all__ = ["LoggedPlans", "PlanCount", "PlanLog", "is_plan_log", "read_plan_log"]
-
 _PUBLISHED_NAME = re.compile(r"eval_longhrz_checkpoints_(?P<model>.+?)_?\.log(?:\.gz)?$")
 _HINT = "give a log of the published scripts, with the counts of a trajectory's plans a line"
 # Each plan becomes a record; a task has a few.

@@ -16,8 +16,6 @@ from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.storage.folders import packaged_folder
 
-__all__ = ["PUBLISHED_DATA", "PublishedRow", "PublishedTable", "published_tables"]
-
 PUBLISHED_DATA = (
     "Published rows are on the published data; a run on other data, such as your own, is not "
     "comparable with them."

@@ -25,8 +25,6 @@ from infthor_eval.formats.csv_files import CsvRow, read_rows, shield, unshield
 from infthor_eval.formats.question import PublishedColumns, Question, SkippedQuestion
 from infthor_eval.storage.files import write_atomically
 
-__all__ = ["encode_questions", "read_questions", "write_questions"]
-
 _COLUMNS = ("traj_id", "question", "gt_img_idx", "answer")
 _TYPE = "question_type"
 _ABSENCE = "absence"

@@ -6,8 +6,6 @@ from typing import Literal
 
 from infthor_eval.storage.digests import digest
 
-__all__ = ["ABSENCE", "WITHHELD", "Answer", "PublishedColumns", "Question", "SkippedQuestion"]
-
 Answer = str | int | float
 WITHHELD = "(withheld)"  # in place of the gold answers, in the public part of a private set
 ABSENCE = "absence"  # column of the absence questions (no frame is evidence)

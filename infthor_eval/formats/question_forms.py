@@ -9,8 +9,6 @@ import re
 from dataclasses import dataclass
 from functools import cached_property
 
-__all__ = ["FORMS", "FURTHER_FORMS", "QuestionForm", "find_form", "type_of"]
-
 _LONGEST = 1000  # characters of a question of a form: to look for one takes up to their square
 _ONE_TYPE = r"(?:(?:a|an|the) )?[^?]+"
 

@@ -26,24 +26,6 @@ from infthor_eval.errors import DataError, in_one_line, wrap_errors
 from infthor_eval.storage.files import PACKED
 from infthor_eval.storage.limits import FILE_MB, LINE_MB
 
-__all__ = [
-    "DAMAGED",
-    "DAMAGED_ZIP",
-    "NOT_JSON",
-    "file_problem",
-    "find_packed",
-    "first_duplicate",
-    "json_lines_of",
-    "json_value",
-    "lines_of",
-    "read_bytes",
-    "read_json",
-    "read_packed_bytes",
-    "read_text",
-    "require_file",
-    "require_plain_files",
-]
-
 T = TypeVar("T")
 
 # What the decoders of gzip, xz and zip raise on damaged content, beside OSError.

@@ -9,8 +9,6 @@ from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import read_json
 from infthor_eval.storage.files import is_written, write_atomically, writing_hint
 
-__all__ = ["FORMAT", "claim_for_simulator", "simulator_of", "writer_of"]
-
 FORMAT = 1  # increased when the files of a set that we write change their meaning
 _FILE = "set.json"
 

@@ -17,14 +17,6 @@ from infthor_eval.formats.reading import find_packed, read_text
 from infthor_eval.storage.digests import digest, digest_of_file
 from infthor_eval.storage.files import write_packed
 
-__all__ = [
-    "patched_name",
-    "read_shared_frames",
-    "store_encoded",
-    "store_picture",
-    "write_frame_names",
-]
-
 _PICTURES = "frames"
 _NAMES = "frames.txt"
 _NAME = re.compile(r"[0-9a-f]{32}")

@@ -23,21 +23,6 @@ from infthor_eval.formats.frames import find_images
 from infthor_eval.formats.reading import find_packed, read_json, read_packed_bytes
 from infthor_eval.storage.files import write_packed
 
-__all__ = [
-    "Layout",
-    "LoggedPose",
-    "ObjectInFrame",
-    "ObjectLog",
-    "ObjectState",
-    "Step",
-    "iter_object_states",
-    "layout_of",
-    "log_file",
-    "pack_steps",
-    "read_steps",
-    "write_steps",
-]
-
 _FILE = "metadata.json"
 _HINT = "replay the trajectory again or restore the published file"
 

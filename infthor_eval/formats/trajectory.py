@@ -20,30 +20,6 @@ from infthor_eval.formats.twins import TwinWorld
 from infthor_eval.storage.digests import digest
 from infthor_eval.storage.limits import OBJECT_POSES
 
-__all__ = [
-    "ApiAction",
-    "DiscreteAction",
-    "ExpertPlan",
-    "HighAction",
-    "InitAction",
-    "LowAction",
-    "ObjectPose",
-    "PlannerAction",
-    "Scene",
-    "StartState",
-    "SubTask",
-    "SubTrajectory",
-    "TaskInfo",
-    "Toggle",
-    "Trajectory",
-    "TrajectorySource",
-    "encode_trajectory",
-    "is_trajectory_file",
-    "iter_sources",
-    "iter_trajectories",
-    "trajectory_files",
-]
-
 _SUFFIXES = (".json", ".jsonl", ".jsonl.gz")
 # Other JSON files of what is replayed, and of a folder of the published generator.
 _NOT_TRAJECTORIES = {

@@ -16,16 +16,6 @@ from infthor_eval.formats.question import Answer
 from infthor_eval.formats.reading import read_bytes
 from infthor_eval.storage.files import write_atomically
 
-__all__ = [
-    "ComparedFrame",
-    "PairedQuestion",
-    "TwinPair",
-    "TwinPlace",
-    "TwinWorld",
-    "read_pairs",
-    "write_pairs",
-]
-
 _TWINS = "twins.jsonl"
 _HINT = "make the twins again"
 

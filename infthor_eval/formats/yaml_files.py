@@ -9,8 +9,6 @@ from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import first_duplicate, read_text
 from infthor_eval.storage.limits import ALIAS_NODES
 
-__all__ = ["PlainLoader", "read_yaml"]
-
 
 class PlainLoader(yaml.SafeLoader):
     """Loader of plain YAML; subclasses add the custom tags of a file format."""

@@ -36,17 +36,6 @@ from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings
 
-__all__ = [
-    "MANIFEST",
-    "Manifest",
-    "TrajectoryRecipe",
-    "TwinsManifest",
-    "build_bundle",
-    "build_twins",
-    "differing_files",
-    "read_manifest",
-]
-
 MANIFEST = "manifest.json"
 _HINT = "give a manifest"
 _NOT_SHIPPED = "replay.json"  # has wall times, which differ from build to build

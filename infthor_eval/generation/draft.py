@@ -25,8 +25,6 @@ from infthor_eval.generation.trace import Trace
 from infthor_eval.thor.recorder import object_log
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["Draft", "Length", "initial_scene"]
-
 
 class Length(NamedTuple):
     """Numbers of low-level actions and of sub-goals."""

@@ -38,8 +38,6 @@ from infthor_eval.household.tasks import Task, TaskType, sub_task
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator, SimulatorMark
 
-__all__ = ["GeneratedTrajectory", "generate"]
-
 _MAX_ADDED = 8  # ordinary tasks, where a final task is to need a memory and none does
 _MIN_NOT_EXECUTED = 200  # tasks without any executed action that end an attempt, at least
 _OTHER_SETTINGS = "choose another scene or seed or a higher --max-fail"

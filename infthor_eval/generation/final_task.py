@@ -14,8 +14,6 @@ from typing import Any
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.tasks import Task
 
-__all__ = ["SHARE", "EndTypes", "end_types", "violation"]
-
 SHARE = 0.2  # of the frames, at either end
 
 

@@ -26,14 +26,6 @@ from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings, run_jobs
 
-__all__ = [
-    "GeneratedSet",
-    "GenerationSummary",
-    "TaskCounts",
-    "generate_set",
-    "generate_with_workers",
-]
-
 _MAX_COPIES = 16  # of the simulator's state
 
 

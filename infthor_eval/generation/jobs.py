@@ -9,8 +9,6 @@ from infthor_eval.generation.settings import MAX_FAIL, FinalTask, TrajectorySett
 from infthor_eval.scene_types import BATHROOM, scene_type
 from infthor_eval.storage.limits import STEPS, TRAJECTORIES
 
-__all__ = ["trajectory_jobs", "without_bathrooms"]
-
 # Of one action: processor time at 10,000 actions (benchmarks/generation.md), and size in the file.
 _STEP_S = 0.0275
 _STEP_BYTES = 860

@@ -8,8 +8,6 @@ from infthor_eval.household.containment import direct_parent
 from infthor_eval.household.symbolic import SymbolicRoom, room_of
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["KnownFailures"]
-
 _Size = tuple[float, ...]
 # tasks after which a failure is forgotten: other objects have moved and may have cleared the way
 _LIFETIME = 24

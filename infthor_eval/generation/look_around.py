@@ -18,16 +18,6 @@ from infthor_eval.generation.trace import ExecutedAction, RolloutError, Trace
 from infthor_eval.household.scout import HORIZON_STEP
 from infthor_eval.thor.simulator import SimulatorMark
 
-__all__ = [
-    "INSERTED",
-    "MIN_RUN",
-    "LevelWalk",
-    "inserted_before",
-    "level_walks",
-    "look_around",
-    "with_looks",
-]
-
 INSERTED = "look_around"  # the mark of an inserted action, its field `inserted`
 MIN_RUN = 6  # actions of a stretch, at least
 

@@ -24,8 +24,6 @@ from infthor_eval.generation.look_around import (
 )
 from infthor_eval.storage.files import write_atomically, writing_hint
 
-__all__ = ["LookAroundSummary", "add_look_around", "look_around_files"]
-
 _HORIZON = 30  # degrees, where the initial pose has none, as published
 _HINT = "give a .json file of one trajectory, or a folder of them"
 

@@ -5,8 +5,6 @@ from collections.abc import Iterator
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView, Vector, teleport_call
 
-__all__ = ["intermediate_views", "smoothstep"]
-
 
 def smoothstep(share: float) -> float:
     """Return the share of a motion that is done at a share of its time, if it starts and ends

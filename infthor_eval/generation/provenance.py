@@ -12,8 +12,6 @@ import msgspec
 from infthor_eval import __version__
 from infthor_eval.errors import UsageError
 
-__all__ = ["provenance"]
-
 _TIME = "SOURCE_DATE_EPOCH"  # of reproducible-builds.org
 
 

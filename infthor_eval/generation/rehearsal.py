@@ -14,8 +14,6 @@ from infthor_eval.household.symbolic import Operator
 from infthor_eval.household.tasks import Task
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["rehearse"]
-
 _NO_PICTURES = {"renderImage": False, "renderInstanceSegmentation": False}
 
 

@@ -27,8 +27,6 @@ from infthor_eval.generation.simulator_jobs import TellProgress, tell_nobody
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["RenderReport", "RenderSettings"]
-
 _TURNS = ("RotateLeft", "RotateRight")
 _SMOOTHED = ("MoveAhead", *_TURNS, "LookUp", "LookDown")
 

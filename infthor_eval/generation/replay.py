@@ -27,16 +27,6 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = [
-    "ActionReplay",
-    "Overlap",
-    "Refusal",
-    "ReplayReport",
-    "SetForm",
-    "box_iou",
-    "replay",
-]
-
 
 class Refusal(msgspec.Struct):
     """An action that the simulator refused."""

@@ -39,17 +39,6 @@ from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import agent_path
 from infthor_eval.workers import WorkerSettings, run_jobs
 
-__all__ = [
-    "ReplayFailure",
-    "ReplayForm",
-    "ReplayedSet",
-    "Selection",
-    "replay_set",
-    "replay_with_workers",
-    "select",
-    "wrap_malformed",
-]
-
 _REPORT = "replay.json"
 _SET = SetForm()
 Item = tuple[TrajectorySource, Trajectory]

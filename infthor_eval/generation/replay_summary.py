@@ -9,8 +9,6 @@ import msgspec
 from infthor_eval.generation.replay import Overlap, ReplayReport
 from infthor_eval.generation.replay_set import ReplayedSet, ReplayFailure
 
-__all__ = ["ActionCounts", "Divergence", "OverlapStatistics", "ReplaySummary", "summarise"]
-
 
 class ActionCounts(msgspec.Struct):
     """Numbers of actions of one name."""

@@ -14,8 +14,6 @@ from infthor_eval.household.symbolic import Operator
 from infthor_eval.household.wording import compact_name
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["Rollout", "Walking"]
-
 
 class Walking(Protocol):
     """Brings the agent to where it can act; see `walking.Walker`."""

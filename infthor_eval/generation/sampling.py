@@ -12,8 +12,6 @@ from collections.abc import Collection, Iterable, Sequence
 
 from infthor_eval.household.tasks import Task
 
-__all__ = ["TaskPool"]
-
 _NOISE = 10  # largest n of a weight (`inject_noise`)
 _N_VARIABLES = 4
 

@@ -7,8 +7,6 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.household.possible_tasks import usual_tasks
 from infthor_eval.household.tasks import SAMPLED, TaskType
 
-__all__ = ["MAX_FAIL", "MEMORY", "MIN_STEPS", "MIN_SUBGOALS", "FinalTask", "TrajectorySettings"]
-
 # Values of the paper's Algorithm 1
 MIN_STEPS = 300
 MIN_SUBGOALS = 10

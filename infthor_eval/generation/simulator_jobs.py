@@ -9,15 +9,6 @@ from typing import Any, Protocol, TypeVar
 from infthor_eval.errors import InfthorError
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = [
-    "JobProgress",
-    "SimulatorWorker",
-    "TellProgress",
-    "collect_outcomes",
-    "freeze_existing_objects",
-    "tell_nobody",
-]
-
 
 @dataclass(frozen=True)
 class JobProgress:

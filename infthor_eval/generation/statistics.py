@@ -4,8 +4,6 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["AttemptStatistics", "RollBack"]
-
 
 @dataclass(frozen=True)
 class RollBack:

@@ -6,15 +6,6 @@ from infthor_eval.generation.generate_set import GenerationSummary
 from infthor_eval.generation.replay_summary import OverlapStatistics, ReplaySummary
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = [
-    "final_tasks_table",
-    "generation_notes",
-    "overlaps_table",
-    "refusals_table",
-    "regular_numbers",
-    "tasks_table",
-]
-
 _MAX_REASONS = 3  # in a line
 _EXACT = 0.995  # an IoU that is shown as 1.00
 

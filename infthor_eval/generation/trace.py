@@ -13,8 +13,6 @@ from infthor_eval.formats.trajectory import (
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["ExecutedAction", "RolloutError", "Trace"]
-
 
 class RolloutError(Exception):
     """A plan failed in the simulator; the message has the action and the reason.

@@ -10,8 +10,6 @@ from infthor_eval.formats.trajectory import SubTask, Trajectory
 from infthor_eval.household.sequence_text import goal_text
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["SubGoalSummary", "TrajectorySummary", "summary_of", "trajectory_table"]
-
 
 class SubGoalSummary(msgspec.Struct):
     """A task, or the put-down of what one left in the hand.

@@ -12,8 +12,6 @@ from infthor_eval.household.scout import (
 )
 from infthor_eval.household.wording import compact_name
 
-__all__ = ["Walker"]
-
 _TURN = 90  # degrees
 _MIN_PIXELS = 60  # minimum size of the object acted on, in a frame of 90,000 pixels
 

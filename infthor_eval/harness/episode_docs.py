@@ -9,8 +9,6 @@ from typing import Any
 from infthor_eval.harness.requests import Doc
 from infthor_eval.runs import TaskFile, TaskRequest
 
-__all__ = ["settings_doc", "task_request"]
-
 
 def settings_doc(suite: str, config: Mapping[str, Any], settings: type, options: type) -> Doc:
     """Return the common part of a task's docs: suite, settings, options and data folder, as JSON.

@@ -18,8 +18,6 @@ from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.manipulation.task import ArmTaskSettings
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["ManipulationRequests", "dataset", "doc_to_target", "doc_to_text", "process_results"]
-
 register()  # see `nieh_task`
 
 

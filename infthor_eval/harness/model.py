@@ -29,9 +29,6 @@ from model_adapters import (
     refuse_deferring,
 )
 
-__all__ = ["InfthorLM"]
-
-
 _DEFAULT_DEVICE = "cuda:0"  # lm-eval's default
 
 

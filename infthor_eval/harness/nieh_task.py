@@ -27,19 +27,6 @@ from infthor_eval.pairs import PAIR_BOUNDS, PairShares
 from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.runs.generation_kwargs import decoding_of
 
-__all__ = [
-    "NiehRequests",
-    "dataset",
-    "doc_to_image",
-    "doc_to_target",
-    "doc_to_text",
-    "net_pairs",
-    "pair_accuracy",
-    "pairs_exchanged",
-    "process_pair",
-    "process_results",
-]
-
 # lm-eval 0.4.13 reads no entry points; where it imports a task's functions before it looks for the
 # model (a task file given by its path), this lets it find ours.
 register()

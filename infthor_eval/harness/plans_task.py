@@ -18,8 +18,6 @@ from infthor_eval.plans.records import PlanRecord
 from infthor_eval.plans.task import PlanTaskSettings
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["PlansRequests", "dataset", "doc_to_target", "doc_to_text", "process_results"]
-
 register()  # see `nieh_task`
 
 

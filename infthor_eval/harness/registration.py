@@ -10,14 +10,6 @@ from infthor_eval.exports import LM_EVAL_MODEL as NAME
 from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.terminal import print_error
 
-__all__ = [
-    "NAME",
-    "add_tasks",
-    "model_takes_references",
-    "register",
-    "say_model_takes_references",
-]
-
 _TARGET = "infthor_eval.harness.model:InfthorLM"
 _references = False
 

@@ -10,9 +10,6 @@ from typing import Any, Protocol, TypeVar
 
 from infthor_eval.runs import Evaluation, Unit, UnitKey, UnitRecord
 
-__all__ = ["Doc", "Payload", "RequestAdapter", "SuiteUnit"]
-
-
 Doc = dict[str, Any]
 Payload = TypeVar("Payload")  # of the records of a suite
 SuiteUnit = TypeVar("SuiteUnit", bound=Unit[Any])

@@ -19,8 +19,6 @@ from infthor_eval.harness.registration import NAME
 from infthor_eval.runs import RunOutcome
 from infthor_eval.storage.scratch import ScratchFolder
 
-__all__ = ["Trackers"]
-
 Arguments = Mapping[str, str]
 _OURS = {"self", "output_path", "token", "init_args", "step"}  # arguments that are not a user's
 

@@ -15,22 +15,6 @@ import yaml
 
 from infthor_eval.formats.object_ids import modern_type
 
-__all__ = [
-    "CLEANABLE",
-    "COOLABLE",
-    "GOALS_BY_ROOM",
-    "HEATABLE",
-    "KNIVES",
-    "KNOWN_TYPES",
-    "LIGHTS",
-    "MAX_PLAN_STEPS",
-    "MOVABLE_RECEPTACLES",
-    "SLICEABLE",
-    "STOWABLE",
-    "goes_into",
-    "preposition",
-]
-
 _TABLES: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("affordances.yaml").read_text())
 
 

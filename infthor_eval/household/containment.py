@@ -7,8 +7,6 @@ from infthor_eval.formats.step_log import ObjectState
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["contents_of", "direct_parent", "is_in", "logged_parent"]
-
 
 def contents_of(holder: str, objects: Mapping[str, ThorObject]) -> frozenset[str]:
     """Return the ids of all objects in or on a receptacle, including those in its contents."""

@@ -11,8 +11,6 @@ from enum import StrEnum
 from infthor_eval.formats.twins import TwinPlace
 from infthor_eval.thor.view import AgentPose
 
-__all__ = ["FirstPlace", "apart", "first_place", "is_looked_at"]
-
 _REACH = 1.5  # AI2-THOR's visibility distance, metres
 _SIDEWAYS = 45.0  # of the four directions that an agent can face, exactly one faces a place
 

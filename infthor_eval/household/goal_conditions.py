@@ -14,8 +14,6 @@ from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["GoalConditions", "goal_conditions"]
-
 
 class GoalConditions(NamedTuple):
     """How many conditions of a goal are met, and how many there are."""

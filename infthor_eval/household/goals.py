@@ -9,8 +9,6 @@ from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["APPLIANCE", "goal_holds", "is_achieved", "lower_bound"]
-
 APPLIANCE = {TaskType.CLEAN: "SinkBasin", TaskType.HEAT: "Microwave", TaskType.COOL: "Fridge"}
 
 

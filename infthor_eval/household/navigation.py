@@ -4,8 +4,6 @@ from collections import deque
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass
 
-__all__ = ["GRID", "Cell", "Grid", "GridPose"]
-
 GRID = 0.25  # metres
 Cell = tuple[int, int]  # (x, z) in grid units
 _AHEAD: dict[int, Cell] = {0: (0, 1), 90: (1, 0), 180: (0, -1), 270: (-1, 0)}

@@ -13,8 +13,6 @@ from infthor_eval.household.planner import relevant_items
 from infthor_eval.household.symbolic import ABSENT, FLOOR, SymbolicRoom, slice_item
 from infthor_eval.household.tasks import Task, TaskType
 
-__all__ = ["DOMAIN", "problem"]
-
 _FINISHES = {
     TaskType.PLACE: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p))",
     TaskType.PLACE_TWO: "(?i ?j - item ?p - place) (and (target ?i) (target ?j) (not (= ?i ?j))"

@@ -16,8 +16,6 @@ from infthor_eval.household.goals import APPLIANCE, lower_bound
 from infthor_eval.household.symbolic import ABSENT, FLOOR, Operator, State, SymbolicRoom, slice_item
 from infthor_eval.household.tasks import Task, TaskType
 
-__all__ = ["is_feasible", "plan", "relevant_items"]
-
 # States of a search; the hardest of the solvable problems tried needed a quarter of it.
 _LIMIT = 60_000
 

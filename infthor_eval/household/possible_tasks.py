@@ -19,8 +19,6 @@ from infthor_eval.household.symbolic import ABSENT, SymbolicRoom
 from infthor_eval.household.tasks import SAMPLED, Task, TaskType
 from infthor_eval.scene_types import scene_type
 
-__all__ = ["open_tasks", "tasks_of", "usual_tasks"]
-
 _TREATED = {
     TaskType.CLEAN: affordances.CLEANABLE,
     TaskType.HEAT: affordances.HEATABLE,

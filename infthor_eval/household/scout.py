@@ -14,15 +14,6 @@ from infthor_eval.household.navigation import Grid, GridPose
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector, teleport_call
 
-__all__ = [
-    "CAMERA_HEIGHT",
-    "HORIZON_STEP",
-    "Viewpoint",
-    "find_viewpoint",
-    "grid_pose_of",
-    "reachable_grid",
-]
-
 CAMERA_HEIGHT = 0.675  # height of the camera above the agent's position, metres
 HORIZON_STEP = 30  # degrees
 _HORIZONS = (-30, 0, 30, 60)

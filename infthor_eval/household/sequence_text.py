@@ -13,19 +13,6 @@ from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.trajectory import ApiAction, HighAction, SubTask, Trajectory
 from infthor_eval.thor.actions import text_of
 
-__all__ = [
-    "ACT",
-    "MARKS",
-    "action_part",
-    "action_text",
-    "goal_part",
-    "goal_text",
-    "plan_part",
-    "plan_text",
-    "sequence_text",
-    "task_goal_part",
-]
-
 _Described = TypeVar("_Described")
 ACT = "<|act|>"
 _PLAN = "<|plan|>"

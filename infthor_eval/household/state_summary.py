@@ -9,8 +9,6 @@ from infthor_eval.household.affordances import preposition
 from infthor_eval.household.containment import logged_parent
 from infthor_eval.household.wording import noun, with_article
 
-__all__ = ["state_summaries"]
-
 _SURROUNDINGS = frozenset({"Floor", "Wall", "Ceiling"})
 
 

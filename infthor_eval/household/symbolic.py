@@ -13,8 +13,6 @@ from infthor_eval.household.affordances import SLICEABLE, goes_into
 from infthor_eval.household.containment import direct_parent
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["ABSENT", "FLOOR", "Operator", "State", "SymbolicRoom", "room_of", "slice_item"]
-
 ABSENT = ""  # parent of an item that is held, or does not exist yet or any more
 FLOOR = "floor"
 _SLICES = 2

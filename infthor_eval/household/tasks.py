@@ -15,8 +15,6 @@ from infthor_eval.formats.trajectory import SubTask, TaskInfo
 from infthor_eval.household.affordances import preposition
 from infthor_eval.household.wording import compact_name, noun, plural, with_article
 
-__all__ = ["SAMPLED", "Task", "TaskType", "sub_task", "task_of"]
-
 
 class TaskType(StrEnum):
     """ALFRED's task types, and the published generator's PUT_AWAY, by their trajectories' names."""

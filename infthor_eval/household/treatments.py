@@ -12,8 +12,6 @@ from msgspec.structs import astuple
 from infthor_eval.household.containment import contents_of
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["Treatments"]
-
 _BASINS = {"SinkBasin", "BathtubBasin"}
 
 

@@ -8,18 +8,6 @@ import re
 
 from infthor_eval.household.affordances import preposition
 
-__all__ = [
-    "answer_of",
-    "canonical_type",
-    "compact_name",
-    "in_or_on",
-    "noun",
-    "object_type",
-    "plural",
-    "with_article",
-    "with_the",
-]
-
 _VOWEL_SOUND = re.compile(r"^(?:[aeio]|u(?!se|ni))", re.IGNORECASE)
 _WHOLE = {"SinkBasin": "Sink", "BathtubBasin": "Bathtub"}
 _LETTERS = {"CD": "CD", "TVStand": "TV stand", "Television": "television"}

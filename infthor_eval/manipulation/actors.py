@@ -19,8 +19,6 @@ from infthor_eval.runs.suite import BaselineSubject
 from model_adapters import ArmDelta, Capabilities, Policy, Subject
 from model_adapters.refusals import check_chunk
 
-__all__ = ["BASELINES", "ArmActor", "ArmBaseline", "ArmSituation", "PolicyActor", "Step"]
-
 Step = ArmDelta | Sequence[Call]
 _IN_FLIGHT = 2  # trajectories at a time; each has two simulators
 _MAX_TURN = 0.17  # radians of a random turn about each axis: 10 degrees

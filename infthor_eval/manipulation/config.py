@@ -4,8 +4,6 @@ from infthor_eval.episodes.config import EpisodesConfig, EpisodeTaskConfig
 from infthor_eval.manipulation.kinds import ManipulationKind, PutCriterion
 from infthor_eval.quantities import Amount
 
-__all__ = ["ArmTaskConfig", "ManipulationConfig"]
-
 
 class ArmTaskConfig(EpisodeTaskConfig, frozen=True, kw_only=True, omit_defaults=True):
     """The config of a task.

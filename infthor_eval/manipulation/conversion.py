@@ -15,8 +15,6 @@ from typing import Any
 
 from model_adapters import ArmDelta
 
-__all__ = ["Call", "Conversion"]
-
 Call = dict[str, Any]
 _STILL = 1e-6  # metres or degrees; a smaller movement is left out
 

@@ -41,8 +41,6 @@ from infthor_eval.thor.view import (
 )
 from model_adapters import ArmDelta
 
-__all__ = ["SUCCESS_RULES", "ArmEnvironment", "ArmOutcome", "Grasp", "arm_of"]
-
 SUCCESS_RULES = 1  # part of a run's identity: another number when the code gives other successes
 _MAX_WAITS = 20  # until a released object lies still
 _HALVINGS = 8  # of the range of heights, to half a centimetre

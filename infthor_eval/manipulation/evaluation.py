@@ -20,8 +20,6 @@ from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory
 from infthor_eval.runs import Group, Session, TaskRequest, UnitKey, UnitRecord, UnitSample
 from model_adapters import Policy, Subject
 
-__all__ = ["ArmUnit", "BoundManipulation", "ManipulationEvaluation"]
-
 ArmUnit = EpisodeUnit[ArmRecord, ArmTrajectory, ArmEpisode]
 _Camera = tuple[int, float]  # see `ArmTaskSettings.camera`
 

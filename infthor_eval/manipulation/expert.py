@@ -13,8 +13,6 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView
 
-__all__ = ["EpisodeStart", "ExpertStates", "replay_expert"]
-
 _WALKING = {"MoveAhead", "RotateLeft", "RotateRight", "LookUp", "LookDown"}
 
 

@@ -5,19 +5,6 @@ from typing import NamedTuple
 
 from infthor_eval.thor.view import ThorObject, Vector
 
-__all__ = [
-    "Corners",
-    "Point",
-    "corners_of",
-    "distance_to",
-    "interpolate",
-    "middle_of",
-    "offset",
-    "point_of",
-    "size_of",
-    "xyz",
-]
-
 Point = tuple[float, float, float]
 
 

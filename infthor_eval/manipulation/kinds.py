@@ -5,8 +5,6 @@ What the paper does not say of its protocol can be set (docs/manipulation.md).
 
 from enum import StrEnum
 
-__all__ = ["KIND_NAMES", "Closing", "Hand", "ManipulationKind", "PutCriterion", "Stand"]
-
 
 class ManipulationKind(StrEnum):
     """What the arm does in an episode."""

@@ -6,8 +6,6 @@ from infthor_eval.episodes.options import SimulatorOptions
 from infthor_eval.errors import UsageError
 from infthor_eval.manipulation.kinds import Closing, Hand, PutCriterion, Stand
 
-__all__ = ["RADII", "ManipulationOptions"]
-
 RADII = (0.04, 0.5)  # of the hand's sphere, metres, as AI2-THOR allows
 
 

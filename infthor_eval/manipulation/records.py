@@ -11,8 +11,6 @@ from infthor_eval.manipulation.kinds import PutCriterion
 from infthor_eval.quantities import Amount, Number
 from infthor_eval.runs.journals.records import RecordTypes
 
-__all__ = ["RECORDS", "ArmEnded", "ArmRecord", "ArmStep"]
-
 Call = dict[str, Any]
 Point = tuple[Number, Number, Number]
 _COLLIDED = "Collided"  # beginning of AI2-THOR's message

@@ -19,8 +19,6 @@ from infthor_eval.thor.frames import FrameFolder, FrameKeeper, NoFrames
 from infthor_eval.thor.simulator import Simulator
 from model_adapters import ArmDelta
 
-__all__ = ["ArmRunner", "arm_record"]
-
 _DIGITS = 6  # of metres and rewards; more would be rounding noise
 
 

@@ -19,8 +19,6 @@ from infthor_eval.manipulation.records import ArmEnded, ArmRecord
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["ArmTaskSummary", "ManipulationSummary", "summarise_manipulation"]
-
 Record = UnitRecord[ArmRecord]
 
 

@@ -17,8 +17,6 @@ from infthor_eval.rates import Rate, format_percent, paired_rate
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["overview_table", "result_tables"]
-
 _STILL = "still"  # the baseline that never moves
 _ABOVE = ("Pick-up above still", "Put above still")
 _CRITERIA = ("Put, released", "Put, at rest")

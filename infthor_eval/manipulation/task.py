@@ -24,8 +24,6 @@ from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory, re
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.limiting import limit_items
 
-__all__ = ["ArmTaskSettings", "ManipulationTask", "check_task_file"]
-
 _INSTRUCTIONS = {
     ManipulationKind.PICKUP: "pick up the {object}",
     ManipulationKind.PUT: "put the {object} in the {receptacle}",

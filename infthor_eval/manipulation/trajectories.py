@@ -10,8 +10,6 @@ from infthor_eval.formats.trajectory import LowAction, Trajectory, TrajectorySou
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.storage.digests import digest
 
-__all__ = ["EXPERT_ACTIONS", "ArmEpisode", "ArmTrajectory", "arm_episodes", "read_arm_trajectory"]
-
 EXPERT_ACTIONS = {"PickupObject": ManipulationKind.PICKUP, "PutObject": ManipulationKind.PUT}
 
 

@@ -7,8 +7,6 @@ from typing import Any
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.memory.protocol import Observation, Recalled, tokens_of
 
-__all__ = ["check_recalled", "pieces_of", "read_budget"]
-
 _MOST_TOKENS = 10**9  # more is a typing error
 _MOST_PIECES = 100_000  # more than any trajectory has steps
 

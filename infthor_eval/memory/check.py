@@ -28,8 +28,6 @@ from infthor_eval.storage.scratch import ScratchFolder
 from model_adapters.check.clauses import ContractError, require
 from model_adapters.check.results import MEMBERS, CheckResult, run_each
 
-__all__ = ["check_memory"]
-
 _STEPS = 24
 _TOKENS_PER_FRAME = 121  # of Qwen2.5-VL at 300x300
 _BUDGETS = (0, 60, 121, 500, 3000)

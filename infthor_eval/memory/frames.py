@@ -13,8 +13,6 @@ from infthor_eval.memory.protocol import (
     TrajectoryFacts,
 )
 
-__all__ = ["FrameMemory", "Last", "Nothing", "Oracle", "Random", "Uniform"]
-
 PUBLISHED_K = 10  # frames that the published retrieval shows
 
 

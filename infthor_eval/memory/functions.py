@@ -18,8 +18,6 @@ from infthor_eval.memory.protocol import (
 )
 from model_adapters.own_function import OwnFunction, read_function
 
-__all__ = ["FunctionMemory", "function_memory"]
-
 _FORM = ("images", "question")
 
 

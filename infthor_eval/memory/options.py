@@ -4,8 +4,6 @@ from dataclasses import dataclass, field
 
 from infthor_eval.memory.budgets import read_budget
 
-__all__ = ["MemoryOptions"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class MemoryOptions:

@@ -14,18 +14,6 @@ from typing import Any, Protocol, runtime_checkable
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.step_log import ObjectLog
 
-__all__ = [
-    "CHARACTERS_PER_TOKEN",
-    "Memory",
-    "MemoryCapabilities",
-    "Observation",
-    "Query",
-    "Recalled",
-    "TrajectoryFacts",
-    "Write",
-    "tokens_of",
-]
-
 # Tokens of a recalled text are estimated, as no tokenizer is at hand for a model behind a server;
 # the tables have the tokens that the model itself counted.
 CHARACTERS_PER_TOKEN = 4

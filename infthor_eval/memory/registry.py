@@ -29,17 +29,6 @@ from model_adapters.adapter_identity import package_identity
 from model_adapters.options.parsing import read_pairs
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
 
-__all__ = [
-    "MEMORIES",
-    "MemoryOptions",
-    "accepted_options",
-    "memory_class",
-    "memory_identity",
-    "open_memory",
-    "parse_options",
-    "wrap_memory_errors",
-]
-
 _FRAMES = "infthor_eval.memory.frames"
 _RETRIEVAL = "infthor_eval.memory.retrieval"
 _TEXTS = "infthor_eval.memory.texts"

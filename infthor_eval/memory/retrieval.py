@@ -16,8 +16,6 @@ from infthor_eval.memory.protocol import Query
 if TYPE_CHECKING:
     from model_adapters.hf.retrieval import Retriever
 
-__all__ = ["PUBLISHED_RETRIEVER", "Clip", "ClipView"]
-
 PUBLISHED_RETRIEVER = "openai/clip-vit-large-patch14"
 
 

@@ -13,8 +13,6 @@ from infthor_eval.memory.protocol import (
     TrajectoryFacts,
 )
 
-__all__ = ["Notes", "TextLog", "note_request"]
-
 
 class _Texts:
     """Base of memories of texts: they keep all steps."""

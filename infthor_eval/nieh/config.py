@@ -10,16 +10,6 @@ from infthor_eval.memory import read_budget
 from infthor_eval.quantities import MOST, Count, Repetition
 from infthor_eval.runs import RunConfig, TaskConfig
 
-__all__ = [
-    "MemoryIdentity",
-    "MetricsConfig",
-    "NiehConfig",
-    "NiehTaskConfig",
-    "RescoredConfig",
-    "SkippedSample",
-    "SourceRun",
-]
-
 
 class MetricsConfig(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The metrics of a task, and what tells them from others of their names.

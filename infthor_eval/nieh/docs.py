@@ -18,17 +18,6 @@ from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.frame_ablations import FrameAblation
 from infthor_eval.nieh.samples import TaskSamples, open_set
 
-__all__ = [
-    "Doc",
-    "doc_of",
-    "doc_parts",
-    "doc_prompt",
-    "doc_target",
-    "prompt_of",
-    "sample_of",
-    "samples_of",
-]
-
 Doc = dict[str, Any]
 # The first is lm-eval's own mark of an image in a text.
 _PLACEHOLDERS = {FrameRef: "<image>", Video: "<video>"}

@@ -32,8 +32,6 @@ from infthor_eval.runs import (
 )
 from model_adapters import Model, Subject, check_decoding
 
-__all__ = ["BoundNieh", "NiehEvaluation", "PreparedEvaluation"]
-
 
 class NiehEvaluation:
     """NIEH set up for a run; see `infthor_eval.runs.Evaluation`."""

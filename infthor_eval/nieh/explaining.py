@@ -20,8 +20,6 @@ from infthor_eval.nieh.scoring import (
     strict_form,
 )
 
-__all__ = ["explain"]
-
 _YES_NO = ("yes", "no")
 _LONGEST = 60  # characters of a quoted text
 _FORMS: Mapping[Scorer, Callable[[Answer], str]] = {

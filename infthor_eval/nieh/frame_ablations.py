@@ -17,8 +17,6 @@ from infthor_eval.nieh.contexts import Context, ContextPart, Sample
 from infthor_eval.nieh.options import BLANK, NO_CLUE, OTHER, SHOWN, check_frames
 from infthor_eval.nieh.other_homes import count_homes, draw_other_home
 
-__all__ = ["FrameAblation"]
-
 
 @dataclass(frozen=True)
 class FrameAblation:

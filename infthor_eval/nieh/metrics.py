@@ -25,8 +25,6 @@ from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.digests import digest_of_file
 from infthor_eval.storage.limits import SCORER_SECONDS
 
-__all__ = ["PUBLISHED", "MetricError", "Metrics", "metrics_of", "wrap_metric_errors"]
-
 _OURS = (
     "infthor_eval.harness.nieh_task.process_results",
     "infthor_eval.harness.nieh_task.process_pair",

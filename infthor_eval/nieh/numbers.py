@@ -11,13 +11,12 @@ from word2number import w2n
 
 from infthor_eval.formats.question import Answer
 
-__all__ = ["number_in", "number_of"]
-
 _START, _END = r"(?<![^\W_])", r"(?![^\W_])"  # of a word: an underscore is a mark
 _VALUES = {"none": 0, "nothing": 0, "never": 0, "nil": 0, "once": 1, "twice": 2, "dozen": 12}
 _VALUES |= {"half one dozen": 6, "one dozen": 12, "two dozen": 24, "hundred": 100, "thousand": 1000}
 _NAMES = list(w2n.american_number_system)  # zero to nineteen, twenty to ninety, hundred, ...
-_UNDER_20, _TENS = rf"(?:{'|'.join(_NAMES[1:20])}){_END}", rf"(?:{'|'.join(_NAMES[20:28])})"
+_UNDER_20 = rf"(?:{'|'.join(_NAMES[1:20])}){_END}"
+_TENS = rf"(?:{'|'.join(_NAMES[20:28])})"
 _UNDER_100 = rf"(?:{_TENS}(?:[-\s]+(?:{'|'.join(_NAMES[1:10])}))?{_END}|{_UNDER_20})"
 _GROUP = rf"(?:{_UNDER_20}\s+hundred{_END}(?:\s+(?:and\s+)?{_UNDER_100})?|{_UNDER_100})"
 _WORDS = rf"(?:{'|'.join(_VALUES)}|zero){_END}"

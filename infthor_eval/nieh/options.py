@@ -7,8 +7,6 @@ from infthor_eval.memory.options import MemoryOptions
 from infthor_eval.nieh.prompts import PROMPTS, PUBLISHED_MAIN
 from infthor_eval.quantities import MOST_REPEATS
 
-__all__ = ["BLANK", "FRAMES", "NO_CLUE", "OTHER", "SHOWN", "NiehOptions", "check_frames"]
-
 SHOWN = "shown"
 BLANK = "blank"
 OTHER = "other"

@@ -9,8 +9,6 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.scene_types import scene_type
 
-__all__ = ["count_homes", "draw_other_home", "without_alike"]
-
 
 class _Home(NamedTuple):
     """A trajectory's home: what it was made of (`Question.cluster`), and its kind of room.

@@ -17,8 +17,6 @@ from infthor_eval.runs import UnitKey, UnitRecord
 from model_adapters.adapter_identity import package_identity
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
 
-__all__ = ["OwnScorer", "OwnScores", "find_scorer"]
-
 _SCORERS = PluginTable("scorer", "infthor_eval.scorers", {}, "docs/own-tasks.md")
 
 ScoreReply = Callable[[str, Sequence[Answer]], float | Mapping[str, float]]

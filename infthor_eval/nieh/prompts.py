@@ -6,8 +6,6 @@ To add or change the words of a question: here; which contexts take them is in
 
 from infthor_eval.formats.question import Question
 
-__all__ = ["PROMPTS", "PUBLISHED_LOGS", "PUBLISHED_MAIN", "last_line", "question_text"]
-
 PUBLISHED_MAIN = "published-main"  # of the published branch main; the default
 # Of the branch nieh_dev, with which the published image logs were asked.
 PUBLISHED_LOGS = "published-logs"

@@ -11,17 +11,6 @@ from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.quantities import Amount, Count, Number, Share, Whole
 from infthor_eval.runs.journals.records import RecordTypes
 
-__all__ = [
-    "RECORDS",
-    "BlindGuess",
-    "NiehAnswer",
-    "NiehNote",
-    "NiehRecall",
-    "NiehVerdict",
-    "ShownClues",
-    "TwinSide",
-]
-
 _Answers = tuple[str | Whole | Number, ...]
 
 

@@ -28,8 +28,6 @@ from infthor_eval.runs.limiting import spread
 from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.storage.once import once_a_command
 
-__all__ = ["TaskSamples", "find_samples", "find_set", "open_set"]
-
 _WORD = re.compile(r"[A-Za-z]{3,}")
 
 

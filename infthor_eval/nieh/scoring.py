@@ -35,27 +35,6 @@ from infthor_eval.formats.question import Answer
 from infthor_eval.nieh.numbers import number_in, number_of
 from infthor_eval.nieh.prompts import last_line
 
-__all__ = [
-    "NEAR",
-    "SCORERS",
-    "STRICT_RULES",
-    "Scorer",
-    "are_synonyms",
-    "compared_form",
-    "matches_reference",
-    "matches_strict",
-    "normal_form",
-    "pieces_of",
-    "plain_form",
-    "response_of",
-    "says_yes_or_no",
-    "score",
-    "scores",
-    "similarity",
-    "split_published",
-    "strict_form",
-]
-
 # Part of a run's identity: scores of other rules are another run's. 2: F1 of several answers;
 # slices. 3: numbers with marks and words around them; separators and lines of lists.
 STRICT_RULES = "3"

@@ -15,8 +15,6 @@ from infthor_eval.formats.step_log import layout_of
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.runs import Catalog
 
-__all__ = ["AskedTask", "SetContents", "read_asked_tasks", "read_contents"]
-
 # Contexts whose frames are chosen by a model; which questions they can be asked with is that of
 # whole trajectories.
 _BY_MODEL = frozenset({"clip_retrieval", "memory"})

@@ -17,8 +17,6 @@ from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject
 
-__all__ = ["NiehSuite"]
-
 
 class NiehSuite:
     """The suite."""

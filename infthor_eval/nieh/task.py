@@ -26,8 +26,6 @@ from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.storage.folders import packaged_folder
 from model_adapters import Decoding, cut_at_stop
 
-__all__ = ["NiehTask", "PreparedTask", "check_task_file"]
-
 # Keys of `dataset_kwargs` beside the settings of contexts.
 _OF_SETS = ("context", "leaves_open", "data", "bundled")
 _NEEDED = (

@@ -12,8 +12,6 @@ from infthor_eval.nieh.records import TwinSide
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.storage.digests import seed_of
 
-__all__ = ["first_world", "twin_of_reply", "twin_side"]
-
 
 def first_world(traj_ids: Iterable[str]) -> str:
     """Return which of the trajectories of a pair of worlds is asked about first, drawn by both."""

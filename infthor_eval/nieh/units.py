@@ -13,8 +13,6 @@ from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.twins import twin_side
 from infthor_eval.runs import Unit, UnitKey, UnitRecord
 
-__all__ = ["NiehUnit", "shown_clues"]
-
 
 @dataclass(frozen=True)
 class NiehUnit(Unit[NiehAnswer]):

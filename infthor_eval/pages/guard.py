@@ -13,8 +13,6 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from infthor_eval.pages.policy import SERVED
 
-__all__ = ["Guard"]
-
 _NAMES = ("127.0.0.1", "localhost")
 _HEADERS = {
     "Content-Security-Policy": SERVED,

@@ -13,8 +13,6 @@ from infthor_eval.errors import wrap_errors
 from infthor_eval.pages.policy import file_policy
 from infthor_eval.storage.files import write_atomically
 
-__all__ = ["LOOK", "THEME", "read_part", "write_page_file"]
-
 
 def read_part(package: str, name: str) -> str:
     """Return the text of a file that lies beside the modules of a package."""

@@ -7,8 +7,6 @@ of text: what a run, a set or a server calls itself stays text even where a scri
 import base64
 import hashlib
 
-__all__ = ["SERVED", "file_policy"]
-
 _ALWAYS = {
     "default-src": "'none'",
     "base-uri": "'none'",

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from starlette.routing import BaseRoute, Route
     from uvicorn import Server
 
-__all__ = ["PageServer", "file_route", "listen", "require_page_extra", "serve_pages"]
-
 _HOST = "127.0.0.1"
 _TOKEN_BYTES = 24
 _STOP_WITHIN_S = 2  # for requests that are being answered when the server stops

@@ -17,8 +17,6 @@ from infthor_eval.plans.expert import ExpertAction, ExpertRefusedError
 from infthor_eval.plans.plan import Plan
 from model_adapters import ContractError
 
-__all__ = ["Environment", "check_env"]
-
 _ID = re.compile(r"[A-Za-z]+\|[^|]+\|[^|]+\|[^|]+(\|\w+)*")  # type, position, part
 _NONSENSE = ("", "fly to the moon", "MoveAhead Mug", "PutObject Mug", "pickupobject Mug")
 _UNKNOWN = "PickupObject Unicorn"

@@ -7,8 +7,6 @@ import msgspec
 from infthor_eval.episodes.config import EpisodesConfig, EpisodeTaskConfig
 from infthor_eval.formats.object_ids import Words
 
-__all__ = ["PlansConfig", "PlansTaskConfig"]
-
 
 class PlansTaskConfig(EpisodeTaskConfig, frozen=True, kw_only=True, omit_defaults=True):
     """The config of a task; imported counts have no rewards, and nothing but the defaults.

@@ -33,8 +33,6 @@ from infthor_eval.thor.recorded import degrees_of
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView
 
-__all__ = ["Ended", "Observation", "PlanEnvironment", "StepInfo", "StepOutcome"]
-
 MAX_STEPS = 50
 
 

@@ -22,8 +22,6 @@ from infthor_eval.runs import Group, Session, TaskRequest, UnitRecord, UnitSampl
 from infthor_eval.storage.scratch import ScratchFolder
 from model_adapters import Model, Subject, check_decoding
 
-__all__ = ["BoundPlans", "PlanUnit", "PlansEvaluation"]
-
 PlanUnit = EpisodeUnit[PlanRecord, PlanTrajectory, Plan]
 
 

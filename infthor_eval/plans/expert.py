@@ -24,8 +24,6 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator, SimulatorMark
 from infthor_eval.thor.view import AgentPose, SimulatorView
 
-__all__ = ["Expert", "ExpertAction", "ExpertRefusedError", "PlanStart", "Replayed"]
-
 
 class ExpertRefusedError(InfeasibleError):
     """This simulator refuses an action of the expert: there is no true history from its plan on."""

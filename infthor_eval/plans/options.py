@@ -6,8 +6,6 @@ from infthor_eval.episodes.options import SimulatorOptions
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.memory.options import MemoryOptions
 
-__all__ = ["PlansOptions"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class PlansOptions(SimulatorOptions, MemoryOptions):

@@ -10,8 +10,6 @@ from infthor_eval.formats.trajectory import HighAction, SubTask, TaskInfo, Traje
 from infthor_eval.household.sequence_text import goal_text, plan_text
 from infthor_eval.household.tasks import Task, task_of
 
-__all__ = ["Plan", "PlanKind", "TrajectoryTask", "plans_of", "tasks_of"]
-
 
 class PlanKind(StrEnum):
     """ALFRED's sub-goals."""

@@ -8,8 +8,6 @@ from infthor_eval.plans.config import PlansConfig
 from infthor_eval.quantities import Count, Number, Total
 from infthor_eval.runs.journals.records import RecordTypes
 
-__all__ = ["RECORDS", "PlanRecord", "StepRecord", "TwinRecord"]
-
 
 class StepRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """One action of an agent.

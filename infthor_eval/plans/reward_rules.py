@@ -9,8 +9,6 @@ from infthor_eval.errors import unknown_name
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.plans.plan import PlanKind
 
-__all__ = ["RewardRules", "reward_rules"]
-
 _FILE = Path(__file__).with_name("rewards.yaml")
 
 

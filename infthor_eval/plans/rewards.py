@@ -25,8 +25,6 @@ from infthor_eval.plans.reward_rules import RewardRules
 from infthor_eval.plans.targets import TREATMENTS, PlanTarget, in_hand, subject_of
 from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject
 
-__all__ = ["PlanReward", "StepReward", "count_actions_to_goal", "max_reward"]
-
 # Share of a look below which the camera's angle is right: simulators report rounded angles
 _SMALL_LOOK = 0.01
 _COOLING_STAGES = 3  # cooled, opened again, picked up again

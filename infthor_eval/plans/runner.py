@@ -22,8 +22,6 @@ from infthor_eval.thor.frames import FrameFolder, NoFrames
 from infthor_eval.thor.simulator import Simulator
 from model_adapters import Reply
 
-__all__ = ["PlanRunner", "plan_record"]
-
 _DIGITS = 6  # of rewards; more would be rounding noise
 
 

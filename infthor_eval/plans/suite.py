@@ -27,8 +27,6 @@ from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject
 
-__all__ = ["PlansSuite"]
-
 
 class PlansSuite:
     """The suite; see `infthor_eval.runs.Suite`."""

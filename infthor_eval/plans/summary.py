@@ -24,8 +24,6 @@ from infthor_eval.plans.twins.results import TwinResults, twin_results
 from infthor_eval.rates import Rate, clustered_rate, rate_over_clusters
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["FINAL_COLUMNS", "NEVER", "PlanTaskSummary", "PlansSummary", "summarise_plans"]
-
 Record = UnitRecord[PlanRecord]
 _COLUMNS: dict[str, frozenset[str]] = {
     "Go to": frozenset({PlanKind.GOTO}),

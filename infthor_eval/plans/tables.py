@@ -21,8 +21,6 @@ from infthor_eval.rates import Rate, format_number, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["overview_table", "result_tables"]
-
 _PATH_WEIGHTED = "path-weighted"
 _COUNTS = ("plans", "tried", "trajectories", "excluded", "skipped", "failed", "not asked")
 _DRAW_NOTHING = {"baseline", "reader"}  # in the identities of baselines and of people

@@ -9,8 +9,6 @@ from infthor_eval.plans.plan import Plan, PlanKind
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["TREATMENTS", "PlanTarget", "in_hand", "subject_of", "target_of"]
-
 TREATMENTS = {PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
 
 

@@ -25,8 +25,6 @@ from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.runs.limiting import limit_items
 
-__all__ = ["PlanTaskSettings", "PlansTask", "check_task_file"]
-
 _CHOICES = {
     "plans": ("all", "final"),
     "protocol": ("default", "published"),

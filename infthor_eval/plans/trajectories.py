@@ -13,8 +13,6 @@ from infthor_eval.plans.history.clue_steps import clue_step, object_logs
 from infthor_eval.plans.plan import Plan, TrajectoryTask, plans_of, tasks_of
 from infthor_eval.storage.digests import digest
 
-__all__ = ["PlanTrajectory", "read_plan_trajectory"]
-
 
 @dataclass(frozen=True)
 class PlanTrajectory(TaskTrajectory):

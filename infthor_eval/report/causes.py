@@ -14,8 +14,6 @@ import msgspec
 
 from infthor_eval.runs import RunConfig
 
-__all__ = ["UNTOLD", "Cause", "Effect", "Setting", "differing_causes"]
-
 Path = tuple[str, ...]
 _ABSENT = "-"
 

@@ -17,8 +17,6 @@ from infthor_eval.runs import Suite, UnitKey, UnitRecord
 from infthor_eval.statistics import Difference, paired_difference
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
-__all__ = ["Comparison", "compare", "comparison_table", "p_cell"]
-
 Record = UnitRecord[Any]
 Scores = Mapping[str, float]
 _NORMAL_95 = 1.96

@@ -17,16 +17,6 @@ from infthor_eval.report.presenter import THOUGHT, ReplyTokens
 from infthor_eval.report.same_questions import Side, find_sides
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = [
-    "NEAR_TIE",
-    "Answer",
-    "Compared",
-    "QuestionDifference",
-    "compare_questions",
-    "differing_token",
-    "margin_of_difference",
-]
-
 Record = UnitRecord[Any]
 
 

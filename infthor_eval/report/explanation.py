@@ -20,8 +20,6 @@ from infthor_eval.report.differences import (
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["Explanation", "explain_runs"]
-
 _N_SHOWN = 5  # questions in the table, unless all are wanted
 _LONGEST = 36  # characters of a value or a reply in a cell
 _BEFORE = 12  # of these, before the first that differs
@@ -175,7 +173,8 @@ class Explanation:
         rows = []
         for finding in self.findings:
             name = finding.cause.name
-            n, carries = str(len(finding.questions)), f"{self._factor * finding.carries:+.2f}"
+            n = str(len(finding.questions))
+            carries = f"{self._factor * finding.carries:+.2f}"
             for setting in finding.cause.settings:
                 values = (_short(setting.first), _short(setting.second))
                 rows.append(Row((name, setting.name, *values, n, carries)))

@@ -11,8 +11,6 @@ from infthor_eval.formats.csv_files import shield
 from infthor_eval.tables import Column, Table, TableCell
 from infthor_eval.terminal import printable
 
-__all__ = ["FlatColumn", "export_tables", "flat_columns"]
-
 _LATEX = str.maketrans(
     {
         "\\": r"\textbackslash{}",

@@ -11,8 +11,6 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.validation.cross_validation import DECISIONS, JudgedQuestion
 from infthor_eval.pages.one_file import read_part, write_page_file
 
-__all__ = ["write_inspection_page"]
-
 _IMAGES = "'self' file: data:"  # frames beside the page, from a disk or from a server
 
 

@@ -17,8 +17,6 @@ from infthor_eval.suites import find_presenter, suite_names
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as MatplotlibFigure
 
-__all__ = ["build_figure", "load_figure"]
-
 
 def build_figure(
     folders: Sequence[Path], name: str, request: FigureRequest, tell: Callable[[str], None]

@@ -24,8 +24,6 @@ from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["PlainPresenter"]
-
 _LONGEST = 2000  # characters of a field on the page
 
 

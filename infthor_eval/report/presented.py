@@ -17,8 +17,6 @@ from infthor_eval.runs.stored.command import read_stored_command
 from infthor_eval.runs.stored.search import read_results
 from infthor_eval.suites import find_presenter, find_suite
 
-__all__ = ["PresentedRun", "read_report_run", "read_report_runs"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class PresentedRun(ReportRun):

@@ -24,26 +24,6 @@ from infthor_eval.tables import Table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as MatplotlibFigure
 
-__all__ = [
-    "NET_PAIRS",
-    "PAIRS_FINDING",
-    "THOUGHT",
-    "Description",
-    "EpisodeSelection",
-    "Figure",
-    "FigureRequest",
-    "FigureResult",
-    "FindFrames",
-    "GroupScore",
-    "OpenReplay",
-    "Presenter",
-    "Recording",
-    "Replay",
-    "ReplayFrame",
-    "ReplyTokens",
-    "Timelines",
-]
-
 Record = UnitRecord[Any]
 # Of twins, in any suite.
 NET_PAIRS = "net pairs"

@@ -17,8 +17,6 @@ from infthor_eval.runs.stored.search import StoredRun, find_runs
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-__all__ = ["load_runs"]
-
 
 def load_runs(*folders: str | os.PathLike[str]) -> DataFrame:
     """See `infthor_eval.load_runs`."""

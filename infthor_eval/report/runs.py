@@ -9,15 +9,6 @@ from typing import Any, TypeVar
 from infthor_eval.runs import RunHeader, RunSummary, Suite, UnitKey, UnitRecord, Usage
 from infthor_eval.runs.stored.labels import label_runs
 
-__all__ = [
-    "ReportRun",
-    "choose_evenly",
-    "distinct_names",
-    "label_report_runs",
-    "records_by_unit",
-    "with_frames",
-]
-
 T = TypeVar("T")
 _LONGEST_TASKS = 60  # characters of the tasks in a label
 

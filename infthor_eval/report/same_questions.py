@@ -18,8 +18,6 @@ from infthor_eval.report.presented import PresentedRun
 from infthor_eval.runs import UnitRecord
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
-__all__ = ["Side", "compare_sides", "find_sides", "sides_table"]
-
 _TASK = "same questions"  # the one task that the sides of a comparison are of
 
 Record = UnitRecord[Any]

@@ -20,8 +20,6 @@ from infthor_eval.report.web.samples import Prompt, PromptFrames, StepRow
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["Sample", "find_samples", "load_sample"]
-
 _MOST_FRAMES = 24  # in a cell
 _SIDE = 150  # pixels of a frame's longer side
 _ROOM = 10**7  # bytes of all frames: more than they can have

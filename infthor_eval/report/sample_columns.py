@@ -10,8 +10,6 @@ from typing import Any, NamedTuple
 
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["ENVELOPE", "SampleColumn", "payload_column"]
-
 
 class SampleColumn(NamedTuple):
     """A column.

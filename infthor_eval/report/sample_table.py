@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from pyarrow import Table
 
-__all__ = ["FORMS", "encode_samples", "load_run", "sample_table"]
-
 FORMS = ("csv", "parquet")
 
 

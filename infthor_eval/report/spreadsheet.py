@@ -14,8 +14,6 @@ from infthor_eval.tables import Table
 if TYPE_CHECKING:
     from xlsxwriter.worksheet import Worksheet
 
-__all__ = ["prepare_spreadsheet", "write_spreadsheet"]
-
 _WIDEST = 60  # characters of a column; longer texts are cut by the program, not in the file
 _DIGITS = ".16G"  # as XlsxWriter writes numbers; the greatest floats become infinite by rounding
 

@@ -10,8 +10,6 @@ from rich.text import Text
 from infthor_eval.tables import Table
 from infthor_eval.terminal import console, printable
 
-__all__ = ["print_table", "table_console"]
-
 _LINE = 100  # letters in a line of a note
 _WIDTH = 200  # where it is no terminal
 _ANY_WIDTH = 10_000

@@ -19,8 +19,6 @@ from infthor_eval.formats.yaml_files import PlainLoader, read_yaml
 from infthor_eval.storage.digests import canonical_json
 from infthor_eval.storage.folders import packaged_folder
 
-__all__ = ["ENTRY_POINTS", "KEYS", "Catalog", "TaskFile"]
-
 ENTRY_POINTS = "infthor_eval.tasks"  # a package's entry is "package.folder" with its task files
 
 _HINT = "fix the task file"

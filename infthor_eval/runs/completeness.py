@@ -13,8 +13,6 @@ import msgspec
 from infthor_eval.quantities import Count
 from infthor_eval.runs.journals.records import RunHeader, UnitRecord
 
-__all__ = ["UnitCounts", "count_missing", "count_units", "mark_incomplete", "unmarked"]
-
 _MARK = " (incomplete)"
 
 

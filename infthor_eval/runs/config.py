@@ -10,8 +10,6 @@ from infthor_eval.errors import DataError, in_one_line
 from infthor_eval.quantities import Count
 from infthor_eval.storage.digests import fingerprint, json_values
 
-__all__ = ["Config", "RunConfig", "TaskConfig", "TaskConfigType", "require_tasks"]
-
 
 class TaskConfig(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The config of a task; a suite adds fields in a subclass.

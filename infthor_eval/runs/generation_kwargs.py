@@ -6,8 +6,6 @@ from typing import Any
 from infthor_eval.errors import UsageError
 from model_adapters.protocols import Decoding
 
-__all__ = ["decoding_of"]
-
 _KNOWN = (
     "until",
     "max_gen_toks",

@@ -4,8 +4,6 @@ import random
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-__all__ = ["limit_items", "spread"]
-
 T = TypeVar("T")
 
 

@@ -13,8 +13,6 @@ from infthor_eval.storage.once import forget_files
 from infthor_eval.workers import WorkerSettings
 from model_adapters import check_options, is_known, label, names
 
-__all__ = ["PreparedRun", "RunRequest", "prepare", "prepare_all", "run_folder"]
-
 _LONGEST_TASKS = 80  # characters of their names in a folder's
 
 

@@ -14,16 +14,6 @@ from infthor_eval.runs.suite import RunSummary, Suite
 from infthor_eval.runs.usage import Usage
 from infthor_eval.storage.files import write_atomically, writing_hint
 
-__all__ = [
-    "RESULTS",
-    "results_document",
-    "write_document",
-    "write_results",
-    "write_run_files",
-    "write_scores",
-    "write_usage",
-]
-
 RESULTS = "results.json"
 _SCORES = "scores.jsonl"
 _USAGE = "usage.json"

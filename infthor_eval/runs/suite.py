@@ -42,22 +42,6 @@ from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.tables import Table
 from model_adapters import Capabilities, Subject
 
-__all__ = [
-    "BaselineSubject",
-    "BoundEvaluation",
-    "Cost",
-    "Evaluation",
-    "Group",
-    "Need",
-    "RunSummary",
-    "Session",
-    "Skipped",
-    "Suite",
-    "TaskRequest",
-    "UnitSample",
-    "Workload",
-]
-
 Need = Literal["conversation", "policy"]
 
 Options_co = TypeVar("Options_co", covariant=True)

@@ -8,8 +8,6 @@ import msgspec
 from infthor_eval.quantities import Amount, Count
 from model_adapters import Reply
 
-__all__ = ["NOTHING", "Usage"]
-
 _DIGITS = 9  # of dollars; further digits depend on the order of the sum
 
 

@@ -21,8 +21,6 @@ from typing import ClassVar
 
 from infthor_eval.storage.limits import Limit
 
-__all__ = ["limit_by", "limit_time", "not_counted"]
-
 _AGAIN_S = 1.0  # after which code that catches everything is interrupted once more
 _SOON_S = 0.001  # after which code that is between two contexts is looked at again
 

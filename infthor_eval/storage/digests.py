@@ -7,17 +7,6 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-__all__ = [
-    "SIZE",
-    "canonical_json",
-    "digest",
-    "digest_of_file",
-    "digest_of_files",
-    "fingerprint",
-    "json_values",
-    "seed_of",
-]
-
 SIZE = 16  # bytes of a content digest; names and fingerprints are shorter
 
 

@@ -14,23 +14,6 @@ from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.storage.digests import digest
 from infthor_eval.storage.locks import hold_lock
 
-__all__ = [
-    "OVERWRITE_HINT",
-    "PACKED",
-    "file_name",
-    "hold_folder",
-    "is_written",
-    "plain_name",
-    "prepare_file",
-    "prepare_folder",
-    "refuse_overwrite",
-    "remove",
-    "require_writable",
-    "write_atomically",
-    "write_packed",
-    "writing_hint",
-]
-
 PACKED = ".xz"  # ends the name of a packed file
 OVERWRITE_HINT = "give another --out, or --overwrite if nobody edited it"
 # Other characters, and these names with any ending, mean something to some system.

@@ -10,8 +10,6 @@ from pathlib import Path
 
 from infthor_eval.errors import DataError, wrap_errors
 
-__all__ = ["packaged_folder", "user_cache"]
-
 
 def packaged_folder(name: str) -> Path:
     """Return the package's data folder of this name ("tasks", "results", "sets/nieh_mini").

@@ -10,28 +10,6 @@ from dataclasses import dataclass
 
 from infthor_eval.errors import UsageError
 
-__all__ = [
-    "ACTION_SECONDS",
-    "ALIAS_NODES",
-    "CSV_LINE_MB",
-    "FILE_MB",
-    "IMAGE_ASPECT",
-    "IMAGE_MEGAPIXELS",
-    "JUDGE_SECONDS",
-    "LINE_MB",
-    "MEMORY_SECONDS",
-    "OBJECT_POSES",
-    "OWN_CODE_SECONDS",
-    "SCORER_SECONDS",
-    "STEPS",
-    "TEMPLATE_CHARACTERS",
-    "TEMPLATE_MB",
-    "TEMPLATE_SECONDS",
-    "TRAJECTORIES",
-    "UNITY_ACTION_SECONDS",
-    "Limit",
-]
-
 
 @dataclass(frozen=True)
 class Limit:

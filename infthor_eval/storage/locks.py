@@ -10,8 +10,6 @@ from typing import BinaryIO
 
 from infthor_eval.errors import UsageError
 
-__all__ = ["hold_lock"]
-
 _RETRY_S = 0.05  # between two attempts
 
 

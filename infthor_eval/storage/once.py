@@ -7,8 +7,6 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, ParamSpec, Protocol, TypeVar
 
-__all__ = ["forget_files", "once_a_command"]
-
 Arguments = ParamSpec("Arguments")
 T_co = TypeVar("T_co", covariant=True)
 _N_KEPT = 8  # results of each function

@@ -11,8 +11,6 @@ from typing import BinaryIO
 
 from infthor_eval.storage.files import remove
 
-__all__ = ["ScratchFolder", "remove_abandoned"]
-
 _PREFIX = "infthor-"
 _LOCK = ".lock"  # ends the name of the file beside a folder
 _TRIES = 2  # to remove what cannot be removed at once, as on a disk with a passing error

@@ -16,18 +16,6 @@ from msgspec import UnsetType
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = [
-    "ActionText",
-    "Misuse",
-    "UngroundedError",
-    "applicable_actions",
-    "applicable_calls",
-    "ground",
-    "parse_action",
-    "text_of",
-    "text_of_call",
-]
-
 _APPLIES: dict[str, Callable[[ThorObject], bool | UnsetType]] = {
     "OpenObject": lambda obj: obj.openable and not obj.is_open,
     "CloseObject": lambda obj: obj.openable and obj.is_open,

@@ -10,8 +10,6 @@ from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.transport import PeerFault, SafeFifoServer
 
-__all__ = ["SafeController", "scene_name"]
-
 _ANY_DISPLAY = "0"  # ai2thor requires some DISPLAY; a simulator without a window does not use it
 
 

@@ -9,8 +9,6 @@ from infthor_eval.formats.pictures.png import write_png
 from infthor_eval.storage.files import writing_hint
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["FrameFolder", "FrameKeeper", "NoFrames"]
-
 
 class FrameKeeper(Protocol):
     """Stores frames and returns references to them."""

@@ -13,8 +13,6 @@ from msgspec.structs import astuple
 from infthor_eval.formats.object_ids import modern_type, object_type_of
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["Grounding", "id_position"]
-
 
 def id_position(object_id: str) -> tuple[float, float, float] | None:
     """Return the position (metres) in an object id, or None if it has none."""

@@ -8,8 +8,6 @@ from pathlib import Path
 from infthor_eval.storage.limits import ACTION_SECONDS, UNITY_ACTION_SECONDS
 from infthor_sim.launch import own_player, player_command
 
-__all__ = ["Launch", "embedded_launch", "unity_launch"]
-
 
 @dataclass(frozen=True)
 class Launch:

@@ -14,8 +14,6 @@ from msgspec import UNSET, UnsetType
 from infthor_eval.thor.actions import Misuse, UngroundedError
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["current_call", "ground_published", "published_call"]
-
 _Has = Callable[[ThorObject], bool | UnsetType]
 
 _HAS: Mapping[str, _Has] = {

@@ -16,8 +16,6 @@ import numpy as np
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.floor_plans import write_floor_plan
 
-__all__ = ["HOST", "PUBLISHED_SCENES", "fetch_scene"]
-
 HOST = "https://raw.githubusercontent.com"
 # at fixed commits, so that everybody has the same scenes
 _OBJECTS = (

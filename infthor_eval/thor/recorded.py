@@ -6,8 +6,6 @@ from infthor_eval.formats.trajectory import LowAction
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["MissingObjectError", "degrees_of", "translate"]
-
 # Default angles of 2.1.0, degrees.
 _TURNS = {"RotateLeft": 90.0, "RotateRight": 90.0, "LookUp": 30.0, "LookDown": 30.0}
 

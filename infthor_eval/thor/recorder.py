@@ -8,8 +8,6 @@ from infthor_eval.formats.pictures.png import write_png
 from infthor_eval.formats.step_log import LoggedPose, ObjectInFrame, ObjectLog, ObjectState, Step
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["Recorder", "object_log", "state_of"]
-
 _PNG_LEVEL = 3  # 6 takes twice as long and shrinks rendered frames by a sixth
 
 

@@ -18,8 +18,6 @@ from infthor_eval.thor.settling import Deviation, poses_call, settle
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView, Vector, teleport_call
 
-__all__ = ["RestoreReport", "restore"]
-
 
 @dataclass
 class RestoreReport:

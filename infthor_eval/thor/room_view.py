@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView, Vector, teleport_call
 
-__all__ = ["find_room_view"]
-
 _N_POSITIONS = 24
 _HEADINGS = (0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0)
 _HORIZONS = (0.0, 20.0)  # degrees below the horizontal

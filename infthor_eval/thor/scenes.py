@@ -12,8 +12,6 @@ from infthor_eval.thor.room_view import find_room_view
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView, Vector, teleport_call
 
-__all__ = ["dump_scene", "scene_pictures"]
-
 
 def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """Return the scene from above, and from where most of it is seen: uint8 [height, width, 3].

@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Instance", "Segmentation", "instances_of", "segmentation_of"]
-
 
 @dataclass(frozen=True)
 class Instance:

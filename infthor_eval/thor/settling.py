@@ -16,8 +16,6 @@ from msgspec.structs import asdict, astuple
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["Deviation", "poses_call", "settle"]
-
 _ROUNDS = 2  # times that physics acts on the poses before they are set for the last time
 _PASSES = 3  # actions of doing nothing in which physics acts
 _PUSHED = 0.05  # metres from its place at which an object is put back

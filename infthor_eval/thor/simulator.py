@@ -17,8 +17,6 @@ from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.transport import PeerFault
 from infthor_eval.thor.view import SimulatorView, teleport_call, view_of
 
-__all__ = ["Simulator", "SimulatorMark"]
-
 _CallResult = tuple[dict[str, Any], bool]  # a call, and whether it succeeded
 _LOG = logging.getLogger(__name__)
 _INITIAL = {"gridSize": 0.25, "fieldOfView": 60, "visibilityDistance": 1.5, "snapToGrid": True}

@@ -17,8 +17,6 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.recorded import degrees_of
 
-__all__ = ["agent_path", "supplement_file", "write_supplement"]
-
 _GRID = 0.25
 _HEADINGS = {"MoveAhead": 0.0, "MoveRight": 90.0, "MoveBack": 180.0, "MoveLeft": 270.0}
 _ON_FIXED = {"OpenObject", "CloseObject", "ToggleObjectOn", "ToggleObjectOff"}

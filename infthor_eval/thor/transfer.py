@@ -14,8 +14,6 @@ from msgspec.structs import asdict, astuple
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["transfer"]
-
 _NEAR = 0.01  # tolerance of positions, metres
 _ALIKE = 0.5  # tolerance of rotations, degrees
 _ROUNDS = 3  # passes over all objects: moving a receptacle also moves what is in it

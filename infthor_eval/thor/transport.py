@@ -21,8 +21,6 @@ from ai2thor.server import DepthFormat, MultiAgentEvent
 from infthor_eval.errors import SimulatorError
 from infthor_eval.storage.scratch import ScratchFolder
 
-__all__ = ["PeerFault", "SafeFifoServer"]
-
 _WATCH_SECONDS = 0.1  # interval at which a waiting read or write checks the child process
 # A frame with ids and depth has 0.9 MB; the default of 64 KiB would cost many wake-ups.
 _PIPE_BYTES = 1 << 20

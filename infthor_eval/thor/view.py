@@ -12,19 +12,6 @@ from numpy.typing import NDArray
 from infthor_eval.errors import SimulatorError, in_one_line
 from infthor_eval.thor.segmentation import Instance, Segmentation, segmentation_of
 
-__all__ = [
-    "AgentPose",
-    "ArmJoint",
-    "ArmState",
-    "AxisAngle",
-    "Box",
-    "SimulatorView",
-    "ThorObject",
-    "Vector",
-    "teleport_call",
-    "view_of",
-]
-
 
 class Vector(msgspec.Struct, frozen=True):
     """Metres along Unity's axes (y up), or degrees about them."""

@@ -17,8 +17,6 @@ from infthor_eval.plans.plan import plans_of, tasks_of
 from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
 from model_adapters.hf.prompting.prompt import n_tokens
 
-__all__ = ["recorded_segments", "windows"]
-
 
 def recorded_segments(
     trajectory: Trajectory, steps: Sequence[Step], frames: Sequence[FrameRef], words: Words

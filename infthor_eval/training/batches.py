@@ -11,8 +11,6 @@ from infthor_eval.training.encoding import TrainingSequence
 from model_adapters.hf.family import Family
 from model_adapters.hf.prompting.prompt import Frame, token_ids
 
-__all__ = ["IGNORED", "Batch", "collate", "n_labels", "pad_positions"]
-
 IGNORED = -100  # label of tokens without loss, in PyTorch's cross entropy
 
 

@@ -13,8 +13,6 @@ from safetensors.torch import load_model, save_model
 from infthor_eval.errors import UsageError, wrap_errors
 from infthor_eval.storage.files import prepare_folder, write_atomically
 
-__all__ = ["Checkpoints"]
-
 _WEIGHTS = "model.safetensors"
 _OPTIMIZER = "optimizer.pt"
 _STATE = "state.json"

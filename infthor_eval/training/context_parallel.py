@@ -25,8 +25,6 @@ from infthor_eval.training.batches import IGNORED, Batch
 from infthor_eval.training.network import SequenceModel, next_labels
 from model_adapters.hf.prompting.prompt import Frame
 
-__all__ = ["ContextParallel", "SequenceSplit", "causal_attention", "context_parallel"]
-
 _MASK_ROWS = 256  # rows of an explicit causal mask that exist at a time
 _HALF = (torch.float16, torch.bfloat16)
 

@@ -11,8 +11,6 @@ from infthor_eval.training.data import TrainingData
 from infthor_eval.training.network import SequenceModel, parameters_by_part
 from infthor_eval.training.recipe import Recipe
 
-__all__ = ["TrainingCost", "estimate_cost"]
-
 _SAMPLE = (300, 300)  # width and height of frames in the published data
 _MOMENTS = 2  # moments of AdamW per weight
 _LORA_SHARE = 0.02  # approximate size of adapters of rank 16, relative to the decoder's weights

@@ -20,14 +20,6 @@ from infthor_eval.training.memory_sequences import memory_sequences
 from infthor_eval.training.question_sequences import question_sequences
 from infthor_eval.training.recipe import ActionData, Recipe
 
-__all__ = [
-    "TrainingData",
-    "action_sequences",
-    "read_history",
-    "read_training_data",
-    "trajectory_names",
-]
-
 
 @dataclass(frozen=True)
 class TrainingData:

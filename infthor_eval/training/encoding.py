@@ -15,13 +15,6 @@ from model_adapters import Part, Turn
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.prompt import Frame, Piece, Prompter, n_tokens
 
-__all__ = [
-    "Encoder",
-    "SkippedSequence",
-    "TrainingSequence",
-    "within",
-]
-
 
 @dataclass(frozen=True)
 class TrainingSequence:

@@ -15,8 +15,6 @@ from model_adapters.hf.loading.card import WORDS
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.loading.tower_names import with_published_names
 
-__all__ = ["export", "gather_weights"]
-
 _CONFIG = "config.json"
 _CARD = f"""\
 ---

@@ -29,8 +29,6 @@ from infthor_eval.training.starting_model import load_starting_model
 from infthor_eval.training.trainer import train_with_trainer
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
-__all__ = ["StepCallback", "TrainingRun", "fine_tune", "prepare_run"]
-
 _DESCRIPTION = "training.json"
 _STATES = "states"
 _CHECKPOINT = "checkpoint"

@@ -15,8 +15,6 @@ from infthor_eval.plans.history.segments import Part, PlanSegment
 from infthor_eval.plans.published.system_prompts import system_prompt
 from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
 
-__all__ = ["goal_windows", "goals_of_actions"]
-
 # tokens that the trainer keeps free: its count of the system prompt (1), and 8 of the template's
 _FEWER = 9
 

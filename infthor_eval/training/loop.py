@@ -25,8 +25,6 @@ from infthor_eval.training.network import SequenceModel
 from infthor_eval.training.ranks import Ranks, sum_gradients
 from infthor_eval.training.schedule import LoopSettings
 
-__all__ = ["Loop", "LoopSettings", "Progress"]
-
 _Loss = Callable[[Batch, int], Tensor]
 
 

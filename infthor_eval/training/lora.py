@@ -6,8 +6,6 @@ from infthor_eval.errors import UsageError, wrap_errors
 from infthor_eval.training.network import SequenceModel
 from infthor_eval.training.recipe import Lora
 
-__all__ = ["add_adapters"]
-
 
 def add_adapters(network: SequenceModel, settings: Lora) -> Any:
     """Add adapters to the decoder's linear layers, freeze the rest, and return peft's model.

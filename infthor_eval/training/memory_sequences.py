@@ -22,8 +22,6 @@ from infthor_eval.plans.plan import tasks_of
 from infthor_eval.plans.published.system_prompts import system_prompt
 from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence, within
 
-__all__ = ["MemoryKind", "memory_sequences"]
-
 MemoryKind = Literal["text", "frames"]
 _NAMES = "top20"  # the list of the published trainer
 

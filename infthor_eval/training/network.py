@@ -14,8 +14,6 @@ from infthor_eval.training.batches import IGNORED
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.prompt import Frame
 
-__all__ = ["PARTS", "SequenceModel", "freeze", "next_labels", "parameters_by_part"]
-
 PARTS = ("vision", "embeddings", "decoder", "head")
 # Frames in the vision tower at once; 1,000 frames would need more memory than the decoder.
 _FRAME_BATCH = 32

@@ -26,8 +26,6 @@ from model_adapters.hf.loading.hub import fetch
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.loading.tower_names import published_name
 
-__all__ = ["ImportedWeights", "find_weights", "import_weights"]
-
 _DTYPES = {name for name in dir(torch) if isinstance(getattr(torch, name), torch.dtype)}
 # What the pickle `.metadata` may name, by module: it may come from the hub, and a pickle that may
 # name anything runs code.

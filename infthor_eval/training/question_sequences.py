@@ -9,8 +9,6 @@ from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence, within
 
-__all__ = ["question_sequences"]
-
 
 def question_sequences(
     encoder: Encoder, task: TaskSamples, limit: int

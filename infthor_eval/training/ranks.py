@@ -9,8 +9,6 @@ from torch.nn import Parameter
 
 from infthor_eval.errors import UsageError
 
-__all__ = ["Ranks", "assign_ranks", "sum_gradients"]
-
 
 @dataclass(frozen=True)
 class Ranks:

@@ -11,18 +11,6 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.storage.folders import packaged_folder
 
-__all__ = [
-    "ActionData",
-    "Lora",
-    "Optimizer",
-    "Parallel",
-    "QuestionData",
-    "Recipe",
-    "read_recipe",
-    "read_recipe_file",
-    "recipe_names",
-]
-
 _FOLDER = "training/recipes"
 _EXAMPLES = "see infthor_eval/training/recipes for examples"
 _Form = TypeVar("_Form", bound=msgspec.Struct)

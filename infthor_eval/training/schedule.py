@@ -8,8 +8,6 @@ import torch
 from infthor_eval.errors import UsageError
 from infthor_eval.storage.digests import seed_of
 
-__all__ = ["LoopSettings", "linear_share"]
-
 
 def linear_share(step: int, n_steps: int, warmup_ratio: float) -> float:
     """Return a step's share of the highest learning rate, by the published linear schedule.

@@ -10,8 +10,6 @@ from model_adapters import has_option, load
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
-__all__ = ["load_starting_model"]
-
 
 def load_starting_model(
     model: str, options: Mapping[str, str], prompt: str, seed: int, max_tokens: int | None = None

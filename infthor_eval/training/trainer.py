@@ -25,8 +25,6 @@ from infthor_eval.training.network import SequenceModel
 from infthor_eval.training.recipe import Recipe
 from infthor_eval.training.schedule import linear_share
 
-__all__ = ["train_with_trainer"]
-
 _WEIGHTS = "model.safetensors"
 _STATE = "trainer_state.json"
 

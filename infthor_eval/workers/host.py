@@ -7,8 +7,6 @@ from typing import Any
 from infthor_eval.errors import InfthorError, describe_exception
 from infthor_eval.workers.link import OpenWorker, Worker
 
-__all__ = ["WorkerHost", "to_portable_error"]
-
 
 class WorkerHost:
     """A worker whose job can be stopped."""

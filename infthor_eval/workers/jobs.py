@@ -11,8 +11,6 @@ from infthor_eval.workers.link import OpenWorker, WorkerLostError
 from infthor_eval.workers.pool import JobFailed, JobResult, Pool, WorkerLost, WorkerWithdrawn
 from infthor_eval.workers.settings import WorkerSettings
 
-__all__ = ["run_jobs"]
-
 
 def run_jobs(
     open_worker: OpenWorker,

@@ -8,8 +8,6 @@ from typing import Any, Protocol
 
 from infthor_eval.errors import InfthorError
 
-__all__ = ["Connect", "Link", "OpenWorker", "Worker", "WorkerLostError"]
-
 
 class WorkerLostError(InfthorError):
     """A worker is gone: its process was killed, or its machine is down."""

@@ -13,8 +13,6 @@ from typing import Any
 from infthor_eval.errors import InfthorError
 from infthor_eval.workers.link import Connect, Link, WorkerLostError
 
-__all__ = ["Event", "JobFailed", "JobResult", "Pool", "WorkerLost", "WorkerWithdrawn"]
-
 _MAX_LOSSES = 3  # in a row, of one job or while one worker opens
 _EXIT_WAIT_S = 10.0  # for the thread of a closed link
 _STOP_CHECK_S = 0.2  # between two checks whether to stop

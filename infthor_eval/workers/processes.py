@@ -16,8 +16,6 @@ from infthor_eval.process_settings import leave_safe_path, safe_path
 from infthor_eval.workers.host import WorkerHost, to_portable_error
 from infthor_eval.workers.link import Connect, OpenWorker, WorkerLostError
 
-__all__ = ["ProcessLink", "processes"]
-
 _STOP = "stop"
 _TERMINATED = 143  # exit status
 _EXIT_WAIT_S = 10.0  # for a process to end

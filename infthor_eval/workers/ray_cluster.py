@@ -8,8 +8,6 @@ from infthor_eval.errors import InfthorError, UsageError, in_one_line
 from infthor_eval.workers.host import WorkerHost, to_portable_error
 from infthor_eval.workers.link import Connect, OpenWorker, WorkerLostError
 
-__all__ = ["RayLink", "ray_actors"]
-
 _CLOSE_WAIT_S = 5.0  # for an actor to release its resources
 
 

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from infthor_eval.workers.link import Connect, OpenWorker
 from infthor_eval.workers.processes import processes
 
-__all__ = ["WorkerSettings"]
-
 
 @dataclass(frozen=True)
 class WorkerSettings:

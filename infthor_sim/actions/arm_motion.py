@@ -11,8 +11,6 @@ from infthor_sim.errors import ActionError
 from infthor_sim.geometry import Array
 from infthor_sim.simulation import Simulation
 
-__all__ = ["agent_arm", "follow", "obstacles", "position_text", "quaternion_text"]
-
 Contact = tuple[int, str]  # index of a stance in a path, and id or name of what is in the way there
 
 

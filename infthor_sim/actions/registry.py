@@ -14,8 +14,6 @@ from infthor_sim.errors import ActionError, ErrorCode
 from infthor_sim.settings import AGENT_MODES
 from infthor_sim.simulation import Simulation
 
-__all__ = ["Action", "Vector3", "action", "action_names", "bind", "is_vector"]
-
 # The client adds these to messages of any action; Unity reads them before it looks for the action's
 # own arguments.
 _MESSAGE_KEYS = frozenset(

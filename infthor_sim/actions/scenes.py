@@ -55,8 +55,7 @@ def initialize(
     massThreshold: float | None = None,
 ) -> dict[str, float]:
     """Set up the agents; arguments that only Unity knows are ignored, as Unity does here."""
-    # The client does not look at the reply to Reset, but raises on the reply to Initialize that it
-    # sends next.
+    # The client raises on the reply to Initialize, which follows Reset, and not on Reset's.
     if sim.failed_reset:
         raise ActionError(sim.failed_reset)
     mode = agentMode.lower()

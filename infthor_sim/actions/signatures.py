@@ -6,8 +6,6 @@ import typing
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["Vector3", "type_name", "unknown_arguments_text"]
-
 
 class Vector3(dict[str, float]):
     """A position (metres) or rotation (degrees): `{"x", "y", "z"}`, any of them absent."""

@@ -8,15 +8,6 @@ from infthor_sim.objects import SimObject
 from infthor_sim.settings import HAND_MODES
 from infthor_sim.simulation import Simulation
 
-__all__ = [
-    "BY_ID_OR_PIXEL",
-    "check_in_frame",
-    "held_object",
-    "interactable",
-    "object_action",
-    "object_at",
-]
-
 BY_ID_OR_PIXEL = (("objectId",), ("x", "y"))
 """Forms of the actions that take an object by its id or by where it is seen."""
 

@@ -10,8 +10,6 @@ from infthor_sim.agent import Agent, Grip
 from infthor_sim.arm.rig import ArmPose, Rig
 from infthor_sim.geometry import Array
 
-__all__ = ["Arm", "Transform", "base_transforms"]
-
 _RADIUS = 0.06  # of the hand's sphere after Initialize, metres
 
 

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from infthor_sim.geometry import Array
 
-__all__ = ["Boxes", "join", "separations", "sphere_gaps"]
-
 _PARALLEL = 1e-4  # sine of an angle below which two edges count as parallel
 # the other two axes of each axis, in the order of cross products
 _NEXT = [1, 2, 0]

@@ -12,8 +12,6 @@ from infthor_sim.physics.falling import let_fall
 from infthor_sim.settings import LOCOBOT
 from infthor_sim.world import World
 
-__all__ = ["equip"]
-
 _RIGS: dict[str, type[Kinova] | type[Stretch]] = {"arm": Kinova, "stretch": Stretch}
 
 

@@ -12,8 +12,6 @@ from infthor_sim.objects import SimObject
 from infthor_sim.physics.falling import let_fall
 from infthor_sim.world import World
 
-__all__ = ["TouchedObjects", "drop_all", "pick_up", "touched_objects"]
-
 
 class TouchedObjects(NamedTuple):
     """Objects that the hand's sphere touches and the arm does not hold, in the metadata's order.

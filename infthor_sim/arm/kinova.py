@@ -15,8 +15,6 @@ from infthor_sim.arm.boxes import Boxes
 from infthor_sim.arm.rig import ArmPose, Joints
 from infthor_sim.geometry import Array, cross
 
-__all__ = ["FINGERS", "LINK", "PALM", "SHOULDER", "Kinova", "forward", "inverse"]
-
 LINK = 0.31675  # metres from joint to joint
 SHOULDER: Array = np.array([0.0, 0.0, LINK])
 _ALLOWED = 0.6325  # metres from the shoulder that restricted movements may go

@@ -9,8 +9,6 @@ from infthor_sim.arm.holding import touched_objects
 from infthor_sim.geometry import Array, axis_angle, round_xyz
 from infthor_sim.world import World
 
-__all__ = ["arm_metadata"]
-
 _DIGITS = 6
 
 

@@ -13,8 +13,6 @@ from infthor_sim.objects import SimObject
 from infthor_sim.render.primitives import AXES, CENTER, FORM, HALF, INSTANCE, Form
 from infthor_sim.world import World
 
-__all__ = ["ArmObstacles", "arm_obstacles"]
-
 _WALL = 0.08  # thickness of the sides and the floor of a hollow primitive, as a share of its width
 # of a hollow box
 _SIDES: Array = np.array([(0, -1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, 1), (0, 0, -1)], dtype=float)

@@ -6,8 +6,6 @@ import numpy as np
 
 from infthor_sim.geometry import Array, axis_angle, axis_rotation
 
-__all__ = ["STEP", "path_distances", "rotation_steps", "shares"]
-
 STEP = 0.02  # metres between two collision checks: Unity's usual speed of 1 m/s in frames of 1/50 s
 # metres of a path that are checked by such steps; the arm is stretched out by then and hardly moves
 _FINE = 1.0

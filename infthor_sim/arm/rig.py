@@ -10,8 +10,6 @@ from typing import Protocol
 from infthor_sim.arm.boxes import Boxes
 from infthor_sim.geometry import Array
 
-__all__ = ["ArmPose", "Joints", "Rig"]
-
 
 @dataclass(frozen=True)
 class ArmPose:

@@ -13,8 +13,6 @@ from infthor_sim.arm.boxes import Boxes
 from infthor_sim.arm.rig import ArmPose, Joints
 from infthor_sim.geometry import Array, yaw_matrix
 
-__all__ = ["Stretch"]
-
 # All lengths in metres.
 _ORIGIN = (0.1438, -0.8132, -0.0239)  # of the base, in the agent's frame
 # limits of the wrist's height above the base; longest extension

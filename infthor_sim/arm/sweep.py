@@ -11,8 +11,6 @@ from infthor_sim.arm.rig import ArmPose
 from infthor_sim.geometry import Array
 from infthor_sim.world import World
 
-__all__ = ["Stance", "first_contact", "is_free", "moving_boxes", "stance", "take_stance"]
-
 _SKIN = 0.001  # metres that boxes may overlap, as those of objects that touch do
 _STUCK = 0.02  # metres of overlap from which a part of the arm counts as stuck in an object
 _SAME = 1e-9  # metres of rounding

@@ -4,8 +4,6 @@ from functools import partial
 
 from infthor_sim.object_types.record import ObjectType, Unfolding, portable
 
-__all__ = ["TYPES"]
-
 _machine = partial(ObjectType, moveable=True, toggleable=True)
 
 TYPES = (

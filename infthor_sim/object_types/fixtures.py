@@ -4,8 +4,6 @@ from functools import partial
 
 from infthor_sim.object_types.record import ObjectType, Unfolding
 
-__all__ = ["TYPES"]
-
 # What hangs on a rail hangs around it; the support is where the underside of a towel or a roll of
 # the usual size is.
 _rail = partial(ObjectType, receptacle=True, overhang=True, area=(-1.0, 0.2, 1.0, 0.8))

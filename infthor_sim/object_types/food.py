@@ -4,8 +4,6 @@ from functools import partial
 
 from infthor_sim.object_types.record import portable
 
-__all__ = ["TYPES"]
-
 _food = partial(portable, materials=("Food",), categories=("food",))
 
 TYPES = (

@@ -4,8 +4,6 @@ from functools import partial
 
 from infthor_sim.object_types.record import ObjectType, portable
 
-__all__ = ["TYPES"]
-
 _furniture = partial(ObjectType, moveable=True, receptacle=True, furniture=True)
 _seat = partial(ObjectType, moveable=True, receptacle=True, takes=("lounge",))
 _store = partial(ObjectType, receptacle=True, openable=True, encloses=True)

@@ -2,8 +2,6 @@
 
 from infthor_sim.object_types.record import ObjectType, Unfolding, portable
 
-__all__ = ["TYPES"]
-
 TYPES = (
     portable("AlarmClock", (0.19, 0.18, 0.10), shape="alarm_clock", categories=("lounge",)),
     portable("BaseballBat", (0.10, 0.10, 0.85), shape="bat", categories=("lounge", "bulky")),

@@ -4,8 +4,6 @@ from functools import partial
 
 from infthor_sim.object_types.record import portable
 
-__all__ = ["TYPES"]
-
 _dish = partial(portable, receptacle=True, dirtyable=True, open_top=0.8, overhang=True)
 _cutlery = partial(portable, mass=0.06, materials=("Metal",), categories=("cutlery",))
 

@@ -9,8 +9,6 @@ from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from typing import Any
 
-__all__ = ["PLAIN_BOX", "ObjectType", "Unfolding", "portable"]
-
 PLAIN_BOX = "box"
 """The shape of types that name none: a box as large as they are."""
 

@@ -9,8 +9,6 @@ from infthor_sim.objects import SimObject
 from infthor_sim.physics.receptacles import contains_box
 from infthor_sim.world import World
 
-__all__ = ["obstacle_at", "obstacles_at", "occupant"]
-
 _SKIN = 0.005  # metres by which boxes may overlap: things that touch do
 
 

@@ -12,8 +12,6 @@ from infthor_sim.physics.falling import let_fall
 from infthor_sim.physics.navigation import NavGrid
 from infthor_sim.world import World
 
-__all__ = ["MOST_AGENTS", "agent_at", "agent_on_way", "free_cells", "set_agent_count"]
-
 MOST_AGENTS = 6  # AI2-THOR has colours for so many
 _BETWEEN = 2 * AGENT_RADIUS  # metres between the middles of two agents that touch
 _SAME = 1e-6  # metres

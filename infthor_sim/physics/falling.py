@@ -11,8 +11,6 @@ from infthor_sim.objects import SimObject
 from infthor_sim.physics.receptacles import Surface, find_parent, surfaces
 from infthor_sim.world import World
 
-__all__ = ["assign_parent", "is_over", "let_fall"]
-
 _BREAKING = 0.9  # metres of fall that break a breakable thing
 # metres that an object may already be below what it falls on: it was pushed along it, or lay in it
 _SUNK = 0.03

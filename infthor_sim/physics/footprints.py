@@ -4,8 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-__all__ = ["Rect", "polygon_rects", "subtract"]
-
 Rect = tuple[float, float, float, float]
 """A rectangle seen from above: x0, z0, x1, z1 in metres."""
 

@@ -22,8 +22,6 @@ from infthor_sim.physics.solids import (
 )
 from infthor_sim.world import World
 
-__all__ = ["PointFilter", "find_place"]
-
 _STEP = 0.05  # metres between the points that are tried
 _BELOW_HAND = 0.15  # metres below the agent's own height of the surface that is tried first
 _CLEARANCE = 0.008  # metres between neighbours

@@ -8,8 +8,6 @@ import numpy as np
 
 from infthor_sim.geometry import Array
 
-__all__ = ["CELL", "NavGrid"]
-
 CELL = 0.25  # metres
 _SAME = 1e-3  # metres between two positions that count as one
 # metres that a recorded position may be off its cell's centre, by rounding in the recordings

@@ -7,8 +7,6 @@ from infthor_sim.geometry import Array, aabb_overlap, level_gaps, yaw_matrix
 from infthor_sim.objects import DOOR_SWING, DRAWER_SLIDE, SimObject
 from infthor_sim.world import World
 
-__all__ = ["blocking_object", "door_leaf", "held_object_blocks", "nearest_name"]
-
 # heights in metres between which a door stops the agent
 _KNEE = 0.15
 _HEAD = 1.5

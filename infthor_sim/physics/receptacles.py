@@ -10,8 +10,6 @@ from infthor_sim.objects import DRAWER_SLIDE, WALL, SimObject
 from infthor_sim.physics.footprints import Rect
 from infthor_sim.world import World
 
-__all__ = ["Surface", "contains_box", "drawer_offset", "find_parent", "surfaces"]
-
 _TOUCH = 0.008  # metres by which what stands on a vessel's floor may reach into it
 # metres: what a recorded box may lack at its sides, a floor above its height, a sink at its rim
 _BESIDE = 0.01

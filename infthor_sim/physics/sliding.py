@@ -6,8 +6,6 @@ from infthor_sim.physics.clearance import obstacles_at
 from infthor_sim.physics.falling import assign_parent, is_over, let_fall
 from infthor_sim.world import World
 
-__all__ = ["LIGHTEST", "slide"]
-
 _STEP = 0.02  # metres between two collision checks
 LIGHTEST = 0.05  # kilograms; some recorded objects have a mass of 0
 # metres; no room is much larger, and a strong push of a light object would go on for kilometres

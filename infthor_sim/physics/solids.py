@@ -15,17 +15,6 @@ from infthor_sim.objects import DRAWER_SLIDE, SimObject
 from infthor_sim.render.primitives import Form, ShapePart
 from infthor_sim.render.shapes import shape
 
-__all__ = [
-    "Box",
-    "Wall",
-    "as_open",
-    "opening_space",
-    "outline",
-    "part_boxes",
-    "unfold",
-    "vessel_walls",
-]
-
 Box = tuple[Array, Array]
 """Low and high corner of an axis-aligned box in the world, metres (3,)."""
 

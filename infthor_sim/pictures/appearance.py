@@ -8,8 +8,6 @@ import numpy as np
 from infthor_sim.geometry import Array
 from infthor_sim.render.primitives import COLOR, INSTANCE, MATERIAL, Material
 
-__all__ = ["RANDOM_PATTERNS", "Appearance", "Finish", "apply_finishes"]
-
 RANDOM_PATTERNS = tuple(int(m) for m in Material if m not in (Material.GLASS, Material.PLAIN))
 """Patterns that a randomized surface may have."""
 

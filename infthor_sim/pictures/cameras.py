@@ -9,8 +9,6 @@ from infthor_sim.geometry import Array, euler_matrix
 from infthor_sim.render.camera import FAR, NEAR, PinholeCamera
 from infthor_sim.world import World
 
-__all__ = ["ThirdPartyCamera", "agent_camera", "map_camera", "pinhole_camera"]
-
 _POSITION_DIGITS = 5  # of the agent's camera, metres
 
 

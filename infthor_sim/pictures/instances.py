@@ -10,8 +10,6 @@ from infthor_sim.render.picture import Picture
 from infthor_sim.render.primitives import INSTANCE
 from infthor_sim.world import World
 
-__all__ = ["class_color", "class_image", "instance_color", "instance_image"]
-
 
 @lru_cache(maxsize=65536)
 def instance_color(object_id: str) -> tuple[int, int, int]:

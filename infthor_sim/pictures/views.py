@@ -24,8 +24,6 @@ from infthor_sim.render.scene import SceneModel
 from infthor_sim.settings import SimulatorSettings
 from infthor_sim.world import World
 
-__all__ = ["Display", "Views"]
-
 
 @dataclass
 class Display:

@@ -15,8 +15,6 @@ from infthor_sim.render.probe import VisibilityProbe
 from infthor_sim.settings import SimulatorSettings
 from infthor_sim.world import World
 
-__all__ = ["AgentVision"]
-
 # of a picture's pixels that must show an object for it to be visible: 2 pixels at 300x300
 _PIXEL_SHARE = 2.5e-5
 _INNER_FRAME = 0.9  # of half the frame: what is nearer to its edge may be cut off

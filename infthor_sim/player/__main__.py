@@ -16,8 +16,6 @@ from pathlib import Path
 
 from infthor_sim.errors import SimulatorError, UsageError
 
-__all__ = ["main"]
-
 # GNU's numbers of the options
 _M_TRIM_THRESHOLD = -1
 _M_MMAP_THRESHOLD = -3

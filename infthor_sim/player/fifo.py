@@ -18,8 +18,6 @@ from typing import Any
 
 from infthor_sim.errors import SimulatorError
 
-__all__ = ["FieldType", "FifoPipes", "parse_action"]
-
 _HEADER = struct.Struct("!BI")
 _ROOM = 1 << 20  # bytes; the most that Linux grants without privileges
 _PAUSE = 0.01  # seconds between two attempts at a pipe that the other side has not opened yet

@@ -20,8 +20,6 @@ from infthor_sim.render.hand import HAND
 from infthor_sim.render.shell import SHELL_NAMES
 from infthor_sim.simulation import Simulation
 
-__all__ = ["MetadataPacker"]
-
 _DYNAMIC = 3  # fields that depend on the agent: visible, isInteractable, distance
 _VISIBLE = (
     msgpack.packb("visible")

@@ -17,8 +17,6 @@ from infthor_sim.render.picture import Picture
 from infthor_sim.settings import PHYSICS_STEP
 from infthor_sim.simulation import Simulation
 
-__all__ = ["SimulatorServer"]
-
 Frames = Iterator[tuple[FieldType, bytes | memoryview]]
 _AGENT = (FieldType.RGB, FieldType.DEPTH, FieldType.NORMALS, FieldType.IDS, FieldType.CLASSES)
 _STARTS = ("Reset", "Initialize")

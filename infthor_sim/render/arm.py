@@ -8,8 +8,6 @@ from infthor_sim.arm.kinova import FINGERS
 from infthor_sim.geometry import Array, euler_matrix
 from infthor_sim.render.primitives import Color, Form, Material, ShapePart, rows
 
-__all__ = ["ARM", "arm_rows"]
-
 ARM = "Arm"  # its name in segmentation frames
 _SHELL: Color = (0.86, 0.87, 0.88)
 _JOINT: Color = (0.16, 0.17, 0.19)

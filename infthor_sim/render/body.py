@@ -7,8 +7,6 @@ from infthor_sim.geometry import Array, euler_matrix
 from infthor_sim.render.primitives import Color, Form, Material, ShapePart, rows
 from infthor_sim.world import World
 
-__all__ = ["BODY", "bodies_state", "body_rows"]
-
 BODY = "Agent"  # its name in segmentation frames
 # by id of the agent, as in AI2-THOR: blue, yellow, green, red, magenta, grey
 _COLORS: tuple[Color, ...] = (

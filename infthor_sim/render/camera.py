@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from infthor_sim.geometry import Array
 
-__all__ = ["CORNERS", "EDGES", "FAR", "NEAR", "PinholeCamera", "Projection"]
-
 # clipping planes of AI2-THOR's cameras, metres
 NEAR = 0.1
 FAR = 20.0

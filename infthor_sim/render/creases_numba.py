@@ -10,8 +10,6 @@ from numba import njit
 
 from infthor_sim.geometry import Array
 
-__all__ = ["DARKEST", "LIGHTEST", "ROWS", "STRENGTH", "crease_factors"]
-
 STRENGTH = 7.0
 DARKEST = 0.68
 LIGHTEST = 1.1

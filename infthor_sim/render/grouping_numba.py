@@ -8,8 +8,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["group"]
-
 
 @njit(cache=True, error_model="numpy")
 def group(

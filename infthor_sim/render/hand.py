@@ -26,8 +26,6 @@ from infthor_sim.render.primitives import (
     ShapePart,
 )
 
-__all__ = ["HAND", "held_rows"]
-
 HAND = "Hand"  # its name in segmentation frames
 # metres in front of the camera: nearer than anything that the agent can stand in front of
 _AWAY = 0.16

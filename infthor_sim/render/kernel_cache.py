@@ -8,8 +8,6 @@ the cache is stale.
 import hashlib
 from pathlib import Path
 
-__all__ = ["drop_stale_kernels"]
-
 _SOURCES = (  # every file that compiled code comes from
     "camera.py", "creases_numba.py", "grouping_numba.py", "lighting.py", "patterns.py",
     "primitives.py", "probe_numba.py", "projection_numba.py", "raster_numba.py",

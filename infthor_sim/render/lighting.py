@@ -6,8 +6,6 @@ import numpy as np
 
 from infthor_sim.geometry import Array
 
-__all__ = ["AMBIENT", "HEADLIGHT", "LAMP_REACH", "SKY", "SUN", "SUN_DIRECTION", "Lights"]
-
 # brightness; the headlight shows shapes that the sun misses
 AMBIENT = 0.46
 SKY = 0.12

@@ -7,8 +7,6 @@ from infthor_sim.geometry import Array
 from infthor_sim.render.picture import Picture
 from infthor_sim.render.primitives import AXES, BOTTOM, FORM, HALF, TOP, Form
 
-__all__ = ["normal_image", "surface"]
-
 _RIM = 1.0 - 1e-6  # |y| of hits that count as on a cylinder's flat end, with a margin for rounding
 
 

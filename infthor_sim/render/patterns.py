@@ -13,19 +13,6 @@ import numpy as np
 
 from infthor_sim.render.primitives import Material
 
-__all__ = [
-    "PATTERNS",
-    "carpet",
-    "fabric",
-    "glass",
-    "metal",
-    "paper",
-    "planks",
-    "stone",
-    "tiles",
-    "wood",
-]
-
 
 def wood(a: Any, b: Any) -> Any:
     """Grain along `a`."""

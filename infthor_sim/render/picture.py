@@ -13,8 +13,6 @@ from infthor_sim.render.kernel_cache import drop_stale_kernels
 from infthor_sim.render.lighting import Lights
 from infthor_sim.render.primitives import INSTANCE
 
-__all__ = ["Picture", "Rasterizer", "cast_picture", "colour_picture", "compiled_rasterizer"]
-
 Project = Callable[[Array, PinholeCamera], Projection]
 Cast = Callable[[Array, Projection, PinholeCamera], tuple[Array, NDArray[np.int32]]]
 Count = Callable[[NDArray[np.int32], int], NDArray[np.int64]]

@@ -16,12 +16,6 @@ import numpy as np
 
 from infthor_sim.geometry import Array
 
-__all__ = [
-    "AXES", "BOTTOM", "CENTER", "COLOR", "COLUMNS", "EMISSION", "FORM", "HALF", "INSTANCE",
-    "MATERIAL", "TOP", "Color",
-    "Form", "Material", "ShapePart", "rows",
-]  # fmt: skip
-
 FORM = 0
 CENTER = 1
 HALF = 4

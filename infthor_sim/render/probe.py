@@ -8,8 +8,6 @@ from infthor_sim.render.camera import PinholeCamera
 from infthor_sim.render.picture import Rasterizer
 from infthor_sim.render.primitives import AXES, CENTER, HALF, INSTANCE
 
-__all__ = ["VisibilityProbe"]
-
 _SLACK = 1e-6  # metres; what touches the region between camera and object counts as in it
 
 

@@ -15,8 +15,6 @@ from infthor_sim.render.camera import PinholeCamera
 from infthor_sim.render.primitives import AXES, BOTTOM, CENTER, FORM, HALF, TOP
 from infthor_sim.render.raster_numba import hit
 
-__all__ = ["sees"]
-
 # every eighth row and column is tried first: an object in full view shows up there already
 _COARSE = 8
 # of a primitive in a camera's view: first and last column, first and last row, least and greatest

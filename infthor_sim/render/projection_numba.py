@@ -13,8 +13,6 @@ from infthor_sim.geometry import Array
 from infthor_sim.render.camera import CORNERS, EDGES, PinholeCamera, Projection
 from infthor_sim.render.primitives import AXES, CENTER, HALF
 
-__all__ = ["project"]
-
 # of a primitive's picture: low and high u and v, least and greatest depth
 _U0, _V0, _U1, _V1, _NEAR, _FAR = range(6)
 

@@ -15,8 +15,6 @@ from infthor_sim.geometry import Array
 from infthor_sim.render.camera import PinholeCamera, Projection
 from infthor_sim.render.primitives import BOTTOM, FORM, TOP, Form
 
-__all__ = ["cast", "count_pixels", "hit", "hits"]
-
 _TINY = 1e-12  # takes the place of smaller components of directions, which are divided by
 _BOX = int(Form.BOX)
 _ELLIPSOID = int(Form.ELLIPSOID)

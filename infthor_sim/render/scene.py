@@ -12,8 +12,6 @@ from infthor_sim.render.shapes import shape
 from infthor_sim.render.shell import SHELL_NAMES, shell_rows
 from infthor_sim.world import World
 
-__all__ = ["SceneModel"]
-
 _DARK = 0.55  # factor of the daylight when every light switch is off
 
 

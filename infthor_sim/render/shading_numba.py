@@ -26,8 +26,6 @@ from infthor_sim.render.primitives import (
 )
 from infthor_sim.render.table import INVERSE, ORIGIN, STEPS, SUNWARD, shading_table
 
-__all__ = ["brightness", "eye_of", "shade"]
-
 _RIM = 1.0 - 1e-6  # |y| of hits that count as on a cylinder's flat end, with a margin for rounding
 _BOX, _ELLIPSOID, _CUP, _BOWL = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP), int(Form.BOWL)
 _WOOD, _PLANKS, _TILES = int(Material.WOOD), int(Material.PLANKS), int(Material.TILES)

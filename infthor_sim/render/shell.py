@@ -6,8 +6,6 @@ from infthor_sim.geometry import Array, yaw_matrix
 from infthor_sim.render.primitives import Color, Form, Material, ShapePart, rows
 from infthor_sim.world import RoomShell, Wall, World
 
-__all__ = ["FLOORS", "SHELL_NAMES", "shell_rows"]
-
 SHELL_NAMES = ("Wall", "Ceiling", "Ground")
 _WALLS: tuple[Color, ...] = (
     (0.86, 0.82, 0.74), (0.74, 0.80, 0.82), (0.82, 0.76, 0.72), (0.76, 0.81, 0.73),

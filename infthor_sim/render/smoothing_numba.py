@@ -18,8 +18,6 @@ from infthor_sim.render.raster_numba import hits
 from infthor_sim.render.shading_numba import brightness, eye_of
 from infthor_sim.render.table import ORIGIN, STEPS, shading_table
 
-__all__ = ["JUMP", "NEIGHBOURS", "SUBPIXELS", "smooth"]
-
 JUMP = 48  # of brightness between neighbours, as the sum of three channels (of 765)
 # A rotated grid: no two rays share a row or column, so that nearly level and nearly upright edges
 # get all four steps.

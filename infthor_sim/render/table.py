@@ -12,8 +12,6 @@ from infthor_sim.render.camera import Projection
 from infthor_sim.render.lighting import SUN_DIRECTION, Lights
 from infthor_sim.render.primitives import AXES, COLUMNS, HALF
 
-__all__ = ["INVERSE", "ORIGIN", "STEPS", "SUNWARD", "shading_table"]
-
 INVERSE = COLUMNS  # inverse half extents
 SUNWARD = INVERSE + 3  # cosines between the primitive's axes and the sun
 ORIGIN = SUNWARD + 3  # the camera in the primitive's scaled frame

@@ -3,8 +3,6 @@
 
 from infthor_sim.scenes.roomplan import RoomPlan, name_after, rim_pieces
 
-__all__ = ["furnish_bathroom"]
-
 _LOOSE = (
     "Candle Candle Cloth Cloth DishSponge SoapBar SoapBar SoapBottle SoapBottle SprayBottle "
     "SprayBottle TissueBox"

@@ -4,8 +4,6 @@
 from infthor_sim.scenes.living_room import place_drawers, place_lamp
 from infthor_sim.scenes.roomplan import RoomPlan
 
-__all__ = ["furnish_bedroom"]
-
 _LOOSE = (
     "AlarmClock AlarmClock BaseballBat BasketBall Book Book Bowl CD CD CellPhone CreditCard "
     "CreditCard KeyChain Laptop"

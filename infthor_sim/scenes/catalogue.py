@@ -16,8 +16,6 @@ from infthor_sim.scenes.procedural import SCENE_TYPES, build_scene
 from infthor_sim.scenes.supplement import Supplement, read_supplement
 from infthor_sim.world import RoomShell, World
 
-__all__ = ["Catalogue"]
-
 _LISTED = 1000  # procedural scenes of each kind that `names` has; there is no last one
 _PROCEDURAL = re.compile(r"([a-z-]+)-(\d+)")
 _ROBOTHOR = re.compile(r"FloorPlan_(Train|Val|Test|RVal|test-dev|test-challenge)\d+_\d+")

@@ -17,8 +17,6 @@ import numpy as np
 from infthor_sim.errors import DataError, in_one_line
 from infthor_sim.geometry import Array
 
-__all__ = ["FloorPlanData"]
-
 _OBJECTS = Path("thor_scenes/objects.jsonl.gz")
 _LAYOUTS = Path("alfred/layouts")
 # What numpy raises on a damaged file: its header is a Python literal.

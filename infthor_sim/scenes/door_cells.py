@@ -12,8 +12,6 @@ from infthor_sim.physics.navigation import CELL, NavGrid
 from infthor_sim.physics.obstacles import door_leaf
 from infthor_sim.world import World
 
-__all__ = ["add_door_cells"]
-
 _RADIUS = 0.2  # of the agent's capsule, metres
 _OPENNESS = (0.25, 0.5, 0.75, 1.0)
 _KNEE = 0.1  # metres above the floor below which nothing stops the agent

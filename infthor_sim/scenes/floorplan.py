@@ -18,8 +18,6 @@ from infthor_sim.scenes.supplement import Supplement
 from infthor_sim.scenes.trajectory_ids import use_trajectory_ids
 from infthor_sim.world import FLOOR_STYLES, RoomShell, World
 
-__all__ = ["build_floor_plan"]
-
 _CEILING = 2.6  # metres
 # Poses (x, z, yaw) that AI2-THOR starts its agent in, where known: recordings do not have them.
 # Others are inferred.

@@ -6,8 +6,6 @@ import numpy as np
 from infthor_sim.objects import SimObject
 from infthor_sim.scenes.roomplan import RoomPlan, name_after, rim_pieces
 
-__all__ = ["furnish_kitchen"]
-
 # of the counter, metres
 _HEIGHT = 0.92
 _DEPTH = 0.65

@@ -10,8 +10,6 @@ from infthor_sim.physics.footprints import Rect, subtract
 from infthor_sim.physics.navigation import NavGrid
 from infthor_sim.world import World
 
-__all__ = ["infer_layout"]
-
 _BODY = np.array([0.2, 0.0, 0.2])  # half of the floor that the agent takes up, metres
 # metres that a counter sticks out over its cabinets, and of free floor in front of them
 _LIP = 0.02

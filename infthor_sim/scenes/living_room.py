@@ -3,8 +3,6 @@
 
 from infthor_sim.scenes.roomplan import RoomPlan
 
-__all__ = ["furnish_living_room"]
-
 _ALONG_WALLS = (
     "ArmChair SideTable FloorLamp ShelvingUnit GarbageCan DiningTable Desk Ottoman".split()
 )

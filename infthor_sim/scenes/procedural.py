@@ -14,8 +14,6 @@ from infthor_sim.scenes.living_room import furnish_living_room
 from infthor_sim.scenes.roomplan import RoomPlan, build_world
 from infthor_sim.world import FLOOR_STYLES, RoomShell, World
 
-__all__ = ["SCENE_TYPES", "build_scene"]
-
 _FURNISH: dict[str, Callable[[RoomPlan], None]] = {
     "kitchen": furnish_kitchen,
     "living-room": furnish_living_room,

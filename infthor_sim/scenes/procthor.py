@@ -20,8 +20,6 @@ from infthor_sim.rearrange import assign_parents
 from infthor_sim.scenes.layout_inference import infer_layout
 from infthor_sim.world import FLOOR_STYLES, RoomShell, Wall, World
 
-__all__ = ["build_house", "read_asset_sizes"]
-
 # All lengths in metres.
 _HEIGHT = 2.6  # of ceilings
 _FARTHEST = 200.0  # of a floor from the origin, metres: beyond it cells take minutes to count

@@ -12,8 +12,6 @@ from infthor_sim.geometry import Array, to_array, wrap_degrees, yaw_matrix
 from infthor_sim.object_types import ObjectType, type_named
 from infthor_sim.objects import SimObject, SimObjectState, style_of
 
-__all__ = ["recorded_object"]
-
 # degrees of pitch or roll beyond which an object's yaw is taken from its box, not from its angles
 _TILTED = 10.0
 

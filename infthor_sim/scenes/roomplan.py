@@ -14,8 +14,6 @@ from infthor_sim.physics.navigation import CELL, NavGrid
 from infthor_sim.physics.solids import opening_space
 from infthor_sim.world import RoomShell, World
 
-__all__ = ["RoomPlan", "build_world", "name_after", "rim_pieces"]
-
 _BODY = 0.23  # the agent's radius and a margin, metres
 # heights in metres between which an object takes floor from the agent
 _KNEE = 0.1

@@ -18,8 +18,6 @@ from typing import Any
 
 from infthor_sim.errors import DataError
 
-__all__ = ["Supplement", "read_supplement"]
-
 
 @dataclass(frozen=True)
 class Supplement:

@@ -14,8 +14,6 @@ from infthor_sim.object_types import type_named
 from infthor_sim.objects import SimObject, default_object
 from infthor_sim.physics.navigation import NavGrid
 
-__all__ = ["use_trajectory_ids"]
-
 _NEAR = 0.3  # metres that an object may be off between the two versions
 
 

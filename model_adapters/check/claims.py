@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.pictures.video import Video
 from model_adapters.check.clauses import (
     GREEDY,
     NEW_TOKENS,
@@ -17,9 +18,7 @@ from model_adapters.check.clauses import (
     same_reply,
     start_conversation,
 )
-from model_adapters.protocols import Decoding, Model, Reply, Video
-
-__all__ = ["check_choices", "check_flight", "check_sampling", "check_video"]
+from model_adapters.protocols import Decoding, Model, Reply
 
 _MOST_THREADS = 4
 _CHOICES = ("bright", "dark", "dark and bright")  # one is a prefix of another

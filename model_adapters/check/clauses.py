@@ -11,21 +11,6 @@ from infthor_eval.storage.digests import json_values
 from infthor_eval.storage.scratch import ScratchFolder
 from model_adapters.protocols import Conversation, Decoding, Model, Part, Policy, Reply
 
-__all__ = [
-    "GREEDY",
-    "NEW_TOKENS",
-    "QUESTION",
-    "ContractError",
-    "ask",
-    "check_identity",
-    "check_members",
-    "frames_of_one_colour",
-    "raises",
-    "require",
-    "same_reply",
-    "start_conversation",
-]
-
 NEW_TOKENS = 8
 GREEDY = Decoding(max_new_tokens=NEW_TOKENS)
 QUESTION = "\nQuestion: What do you see? Answer with a single word."

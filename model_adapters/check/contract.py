@@ -18,8 +18,6 @@ from model_adapters.check.replies import (
 from model_adapters.check.results import CheckResult, run_each
 from model_adapters.protocols import Model, Policy
 
-__all__ = ["check_adapter", "model_checks", "run_checks"]
-
 
 def check_adapter(adapter: Model | Policy, frame_size: tuple[int, int] = (300, 300)) -> None:
     """Check a model or a policy against its contract, as far as its capabilities go.

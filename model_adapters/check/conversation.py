@@ -15,8 +15,6 @@ from model_adapters.check.clauses import (
 )
 from model_adapters.protocols import Conversation, Model
 
-__all__ = ["check_counts", "check_marks", "check_parts", "check_turns"]
-
 
 def check_parts(model: Model, frame: FrameRef) -> None:
     """Check that texts and frames can be appended, and nothing else."""

@@ -8,8 +8,6 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.check.clauses import check_identity, check_members, require
 from model_adapters.protocols import ArmDelta, Policy
 
-__all__ = ["policy_checks"]
-
 _INSTRUCTION = "pick up the mug"
 
 

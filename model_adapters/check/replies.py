@@ -15,8 +15,6 @@ from model_adapters.check.clauses import (
 )
 from model_adapters.protocols import Conversation, Decoding, Model, Part, Reply
 
-__all__ = ["check_continuations", "check_frames", "check_reply", "check_sharing"]
-
 
 def check_reply(model: Model, frame: FrameRef) -> None:
     """Check one reply: its counts and ids, its length, its stop strings."""

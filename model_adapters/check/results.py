@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from infthor_eval.errors import STOPS, InfthorError, describe_exception
 from model_adapters.check.clauses import ContractError
 
-__all__ = ["MEMBERS", "CheckResult", "run_each"]
-
 MEMBERS = "members"  # the check that all others need
 
 

@@ -13,8 +13,6 @@ from model_adapters.hf.family import MakeFamily
 from model_adapters.hf.loading.checkpoint import LocatedCheckpoint, load_checkpoint, locate
 from model_adapters.options.checkpoints import CheckpointOptions, CheckpointReading
 
-__all__ = ["CheckpointAdapter", "load_model", "require_model_type", "wrap_mismatch_errors"]
-
 _SAMPLE = (300, 300)  # width and height of frames in the published data
 
 R = TypeVar("R", bound=CheckpointReading)

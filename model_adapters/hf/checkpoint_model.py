@@ -15,8 +15,6 @@ from model_adapters.hf.prompting.prompt import Piece, Prompter, n_tokens
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 
-__all__ = ["CheckpointModel", "HfModel"]
-
 
 class CheckpointModel(ABC):
     """A model whose prompts are written here, by the checkpoint's tokenizer and template.

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from model_adapters.hf.prompting.ahead import Ahead
     from model_adapters.hf.prompting.embedding import Embed
 
-__all__ = ["ClipShape", "Family", "MakeFamily", "Pixels", "Shape", "Size", "VideoInput"]
-
 Size = tuple[int, int]  # width, height in pixels
 Pixels = Mapping[str, torch.Tensor]  # what an image processor makes of a frame or a clip
 

@@ -6,8 +6,6 @@ from contextlib import contextmanager
 import torch
 from transformers.utils import logging
 
-__all__ = ["hide_transformers_output", "torch_threads"]
-
 
 @contextmanager
 def torch_threads(n_threads: int | None) -> Iterator[None]:

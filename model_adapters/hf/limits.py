@@ -8,8 +8,6 @@ import torch
 
 from infthor_eval.errors import ModelError, wrap_errors
 
-__all__ = ["check_limit", "wrap_memory_errors", "wrap_model_errors"]
-
 # Errors that torch and image processors raise on unsuitable input.
 _FAILURES = (RuntimeError, ValueError, IndexError, ArithmeticError, MemoryError)
 

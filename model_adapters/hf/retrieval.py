@@ -30,8 +30,6 @@ from model_adapters.hf.loading.image_processors import load_image_processor
 from model_adapters.hf.vectors import VectorFile
 from model_adapters.options.checkpoints import Placement
 
-__all__ = ["Retriever", "open_retriever"]
-
 _BATCH = 32  # frames whose pixels are in memory at once
 
 

@@ -30,8 +30,6 @@ from model_adapters.hf.prompting.rendering import Marks, render, starts_with_bos
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 
-__all__ = ["UncachedModel", "expand_image_tokens", "image_token", "n_image_tokens", "process_turns"]
-
 
 def process_turns(processor: Any, template: str, turns: Sequence[Turn]) -> Any:
     """Return the tensors that transformers' processor makes of a conversation.

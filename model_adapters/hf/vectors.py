@@ -9,8 +9,6 @@ import numpy as np
 
 from infthor_eval.errors import DataError
 
-__all__ = ["VectorFile", "nearest"]
-
 _DIGITS = 6  # digits of a similarity; rounding errors beyond must not decide between equal vectors
 
 

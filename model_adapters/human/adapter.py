@@ -10,8 +10,6 @@ from infthor_eval.pages.server import listen, require_page_extra
 if TYPE_CHECKING:
     from model_adapters.human.model import HumanModel
 
-__all__ = ["Human", "HumanOptions"]
-
 _READER = re.compile(r"[\w.-]{1,40}")
 
 

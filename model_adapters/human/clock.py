@@ -2,8 +2,6 @@
 
 import time
 
-__all__ = ["ScreenClock"]
-
 
 class ScreenClock:
     """Counts the seconds in which at least one page shows something."""

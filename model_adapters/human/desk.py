@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 from model_adapters.human.clock import ScreenClock
 from model_adapters.protocols import Decoding, Notice, Turn
 
-__all__ = ["Answer", "Desk", "Inquiry", "Question", "StaleError"]
-
 # seconds between two looks at signals: conditions wait without, and Ctrl-C must end a run at once
 _WAKE_S = 0.2
 

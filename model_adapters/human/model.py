@@ -14,8 +14,6 @@ from model_adapters.human.serving import serve_desk
 from model_adapters.protocols import Capabilities, Conversation, Decoding, Notice, Reply, Turn
 from model_adapters.thinking import cut_at_stop
 
-__all__ = ["UNTIMED", "HumanModel"]
-
 UNTIMED = (
     "the page never told that the question was on the screen: its seconds count from when it was "
     "asked"

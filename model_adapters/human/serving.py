@@ -24,8 +24,6 @@ from model_adapters.human.adapter import HumanOptions
 from model_adapters.human.desk import Desk, StaleError
 from model_adapters.human.view import frames_of, state_of
 
-__all__ = ["desk_routes", "serve_desk"]
-
 _WAIT_S = 20.0  # a page asks again after so long without a change
 _LOOK_S = 0.03  # and hears of one so soon
 # For pages to learn that it is over: those that wait for news, and those that may be closed.

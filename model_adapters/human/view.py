@@ -7,8 +7,6 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.human.desk import Desk, Question
 from model_adapters.protocols import Turn
 
-__all__ = ["frames_of", "state_of"]
-
 
 def state_of(desk: Desk) -> dict[str, Any]:
     """Return what the page shows now.

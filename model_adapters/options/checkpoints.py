@@ -4,16 +4,6 @@ import importlib.util
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-__all__ = [
-    "CheckpointOptions",
-    "CheckpointReading",
-    "CheckpointSource",
-    "FrameScaling",
-    "HfOptions",
-    "Placement",
-    "parse_rope",
-]
-
 _ATTENTION = ("eager", "sdpa", "flex_attention", "flash_attention_2", "flash_attention_3")
 # Implementation to the module that has it, and the package to install for it.
 _PACKAGES = {

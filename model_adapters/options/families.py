@@ -6,18 +6,6 @@ from typing import Any
 from infthor_eval.storage.limits import IMAGE_MEGAPIXELS
 from model_adapters.options.checkpoints import CheckpointOptions, FrameScaling
 
-__all__ = [
-    "DeepseekVLOptions",
-    "Gemma4Options",
-    "HfVlmOptions",
-    "LlavaOnevisionOptions",
-    "PixelLimits",
-    "PixelVlmOptions",
-    "PixtralOptions",
-    "Qwen25VLNanoOptions",
-    "Qwen25VLOptions",
-]
-
 _SOFT_TOKENS = (70, 140, 280, 560, 1120)  # that Gemma 4 was trained with
 
 

@@ -9,8 +9,6 @@ from typing import Any
 
 from infthor_eval.errors import UsageError
 
-__all__ = ["NoOptions", "describe", "is_required", "parse", "read_pairs", "with_defaults"]
-
 _LARGEST = 2**63  # limit of the numbers in a run config
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 

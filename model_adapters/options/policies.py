@@ -5,19 +5,6 @@ from dataclasses import dataclass
 from model_adapters.addresses import act_url
 from model_adapters.options.checkpoints import CheckpointSource, Placement
 
-__all__ = [
-    "DEFAULT_INTRINSICS",
-    "ActionOptions",
-    "CheckpointPolicyOptions",
-    "FrameCrop",
-    "OpenVLAOptions",
-    "PolicyOptions",
-    "SpatialVLACheckpointOptions",
-    "SpatialVLAOptions",
-    "VlaHttpOptions",
-    "parse_field_of_view",
-]
-
 DEFAULT_INTRINSICS = "default"
 _ENSEMBLES = ("none", "exp")
 _ATTENTION = ("eager", "sdpa")  # implementations that SpatialVLA supports

@@ -6,8 +6,6 @@ from model_adapters.options.checkpoints import HfOptions
 from model_adapters.options.families import PixelLimits
 from model_adapters.options.policies import FrameCrop, PolicyOptions, SpatialVLAOptions
 
-__all__ = ["OpenVLATinyOptions", "Qwen25VLTinyOptions", "SpatialVLATinyOptions", "TinyOptions"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class _TinyPlacement:

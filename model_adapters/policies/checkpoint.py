@@ -20,8 +20,6 @@ from model_adapters.hf.loading.checkpoint import (
 from model_adapters.hf.loading.hub import fetch
 from model_adapters.options.checkpoints import Placement
 
-__all__ = ["PolicyCheckpoint", "find_policy_checkpoint"]
-
 _HINT = "restore the checkpoint"
 
 T = TypeVar("T")

@@ -7,8 +7,6 @@ import torch
 
 from infthor_eval.errors import ModelError
 
-__all__ = ["decode_greedily", "embed_ids"]
-
 
 def embed_ids(model: Any, ids: Sequence[int]) -> torch.Tensor:
     """Return embeddings of ids, (1, ids, hidden), as input of a transformers model."""

@@ -6,8 +6,6 @@ import numpy as np
 
 from model_adapters.policies.statistics import Actions
 
-__all__ = ["ExponentialEnsemble"]
-
 _RATE = 0.8
 
 

@@ -10,8 +10,6 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.policies.policy import arm_deltas
 from model_adapters.protocols import ArmDelta, Capabilities
 
-__all__ = ["FunctionPolicy"]
-
 
 class FunctionPolicy:
     """A function that returns seven numbers, or several rows of them, for each view.

@@ -18,16 +18,6 @@ from model_adapters.protocols import ArmDelta, Policy
 from model_adapters.refusals import check_chunk
 from model_adapters.registry import has_option, load
 
-__all__ = [
-    "INSTRUCTIONS",
-    "ParityReport",
-    "compare_policies",
-    "frames_in_folder",
-    "load_policy",
-    "reference_policy",
-    "synthetic_frames",
-]
-
 INSTRUCTIONS = ("pick up the mug", "pick up the apple", "Put the knife in the drawer")
 _NOISE = 4
 

@@ -17,8 +17,6 @@ from model_adapters.policies.statistics import ACTION_SIZE, Actions, ActionStati
 from model_adapters.protocols import ArmDelta, Capabilities
 from model_adapters.refusals import wrap_request_errors
 
-__all__ = ["Network", "PolicyAdapter", "VlaPolicy", "arm_deltas"]
-
 
 class Network(Protocol):
     """A network that predicts actions from a frame."""

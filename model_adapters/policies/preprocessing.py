@@ -6,8 +6,6 @@ import numpy as np
 import torch
 from PIL import Image
 
-__all__ = ["crop_centre", "normalise", "resize"]
-
 _CROPPED = 0.9  # of a frame's area, as in OpenVLA's evaluation on LIBERO
 
 

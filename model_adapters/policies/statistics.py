@@ -9,8 +9,6 @@ import numpy.typing as npt
 
 from infthor_eval.errors import ModelError, UsageError
 
-__all__ = ["ACTION_SIZE", "ActionStatistics", "Actions", "select_statistics"]
-
 ACTION_SIZE = 7  # x, y, z, roll, pitch, yaw, gripper
 
 Actions = npt.NDArray[np.float64]  # (steps, 7)

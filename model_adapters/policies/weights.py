@@ -18,8 +18,6 @@ from torch import nn
 
 from infthor_eval.errors import ModelError
 
-__all__ = ["Layout", "Shape", "empty_parameters", "load_weights"]
-
 Shape = tuple[int, ...]
 
 _MOST_KEYS = 3  # keys that an error lists

@@ -15,8 +15,6 @@ from model_adapters.served.secret import Secret, read_key
 if TYPE_CHECKING:
     from model_adapters.served.model import ServedModel
 
-__all__ = ["Anthropic", "Gemini", "OpenAI"]
-
 
 class OpenAI:
     """The adapter `openai`: any model behind a server with OpenAI's chat completions."""

@@ -8,8 +8,6 @@ import msgspec
 from infthor_eval.errors import ModelError, in_one_line
 from model_adapters.served.wire import StatusError
 
-__all__ = ["Completion", "TokenUsage", "decode_reply", "read_error", "read_usage"]
-
 T = TypeVar("T")
 
 # Ends of replies at which the server failed: OpenRouter, vLLM and SGLang, Zhipu, DeepSeek, Google.

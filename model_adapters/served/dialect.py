@@ -12,8 +12,6 @@ from model_adapters.served.batches.service import BatchService
 from model_adapters.served.completion import Completion
 from model_adapters.served.endpoint import Endpoint
 
-__all__ = ["Dialect"]
-
 
 class Dialect(Protocol):
     """How requests to a server and its replies are written.

@@ -22,8 +22,6 @@ from model_adapters.served.wire import (
     Wire,
 )
 
-__all__ = ["Endpoint", "NoAnswerError", "is_transient"]
-
 T = TypeVar("T")
 
 _FIRST_WAIT_S = 0.5  # pause before the second attempt; it doubles before each further one

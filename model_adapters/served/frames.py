@@ -10,8 +10,6 @@ from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.protocols import Turn
 
-__all__ = ["EncodedFrames", "require_user_frames"]
-
 _CACHE_BYTES = 256 * 2**20  # of encoded frames: a few thousand of the published size
 _SETTINGS: dict[str, dict[str, Any]] = {
     "png": {"compress_level": 6},

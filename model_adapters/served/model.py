@@ -9,9 +9,10 @@ import msgspec
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.pictures.video import Video
 from infthor_eval.storage.digests import SIZE, canonical_json, digest
 from model_adapters.backend import BackendConversation
-from model_adapters.protocols import Capabilities, Conversation, Decoding, Reply, Turn, Video
+from model_adapters.protocols import Capabilities, Conversation, Decoding, Reply, Turn
 from model_adapters.served.batches.queue import BatchQueue, BatchRules
 from model_adapters.served.batches.service import BatchReply
 from model_adapters.served.completion import Completion, TokenUsage
@@ -22,8 +23,6 @@ from model_adapters.served.secret import Secret
 from model_adapters.served.spend import Caps, Charge, Prices, RateLimiter, Spend
 from model_adapters.served.wire import Call, StatusError
 from model_adapters.thinking import cut_at_stop
-
-__all__ = ["ServedModel"]
 
 _JSON = {"Content-Type": "application/json"}
 

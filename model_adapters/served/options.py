@@ -11,8 +11,6 @@ from typing import Any, ClassVar
 
 from model_adapters.addresses import is_local, server_address
 
-__all__ = ["AnthropicOptions", "GeminiOptions", "OpenAIOptions", "ServedOptions"]
-
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _RANGES = {
     "max_in_flight": (1, 256),

@@ -4,8 +4,6 @@ import os
 
 from infthor_eval.errors import ModelError
 
-__all__ = ["Secret", "read_key"]
-
 _LEAST = 8  # characters; a shorter value ("EMPTY") is not secret and may be part of ordinary words
 
 

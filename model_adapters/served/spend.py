@@ -11,8 +11,6 @@ from infthor_eval.errors import NotAskedError
 from model_adapters.served.completion import TokenUsage
 from model_adapters.served.options import ServedOptions
 
-__all__ = ["Caps", "Charge", "Prices", "RateLimiter", "Spend"]
-
 _MILLION = 1_000_000
 
 

@@ -16,8 +16,6 @@ from infthor_eval.errors import UsageError, wrap_errors
 from model_adapters.addresses import is_local
 from model_adapters.served.options import ServedOptions
 
-__all__ = ["Answer", "Call", "StatusError", "UnreachableError", "UnreadableError", "Wire"]
-
 _LARGEST = 4 * 2**20  # bytes of the largest accepted reply
 _CONNECT_S = 30.0  # limit for a connection
 # The last three are of addresses that are none: of a proxy, or given by a server.

@@ -15,8 +15,6 @@ from transformers.models.deepseek_vl_hybrid.image_processing_pil_deepseek_vl_hyb
 from model_adapters.hf.families.deepseek_vl import DeepseekVLFamily
 from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin, siglip_config, text_config
 
-__all__ = ["DeepseekVLTiny"]
-
 _BEGIN = "<｜begin▁of▁sentence｜>"
 _END = "<｜end▁of▁sentence｜>"
 

@@ -11,8 +11,6 @@ from transformers.models.llava_onevision.image_processing_pil_llava_onevision im
 from model_adapters.hf.families.llava_onevision import LlavaOnevisionFamily
 from model_adapters.tiny.twin import TinyAdapter, Twin, siglip_config, text_config
 
-__all__ = ["LlavaOnevisionTiny"]
-
 # Like the family's template: images first, then each text on its own line.
 _TEMPLATE = """\
 {%- for message in messages -%}

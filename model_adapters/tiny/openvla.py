@@ -14,8 +14,6 @@ from model_adapters.policies.weights import Layout, empty_parameters
 from model_adapters.tiny.policy_twin import BRIDGE, PolicyTwin, TinyPolicyAdapter
 from model_adapters.tiny.tokenizer import train_tokenizer
 
-__all__ = ["OpenVLATiny"]
-
 _TOWERS = (TowerShape("dinov2", 32, 3, 2, 64), TowerShape("siglip", 48, 3, 2, 80))
 _IMAGE_SIZE = 56
 

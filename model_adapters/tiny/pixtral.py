@@ -9,8 +9,6 @@ from transformers.models.pixtral.image_processing_pil_pixtral import PixtralImag
 from model_adapters.hf.families.pixtral import PixtralFamily
 from model_adapters.tiny.twin import HEAD, SPREAD, TinyAdapter, Twin, text_config
 
-__all__ = ["PixtralTiny"]
-
 _TEMPLATE = """\
 {{- bos_token -}}
 {%- for message in messages -%}

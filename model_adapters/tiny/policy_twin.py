@@ -17,8 +17,6 @@ from model_adapters.policies.checkpoint import PolicyCheckpoint
 from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.weights import Layout, Shape
 
-__all__ = ["BRIDGE", "PolicyTwin", "TinyPolicyAdapter"]
-
 # Statistics of the actions of Bridge in openvla/openvla-7b and SpatialVLA's checkpoints, to four
 # digits.
 BRIDGE = {

@@ -11,8 +11,6 @@ from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
 from model_adapters.options.tiny import Qwen25VLTinyOptions
 from model_adapters.tiny.twin import HIDDEN, SPREAD, TinyAdapter, Twin, text_config
 
-__all__ = ["SPECIAL", "Qwen25VLTiny", "save_tiny_checkpoint"]
-
 SPECIAL = (
     "<|endoftext|>",
     "<|im_start|>",

@@ -17,8 +17,6 @@ from model_adapters.policies.weights import Layout, empty_parameters
 from model_adapters.tiny.policy_twin import BRIDGE, PolicyTwin, TinyPolicyAdapter
 from model_adapters.tiny.tokenizer import train_tokenizer
 
-__all__ = ["SpatialVLATiny"]
-
 _N_MERGED = 600
 _SPECIAL = ("<pad>", "<eos>", "<bos>", "<unk>", "<image>")
 _N_ACTIONS = 8194

@@ -14,8 +14,6 @@ from tokenizers import (
 )
 from transformers import PreTrainedTokenizerFast
 
-__all__ = ["CORPUS", "train_tokenizer"]
-
 # Splits letters, single digits, punctuation and white space, as current byte-level tokenizers do.
 _SPLIT = r"""[^\r\n\p{L}\p{N}]?\p{L}+|\p{N}| ?[^\s\p{L}\p{N}]+[\r\n]*|\s*[\r\n]+|\s+(?!\S)|\s+"""
 CORPUS = """\

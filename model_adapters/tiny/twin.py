@@ -19,18 +19,6 @@ from model_adapters.hf.prompting.templates import plain_template
 from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.tokenizer import train_tokenizer
 
-__all__ = [
-    "HEAD",
-    "HIDDEN",
-    "SPREAD",
-    "TinyAdapter",
-    "Twin",
-    "draw_model",
-    "siglip_config",
-    "text_config",
-    "token_ids",
-]
-
 # Standard deviation of the weights. Ten times the usual one, so that replies of an untrained model
 # differ from frame to frame and from question to question.
 SPREAD = 0.2

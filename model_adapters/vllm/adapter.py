@@ -33,8 +33,6 @@ from model_adapters.vllm.options import (
     VllmOptions,
 )
 
-__all__ = ["HfVlmOnVllm", "LlavaOnevisionOnVllm", "PixtralOnVllm", "Qwen25VLOnVllm"]
-
 
 class _FamilyOnVllm:
     """Base of the adapters of one family, each with the adapter of the family in transformers."""

@@ -8,8 +8,6 @@ from model_adapters.options.checkpoints import parse_rope
 from model_adapters.vllm.options import EngineOptions, VllmOptions
 from model_adapters.vllm.plugin import encoder_cache_of
 
-__all__ = ["engine_arguments", "frame_limit", "model_arguments", "rope_overrides", "token_limit"]
-
 # vLLM reads the extended length of these from max_position_embeddings; for others it multiplies by
 # the factor itself.
 _LENGTH_IN_CONFIG = ("yarn", "longrope", "longrope-scaled")

@@ -11,8 +11,6 @@ import torch
 
 from infthor_eval.errors import ModelError
 
-__all__ = ["check_kernels", "prepare", "readable_globals", "runs_on_cpu", "set_threads"]
-
 # In one process an engine starts and ends in seconds, also in workers, which may not start
 # processes. Threads that are bound to cores would share one core with those of other workers. The
 # memory for keys and values is in GiB; vLLM's own choice is nearly all of the machine's.

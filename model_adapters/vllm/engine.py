@@ -15,8 +15,6 @@ from PIL import Image
 from infthor_eval.errors import ModelError, wrap_errors
 from model_adapters.vllm import cpu, plugin
 
-__all__ = ["Engine", "EngineOutput", "EngineRequest", "import_vllm", "require_version"]
-
 
 @dataclass(frozen=True)
 class EngineRequest:

@@ -17,8 +17,6 @@ from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 from model_adapters.vllm.engine import Engine, EngineOutput, EngineRequest
 from model_adapters.vllm.options import VllmOptions
 
-__all__ = ["VllmModel"]
-
 _BATCH = 64  # continuations per call; vLLM decides how many of them it runs together
 _SEEDS = 2**63  # number of seeds of torch's generators
 # Of the meta model, which does not run.

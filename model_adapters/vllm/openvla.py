@@ -18,8 +18,6 @@ from model_adapters.vllm.arguments import engine_arguments
 from model_adapters.vllm.engine import Engine, EngineRequest, import_vllm
 from model_adapters.vllm.options import OpenVLAOnVllmOptions
 
-__all__ = ["OpenVLAOnVllm", "VllmPolicy"]
-
 
 class OpenVLAOnVllm:
     """The adapter `openvla@vllm`."""

@@ -17,18 +17,6 @@ from model_adapters.options.families import (
 )
 from model_adapters.options.policies import ActionOptions, FrameCrop, OpenVLAOptions
 
-__all__ = [
-    "EngineOptions",
-    "HfVlmOnVllmOptions",
-    "LlavaOnevisionOnVllmOptions",
-    "OpenVLAOnVllmOptions",
-    "PixtralOnVllmOptions",
-    "Qwen25VLOnVllmOptions",
-    "Throughput",
-    "VllmOptions",
-    "VllmPolicyOptions",
-]
-
 _DTYPES = ("auto", "bfloat16", "float16", "float32")
 _RANGES = {
     "max_model_len": (1, 2**31 - 1),

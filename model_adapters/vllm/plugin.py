@@ -14,8 +14,6 @@ from typing import Any
 
 from model_adapters.hf.loading.tower_names import published_name
 
-__all__ = ["ACTIVE", "EncoderCacheMaker", "encoder_cache_of", "register"]
-
 # Set by our engine. Whatever else uses vLLM in this environment keeps vLLM as it is.
 ACTIVE = "INFTHOR_EVAL_VLLM_PLUGIN"
 _MODELS = {

@@ -18,8 +18,6 @@ from infthor_eval.training.data import read_history, trajectory_names
 from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
 from recipes.nano.settings import ActingSettings
 
-__all__ = ["ActionSampler", "SyntheticPlans", "single_plans"]
-
 
 class ActionSampler:
     """Random training sequences of actions: histories, and synthetic plans.

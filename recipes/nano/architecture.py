@@ -22,8 +22,6 @@ from model_adapters.tiny.twin import draw_model, token_ids
 from recipes.nano.reading.first_weights import Part, part_width
 from recipes.nano.settings import NanoRecipe
 
-__all__ = ["BLOCK", "GRID", "PATCHES", "PATCH_SIDE", "build_untrained", "image_processor"]
-
 PATCHES = 12  # along each side of a frame
 BLOCK = 4  # along each side of a token's part of it
 GRID = PATCHES // BLOCK  # tokens along each side

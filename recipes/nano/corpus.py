@@ -10,8 +10,6 @@ from recipes.nano.reading.asking import question_intro
 from recipes.nano.reading.renaming import Vocabulary
 from recipes.nano.spelling import spellings
 
-__all__ = ["corpus_texts", "single_tokens"]
-
 _MOST_COUNTED = 30  # numbers up to this are words
 _BEFORE_PLACES = (" in the", " on the")
 

@@ -23,8 +23,6 @@ from recipes.nano.architecture import PATCH_SIDE, PATCHES
 from recipes.nano.settings import SceneSettings, ViewSettings
 from recipes.nano.views.generate import ViewJob, generate_views
 
-__all__ = ["generate_training_data", "generate_training_views"]
-
 _EVERY = 500  # more than there are questions on a trajectory
 
 

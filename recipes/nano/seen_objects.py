@@ -16,8 +16,6 @@ from infthor_eval.formats.step_log import (
 )
 from infthor_eval.training.data import trajectory_names
 
-__all__ = ["SeenFrame", "SeenObject", "read_seen_frames"]
-
 # smallest object that counts as shown: a thousandth of a 300 x 300 frame, as in the questions
 _LEAST_PIXELS = 90
 

@@ -6,15 +6,6 @@ import msgspec
 
 from infthor_eval.formats.object_ids import Words
 
-__all__ = [
-    "ActingSettings",
-    "NanoRecipe",
-    "ReadingSettings",
-    "SceneSettings",
-    "ViewSettings",
-    "VisionSettings",
-]
-
 
 def _require_counts(settings: msgspec.Struct, names: Iterable[str]) -> None:
     for name in names:

@@ -2,8 +2,6 @@
 
 from infthor_eval.household.wording import compact_name, noun
 
-__all__ = ["spellings"]
-
 
 def spellings(object_type: str) -> tuple[str, ...]:
     """Return the spellings of an object type in questions, answers, actions and plans."""

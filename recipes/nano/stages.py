@@ -33,8 +33,6 @@ from recipes.nano.seen_objects import SeenFrame, read_seen_frames
 from recipes.nano.settings import NanoRecipe
 from recipes.nano.steps import NanoProgress, Stage, run_stage
 
-__all__ = ["TrainingData", "train_small_model"]
-
 # What the first stage depends on: with other settings of the second one its tower is still good.
 _SEEING = ("hidden", "layers", "seed", "threads", "vision", "weight_decay")
 

@@ -11,8 +11,6 @@ from torch.nn import Parameter
 
 from infthor_eval.training.checkpoints import Checkpoints
 
-__all__ = ["NanoProgress", "Stage", "adamw", "run_stage"]
-
 _WARM_UP = 50  # steps
 _LOWEST = 0.03  # final learning rate as a share of the highest
 _CLIP = 1.0

@@ -21,8 +21,6 @@ from infthor_eval.household.wording import (
 )
 from recipes.nano.seen_objects import SeenFrame, SeenObject
 
-__all__ = ["AskedText", "Kind", "SyntheticQuestions"]
-
 _PRESENCE = ("Have you seen {0}?", "Is there any {1} in this room?")
 _OPENNESS = ("Is {} open now?", "Was {} open?")
 _PLACE = (

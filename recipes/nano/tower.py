@@ -14,8 +14,6 @@ from transformers.models.qwen2_5_vl.modeling_qwen2_5_vl import (
     get_vision_position_ids,
 )
 
-__all__ = ["patch_states", "unit_logits"]
-
 
 def patch_states(tower: Any, patches: Tensor) -> Tensor:
     """Return the states of patches after the tower's last layer, (pictures, patches, width).

@@ -9,8 +9,6 @@ from typing import Any
 import torch
 from torch import Tensor
 
-__all__ = ["whiten_patches"]
-
 _SMOOTHING = 1e-3  # of the mean variance, added to each; components of less are noise
 _SCALE = 0.5  # standard deviation of the filters' outputs
 

@@ -11,8 +11,6 @@ from infthor_eval.cli.options.values import PATH
 if TYPE_CHECKING:
     from infthor_eval.runs import RunSummary
 
-__all__ = ["command"]
-
 
 @click.command(
     "audit", cls=ExampleCommand, example="infthor-eval audit SET --balanced qa_set_balanced.csv"

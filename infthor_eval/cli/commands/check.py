@@ -15,8 +15,6 @@ from infthor_eval.cli.options.values import PATH, FiniteFloat, parse_model_args
 if TYPE_CHECKING:
     from model_adapters.check import CheckResult
 
-__all__ = ["command"]
-
 
 @click.group(
     "check", cls=ExampleGroup, example="infthor-eval check adapter ./my_adapter.py:MyModel"

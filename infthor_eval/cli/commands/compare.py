@@ -15,8 +15,6 @@ from infthor_eval.cli.options.values import PATH
 if TYPE_CHECKING:
     from infthor_eval.report.presented import PresentedRun
 
-__all__ = ["command"]
-
 
 @click.command(
     "compare",

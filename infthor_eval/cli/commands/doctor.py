@@ -34,8 +34,6 @@ from infthor_eval.nieh.published.hub_data import default_folder
 from infthor_eval.storage.folders import user_cache
 from infthor_eval.terminal import console, print_line, printable
 
-__all__ = ["checks", "command"]
-
 _STYLES = {"ok": "green", "optional": "yellow", "wrong": "red"}
 _HUB_TIMEOUT_S = 2.0
 _GB = 1e9

@@ -14,9 +14,6 @@ from infthor_eval.exports.registry import FORMATS
 if TYPE_CHECKING:
     from infthor_eval.cli.results import RunResults
 
-__all__ = ["export", "import_replies"]
-
-
 _RELATIONSHIPS = ("first_party", "third_party", "collaborative", "other")
 
 

@@ -7,8 +7,6 @@ import click
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
 
-__all__ = ["command"]
-
 
 @click.command(
     "explain",

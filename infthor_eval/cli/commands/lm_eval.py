@@ -12,8 +12,6 @@ from infthor_eval.errors import (
     in_one_line,
 )
 
-__all__ = ["command"]
-
 
 @click.command(
     "lm-eval", context_settings={"ignore_unknown_options": True, "help_option_names": []}

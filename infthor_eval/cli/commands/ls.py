@@ -30,8 +30,6 @@ from model_adapters import has_option, is_known, names, options
 from model_adapters.built_in import BUILT_IN
 from model_adapters.registry import model_description
 
-__all__ = ["command"]
-
 _TaskRow = tuple[str, str, str]  # name, description, data
 
 _SIZE = re.compile(r"(?<=_)\d+[km]$")  # tokens, at the end of a task's name

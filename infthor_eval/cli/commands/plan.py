@@ -20,8 +20,6 @@ from infthor_eval.runs import RunRequest, Suite, TaskEstimate, estimate_run, pre
 from infthor_eval.tables import Column, Row, Table
 from infthor_eval.terminal import progress_bar
 
-__all__ = ["command", "plan"]
-
 _COLUMNS = ("units", "measured", "frames", "requests", "tokens read", "encoded", "written", "time")
 
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from infthor_eval.report.presenter import FigureRequest
     from infthor_eval.report.web.build import PageRequest
 
-__all__ = ["command"]
-
 _PAGE = Path("results/report.html")
 _INDEX = Path("results/report")
 _TABLE_FORMS = ("csv", "latex", "markdown")

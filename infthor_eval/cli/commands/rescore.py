@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from infthor_eval.nieh.rescoring.rescore import Rescored, Rescoring
     from infthor_eval.runs import UnitRecord
 
-__all__ = ["command"]
-
 # Most tokens of a verdict by prompt. Those are the names of
 # `infthor_eval.nieh.rescoring.judge_prompts`, which is slow to import.
 _JUDGE_TOKENS = {"yes-no": 16, "published": 64}

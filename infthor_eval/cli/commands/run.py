@@ -41,8 +41,6 @@ from model_adapters import model_note
 if TYPE_CHECKING:
     from infthor_eval.harness.trackers import Trackers
 
-__all__ = ["command", "evaluate"]
-
 
 @click.command(
     "run",

@@ -18,8 +18,6 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import is_trajectory_file
 from infthor_eval.terminal import print_line
 
-__all__ = ["command"]
-
 
 @click.command(
     "show",

@@ -7,8 +7,6 @@ import click
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
 from infthor_eval.cli.options.values import PATH
 
-__all__ = ["command"]
-
 
 @click.group("table", cls=ExampleGroup, example="infthor-eval table 4 SET")
 def command() -> None:

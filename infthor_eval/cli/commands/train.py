@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from infthor_eval.training.loop import Progress
     from infthor_eval.training.recipe import Recipe
 
-__all__ = ["command"]
-
 _GPUS = 8
 _TFLOPS = 400.0
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from infthor_eval.report.presenter import Recording, Replay
     from infthor_eval.terminal import PlainConsole
 
-__all__ = ["command"]
-
 _FOLDER = Path("results/recordings")
 
 

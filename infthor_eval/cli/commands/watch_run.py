@@ -8,8 +8,6 @@ import click
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
 
-__all__ = ["command"]
-
 
 @click.command(
     "watch-run", cls=ExampleCommand, example="infthor-eval watch-run results/qwen2.5-vl-nano"

@@ -10,8 +10,6 @@ from click.core import ParameterSource
 from infthor_eval.cli.options.values import PATH, ModelArgs
 from infthor_eval.errors import UsageError, unknown_name
 
-__all__ = ["comes_from_file", "config_option"]
-
 
 def _read_file(context: click.Context, option: click.Parameter, path: Path | None) -> None:
     if path is None:

@@ -10,8 +10,6 @@ import click
 if TYPE_CHECKING:
     from infthor_eval.generation.replay_set import ReplayForm
 
-__all__ = ["QUALITIES", "parse_form", "rendering_options"]
-
 # AI2-THOR 5.0.0's rendering qualities, best last.
 QUALITIES = (
     "Very Low",

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 
 import click
 
-__all__ = ["refuse_repeated_options"]
-
 
 def refuse_repeated_options(
     context: click.Context, command: click.Command, arguments: Sequence[str]

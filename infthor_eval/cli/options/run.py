@@ -37,8 +37,6 @@ from infthor_eval.suites import baseline_suites, find_suite, split_by_suite, sui
 from infthor_eval.workers import WorkerSettings
 from model_adapters import has_option, is_known, name_on_engine
 
-__all__ = ["RunOptions", "run_options"]
-
 _OPTIONS = (
     click.option(
         "--model",

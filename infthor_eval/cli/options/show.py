@@ -12,8 +12,6 @@ import click
 from infthor_eval.cli.options.values import parse_pairs
 from infthor_eval.errors import UsageError
 
-__all__ = ["ShowOptions", "parse_trackers", "sample_options", "show_options", "tracker_options"]
-
 _TRACKERS = {
     "wandb_args": "Send finished runs to Weights & Biases: arguments of wandb.init (project=NAME).",
     "trackio_args": "Send finished runs to trackio: arguments of trackio.init (project=NAME).",

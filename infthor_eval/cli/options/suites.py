@@ -16,8 +16,6 @@ from infthor_eval.errors import UsageError
 from infthor_eval.suites import options_class, suite_names
 from model_adapters.options.parsing import is_required
 
-__all__ = ["expand_suite_options", "refuse_duplicate_options", "suite_options", "suite_values"]
-
 
 def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options of every suite to a command, which passes them to `suite_values`.

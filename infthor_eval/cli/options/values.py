@@ -11,23 +11,6 @@ import click
 from infthor_eval.errors import UsageError, unknown_name
 from model_adapters.options.parsing import read_pairs
 
-__all__ = [
-    "PATH",
-    "SCENE_KINDS",
-    "FiniteFloat",
-    "ModelArgs",
-    "ModelList",
-    "ModelSpec",
-    "SceneName",
-    "WholeNumber",
-    "floor_plans_option",
-    "include_option",
-    "output_option",
-    "parse_model_args",
-    "parse_pairs",
-    "split_names",
-]
-
 PATH = click.Path(path_type=Path)
 SCENE_KINDS = ("kitchen", "living-room", "bedroom", "bathroom", "house")  # procedural: KIND-SEED
 _LARGEST = 2**63 - 1  # the largest integer of a run's JSON

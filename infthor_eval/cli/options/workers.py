@@ -7,8 +7,6 @@ import click
 
 from infthor_eval.workers import WorkerSettings
 
-__all__ = ["parse_worker_settings", "worker_options"]
-
 _MAX_WORKERS = 4096
 
 

@@ -12,8 +12,6 @@ from infthor_eval.cli.progress.pace import Pace
 if TYPE_CHECKING:
     from infthor_eval.generation.simulator_jobs import JobProgress
 
-__all__ = ["JobBar", "PacedBar", "StepBars"]
-
 
 class PacedBar:
     """Shows the progress of one piece of work.

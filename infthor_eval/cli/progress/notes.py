@@ -14,16 +14,6 @@ from infthor_eval.terminal import error_console
 if TYPE_CHECKING:
     from infthor_eval.formats.question import SkippedQuestion
 
-__all__ = [
-    "NOTES",
-    "print_failure",
-    "print_left_out",
-    "print_note",
-    "print_refused",
-    "prints_as_notes",
-    "quiet_notes",
-]
-
 NOTES = error_console()
 _SHOWN = 3  # lines that are named
 

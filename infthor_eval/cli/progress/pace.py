@@ -1,7 +1,5 @@
 """How fast work goes: units a second, time left, share of tokens from a cache."""
 
-__all__ = ["Pace", "format_duration"]
-
 _MIN_INTERVAL_S = 10.0  # between two lines
 _MAX_INTERVAL_S = 60.0  # after which there is a line in any case
 _STEP = 0.05  # of all units, after which there is a line

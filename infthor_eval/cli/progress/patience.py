@@ -15,8 +15,6 @@ from collections.abc import Callable, Iterator
 
 from infthor_eval.cli.progress.stopping import n_handled
 
-__all__ = ["answer_ctrl_c"]
-
 _ANSWER_S = 1.0
 _SAME_S = 0.1  # a forked process tells of the same press; a person takes longer for two
 

@@ -20,8 +20,6 @@ from infthor_eval.runs import (
 )
 from infthor_eval.terminal import progress_bar
 
-__all__ = ["check_others", "execute_runs", "print_workload"]
-
 
 class _ProgressObserver:
     """Prints what is skipped and what the run costs, then how fast it goes."""

@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import FrameType
 
-__all__ = ["Stop", "handle_signal", "n_handled", "stop_on_sigint"]
-
 
 class _Handled:
     """How often Ctrl-C was handled: signals are the process's, so there is one of these."""

@@ -29,8 +29,6 @@ from model_adapters.hf.rehearsal.usage import FrameWork, Rehearsal, Usage
 from model_adapters.options.checkpoints import CheckpointOptions
 from model_adapters.registry import name_on_engine, read_options
 
-__all__ = ["rehearse"]
-
 _GIGABYTES = (24, 48, 80, 141)  # of common GPUs
 _CONTEXTS = (8_192, 32_768, 131_072, 524_288, 1_048_576)  # tokens
 _STEP = 1024  # tokens that the largest context is found to

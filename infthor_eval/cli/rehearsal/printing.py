@@ -7,8 +7,6 @@ from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.tables import Column, Row, Table
 from infthor_eval.terminal import printable
 
-__all__ = ["print_rehearsed"]
-
 _GB = 1e9
 _NONE = "-"
 

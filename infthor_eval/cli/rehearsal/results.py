@@ -2,8 +2,6 @@
 
 import msgspec
 
-__all__ = ["Attention", "Context", "Frames", "Gpu", "Images", "Rehearsed", "Task"]
-
 
 class Attention(msgspec.Struct, frozen=True):
     """Calls of attention to a context, of one kind.

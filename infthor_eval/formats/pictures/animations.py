@@ -16,8 +16,6 @@ from infthor_eval.storage.scratch import ScratchFolder
 if TYPE_CHECKING:
     import cv2
 
-__all__ = ["ANIMATION_FORMATS", "require_animation_name", "write_animation"]
-
 ANIMATION_FORMATS = (".mp4", ".gif")
 # VP9, which browsers play, or MPEG-4 where an OpenCV lacks VP9. No OpenCV wheel encodes H.264.
 _CODECS = ("vp09", "mp4v")

@@ -7,8 +7,6 @@ from contextlib import suppress
 from PIL import ExifTags, Image
 from PIL.Image import Transpose
 
-__all__ = ["as_shown", "conversions", "orientation"]
-
 # By EXIF orientation, from 2; from 5 on width and height change places.
 _TURNS = {2: Transpose.FLIP_LEFT_RIGHT, 3: Transpose.ROTATE_180, 4: Transpose.FLIP_TOP_BOTTOM}
 _TURNS |= {5: Transpose.TRANSPOSE, 6: Transpose.ROTATE_270, 7: Transpose.TRANSVERSE}

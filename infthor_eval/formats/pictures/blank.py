@@ -9,8 +9,6 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.storage.files import write_atomically, writing_hint
 from infthor_eval.storage.folders import user_cache
 
-__all__ = ["blank_like"]
-
 _GREY = (128, 128, 128)
 
 

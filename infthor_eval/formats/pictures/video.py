@@ -23,8 +23,6 @@ from infthor_eval.storage.files import writing_hint
 from infthor_eval.storage.folders import user_cache
 from infthor_eval.storage.scratch import ScratchFolder
 
-__all__ = ["FILM_FPS", "Video", "read_video", "sample_positions"]
-
 FILM_FPS = 10  # of the published films, whose frames are those of a trajectory
 
 # Silences FFmpeg, which prints errors of its own beside our one-line error. OpenCV reads the level

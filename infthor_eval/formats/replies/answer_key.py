@@ -17,8 +17,6 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import read_json
 from infthor_eval.storage.files import write_atomically
 
-__all__ = ["AnswerKey", "read_key", "write_key"]
-
 _KEY = "key.json"
 _FORMAT = 1
 _HINT = "give the folder `key` that private-set wrote, or make it again from the seed file"

@@ -13,8 +13,6 @@ import msgspec
 from infthor_eval.formats.replies.logged import LoggedReply, Texts
 from infthor_eval.quantities import Amount, Count
 
-__all__ = ["EveryEvalEverRows", "told_of"]
-
 _STRETCHES = re.compile(r"\d{1,9}(-\d{1,9})?(,\d{1,9}(-\d{1,9})?)*", re.ASCII)
 _LONGEST_STRETCH = 1_000_000  # frames
 

@@ -21,8 +21,6 @@ from infthor_eval.formats.replies.logged import LoggedReply
 from infthor_eval.quantities import Amount, Count, Repetition
 from infthor_eval.storage.limits import FILE_MB, LINE_MB
 
-__all__ = ["INSPECT_SUFFIX", "inspect_documents", "inspect_rows"]
-
 INSPECT_SUFFIX = ".eval"
 _HEADER = ("header.json", "_journal/start.json")  # the second of a run that was stopped
 _SAMPLES = "samples/"

@@ -8,8 +8,6 @@ from msgspec import Meta
 from infthor_eval.formats.question import Question
 from infthor_eval.quantities import MOST_REPEATS
 
-__all__ = ["LoggedReply", "Texts", "UnreadRow"]
-
 Texts = Annotated[tuple[str, ...], Meta(max_length=MOST_REPEATS)]  # of one question, in one row
 
 

@@ -33,8 +33,6 @@ from infthor_eval.formats.replies.inspect_logs import INSPECT_SUFFIX, inspect_ro
 from infthor_eval.formats.replies.logged import LoggedReply, Texts, UnreadRow
 from infthor_eval.quantities import MOST_REPEATS, Amount, Count, Number, Whole
 
-__all__ = ["read_reply_log"]
-
 # characters of a reply: scoring compares texts in quadratic time, and an answer has a few words
 _LONGEST = 20_000
 _HINT = "give a log with a JSON object a line"

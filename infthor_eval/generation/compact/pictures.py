@@ -17,8 +17,6 @@ from PIL import Image
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.shared_frames import patched_name, store_encoded
 
-__all__ = ["PictureStore", "palette_of"]
-
 _Pixels = NDArray[np.uint8]  # [height, width], indices of colours
 
 # A palette by the number of pixels has none of a small object's colours: a room is walls and floor.

@@ -14,8 +14,6 @@ from infthor_eval.formats.step_log import pack_steps
 from infthor_eval.formats.twins import ComparedFrame, TwinPair, read_pairs, write_pairs
 from infthor_eval.generation.compact.pictures import PictureStore
 
-__all__ = ["copy_compactly"]
-
 _SET_INFO = "set.json"
 
 

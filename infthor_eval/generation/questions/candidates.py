@@ -7,15 +7,6 @@ from dataclasses import dataclass
 from infthor_eval.formats.question import Answer, Question
 from infthor_eval.household.wording import answer_of, canonical_type
 
-__all__ = [
-    "MANY",
-    "Candidate",
-    "are_distinguishable",
-    "further_type",
-    "listing_question",
-    "type_question",
-]
-
 MANY = 6  # maximum number of gold answers; longer lists would test writing, not seeing
 _SIMILAR = 0.75  # the published scorer accepts answers from a similarity of 0.8 on
 _ALIKE = (  # types that people call by each other's names

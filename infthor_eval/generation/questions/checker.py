@@ -14,8 +14,6 @@ from infthor_eval.formats.step_log import Step
 from infthor_eval.generation.questions.facts import FrameFacts, facts_shown, frame_facts
 from infthor_eval.generation.questions.solvers import answer
 
-__all__ = ["Checker", "Verdict"]
-
 _SHOWN_BY_TWO_FRAMES = ("How many times did you open", "How many times did you put")
 
 

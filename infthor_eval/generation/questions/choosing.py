@@ -12,8 +12,6 @@ from collections.abc import Iterable
 
 from infthor_eval.generation.questions.candidates import Candidate
 
-__all__ = ["Chooser"]
-
 _YES_NO = ("yes", "no")
 _NEXT_NUMBERS = 6
 _NEXT_ANSWERS = 10

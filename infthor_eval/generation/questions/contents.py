@@ -13,17 +13,6 @@ from infthor_eval.generation.questions.history import Event, TrajectoryHistory, 
 from infthor_eval.generation.questions.readings import can_be_picked_up, is_plain, minimal_cover
 from infthor_eval.household.wording import canonical_type, in_or_on, with_the
 
-__all__ = [
-    "CONTENT",
-    "FURTHER",
-    "SLICING",
-    "at_opening",
-    "at_pickup",
-    "at_slicing",
-    "contents",
-    "slicings",
-]
-
 CONTENT = "container_content"
 FURTHER = further_type(CONTENT)
 SLICING = "slicing"

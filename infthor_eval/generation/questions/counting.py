@@ -15,8 +15,6 @@ from infthor_eval.generation.questions.candidates import Candidate, further_type
 from infthor_eval.generation.questions.history import Event, ObjectMove, TrajectoryHistory
 from infthor_eval.household.wording import in_or_on, noun, with_article, with_the
 
-__all__ = ["ALL", "FURTHER", "QUESTION_TYPE", "counts", "further_counts"]
-
 QUESTION_TYPE = "movement_counting"
 FURTHER = further_type(QUESTION_TYPE)
 ALL = "#"  # the subject of a count of all objects, which is about no type

@@ -14,23 +14,6 @@ from itertools import pairwise
 from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
 from infthor_eval.generation.questions.history import SHARE_FACTOR
 
-__all__ = [
-    "FactEvent",
-    "FrameFacts",
-    "events_of",
-    "facts_shown",
-    "frame_facts",
-    "holder_of",
-    "ids_inside",
-    "is_of_type",
-    "named_type",
-    "only_loose",
-    "place_of",
-    "plain_name",
-    "type_of_id",
-    "whole_id",
-]
-
 _FRAME_PIXELS = 300 * 300
 
 

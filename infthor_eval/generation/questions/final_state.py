@@ -8,8 +8,6 @@ from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.questions.readings import is_plain, minimal_cover
 from infthor_eval.household.wording import in_or_on, with_the
 
-__all__ = ["COUNT_FORM", "QUESTION_TYPE", "final_states"]
-
 QUESTION_TYPE = "final_state"
 COUNT_FORM = "How many objects were {}?"
 

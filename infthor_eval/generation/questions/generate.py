@@ -33,8 +33,6 @@ from infthor_eval.generation.questions.published_words import in_published_words
 from infthor_eval.generation.questions.rooms import rooms_of
 from infthor_eval.workers import WorkerSettings, run_jobs
 
-__all__ = ["GeneratedQuestions", "candidates_of", "further_candidates_of", "generate_questions"]
-
 _ONE_PROCESS = WorkerSettings()
 # Errors of a log that has the documented form but inconsistent content.
 _INCONSISTENT = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)

@@ -10,15 +10,6 @@ from infthor_eval.formats.step_log import ObjectInFrame, ObjectState, Step, iter
 from infthor_eval.household.containment import logged_parent
 from infthor_eval.household.wording import canonical_type
 
-__all__ = [
-    "DEFAULT_SHARE",
-    "SHARE_FACTOR",
-    "Event",
-    "ObjectMove",
-    "TrajectoryHistory",
-    "is_same_object",
-]
-
 _SIDE = 300
 _MARGIN = 15  # distance from the frame's edge from which on an object is well inside, pixels
 DEFAULT_SHARE = 0.001  # of the frame: 90 pixels, about a spoon on a table at 1.5 m

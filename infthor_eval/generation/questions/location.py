@@ -11,8 +11,6 @@ from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
 from infthor_eval.household.wording import answer_of, canonical_type, in_or_on, with_the
 
-__all__ = ["FURTHER", "QUESTION_TYPE", "further_locations", "locations"]
-
 QUESTION_TYPE = "location_tracing"
 FURTHER = candidates.further_type(QUESTION_TYPE)
 

@@ -7,8 +7,6 @@ from infthor_eval.generation.questions.candidates import Candidate, further_type
 from infthor_eval.generation.questions.history import Event, TrajectoryHistory
 from infthor_eval.household.wording import in_or_on, with_the
 
-__all__ = ["CONTAINERS", "FURTHER", "QUESTION_TYPE", "further_open_states", "open_states"]
-
 QUESTION_TYPE = "open_state"
 FURTHER = further_type(QUESTION_TYPE)
 CONTAINERS = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Microwave", "Safe"})

@@ -11,8 +11,6 @@ from infthor_eval.generation.questions.candidates import Candidate, further_type
 from infthor_eval.generation.questions.history import Event, TrajectoryHistory
 from infthor_eval.household.wording import canonical_type, with_the
 
-__all__ = ["QUESTION_TYPE", "orders"]
-
 QUESTION_TYPE = further_type("order")
 
 

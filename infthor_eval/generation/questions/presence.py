@@ -20,8 +20,6 @@ from infthor_eval.generation.questions.rooms import COMMON_TYPES, rooms_of
 from infthor_eval.household.affordances import STOWABLE
 from infthor_eval.household.wording import noun, with_article
 
-__all__ = ["QUESTION_TYPE", "is_clear_absence", "no_questions", "yes_questions"]
-
 QUESTION_TYPE = "object_presence"
 _IN_ROOM = "Is there any {} in this room?"
 _SEEN = "Have you seen {}?"

@@ -13,8 +13,6 @@ from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.household.affordances import preposition
 from infthor_eval.household.wording import answer_of, canonical_type, object_type
 
-__all__ = ["in_published_words"]
-
 # By our form. The names of the candidate become type names; "a" and "preposition" are those of the
 # last one.
 _FORMS = {

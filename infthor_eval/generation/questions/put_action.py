@@ -11,8 +11,6 @@ from infthor_eval.generation.questions.candidates import Candidate, type_questio
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
 from infthor_eval.household.wording import in_or_on
 
-__all__ = ["FURTHER", "QUESTION_TYPE", "further_puts", "puts"]
-
 QUESTION_TYPE = "put_action"
 FURTHER = candidates.further_type(QUESTION_TYPE)
 

@@ -11,8 +11,6 @@ from typing import Any
 
 from infthor_eval.generation.questions.history import TrajectoryHistory
 
-__all__ = ["can_be_picked_up", "is_plain", "minimal_cover"]
-
 _TOPS = frozenset({
     "CoffeeTable", "Desk", "DiningTable", "Dresser", "Shelf", "ShelvingUnit", "SideTable",
     "TVStand",

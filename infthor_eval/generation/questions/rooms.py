@@ -2,8 +2,6 @@
 
 from collections.abc import Set
 
-__all__ = ["COMMON_TYPES", "rooms_of"]
-
 # In AI2-THOR's rooms and in ours each of these stands in one kind of room alone.
 _MARKS = {
     "Kitchen": {"Fridge", "StoveBurner"},

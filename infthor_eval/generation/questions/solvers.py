@@ -23,8 +23,6 @@ from infthor_eval.generation.questions.facts import (
     whole_id,
 )
 
-__all__ = ["answer"]
-
 
 def answer(text: str, facts: Sequence[FrameFacts]) -> list[str] | None:
     """Return the answers to a question, or None if the facts are not sufficient."""

@@ -17,8 +17,6 @@ from infthor_eval.household.affordances import goes_into
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["CountKind", "CountMove", "CountPut", "PutTarget"]
-
 _CARRYING = {"PickupObject", "PutObject"}
 _LEAST_MOVES = 2  # of an object; how often it was moved is asked from then on
 

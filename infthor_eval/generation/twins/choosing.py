@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from infthor_eval.formats.twins import PairedQuestion, TwinPair
 
-__all__ = ["ChosenQuestion", "choose_pairs"]
-
 _MOST = 0.3  # of a set's pairs are of one kind, if there are enough kinds for that
 
 

@@ -19,8 +19,6 @@ from infthor_eval.generation.twins.kinds import Worlds
 from infthor_eval.generation.twins.rewriting import exchange_ids, whole_of
 from infthor_eval.generation.twins.tolerance import EXACT, Tolerance
 
-__all__ = ["Difference", "World", "compare"]
-
 _NEAR = 0.5  # how far a third object may be displaced on its receptacle, metres
 _Frame = tuple[Step, dict[str, ObjectState]]
 

@@ -17,8 +17,6 @@ from infthor_eval.generation.twins.drafting import TwinDraft, TwinSettings
 from infthor_eval.generation.twins.final_tasks import FinalTaskDraft
 from infthor_eval.storage.files import file_name, is_written, write_atomically
 
-__all__ = ["DRAFTS", "DraftOutcome", "Item", "count_edits", "draft_item", "failure_line"]
-
 DRAFTS = "drafts"  # folder in that of the set
 _HINT = "remove it, or choose another --out"
 

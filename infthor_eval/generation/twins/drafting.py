@@ -29,8 +29,6 @@ from infthor_eval.storage.files import file_name, write_atomically
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["Replays", "TwinDraft", "TwinSettings", "draft_twins", "is_flipped", "name_worlds"]
-
 _WORLD = "twin"  # what a world is called while it is replayed
 _COPIED = ("metadata.json", "traj.txt", "state_summary.json")
 

@@ -20,8 +20,6 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["ASKED_OPEN", "Episode", "read_episode"]
-
 # What people would ask about as open or closed, and what can stand open without a hand on it.
 ASKED_OPEN = open_state.CONTAINERS | {"Laptop"}
 _HINT = "give a trajectory that replays here"

@@ -17,8 +17,6 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["Exchange", "ExchangeKind", "Move", "Swap", "SwapSliced", "SwapTask", "Untouched"]
-
 _CARRYING = {"PickupObject", "PutObject"}
 _SLICING = {"SliceObject"}
 _Pair = tuple[ThorObject, ThorObject]

@@ -19,8 +19,6 @@ from infthor_eval.household.first_place import apart
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["Errand", "are_apart", "errands", "place_in"]
-
 _AGO = 10  # frames at least since the object was last shown where it is
 _APART = 1.5  # metres at least between its two places: nobody reaches both from one pose
 _GOALS = 2  # receptacles at most that are tried for one object

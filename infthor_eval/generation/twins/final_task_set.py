@@ -35,8 +35,6 @@ from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings, run_jobs
 
-__all__ = ["FinalTaskSummary", "make_final_tasks"]
-
 
 class FinalTaskSummary(msgspec.Struct):
     """Numbers of a set of twins for agents, as `--json` prints them.

@@ -43,8 +43,6 @@ from infthor_eval.thor.recorder import object_log
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose
 
-__all__ = ["MOVING_KINDS", "TRAJECTORIES", "FinalTaskDraft", "draft_final_tasks"]
-
 # Kinds of edits after which an object may be far from where it is in the twin.
 MOVING_KINDS = ("swap", "swap-task", "move")
 TRAJECTORIES = "trajectories"  # folder in that of the set

@@ -15,8 +15,6 @@ from infthor_eval.generation.twins.rewriting import with_inserted
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["Insertion", "in_reach", "moments"]
-
 
 @dataclass(frozen=True)
 class Insertion:

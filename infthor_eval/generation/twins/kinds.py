@@ -14,8 +14,6 @@ from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.plugins import PluginTable
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["KINDS", "EditKind", "EditRefused", "Proposal", "Worlds"]
-
 _HERE = "infthor_eval.generation.twins"
 KINDS = PluginTable(
     "kind of twins",

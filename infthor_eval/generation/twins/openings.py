@@ -10,8 +10,6 @@ from infthor_eval.generation.twins.insertions import Insertion, in_reach, moment
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["CountOpen"]
-
 
 class CountOpen:
     """A container is opened once more than another one of another type."""

@@ -20,8 +20,6 @@ from infthor_eval.generation.questions.generate import candidates_of, further_ca
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
 from infthor_eval.household.wording import answer_of, canonical_type
 
-__all__ = ["AskedWorld", "ScoreReply", "pair_questions", "types_of_fact"]
-
 # Returns the strict score of a reply for gold answers, from 0 to 1.
 ScoreReply = Callable[[str, Sequence[Answer]], float]
 

@@ -10,8 +10,6 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.step_log import ObjectInFrame
 from infthor_eval.generation.questions.history import DEFAULT_SHARE
 
-__all__ = ["are_clearly_unlike", "channel_differences"]
-
 # Two objects that change places are two outlines, each as large as what counts as shown. Below
 # this, by eye, a pair differs in the edge of a door or of a plate.
 _CLEAR_SHARE = 2 * DEFAULT_SHARE

@@ -14,8 +14,6 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import Box, SimulatorView, ThorObject, Vector
 
-__all__ = ["may_fit", "scenes_of_both"]
-
 _Offset = tuple[float, float]
 
 # Places beside the other's that are tried, nearest first, metres.

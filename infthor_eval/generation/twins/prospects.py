@@ -15,8 +15,6 @@ from infthor_eval.generation.twins.kinds import Proposal
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import teleport_call
 
-__all__ = ["Prospects", "seen_around"]
-
 # Degrees of the agent, and of its camera, in looking around.
 _HEADINGS = (0.0, 90.0, 180.0, 270.0)
 _HORIZONS = (0.0, 30.0)

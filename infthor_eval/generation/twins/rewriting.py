@@ -17,14 +17,6 @@ from infthor_eval.formats.trajectory import (
 )
 from infthor_eval.household.tasks import sub_task, task_of
 
-__all__ = [
-    "exchange_ids",
-    "in_world",
-    "whole_of",
-    "with_inserted",
-    "without_traces",
-]
-
 _ID_FIELDS = ("object_id", "receptacle_id", "clean_id")
 
 

@@ -21,8 +21,6 @@ from infthor_eval.household.wording import canonical_type
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["Opened", "Replace"]
-
 _WITH_DOORS = frozenset({"Cabinet", "Fridge", "Safe"})  # which stand in the way when open
 
 

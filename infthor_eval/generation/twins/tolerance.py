@@ -12,8 +12,6 @@ from infthor_eval.generation.twins.pictures import channel_differences
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import Vector
 
-__all__ = ["EXACT", "UNITY", "Tolerance", "tolerance_of"]
-
 _Place = tuple[float, float, float]
 
 

@@ -39,8 +39,6 @@ from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings, run_jobs
 
-__all__ = ["TwinSummary", "make_twins"]
-
 _QUESTIONS = "qa_set_twins.csv"
 
 

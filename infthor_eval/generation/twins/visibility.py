@@ -11,8 +11,6 @@ from infthor_eval.generation.twins.pairing import AskedWorld, types_of_fact
 from infthor_eval.generation.twins.pictures import are_clearly_unlike
 from infthor_eval.household.wording import canonical_type
 
-__all__ = ["check_insertions", "check_original", "is_shown"]
-
 
 def check_insertions(world: World, inserted: range) -> None:
     """Check that each inserted action changes the picture: a door may open out of the frame.

@@ -13,8 +13,6 @@ from infthor_eval.manipulation.planner.linkage import ArmStand, Array, Linkage, 
 from infthor_eval.manipulation.planner.places import Entry, Places, firmness, occupancy, support
 from infthor_eval.manipulation.planner.roadmap import Contact, Terrain
 
-__all__ = ["PutGoal", "ReleasePoses", "passing_poses", "release_poses"]
-
 # Release poses that are drawn, rated (of those within reach), tested for collisions (of the best),
 # and kept. Each step costs more a pose than the one before, so it sees fewer of them.
 _DRAWN = 8000

@@ -13,17 +13,6 @@ from numpy.typing import NDArray
 from infthor_eval.manipulation.geometry import middle_of, point_of, size_of
 from infthor_eval.thor.view import AgentPose, ArmState, AxisAngle, ThorObject
 
-__all__ = [
-    "ArmStand",
-    "Array",
-    "Linkage",
-    "Parts",
-    "Poses",
-    "angles_of",
-    "heading",
-    "rotations_about",
-]
-
 Array = NDArray[np.float64]
 _UP: Array = np.array([0.0, 1.0, 0.0])
 _THICK = 0.045  # metres: half the thickness of links and palm, a little more than the actual one

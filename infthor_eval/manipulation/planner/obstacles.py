@@ -12,8 +12,6 @@ from infthor_eval.manipulation.planner.linkage import Array, Parts
 from infthor_eval.manipulation.planner.places import Entry, Places
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["Obstacles", "cavity", "clearances", "columns", "obstacles_of"]
-
 _BOARD = 0.02  # metres: half the thickness of walls and boards of furniture
 _LEAF = 0.04  # metres: thickness of a door, with what is on its inner side
 _PIECES = 5  # boxes of an open door, which is not along an axis

@@ -10,19 +10,6 @@ from infthor_eval.manipulation.geometry import Corners, middle_of, point_of, siz
 from infthor_eval.manipulation.planner.linkage import Array, Parts
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = [
-    "ENTERED",
-    "Entry",
-    "Places",
-    "entry_of",
-    "firmness",
-    "is_entered",
-    "occupancy",
-    "others_on",
-    "places_of",
-    "support",
-]
-
 # Types of receptacles that are entered from the front.
 ENTERED = {"Fridge", "Microwave", "Cabinet", "Safe", "CoffeeMachine", "Shelf", "ShelvingUnit"}
 _SPACING = 0.05  # metres between places if there is only one

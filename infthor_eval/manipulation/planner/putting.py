@@ -19,8 +19,6 @@ from infthor_eval.manipulation.planner.roadmap import (
 )
 from infthor_eval.manipulation.planner.surroundings import Belief, Surroundings
 
-__all__ = ["put_steps"]
-
 _MAX_PATHS = 40  # after which it gives up
 # metres, and entries of rotations, within which a pose is reached
 _EXACT = 0.015

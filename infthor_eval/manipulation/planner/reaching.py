@@ -11,8 +11,6 @@ from infthor_eval.manipulation.planner.linkage import ArmStand
 from infthor_eval.manipulation.planner.putting import put_steps
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["plan_steps"]
-
 _SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)  # metres of the base above a target, tried in order
 
 Steps = Iterator[Sequence[Call]]

@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 from infthor_eval.manipulation.planner.linkage import Array, Linkage, Poses, rotations_about
 from infthor_eval.manipulation.planner.obstacles import Obstacles, clearances
 
-__all__ = ["ArmMove", "Contact", "MoveKind", "Roadmap", "Terrain", "first_pose_of"]
-
 # metres and radians between two poses of a movement that are tested
 _STEP = 0.03
 _ANGLE = math.radians(5.0)

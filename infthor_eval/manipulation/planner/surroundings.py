@@ -25,8 +25,6 @@ from infthor_eval.manipulation.planner.places import (
 )
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["Belief", "Surroundings"]
-
 _REACH = 1.5  # metres from the wrist within which things are obstacles
 _FLOOR_EXTENT = 3.0  # metres of the floor to each side
 _SUNK = 0.02  # metres that places may be inside a box that they are only beside

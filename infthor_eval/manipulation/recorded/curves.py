@@ -19,8 +19,6 @@ from infthor_eval.manipulation.recorded.runs import ArmRun, shared_episodes, tas
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["ALL", "arm_curves"]
-
 ALL = "all"  # name of the facet of both kinds together
 _OVER = "the expert's step (low-level action)"
 _END = "at step"

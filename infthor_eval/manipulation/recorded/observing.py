@@ -15,8 +15,6 @@ from infthor_eval.manipulation.recorded.replay_frames import (
 )
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["ArmObserver"]
-
 _MARGIN = 0.1  # metres around what a picture must contain
 _NEAR = 2.5  # metres from the agent within which objects are drawn
 _NOT_DRAWN = {"Floor", "Wall", "Ceiling"}  # the room itself, as large as the picture

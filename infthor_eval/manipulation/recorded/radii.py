@@ -11,8 +11,6 @@ from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["RadiusLine", "SuccessByRadius", "success_by_radius"]
-
 Record = UnitRecord[ArmRecord]
 Points = tuple[tuple[float, Rate], ...]
 

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from infthor_eval.episodes.replay_frames import EpisodeFrame
 
-__all__ = ["ArmFrame", "ArmObservation", "EpisodeTitle", "NearbyObject", "Place", "Reach"]
-
 # Metres to the right of the agent, ahead of it, and up in the world.
 Place = tuple[float, float, float]
 

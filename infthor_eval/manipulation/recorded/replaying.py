@@ -34,8 +34,6 @@ from infthor_eval.runs import UnitRecord
 from infthor_eval.thor.frames import NoFrames
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["ArmReplay", "RecordedEpisodes", "recorded_episodes", "replay_episodes"]
-
 Record = UnitRecord[ArmRecord]
 _TOLERANCE = 1e-4  # metres; positions are recorded to a thousandth of a millimetre
 _ENDED_BY_WORLD = {ArmEnded.DONE, ArmEnded.ELSEWHERE}  # not by a limit, or by an actor that gave up

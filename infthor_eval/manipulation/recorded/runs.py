@@ -16,8 +16,6 @@ from infthor_eval.manipulation.config import ArmTaskConfig, ManipulationConfig
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.records import RECORDS, ArmRecord
 
-__all__ = ["ArmRun", "label_by_radius", "shared_episodes", "task_kinds"]
-
 _COMPARED_ELSEWHERE = {"reward", "radius"}  # settings that have an error and a note of their own
 
 

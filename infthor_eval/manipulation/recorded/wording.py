@@ -7,8 +7,6 @@ from typing import Any
 from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.manipulation.records import ArmStep
 
-__all__ = ["describe_call", "describe_request"]
-
 _LEFT_OUT = {"action", "returnToStart"}
 
 

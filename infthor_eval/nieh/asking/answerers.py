@@ -14,8 +14,6 @@ from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import Session
 from model_adapters import Model, Subject
 
-__all__ = ["Answerer", "answerer_of"]
-
 # Baselines read no frames; contexts that are measured in tokens are cut for them as for Qwen2.5-VL
 # (published count).
 _BASELINE_TOKENS_PER_FRAME = 121

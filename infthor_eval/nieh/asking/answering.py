@@ -41,8 +41,6 @@ from model_adapters import (
     wrap_request_errors,
 )
 
-__all__ = ["OpenAnswerer", "OpenBaseline", "OpenModel", "answer_units", "request_fingerprint"]
-
 _MARGIN_DIGITS = 3  # after the point, of margins in nats
 
 

@@ -25,8 +25,6 @@ from infthor_eval.runs.suite import BaselineSubject
 from infthor_eval.storage.digests import seed_of
 from model_adapters import Subject
 
-__all__ = ["BASELINES", "Baseline", "Predict"]
-
 _RULES = 2  # of `blind` and `random`: with another number earlier replies are not taken again
 
 

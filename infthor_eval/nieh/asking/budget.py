@@ -9,8 +9,6 @@ from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.task import PreparedTask
 from model_adapters import Model, Part
 
-__all__ = ["Budget", "budget_of"]
-
 
 @dataclass(frozen=True)
 class Budget:

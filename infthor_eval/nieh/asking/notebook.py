@@ -9,8 +9,6 @@ from infthor_eval.runs import Session, Usage
 from infthor_eval.storage.digests import fingerprint
 from model_adapters import Decoding, Model, answer_of, wrap_request_errors
 
-__all__ = ["Notebook"]
-
 
 class Notebook:
     """A model's notes, cached in the run's journal: a resumed run uses the same ones."""

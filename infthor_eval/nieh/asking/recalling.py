@@ -35,8 +35,6 @@ from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.storage.deadlines import not_counted
 from infthor_eval.storage.digests import fingerprint
 
-__all__ = ["FindRecall", "KeepRecall", "Recaller", "apply_recall", "asks_model", "recall_all"]
-
 # Looks up what was recalled from the same inputs, by their hash.
 FindRecall = Callable[[str], NiehRecall | None]
 KeepRecall = Callable[[str, NiehRecall], None]

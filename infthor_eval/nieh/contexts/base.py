@@ -16,15 +16,6 @@ from infthor_eval.nieh.options import FRAMES
 from infthor_eval.nieh.prompts import PROMPTS, PUBLISHED_MAIN, question_text
 from infthor_eval.storage.digests import digest_of_file, fingerprint
 
-__all__ = [
-    "Context",
-    "ContextPart",
-    "ContextSettings",
-    "RecallSettings",
-    "Sample",
-    "trajectories_identity",
-]
-
 _LARGEST = 1e9  # kilo-tokens; more is a typing error
 _COUNT = "a whole number from 1"
 ContextPart = str | FrameRef | Video

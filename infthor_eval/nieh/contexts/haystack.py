@@ -19,8 +19,6 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.nieh.contexts.base import ContextSettings, Sample
 
-__all__ = ["haystack", "sampling_pool"]
-
 _K_TOKENS = 1000  # the published kilo-token
 _STEPS = 5  # depths of the published grid
 _OUTSIDE = "the window reaches outside the trajectory"

@@ -8,8 +8,6 @@ from infthor_eval.formats.outline import Outline
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
-__all__ = ["interleaved", "interleaved_parts"]
-
 _STATE = " State: "  # text before frames
 
 

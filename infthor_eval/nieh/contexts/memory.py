@@ -14,8 +14,6 @@ from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.memory import accepted_options, memory_identity
 from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, RecallSettings, Sample
 
-__all__ = ["memory", "memory_sources", "recalled_parts"]
-
 # Stands for what will be recalled, in prompts of samples that no model was asked.
 _UNRECALLED = "<memory>"
 _OF_RETRIEVER = ("retriever", "retriever_revision")

@@ -10,8 +10,6 @@ from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.reading import read_text
 from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
-__all__ = ["interleaved_plans", "plans_parts"]
-
 _MARK = "<image>"  # the place of a frame in traj.txt
 _ACT = "<|act|>"  # the end of an action there
 

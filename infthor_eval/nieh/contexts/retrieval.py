@@ -13,8 +13,6 @@ from infthor_eval.nieh.contexts.base import ContextSettings, Sample
 if TYPE_CHECKING:
     from model_adapters.hf.retrieval import Retriever
 
-__all__ = ["clip_retrieval", "retriever_identity"]
-
 
 def clip_retrieval(
     data: NiehSet, question: Question, settings: ContextSettings

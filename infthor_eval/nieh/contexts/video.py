@@ -11,8 +11,6 @@ from infthor_eval.formats.pictures.video import FILM_FPS, Video, sample_position
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
-__all__ = ["as_images", "video", "video_frames", "video_identity", "video_parts", "video_positions"]
-
 
 def video(
     data: NiehSet, question: Question, settings: ContextSettings

@@ -7,8 +7,6 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
-__all__ = ["clues", "state_parts", "text_state", "trajectory", "truncate_head"]
-
 _K_TOKENS = 1024  # truncate_head's published kilo-token
 
 

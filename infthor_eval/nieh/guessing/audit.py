@@ -26,8 +26,6 @@ from infthor_eval.nieh.guessing.folds import held_out
 from infthor_eval.nieh.guessing.guessers import GUESSERS, blind_guesser, facts_guesser
 from infthor_eval.nieh.scoring import score
 
-__all__ = ["BY", "Audit", "AuditedQuestion", "Group", "audit", "chance_of"]
-
 _YES_NO = ("yes", "no")
 _MANY = 20  # questions of a group that a sentence is worth
 

@@ -10,8 +10,6 @@ from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["audit_tables", "balanced_table", "guessers_table", "runs_table"]
-
 _HEADS = {
     "file": "file",
     "answers": "kind of answer",

@@ -26,8 +26,6 @@ from infthor_eval.nieh.guessing.blind import score_guesses
 from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS
 
-__all__ = ["MARGIN", "Balanced", "balance"]
-
 MARGIN = 0.03
 
 

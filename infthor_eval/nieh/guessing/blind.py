@@ -29,15 +29,6 @@ from infthor_eval.storage.digests import digest_of_files, fingerprint
 from infthor_eval.storage.files import write_atomically
 from infthor_eval.storage.folders import user_cache
 
-__all__ = [
-    "find_blind",
-    "find_floor",
-    "questions_by_file",
-    "sample_on_clues",
-    "score_guesses",
-    "visible_knowledge",
-]
-
 
 def visible_knowledge(context: str) -> Knowledge:
     """Return what a model is told in a context of that name without looking at a frame.

@@ -18,16 +18,6 @@ from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.folds import Fit, Folds, split
 
-__all__ = [
-    "chains_of_words",
-    "chains_of_words_and_count",
-    "chains_of_words_and_place",
-    "form_of",
-    "guess_by_chains",
-    "question_type",
-    "words_of",
-]
-
 Chain = Sequence[Hashable]
 _LEADING_WORDS = 2  # the type of a question whose file names none
 _STEM = 3  # leading words that tell the forms of questions apart

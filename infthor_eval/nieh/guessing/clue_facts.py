@@ -13,8 +13,6 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import Step, read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
 
-__all__ = ["ClueFacts", "read_clue_facts", "read_scenes"]
-
 _LAST_PIXEL = 299
 _LARGE = 90  # pixels from which on an object counts as in view, as for questions
 

@@ -5,8 +5,6 @@ from types import MappingProxyType
 
 from infthor_eval.nieh.contexts import Sample
 
-__all__ = ["Fit", "Folds", "folds_of", "held_out", "split"]
-
 Folds = Sequence[int]  # the fold of each sample
 Fit = Callable[[frozenset[int]], Mapping[int, str]]
 """Learns on all samples but those of some folds, and guesses these, by their positions."""

@@ -27,8 +27,6 @@ from infthor_eval.nieh.guessing.folds import Fit, Folds, folds_of, split
 from infthor_eval.nieh.guessing.learner import guess_by_learning
 from infthor_eval.nieh.scoring import score
 
-__all__ = ["GUESSERS", "Knowledge", "NamedGuesser", "blind_guesser", "facts_guesser"]
-
 
 class Knowledge(Flag):
     """What a guesser knows of a question beside its file."""

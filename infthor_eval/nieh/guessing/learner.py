@@ -19,8 +19,6 @@ from infthor_eval.nieh.guessing.chains import form_of, words_of
 from infthor_eval.nieh.guessing.clue_facts import ClueFacts
 from infthor_eval.nieh.guessing.folds import Fit, Folds, split
 
-__all__ = ["guess_by_learning"]
-
 _FORM = 100  # characters of a form: all of a text's, before each word, would grow with its square
 _PLACES = (15, 100)  # frames that count as one place
 # On the published files strengths from 1 to 10 differ by less than a point; no more is tuned.

@@ -12,8 +12,6 @@ from collections.abc import Iterable, Mapping
 from infthor_eval.formats.replies.logged import LoggedReply
 from infthor_eval.nieh.prompts import PUBLISHED_LOGS, PUBLISHED_MAIN
 
-__all__ = ["asked_prompt"]
-
 _PER_FRAME = 123  # of 300x300 pixels: 121 and two marks
 _PER_PAIR = 144  # of two frames of a film; beside them two marks a request
 _MARKS = 2

@@ -7,8 +7,6 @@ from infthor_eval.formats.archive import unpack_tar
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.storage.folders import user_cache
 
-__all__ = ["NIEH_REPOSITORY", "default_folder", "fetch_nieh"]
-
 NIEH_REPOSITORY = "PEARLS-Lab/infini-thor-nieh"
 _FILES = ["qa_set_nieh_single_clue.csv", "qa_set_nieh_multi_clue.csv", "metadata.tar"]
 

@@ -13,8 +13,6 @@ from infthor_eval.runs import Tokens, Unit, UnitKey, UnitRecord
 from infthor_eval.storage.digests import fingerprint
 from model_adapters import Reply, answer_of
 
-__all__ = ["WHOLE", "Known", "imported_record"]
-
 WHOLE = (None, "full_traj")  # published modes that show all frames; early logs name no mode
 
 

@@ -23,8 +23,6 @@ from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.runs import Catalog, RunHeader, Session, UnitRecord
 from infthor_eval.storage.digests import digest_of_file
 
-__all__ = ["ImportedRun", "Refusal", "import_logs"]
-
 _PUBLISHED_NAME = re.compile(
     r"eval_(?P<file>qa_set_.+?_clue)_(?P<model>.+?)_(?:full_traj.*)\.log(?:\.gz)?$"
 )

@@ -11,8 +11,6 @@ from infthor_eval.nieh.results.summary import CLUE_COLUMNS
 from infthor_eval.statistics import MeanEstimate, clustered_mean
 from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
 
-__all__ = ["derive_row", "table4"]
-
 _TITLE = "Table 4"
 _NOTES = (
     "Columns count clue frames: 1 is the whole file of a single clue, 2 and >=3 are the file of "

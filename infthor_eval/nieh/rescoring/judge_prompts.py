@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from infthor_eval.formats.question import Answer
 from infthor_eval.nieh.prompts import last_line
 
-__all__ = ["JUDGE_PROMPTS", "YES_NO", "JudgePrompt"]
-
 YES_NO = "yes-no"  # the default
 
 _SYSTEM = "You are a strict and reliable automatic evaluator for question-answering systems."

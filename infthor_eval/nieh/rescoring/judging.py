@@ -42,8 +42,6 @@ from model_adapters import (
     wrap_request_errors,
 )
 
-__all__ = ["JUDGED", "Agreement", "Judge", "Judgement", "Verdicts", "judge_replies"]
-
 JUDGED = "judged"  # the metric
 
 _N_SAMPLED = 25  # replies of each kind, right and wrong, on which a judge is measured

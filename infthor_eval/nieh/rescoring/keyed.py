@@ -12,8 +12,6 @@ from infthor_eval.nieh.rescoring.rescore import Source
 from infthor_eval.nieh.twins import twin_of_reply
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["keyed_payload", "with_key"]
-
 
 def with_key(source: Source, key: AnswerKey) -> Source:
     """Return a run on the public part as one on the set with the answers, not yet scored.

@@ -21,8 +21,6 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.runs import RunHeader, UnitRecord
 
-__all__ = ["RebuiltRequest", "RequestRebuilder"]
-
 _RETRIEVED = "clip_retrieval"
 # Settings of contexts that a run gives to all its tasks.
 _RUN_SETTINGS = ("k_tokens", "tokens_per_frame", "frames", "prompt", "seed")

@@ -11,16 +11,6 @@ from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = [
-    "Change",
-    "ChangedScore",
-    "RescoringReport",
-    "agreement_table",
-    "change_table",
-    "find_changes",
-    "sources_of",
-]
-
 Record = UnitRecord[NiehAnswer]
 
 _N_EXAMPLES = 3  # of replies whose score has changed, for each metric

@@ -33,8 +33,6 @@ from infthor_eval.runs.journals.shards import Tell
 from infthor_eval.runs.results import write_document
 from infthor_eval.runs.stored.writing import Stored, store_run
 
-__all__ = ["RESCORED", "Rescored", "Rescoring", "Source", "read_source", "score_again"]
-
 RESCORED = "rescored.json"  # in the run's folder: what has changed
 
 _SUFFIX = "-rescored"  # of the run's name

@@ -29,8 +29,6 @@ from infthor_eval.nieh.results.summary import is_open_ended
 from infthor_eval.nieh.scoring import pieces_of, plain_form, response_of, score
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["KnownAnswers"]
-
 Record = UnitRecord[NiehAnswer]
 
 _BEGINNING = re.compile(r"^(?:(?:on|in|to|into|onto|at) )?(?:(?:the|a|an) )?")

@@ -14,15 +14,6 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.runs import UnitRecord
 from infthor_eval.statistics import bootstrap_interval
 
-__all__ = [
-    "SOLVED",
-    "AboveBlind",
-    "FormScore",
-    "above_blind",
-    "score_above_blind",
-    "score_range",
-]
-
 # A form of which `blind` has more counts as solved by it: what is left is a few questions, and a
 # run that errs on one of them more than `blind` would lose more than it could win on all others.
 SOLVED = 0.95

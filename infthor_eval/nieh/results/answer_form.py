@@ -11,8 +11,6 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.scoring import says_yes_or_no
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["YesNo", "form_notes", "format_failures", "yes_no"]
-
 Record = UnitRecord[NiehAnswer]
 
 _REPEATED = "repeats the question"

@@ -10,17 +10,6 @@ from infthor_eval.runs import UnitRecord
 from infthor_eval.statistics import bootstrap_interval, clustered_mean
 from infthor_eval.tables import TableCell, answered_cell, interval_cell
 
-__all__ = [
-    "Cell",
-    "Score",
-    "both_intervals",
-    "make_cell",
-    "mean_cell",
-    "score_interval",
-    "score_of",
-    "with_missing",
-]
-
 Record = UnitRecord[NiehAnswer]
 
 

@@ -13,8 +13,6 @@ from infthor_eval.rates import format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["control_tables", "without_alike_notes"]
-
 _FRAMES = (SHOWN, NO_CLUE, OTHER, BLANK)
 _DIFFERENCES = ((SHOWN, NO_CLUE), (OTHER, BLANK))  # memory, knowledge
 _NOTES = (

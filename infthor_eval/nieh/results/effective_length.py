@@ -17,8 +17,6 @@ from infthor_eval.nieh.results.summary import NiehSummary, TaskSummary
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["KEPT", "Series", "effective_length", "effective_lengths", "find_series"]
-
 KEPT = 0.85  # share of the base that counts as kept
 _SIZED = ("haystack", "truncate_head")
 

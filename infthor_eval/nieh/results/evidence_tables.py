@@ -15,8 +15,6 @@ from infthor_eval.nieh.results.summary import (
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, TableCell
 
-__all__ = ["above_blind_cell", "above_blind_notes", "evidence_tables", "short_name"]
-
 _ALONE = "above blind: not given, as beside one trajectory there is no other to learn from."
 _WITH_INTERVAL = "In brackets: 95 % interval, clustered by trajectory; in parentheses: questions."
 

@@ -15,18 +15,6 @@ from infthor_eval.runs import RunSummary
 from infthor_eval.statistics import MeanEstimate, paired_difference
 from infthor_eval.tables import TableCell, answered_cell, interval_cell
 
-__all__ = [
-    "Gain",
-    "Scores",
-    "alike_but_for_frames",
-    "difference_cell",
-    "find_gains",
-    "frames_of",
-    "gain_cell",
-    "name_of",
-    "paired_gain",
-]
-
 Scores = Mapping[str, Mapping[str, float]]
 """Scores by trajectory and sample."""
 

@@ -11,8 +11,6 @@ from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["MemorySummary", "MemoryTimes", "subject_of", "summarise_memory", "time_memory"]
-
 _OF_MEMORY = re.compile(r"(?:, )?\b(?:memory|memory_args|budget)=[^,)]*")
 
 Record = UnitRecord[NiehAnswer]

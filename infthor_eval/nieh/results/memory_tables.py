@@ -20,8 +20,6 @@ from infthor_eval.nieh.results.summary import SHOWN_CLUES, NiehSummary, TaskSumm
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, TableCell
 
-__all__ = ["memory_tables"]
-
 _NAMES = ("model", "task", "memory")
 _NUMBERS = (
     "budget",
@@ -105,7 +103,8 @@ def _is_none(run: RunSummary, name: str) -> bool:
 
 
 def _pairs_above_none(run: RunSummary, name: str, runs: Sequence[RunSummary]) -> TableCell:
-    pairs, none = run.summary.tasks[name].pairs, _with_none(run, name, runs)
+    pairs = run.summary.tasks[name].pairs
+    none = _with_none(run, name, runs)
     if pairs is None or none is None or none.pairs is None:
         return difference_cell(None, 0)
     return difference_cell(paired_gain(pairs.scores, none.pairs.scores), pairs.n_pairs)

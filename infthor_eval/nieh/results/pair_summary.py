@@ -19,17 +19,6 @@ from infthor_eval.pairs import PAIR_BOUNDS, PairShares, net_pairs
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.runs import UnitRecord
 
-__all__ = [
-    "NEVER_CHANGED",
-    "N_SHOWN",
-    "SHOWN_DIFFERENCE",
-    "PairScore",
-    "PairSummary",
-    "find_pairs",
-    "score_pairs",
-    "summarise_pairs",
-]
-
 # Frames shown, in classes that double, as budgets of memories do.
 _SIZES = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)
 N_SHOWN = (*(f"<={size}" for size in _SIZES), f">{_SIZES[-1]}")

@@ -16,8 +16,6 @@ from infthor_eval.rates import Rate, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, TableCell
 
-__all__ = ["MEMORY_CURVES", "PairCurve", "pair_overview", "pair_tables"]
-
 _HEADS = (Column("model", False), Column("task", False), Column("context", False))
 _NOTES = (
     "net pairs: pairs right (both worlds' answers) less pairs exchanged (each answer right in the "

@@ -17,8 +17,6 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.scoring import compared_form
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["RepeatSummary", "by_question", "mean_record", "summarise_repeats"]
-
 _NORMAL_95 = 1.96
 
 Record = UnitRecord[NiehAnswer]

@@ -7,8 +7,6 @@ from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, answered_cell
 
-__all__ = ["repeat_tables"]
-
 _NUMBERS = (
     "asked",
     "questions",

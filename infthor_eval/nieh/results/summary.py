@@ -34,22 +34,6 @@ from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.rates import Rate
 from infthor_eval.runs import UnitRecord
 
-__all__ = [
-    "CLUE_COLUMNS",
-    "OPEN_ENDED",
-    "SHOWN_CLUES",
-    "EvidenceCells",
-    "Failure",
-    "LengthCell",
-    "NiehSummary",
-    "SkippedSummary",
-    "TaskSummary",
-    "is_open_ended",
-    "main_metric",
-    "primary_metrics",
-    "summarise",
-]
-
 CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
 OPEN_ENDED = "open-ended"  # column of questions whose answer is neither yes, no nor a number
 

@@ -36,8 +36,6 @@ from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, TableCell, answered_cell, interval_cell
 
-__all__ = ["clues_table", "overview", "tables"]
-
 _NAMES = (Column("model", False), Column("task", False))
 _METRIC = Column("scorer", False)
 _LEFT_OUT = ("skipped", "failed", "not asked")

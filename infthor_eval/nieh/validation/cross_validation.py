@@ -16,17 +16,6 @@ from infthor_eval.formats.csv_files import read_rows, unshield, write_sheet
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.scoring import Scorer, scores
 
-__all__ = [
-    "DECISIONS",
-    "JudgedQuestion",
-    "Verdicts",
-    "check_decisions",
-    "judge_questions",
-    "judge_scores",
-    "read_decisions",
-    "write_inspection_list",
-]
-
 DECISIONS = ("keep", "drop")
 _COLUMNS = ("question_id", "traj_id", "question", "gt_img_idx", "answer", "replies", "decision")
 

@@ -18,8 +18,6 @@ from infthor_eval.nieh.validation.cross_validation import (
 )
 from infthor_eval.storage.files import prepare_folder, write_atomically
 
-__all__ = ["INSPECTION", "check_output", "write_validated_set"]
-
 INSPECTION = "inspection.csv"
 
 

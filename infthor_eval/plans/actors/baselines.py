@@ -19,8 +19,6 @@ from infthor_eval.runs.suite import BaselineSubject
 from infthor_eval.thor.actions import applicable_calls
 from model_adapters import Capabilities
 
-__all__ = ["BASELINES"]
-
 _IN_FLIGHT = 4  # trajectories at a time; each has its own simulator
 
 

@@ -10,8 +10,6 @@ from infthor_eval.plans.actors.protocols import PlanActor, PlanBaseline
 from infthor_eval.plans.task import PlansTask
 from model_adapters import Attended, Model, Subject, identity_of
 
-__all__ = ["ActorFactory", "actor_factory"]
-
 
 @dataclass(frozen=True)
 class ActorFactory:

@@ -9,8 +9,6 @@ from infthor_eval.household.sequence_text import action_text
 from infthor_eval.plans.actors.script import read_plan
 from infthor_eval.plans.plan import Plan, plans_of
 
-__all__ = ["Habits", "expert_texts", "fill_action", "open_action"]
-
 _START = ""  # the action before the first one
 _Key = tuple[str, ...]
 

@@ -26,8 +26,6 @@ from infthor_eval.storage.digests import seed_of
 from infthor_eval.thor.actions import applicable_actions
 from model_adapters import Decoding, Model, answer_of, wrap_request_errors
 
-__all__ = ["AgentConfig", "ModelActor"]
-
 _MAX_ACTION_TOKENS = 64  # if replies are restricted to texts of actions, which must not be cut
 
 

@@ -6,8 +6,6 @@ from infthor_eval.plans.environment import StepOutcome
 from infthor_eval.thor.actions import applicable_actions
 from model_adapters import Attended, Notice
 
-__all__ = ["PersonActor"]
-
 
 class PersonActor(ModelActor):
     """Asks a person for actions; tells goal, plan, rewards, and the actions that are possible."""

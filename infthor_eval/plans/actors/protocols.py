@@ -10,8 +10,6 @@ from infthor_eval.plans.environment import Observation, PlanEnvironment, StepOut
 from infthor_eval.plans.plan import Plan
 from model_adapters import Reply, Subject
 
-__all__ = ["Act", "CountingActor", "EndedActor", "PlanActor", "PlanBaseline", "PlanSituation"]
-
 
 @dataclass(frozen=True)
 class Act:

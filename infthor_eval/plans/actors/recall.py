@@ -13,8 +13,6 @@ from infthor_eval.plans.actors.script import read_plan
 from infthor_eval.plans.environment import PlanEnvironment
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["last_place", "way_by_memory"]
-
 
 def way_by_memory(
     plan: str, environment: PlanEnvironment, view: SimulatorView, logs: Sequence[ObjectLog]

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from infthor_eval.household.affordances import KNOWN_TYPES
 from infthor_eval.household.wording import compact_name
 
-__all__ = ["PLAN", "read_plan", "scripted_action"]
-
 _TYPES = {compact_name(name): name for name in sorted(KNOWN_TYPES)}
 _TYPES |= {"sink": "SinkBasin", "bathtub": "BathtubBasin"}  # things are put into the basin
 # At first, as a rule.

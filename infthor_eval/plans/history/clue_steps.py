@@ -13,8 +13,6 @@ from infthor_eval.formats.step_log import ObjectLog
 from infthor_eval.formats.trajectory import HighAction, Trajectory
 from infthor_eval.plans.plan import Plan, PlanKind
 
-__all__ = ["clue_step", "object_logs"]
-
 # Plans that have their receptacle or tool as the last argument; it is what the agent must find.
 _TO_RECEPTACLE = {PlanKind.PUT, PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
 

@@ -13,16 +13,6 @@ from infthor_eval.plans.history.recalled import MemoryChoice
 from infthor_eval.plans.history.retrieved import RetrievedFrames
 from infthor_eval.plans.history.segments import Part, PlanSegment, restart_at, segment_parts
 
-__all__ = [
-    "FullHistory",
-    "GoalHistory",
-    "LastTokens",
-    "PlanHistory",
-    "PublishedHistory",
-    "StateInWords",
-    "history_named",
-]
-
 
 class FullHistory:
     """The whole history."""

@@ -11,8 +11,6 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.memory import Observation
 from infthor_eval.plans.history.segments import Part, PlanSegment, goal_of_last
 
-__all__ = ["CountTokens", "History", "Past"]
-
 CountTokens = Callable[[Sequence[Part]], int | None]
 
 

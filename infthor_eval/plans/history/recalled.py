@@ -25,8 +25,6 @@ from infthor_eval.memory import (
 from infthor_eval.plans.history.past import CountTokens, Past
 from infthor_eval.plans.history.segments import Part
 
-__all__ = ["MemoryChoice", "RecalledHistory"]
-
 
 class RecalledHistory:
     """What a memory (`infthor_eval.memory`) recalls of earlier steps, the goal, and the frame.

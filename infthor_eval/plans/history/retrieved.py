@@ -21,8 +21,6 @@ from infthor_eval.plans.history.past import CountTokens, Past
 from infthor_eval.plans.history.segments import Part
 from infthor_eval.storage.files import writing_hint
 
-__all__ = ["RetrievedFrames", "require_retrieved", "retrieved_steps"]
-
 _SIDE = 336  # pixels, of remembered frames in the published script; the present one keeps its size
 _FIRST = "000000000"  # the frame before the first action, which `images` does not list
 

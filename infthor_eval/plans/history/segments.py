@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.household.sequence_text import action_part, goal_part, plan_part
 
-__all__ = ["Part", "PlanSegment", "goal_of_last", "restart_at", "segment_parts"]
-
 Part = str | FrameRef
 
 

@@ -30,15 +30,6 @@ from infthor_eval.plans.history.segments import Part
 from infthor_eval.plans.published.system_prompts import system_prompt
 from model_adapters import Decoding
 
-__all__ = [
-    "MAX_STEPS",
-    "FinalForm",
-    "chat_form",
-    "final_form",
-    "present_parts",
-    "with_recorded_state",
-]
-
 _MAX_TOKENS = 32
 MAX_STEPS = 201  # of one plan
 

@@ -8,8 +8,6 @@ from infthor_eval.plans.summary import FINAL_COLUMNS
 from infthor_eval.rates import clustered_rate
 from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
 
-__all__ = ["count_plans", "final_table"]
-
 _TITLE = "final long-horizon tasks"
 _NOTES = (
     "95 %: interval of the total, clustered by trajectory. Trajectories whose set-up failed have "

@@ -12,8 +12,6 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import TaskInfo
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["Scene", "Treated", "goal_holds"]
-
 
 @dataclass(frozen=True)
 class Treated:

@@ -18,8 +18,6 @@ from infthor_eval.plans.records import PlanRecord
 from infthor_eval.runs import RunHeader, Session, UnitRecord
 from infthor_eval.storage.digests import fingerprint
 
-__all__ = ["ImportedCounts", "import_counts"]
-
 _TASK = "infthor_final"  # the task of ours that the logs are about
 _NOT_DONE = "not done"
 _NO_SET_UP = "its set-up failed: the log counts no plan of it"

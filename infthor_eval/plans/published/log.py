@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from infthor_eval.plans.environment import Ended
 from infthor_eval.plans.records import PlanRecord
 
-__all__ = ["LogRow", "log_rows"]
-
 
 @dataclass(frozen=True)
 class LogRow:

@@ -12,8 +12,6 @@ from itertools import pairwise
 import networkx as nx
 import numpy as np
 
-__all__ = ["OffGridError", "Pose", "PublishedGraph", "PublishedPaths"]
-
 # Cell (x, z) of 0.25 m, quarter turn, degrees of the camera downwards.
 Pose = tuple[int, int, int, int]
 _Node = tuple[int, int, int]

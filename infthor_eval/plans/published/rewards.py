@@ -18,8 +18,6 @@ from infthor_eval.plans.published.paths import Pose, PublishedPaths
 from infthor_eval.plans.reward_rules import RewardRules
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["PublishedState", "PublishedTask", "Transition", "UnscoredError", "pose_of"]
-
 _CELL = 0.25  # metres
 _QUARTER = 90
 _UNTREATED = Treated()  # as in the published script, which never notices a treatment

@@ -23,8 +23,6 @@ from infthor_eval.plans.rewards import StepReward
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["PublishedReward", "PublishedScript", "ScriptedPlan"]
-
 _CELL = 0.25  # metres
 _FIRST = "TeleportFull"  # the last action of a scene that was set up
 

@@ -6,8 +6,6 @@ from typing import Literal
 
 from infthor_eval.formats.yaml_files import read_yaml
 
-__all__ = ["PromptForm", "system_prompt"]
-
 # The whole history without plans, a memory in words, one of frames, the plans before.
 PromptForm = Literal["goals", "text", "frames", "plans"]
 _FILE = Path(__file__).with_name("prompts.yaml")

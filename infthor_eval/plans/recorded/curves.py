@@ -20,8 +20,6 @@ from infthor_eval.plans.recorded.runs import PlansRun, shared_plans
 from infthor_eval.plans.records import PlanRecord
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["FACETS", "Axis", "plan_curves"]
-
 
 class Axis(StrEnum):
     """The x axis of a curve."""

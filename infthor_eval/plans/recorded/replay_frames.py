@@ -7,17 +7,6 @@ from numpy.typing import NDArray
 
 from infthor_eval.episodes.replay_frames import EpisodeFrame
 
-__all__ = [
-    "FloorPose",
-    "MapObject",
-    "PlanFrame",
-    "PlanObservation",
-    "PlanRewards",
-    "PlanTitle",
-    "Point",
-    "RoomMap",
-]
-
 Point = tuple[float, float]  # (x, z), metres
 
 

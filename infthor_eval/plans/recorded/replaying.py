@@ -40,8 +40,6 @@ from infthor_eval.thor.actions import text_of
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, ThorObject
 
-__all__ = ["PlanReplay", "RecordedPlans", "recorded_plans", "replay_plans"]
-
 Record = UnitRecord[PlanRecord]
 _TOLERANCE = 1e-6  # rewards are recorded with six digits
 _FLOOR = "Floor"  # object type of the room's own floor, which would cover the map

@@ -13,8 +13,6 @@ from infthor_eval.errors import UsageError
 from infthor_eval.plans.config import PlansConfig
 from infthor_eval.plans.records import RECORDS, PlanRecord
 
-__all__ = ["PlansRun", "shared_plans"]
-
 
 class PlansRun(RecordedRun[PlanRecord, PlansConfig]):
     """The journal of a run of plans."""

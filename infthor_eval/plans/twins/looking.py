@@ -12,8 +12,6 @@ from infthor_eval.plans.records import TwinRecord
 from infthor_eval.plans.trajectories import PlanTrajectory
 from infthor_eval.thor.view import AgentPose
 
-__all__ = ["completed_twin", "twin_record", "worlds_together"]
-
 
 def twin_record(trajectory: PlanTrajectory, plan: Plan) -> TwinRecord | None:
     """Return the record of a plan's pair before anybody acts; None if it has no twin."""

@@ -12,8 +12,6 @@ from infthor_eval.plans.records import PlanRecord, TwinRecord
 from infthor_eval.rates import Rate, clustered_rate, paired_rate
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["PairScore", "TwinResults", "first_place_score", "score_pairs", "twin_results"]
-
 Record = UnitRecord[PlanRecord]
 _World = tuple[Record, ...]  # the plans of one final task, in order; the first finds the object
 

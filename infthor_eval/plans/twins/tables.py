@@ -10,8 +10,6 @@ from infthor_eval.plans.twins.results import TwinResults
 from infthor_eval.rates import format_number, format_percent
 from infthor_eval.tables import Column, Row, Table, TableCell
 
-__all__ = ["NET_PAIRS", "format_pairs", "twin_tables"]
-
 NET_PAIRS = "net pairs, %"
 _COLUMNS = (
     NET_PAIRS,

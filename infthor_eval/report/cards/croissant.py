@@ -9,8 +9,6 @@ from infthor_eval.errors import wrap_errors
 from infthor_eval.report.cards.facts import About, FileFact, SetFacts
 from infthor_eval.report.cards.statements import description, statements
 
-__all__ = ["croissant"]
-
 _CONTEXT: dict[str, Any] = {
     "@language": "en",
     "@vocab": "https://schema.org/",

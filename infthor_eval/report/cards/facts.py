@@ -19,8 +19,6 @@ from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.clue_facts import read_scenes
 from infthor_eval.nieh.set_contents import SetContents, read_contents
 
-__all__ = ["About", "FileFact", "SetFacts", "read_facts"]
-
 _MANIFEST = "manifest.json"
 _PAIRS = "twins.jsonl"
 _HINT = "write the set again"

@@ -10,8 +10,6 @@ from infthor_eval.report.cards.statements import RAI_FIELDS, description, statem
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["card"]
-
 _PAPER = "[Beyond Needle(s) in the Embodied Haystack](https://arxiv.org/abs/2505.16928)"
 
 

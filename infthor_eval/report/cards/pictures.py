@@ -9,8 +9,6 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 
-__all__ = ["draw_example"]
-
 _SIDE = 180  # pixels
 _GAP = 6
 _MOST = 5  # frames in a row

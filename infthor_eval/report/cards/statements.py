@@ -7,8 +7,6 @@ from collections.abc import Iterator
 
 from infthor_eval.report.cards.facts import SetFacts
 
-__all__ = ["RAI_FIELDS", "description", "statements"]
-
 # Names of the fields in Croissant's responsible-AI vocabulary 1.0, and headings in the card.
 RAI_FIELDS = {
     "dataCollection": "How it was made",

@@ -10,16 +10,6 @@ from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.runs.completeness import unmarked
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
-__all__ = [
-    "Panel",
-    "curves_table",
-    "embedded_label",
-    "embedded_note",
-    "one_panel",
-    "read_panels",
-    "trajectories_text",
-]
-
 _MOST_PANELS = 12  # a figure with more cannot be read
 _COLUMNS = ("reward", "95 % interval", "of the bound, %")
 

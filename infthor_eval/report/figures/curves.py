@@ -19,8 +19,6 @@ from infthor_eval.report.figures.style import (
 )
 from infthor_eval.terminal import printable
 
-__all__ = ["curves_figure"]
-
 # inches; the width of one of many
 _PANEL = (4.6, 2.7)
 _NARROW = 3.5

@@ -22,8 +22,6 @@ from infthor_eval.report.svg.drawing import Series
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["radii_chart", "radii_figure", "radii_table"]
-
 _FLOOR = "in the sphere at the start"
 _FLOOR_LOOK = Look("#9a9a9a", "solid", 3.0)
 _OFFSET = 0.004  # metres between the intervals of two lines

@@ -19,18 +19,6 @@ from infthor_eval.errors import wrap_errors
 from infthor_eval.storage.files import write_atomically
 from infthor_eval.terminal import printable
 
-__all__ = [
-    "BOUND",
-    "LEGEND",
-    "Look",
-    "add_legend",
-    "add_words",
-    "inline_svg",
-    "looks_of",
-    "plot_in_style",
-    "save_figure",
-]
-
 # Okabe and Ito's colours, which colour-blind readers can tell apart, without yellow (too faint for
 # a line) and black (the bound's). Runs beyond their number take them again with another style of
 # line; dashes are the bound's.

@@ -8,8 +8,6 @@ from infthor_eval.rates import Rate
 from infthor_eval.report.presented import PresentedRun
 from infthor_eval.runs import UnitCounts, Usage
 
-__all__ = ["TaskResult", "task_results"]
-
 
 @dataclass(frozen=True)
 class TaskResult:

@@ -5,8 +5,6 @@ from itertools import groupby
 
 from infthor_eval.report.headline.results import TaskResult
 
-__all__ = ["headline"]
-
 _MOST_TASKS = 2  # tasks of a suite in its sentence
 _MOST_RUNS = 3  # runs that are named in it; of more, the highest and the lowest
 

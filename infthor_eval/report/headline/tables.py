@@ -9,8 +9,6 @@ from infthor_eval.report.svg.points import Point, PointsChart, points_chart
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.tables import Column, Row, Table, answered_cell, interval_cell
 
-__all__ = ["cost_chart", "results_chart", "results_table"]
-
 _MOST_ROWS = 24  # of the chart; the table has all
 
 

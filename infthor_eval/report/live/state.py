@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.routing import Route
 
-__all__ = ["LiveRun", "LiveSample", "LiveState", "Totals", "live_routes"]
-
 Status = Literal["waiting", "running", "ended", "stopped", "done", "unknown"]
 
 _N_NEWEST = 30  # samples that are shown

@@ -22,8 +22,6 @@ from infthor_eval.report.recordings.canvas import (
 from infthor_eval.report.recordings.fonts import one_line
 from infthor_eval.report.recordings.reach_view import draw_reach
 
-__all__ = ["arm_pictures", "draw_arm_frame", "draw_arm_title"]
-
 
 def arm_pictures(frames: Iterable[ArmFrame], heading: str) -> Iterator[Image.Image]:
     """Draw frames with a heading, the run and the trajectory; see `film_pictures`."""

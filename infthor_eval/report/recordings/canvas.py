@@ -7,31 +7,6 @@ from PIL import Image, ImageDraw
 
 from infthor_eval.report.recordings.fonts import break_lines, fit_line, font, one_line
 
-__all__ = [
-    "BAD",
-    "END_REPEATS",
-    "FAINT",
-    "FURNITURE",
-    "FURNITURE_EDGE",
-    "GOOD",
-    "INK",
-    "NAMED",
-    "NAMED_EDGE",
-    "OVERSAMPLING",
-    "PANE",
-    "SIZE",
-    "TITLE_REPEATS",
-    "WARN",
-    "Line",
-    "draw_panes",
-    "film_pictures",
-    "title_card",
-    "write_bar",
-    "write_in_hand",
-    "write_lines",
-    "write_numbers",
-]
-
 SIZE = (1248, 896)  # of a picture; multiples of 16, as video codecs work in blocks of that size
 # pictures that show a title and an end
 TITLE_REPEATS = 3

@@ -10,8 +10,6 @@ from infthor_eval.report.recordings.canvas import BAD, FAINT, GOOD, INK, WARN
 from infthor_eval.report.recordings.fonts import break_lines, fit_line, font, one_line
 from infthor_eval.report.runs import choose_evenly
 
-__all__ = ["COLUMNS", "MOST_ROWS", "draw_sheet", "sheet_rows", "shown_steps"]
-
 # more would not fit on a screen
 COLUMNS = 5
 MOST_ROWS = 8

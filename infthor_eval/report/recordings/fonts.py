@@ -9,8 +9,6 @@ from PIL import ImageFont
 
 from infthor_eval.terminal import printable
 
-__all__ = ["Font", "break_lines", "fit_line", "font", "one_line"]
-
 Font = ImageFont.FreeTypeFont
 _MORE = "…"
 _LONGEST = 400  # letters; more are never shown, and measuring them takes time

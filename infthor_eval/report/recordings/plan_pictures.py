@@ -23,8 +23,6 @@ from infthor_eval.report.recordings.canvas import (
 from infthor_eval.report.recordings.fonts import one_line
 from infthor_eval.report.recordings.room_map import draw_map
 
-__all__ = ["draw_plan_frame", "draw_plan_title", "plan_pictures"]
-
 
 def plan_pictures(frames: Iterable[PlanFrame], heading: str) -> Iterator[Image.Image]:
     """Draw frames with a heading, the run and the trajectory; see `film_pictures`."""

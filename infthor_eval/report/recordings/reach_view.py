@@ -12,8 +12,6 @@ from infthor_eval.report.recordings.canvas import (
 )
 from infthor_eval.report.recordings.fonts import Font, font
 
-__all__ = ["draw_reach"]
-
 # pixels
 _GAP = 12
 _HEAD = 22

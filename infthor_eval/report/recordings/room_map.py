@@ -23,8 +23,6 @@ from infthor_eval.report.recordings.canvas import (
 )
 from infthor_eval.report.recordings.fonts import Font, font
 
-__all__ = ["draw_map"]
-
 _CELL = 0.25  # metres
 # pixels
 _MARGIN = 14

@@ -4,8 +4,6 @@ from operator import attrgetter
 
 from infthor_eval.report.sample_columns import SampleColumn, payload_column
 
-__all__ = ["ARM_COLUMNS", "PLAN_COLUMNS"]
-
 _EPISODE_COLUMNS = (
     payload_column("index", int),
     payload_column("kind", str),

@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     from infthor_eval.manipulation.recorded.replay_frames import ArmFrame, ArmObservation
     from infthor_eval.manipulation.recorded.replaying import RecordedEpisodes
 
-__all__ = ["ManipulationPresenter"]
-
 Record = UnitRecord[ArmRecord]
 
 

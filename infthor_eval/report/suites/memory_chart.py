@@ -8,8 +8,6 @@ from infthor_eval.report.svg.dots import dot_of
 from infthor_eval.report.svg.points import Point, PointsChart, points_chart
 from infthor_eval.report.web.sections import Chart
 
-__all__ = ["memory_charts"]
-
 
 def memory_charts(runs: Sequence[ReportRun]) -> Iterator[Chart]:
     """Yield a chart for each task with memories whose models count their tokens."""

@@ -33,8 +33,6 @@ from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["NiehPresenter"]
-
 Record = UnitRecord[NiehAnswer]
 _ABOVE_BLIND = ", above blind"
 _BOUNDS = {

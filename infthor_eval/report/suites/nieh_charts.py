@@ -25,8 +25,6 @@ from infthor_eval.report.web.sections import Chart
 from infthor_eval.statistics import MeanEstimate
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["nieh_charts"]
-
 _COLUMNS = (*CLUE_COLUMNS, ABSENCE)
 _DEPTH = "depth="
 

@@ -8,8 +8,6 @@ from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.sample_columns import SampleColumn, payload_column
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["NIEH_COLUMNS"]
-
 
 def _blind_score(scorer: str, record: UnitRecord[NiehAnswer]) -> float | None:
     blind = record.payload.blind

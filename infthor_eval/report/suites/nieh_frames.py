@@ -24,8 +24,6 @@ from infthor_eval.report.web.samples import FrameFacts, Numbered, Timeline, Time
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["find_timelines"]
-
 _OVERVIEW = 5  # frames of a trajectory that are shown for a question without clues
 _DIFFERING = 6  # frames beside the clues that are shown of those that differ from the twin's
 

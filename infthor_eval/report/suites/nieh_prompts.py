@@ -18,8 +18,6 @@ from infthor_eval.report.suites.nieh_sets import RunSets
 from infthor_eval.report.web.samples import Prompt, PromptFrames
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["RequestFrames", "find_prompts"]
-
 Record = UnitRecord[NiehAnswer]
 _Positions = dict[FrameRef, list[int]]  # of each picture in the trajectory; some are there twice
 _OF_BASELINES = "a baseline is not sent it: it answers from the questions alone"

@@ -13,8 +13,6 @@ from infthor_eval.report.runs import ReportRun
 from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.runs.stored.command import read_stored_command
 
-__all__ = ["RunSets"]
-
 Record = UnitRecord[NiehAnswer]
 
 

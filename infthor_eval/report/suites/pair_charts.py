@@ -24,8 +24,6 @@ from infthor_eval.report.svg.drawing import Series
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["build_pairs_figure", "pairs_section"]
-
 # inches
 _PANEL = (4.6, 2.6)
 _MARGIN = 0.8

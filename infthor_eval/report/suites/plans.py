@@ -40,8 +40,6 @@ if TYPE_CHECKING:
     from infthor_eval.plans.recorded.replay_frames import PlanFrame, PlanObservation
     from infthor_eval.plans.recorded.replaying import RecordedPlans
 
-__all__ = ["PlansPresenter"]
-
 Record = UnitRecord[PlanRecord]
 
 

@@ -13,8 +13,6 @@ from infthor_eval.report.svg.curves import curves_charts
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.tables import Table
 
-__all__ = ["DrawnFigure", "curves_on_page", "curves_result", "figure_section"]
-
 
 class DrawnFigure(NamedTuple):
     """A figure for the page: its charts, and the table of its numbers."""

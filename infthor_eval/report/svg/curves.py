@@ -8,8 +8,6 @@ from infthor_eval.report.svg.panel import Panel
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
-__all__ = ["curves_charts"]
-
 _CAPTION = (
     "Higher is better: a line is the reward that a run has earned so far, on average over "
     "trajectories, with its 95 % interval shaded; the dashed line is the upper bound."

@@ -20,8 +20,6 @@ from infthor_eval.report.svg.drawing import (
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
-__all__ = ["Dot", "DotRow", "DotsChart", "class_row", "dot_of", "dots_chart", "number_range"]
-
 _DOT = 13  # pixels between the dots of several runs in a row
 _NARROW = 6  # the same where there are so many that none has its number beside it
 _MOST_NUMBERS = 8

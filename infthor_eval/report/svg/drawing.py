@@ -8,20 +8,6 @@ from typing import NamedTuple
 
 from infthor_eval.terminal import printable
 
-__all__ = [
-    "LETTER",
-    "LINE",
-    "WIDTH",
-    "Series",
-    "draw_legend",
-    "element",
-    "marker",
-    "svg",
-    "text",
-    "ticks_between",
-    "wrap",
-]
-
 WIDTH = 480  # pixels of all charts; a phone shows 390
 LINE = 16  # pixels of a line of text
 LETTER = 7.2  # pixels of a letter at most, on average

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 
 from infthor_eval.report.svg.drawing import LETTER, LINE, WIDTH, element, text, ticks_between
 
-__all__ = ["Panel"]
-
 _HEIGHT = 230  # pixels
 _LEFT = 52
 _RIGHT = WIDTH - 14

@@ -11,8 +11,6 @@ from infthor_eval.report.svg.panel import Panel
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
-__all__ = ["Point", "PointsChart", "points_chart"]
-
 _LARGE = 1e6
 _MOST_DECADES = 3  # with more, only powers of ten have a tick
 

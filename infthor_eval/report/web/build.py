@@ -22,8 +22,6 @@ from infthor_eval.report.web.samples import PageSample
 from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 
-__all__ = ["PageRequest", "build_page", "results_section"]
-
 _SUMMARIES = "runs summarised"
 _FEW = 4  # runs of which each is compared with each
 

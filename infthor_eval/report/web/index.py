@@ -22,8 +22,6 @@ from infthor_eval.runs import RunHeader, read_header
 from infthor_eval.storage.files import file_name, prepare_folder
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["Index", "write_index"]
-
 _WORK = "pages of runs"
 _PICTURES = 20_000_000  # bytes of the pictures of all pages
 _FEWEST_PICTURES = 2_000_000  # bytes for a page; with less, no page has pictures

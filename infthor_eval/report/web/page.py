@@ -17,8 +17,6 @@ from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.web.samples import FrameFacts, Numbered, PageSample, Prompt
 from infthor_eval.report.web.sections import Section
 
-__all__ = ["About", "Page", "SuiteLabels", "embedded_remark", "write_page"]
-
 _SCRIPTS = (
     "wide.js",
     "tables.js",

@@ -2,8 +2,6 @@
 
 from typing import Protocol
 
-__all__ = ["PageProgress", "Silent"]
-
 
 class PageProgress(Protocol):
     """Observes the making of a page: several pieces of work, each of many parts."""

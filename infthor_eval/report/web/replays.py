@@ -16,8 +16,6 @@ from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["EpisodePictures", "EpisodeReplays"]
-
 Record = UnitRecord[Any]
 # Pixels of a map's side: drawn larger than it is shown, since small letters are easier to read when
 # they are reduced.

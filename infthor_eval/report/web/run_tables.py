@@ -7,8 +7,6 @@ from infthor_eval.report.presented import PresentedRun
 from infthor_eval.runs import TaskConfig
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["costs_table", "left_out_table"]
-
 _NAMES = (Column("run", False), Column("task", False))
 _MEASURABLE_S = 0.05  # less is the clock's noise: baselines take microseconds
 

@@ -5,8 +5,6 @@ from typing import NamedTuple
 
 from infthor_eval.report.web.samples import PageSample, SampleResult
 
-__all__ = ["GroupKey", "group_samples"]
-
 
 class GroupKey(NamedTuple):
     """A group, within its task, variant and repetition."""

@@ -26,8 +26,6 @@ from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.runs.journals.shards import FOLDER
 from infthor_eval.runs.journals.tracebacks import StoredTracebacks
 
-__all__ = ["SharedTexts", "SuiteSamples", "build_samples"]
-
 Record = UnitRecord[Any]
 _PROMPTS = "runs with their prompts"
 

@@ -5,18 +5,6 @@ from typing import Generic, TypeVar
 
 import msgspec
 
-__all__ = [
-    "FrameFacts",
-    "Numbered",
-    "PageSample",
-    "Prompt",
-    "PromptFrames",
-    "SampleResult",
-    "StepRow",
-    "Timeline",
-    "TimelineFrame",
-]
-
 T = TypeVar("T", bound=Hashable)
 
 

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 from infthor_eval.tables import Table
 
-__all__ = ["Chart", "Section"]
-
 
 @dataclass(frozen=True)
 class Chart:

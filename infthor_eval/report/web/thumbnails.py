@@ -15,8 +15,6 @@ from PIL import Image
 from infthor_eval.errors import DataError
 from infthor_eval.report.web.progress import PageProgress, Silent
 
-__all__ = ["ThumbnailStore", "n_processors"]
-
 _QUALITY = 55  # of WebP: 1 to 3 kB for a frame of 132 pixels, so that thousands fit into a page
 _EFFORT = 2  # of WebP: twice as fast as 4, pictures are 5 % larger
 _LARGE_SIDE = 480  # the published frames, of 300 pixels, keep their size

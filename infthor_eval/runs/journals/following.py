@@ -17,8 +17,6 @@ from infthor_eval.runs.journals.shards import (
 )
 from infthor_eval.runs.suite import Suite
 
-__all__ = ["FollowedJournal", "is_written"]
-
 _LOCKS = Path("/proc/locks")  # Linux has it
 
 

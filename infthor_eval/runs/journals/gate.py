@@ -15,8 +15,6 @@ from infthor_eval.errors import DataError, in_one_line
 from infthor_eval.runs.journals.records import Payload, RecordTypes
 from infthor_eval.storage.limits import LINE_MB
 
-__all__ = ["Gate", "RefusedRecordError"]
-
 _MB = 2**20
 _HINT = "fix what gives it (the adapter, memory, scorer or suite) and run the same command again"
 _LONGEST_VALUE = 60  # characters of a value in a message

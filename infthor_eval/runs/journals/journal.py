@@ -49,9 +49,6 @@ from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.storage.files import write_atomically, writing_hint
 from infthor_eval.storage.limits import FILE_MB
 
-__all__ = ["Journal", "recover", "set_aside"]
-
-
 _SHARD = "worker-{:d}.jsonl"
 _MB = 2**20
 _RETRY_S = 0.1  # between two attempts to lock

@@ -15,24 +15,6 @@ from infthor_eval.quantities import Amount, Count, Repetition, Total
 from infthor_eval.runs.config import Config, RunConfig
 from infthor_eval.runs.usage import NOTHING, Usage
 
-__all__ = [
-    "FORMAT",
-    "Artifact",
-    "ArtifactRecord",
-    "Payload",
-    "ReadHashes",
-    "RecordTypes",
-    "RunHeader",
-    "State",
-    "SuiteUnit",
-    "Tokens",
-    "Unit",
-    "UnitKey",
-    "UnitRecord",
-    "describe_failure",
-    "state_of",
-]
-
 FORMAT = 3
 
 State = Literal["answered", "failed", "not asked", "excluded"]

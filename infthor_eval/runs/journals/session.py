@@ -9,8 +9,6 @@ from infthor_eval.runs.journals.records import Artifact, Payload, Unit, UnitReco
 from infthor_eval.runs.journals.tracebacks import TracebackFile
 from infthor_eval.runs.usage import NOTHING, Usage
 
-__all__ = ["JournalSession"]
-
 
 class JournalSession(Generic[Payload]):
     """The `Session` of a run with a journal."""

@@ -25,27 +25,6 @@ from infthor_eval.runs.journals.records import (
 )
 from infthor_eval.runs.usage import Usage
 
-__all__ = [
-    "FOLDER",
-    "Decoder",
-    "RunLog",
-    "Tell",
-    "check_format",
-    "find_shards",
-    "is_of_run",
-    "last_change",
-    "parse_header",
-    "parse_record",
-    "read_header",
-    "read_lines",
-    "read_run",
-    "read_run_log",
-    "read_shard",
-    "read_shards",
-    "read_states",
-]
-
-
 FOLDER = "journal"  # within the run's folder
 Decoder = msgspec.json.Decoder[Any]
 # Called with a message for each bad line of a journal, which is then left out.

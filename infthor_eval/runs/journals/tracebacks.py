@@ -10,8 +10,6 @@ from infthor_eval.errors import InfthorError, UserCodeError
 from infthor_eval.formats.reading import read_bytes
 from infthor_eval.runs.journals.records import UnitKey
 
-__all__ = ["StoredTracebacks", "TracebackFile"]
-
 _NAME = "tracebacks.txt"
 _HEADING = re.compile(r"^== (.+, attempt \d+)$", re.MULTILINE)  # each unit's
 _SAME = "as for "  # before the unit whose traceback it is

@@ -13,8 +13,6 @@ from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.runs.request import RunRequest
 from infthor_eval.storage.files import write_atomically, writing_hint
 
-__all__ = ["StoredCommand", "read_options", "read_stored_command", "write_command"]
-
 _FILE = "run.yaml"
 _HEAD = (
     "# The options of this run: `infthor-eval run --config` with this file resumes or repeats it.\n"

@@ -7,8 +7,6 @@ from pathlib import Path, PurePath
 from infthor_eval.runs.journals.records import RunHeader
 from infthor_eval.runs.stored.command import read_stored_command
 
-__all__ = ["label_runs"]
-
 # Options that change no number, and the tasks, which every table has a column for.
 _NOT_SHOWN = {
     "out",

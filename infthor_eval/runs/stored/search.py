@@ -17,8 +17,6 @@ from infthor_eval.runs.journals.shards import FOLDER, Tell, read_header, read_st
 from infthor_eval.runs.results import RESULTS
 from infthor_eval.runs.usage import NOTHING, Usage
 
-__all__ = ["BrokenRun", "Results", "StoredRun", "find_runs", "read_results", "run_folders"]
-
 _DEPTH = 4  # levels of folders that are searched: results may hold sets with thousands of frames
 
 

@@ -12,8 +12,6 @@ from infthor_eval.runs.results import write_run_files
 from infthor_eval.runs.suite import RunSummary, Session, Suite
 from infthor_eval.runs.usage import Usage
 
-__all__ = ["Stored", "store_run"]
-
 
 @dataclass(frozen=True)
 class Stored:

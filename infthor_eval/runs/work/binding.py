@@ -15,9 +15,6 @@ from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
 from model_adapters import Model, Policy, Subject, adapter_identity, identity_of, load
 
-__all__ = ["BoundRun", "bind_run", "check_runs", "require_capability"]
-
-
 _NEEDED: dict[Need, tuple[type, str]] = {
     "conversation": (Model, "a model that answers in words"),
     "policy": (Policy, "a policy that drives an arm (openvla, spatialvla, ...)"),

@@ -14,8 +14,6 @@ from infthor_eval.runs.work.group_records import group_records
 from infthor_eval.workers import WorkerSettings
 from model_adapters import Deferring, Subject
 
-__all__ = ["fetch_replies", "require_independent"]
-
 _BATCHES = "batches"  # beside the shards of the journal
 
 

@@ -21,8 +21,6 @@ from infthor_eval.runs.usage import Usage
 from infthor_eval.runs.work.executor import Executor, LocalExecutor
 from infthor_eval.runs.work.worker_executor import WorkerPoolExecutor
 
-__all__ = ["Observer", "RunOutcome", "Silent", "StoredSamples", "execute"]
-
 
 class Observer(Protocol):
     """Follows a run."""

@@ -18,8 +18,6 @@ from infthor_eval.runs.work.executor import UnrecordedSession
 from infthor_eval.runs.work.group_records import group_records
 from model_adapters import is_known, switched_on, switches
 
-__all__ = ["Equality", "check_equality", "require_switches"]
-
 _Replies = Mapping[UnitKey, str]
 
 

@@ -30,9 +30,6 @@ from infthor_eval.runs.work.binding import bind_run
 from infthor_eval.runs.work.executor import UnrecordedSession
 from infthor_eval.runs.work.group_records import group_records
 
-__all__ = ["Estimate", "Quantities", "TaskEstimate", "estimate_run", "estimate_tasks"]
-
-
 _UNITS_OF_A_GROUP = 3  # measured units of a group: the first, the middle and the last
 
 

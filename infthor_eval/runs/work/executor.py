@@ -26,9 +26,6 @@ from infthor_eval.runs.work.group_records import group_records
 from infthor_eval.runs.work.scheduling import run_groups
 from model_adapters import Attended, Deferring
 
-__all__ = ["Executor", "LocalExecutor", "Recorded", "UnrecordedSession"]
-
-
 # A record that is on disk; True if an earlier run had put it there.
 Recorded = tuple[UnitRecord[Payload], bool]
 

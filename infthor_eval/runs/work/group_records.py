@@ -7,8 +7,6 @@ from infthor_eval.runs.journals.gate import Gate, RefusedRecordError
 from infthor_eval.runs.journals.records import Payload, SuiteUnit, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.suite import BoundEvaluation, Group, Session
 
-__all__ = ["group_records"]
-
 
 def group_records(
     evaluation: BoundEvaluation[SuiteUnit, Payload],

@@ -7,8 +7,6 @@ from threading import Event, Thread
 from infthor_eval.runs.journals.records import Payload, SuiteUnit, UnitRecord
 from infthor_eval.runs.suite import Group
 
-__all__ = ["run_groups"]
-
 
 def run_groups(
     groups: Sequence[Group[SuiteUnit]],

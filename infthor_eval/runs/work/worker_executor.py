@@ -38,9 +38,6 @@ from infthor_eval.workers import (
     WorkerWithdrawn,
 )
 
-__all__ = ["WorkerPoolExecutor"]
-
-
 _SHARD_WAIT_S = 20.0
 # A unit that kills its worker (out of memory, say) must not fail the others of its group: after so
 # many losses in a row the group is split, and each of its units gets so many tries alone.

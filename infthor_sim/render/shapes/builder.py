@@ -10,8 +10,6 @@ from infthor_sim.geometry import Array, euler_matrix, yaw_matrix
 from infthor_sim.objects import WALL, SimObject, SimObjectState
 from infthor_sim.render.primitives import Color, Form, Material, ShapePart
 
-__all__ = ["Builder", "Vector", "shade_of"]
-
 Vector = Sequence[float] | Array
 _LINING = 0.003  # metres of the walls of open things that have the colour of their inside
 

@@ -9,8 +9,6 @@ from infthor_sim.objects import SimObject
 from infthor_sim.render.primitives import Color, ShapePart
 from infthor_sim.render.shapes.builder import Builder, shade_of
 
-__all__ = ["SHAPES", "draws", "shape"]
-
 Drawing = Callable[[Builder], None]
 
 _DIRT: Color = (0.36, 0.27, 0.16)

@@ -5,8 +5,6 @@ from infthor_sim.render.shapes.builder import Builder, shade_of
 from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import pick
 
-__all__ = ["APPLES", "CRUST", "LETTUCE", "POTATO", "TOMATO"]
-
 APPLES: tuple[Color, ...] = ((0.72, 0.07, 0.09), (0.52, 0.7, 0.2), (0.55, 0.05, 0.12))
 CRUST: Color = (0.72, 0.48, 0.24)
 LETTUCE: Color = (0.4, 0.66, 0.25)

@@ -4,12 +4,6 @@ from collections.abc import Sequence
 
 from infthor_sim.render.primitives import Color
 
-__all__ = [
-    "BLACK", "BRASS", "CERAMICS", "CHROME", "CLOTHS", "DARK", "GLASS", "LEAF", "PAPER", "STEEL",
-    "WHITE", "WOODS",
-    "pick",
-]  # fmt: skip
-
 WHITE: Color = (0.93, 0.93, 0.91)
 PAPER: Color = (0.95, 0.94, 0.88)
 BLACK: Color = (0.08, 0.08, 0.09)

@@ -8,8 +8,6 @@ from infthor_sim.render.shapes.builder import Builder, shade_of
 from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import CHROME, CLOTHS, DARK, WOODS, pick
 
-__all__ = ["cut_slab"]
-
 _STONES: tuple[Color, ...] = ((0.55, 0.53, 0.5), (0.35, 0.35, 0.37), (0.72, 0.69, 0.63))
 
 # metres from a chest's front to the backs of the drawers' fronts, which procedural rooms put in it

@@ -12,8 +12,6 @@ from model_adapters.hf.cached.prefix import Prefix, chunks
 from model_adapters.hf.prompting.embedding import Embed, Span
 from model_adapters.hf.prompting.prompt import Piece, token_ids
 
-__all__ = ["answer_together", "encode_together"]
-
 _Span = tuple[int, Span]  # of a branch
 
 

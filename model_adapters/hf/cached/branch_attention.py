@@ -20,8 +20,6 @@ from infthor_eval.errors import ModelError
 from model_adapters.hf.cached.kv_cache import BufferedCache, cache_arguments
 from model_adapters.hf.prompting.embedding import Span
 
-__all__ = ["BranchAttention", "CannotBranchError", "layer_windows"]
-
 _NOT_COMPUTED = ("softcap", "s_aux", "position_bias")  # what some models add to the scores
 
 

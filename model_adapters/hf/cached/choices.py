@@ -6,8 +6,6 @@ from typing import Any
 from infthor_eval.errors import ModelError
 from model_adapters.protocols import Decoding
 
-__all__ = ["Choices", "read_choices"]
-
 
 class Choices:
     """The allowed replies, token by token.

@@ -20,8 +20,6 @@ from infthor_eval.errors import ModelError
 from model_adapters.hf.cached.choices import Choices
 from model_adapters.protocols import Decoding
 
-__all__ = ["Generation", "ReplyState", "decode_replies", "extend_replies", "read_generation"]
-
 # Settings that change the reply and that this decoder does not support, with the values that switch
 # them off.
 _UNSUPPORTED: dict[str, tuple[Any, ...]] = {

@@ -14,8 +14,6 @@ from transformers.cache_utils import Cache, DynamicLayer
 
 from model_adapters.hf.cached.linear_states import LinearStates, linear_layers
 
-__all__ = ["BufferedCache", "cache_arguments"]
-
 # capacities are multiples of this, so that a slightly longer question does not reallocate the
 # prefix
 _STEP = 1024

@@ -15,8 +15,6 @@ from transformers.cache_utils import (
     get_layer_types_and_kwargs,
 )
 
-__all__ = ["LinearStates", "linear_layers"]
-
 _MOST = 4  # marks; those of the longest unused are dropped
 _States = list[dict[str, dict[int, Any]]]
 _FIELDS = (

@@ -21,8 +21,6 @@ from model_adapters.hf.prompting.prompt import Piece, n_common, n_tokens, token_
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Decoding, Reply, Turn
 
-__all__ = ["TransformersModel"]
-
 
 class TransformersModel(HfModel):
     """A loaded checkpoint behind the `Model` protocol.

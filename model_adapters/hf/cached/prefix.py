@@ -19,8 +19,6 @@ from model_adapters.hf.loading.rope import LengthRope
 from model_adapters.hf.prompting.embedding import Embed
 from model_adapters.hf.prompting.prompt import Piece, n_tokens, token_ids
 
-__all__ = ["Prefix", "chunks"]
-
 
 class Prefix:
     """The one encoded sequence of a model.

@@ -10,8 +10,6 @@ from model_adapters.hf.prompting.hashing import hash_context
 from model_adapters.protocols import Decoding, Reply
 from model_adapters.thinking import cut_at_stop
 
-__all__ = ["begin_reply", "end_reply", "reply_text", "stop_ids"]
-
 
 def begin_reply(
     loaded: LoadedCheckpoint,

@@ -9,8 +9,6 @@ from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.family import Pixels
 from model_adapters.options.families import DeepseekVLOptions
 
-__all__ = ["DeepseekVL", "DeepseekVLFamily"]
-
 
 class DeepseekVLFamily(PlainFamily):
     """The family of DeepSeek-VL hybrid."""

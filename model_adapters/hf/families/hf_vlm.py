@@ -42,8 +42,6 @@ from model_adapters.options.checkpoints import CheckpointReading
 from model_adapters.options.families import HfVlmOptions
 from model_adapters.protocols import Model
 
-__all__ = ["HfVlm", "ProcessorFamily", "family_of"]
-
 # Inputs that say which tokens are of images, of which models make masks or positions.
 _MASK_TYPES = ("token_type_ids", "mm_token_type_ids")
 _BLANK = (300, 300)  # width and height of a sample image

@@ -15,8 +15,6 @@ from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.family import Pixels
 from model_adapters.options.families import LlavaOnevisionOptions
 
-__all__ = ["LlavaOnevision", "LlavaOnevisionFamily"]
-
 
 class LlavaOnevisionFamily(PlainFamily):
     """The family of LLaVA-OneVision; each frame is processed as a single image.

@@ -14,8 +14,6 @@ from PIL import Image
 
 from model_adapters.hf.family import ClipShape, Pixels
 
-__all__ = ["LlavaVideo"]
-
 _POOLED = 2  # patches along a side that are pooled to one token
 
 

@@ -26,8 +26,6 @@ from model_adapters.hf.prompting.prompt import Piece, Prompter, n_tokens, token_
 from model_adapters.hf.uncached import UncachedModel, process_turns
 from model_adapters.protocols import Part, Turn
 
-__all__ = ["check_loaded", "require_same_ids"]
-
 # Relative to the largest logit; more in half precision.
 _TOLERANCE = {torch.float32: 1e-3, torch.float64: 1e-3}
 _HALF_TOLERANCE = 0.1

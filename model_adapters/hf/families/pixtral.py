@@ -12,8 +12,6 @@ from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.family import Pixels, Size
 from model_adapters.options.families import PixtralOptions
 
-__all__ = ["Pixtral", "PixtralFamily"]
-
 
 class PixtralFamily(PlainFamily):
     """The family of LLaVA models with Pixtral's vision tower.

@@ -12,8 +12,6 @@ from model_adapters.hf.prompting.ahead import Ahead, PixelsAhead, read_pixels
 from model_adapters.hf.prompting.embedding import Embed, Embedder
 from model_adapters.hf.prompting.features import FeatureCache
 
-__all__ = ["PlainFamily", "three_axis_positions"]
-
 
 class PlainFamily:
     """Base of families with consecutive positions, whose frames consist of equal slots,

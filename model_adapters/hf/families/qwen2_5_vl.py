@@ -21,8 +21,6 @@ from model_adapters.hf.family import ClipShape, Pixels, Shape, Size
 from model_adapters.options.checkpoints import CheckpointOptions
 from model_adapters.options.families import Qwen25VLNanoOptions, Qwen25VLOptions
 
-__all__ = ["NANO_FOLDER", "Qwen25VL", "Qwen25VLFamily", "Qwen25VLNano"]
-
 NANO_FOLDER = "models/qwen2.5-vl-nano"
 
 

@@ -14,8 +14,6 @@ from PIL import Image
 
 from model_adapters.hf.family import ClipShape, Pixels, Size
 
-__all__ = ["QwenVideo"]
-
 # Limits of qwen-vl-utils (VIDEO_MIN_PIXELS, VIDEO_MAX_PIXELS, VIDEO_TOTAL_PIXELS), in pixels.
 _MIN_PIXELS = 128 * 28 * 28
 _MAX_PIXELS = 768 * 28 * 28

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import yaml
 
-__all__ = ["WORDS", "read_card_words"]
-
 WORDS = "infthor_words"
 _DASHES = "---"
 _MOST_BYTES = 1_000_000  # of a card

@@ -33,20 +33,6 @@ from model_adapters.hf.loading.rope import apply_rope
 from model_adapters.hf.prompting.templates import chat_template, plain_template
 from model_adapters.options.checkpoints import CheckpointOptions, CheckpointReading, Placement
 
-__all__ = [
-    "LocatedCheckpoint",
-    "assemble",
-    "build_meta_model",
-    "load_checkpoint",
-    "locate",
-    "origin",
-    "read_checkpoint",
-    "resolve_device",
-    "resolve_dtype",
-    "versions",
-    "wrap_loading_errors",
-]
-
 _DTYPES = (torch.bfloat16, torch.float16, torch.float32, torch.float64)
 _GENERATION = "generation_config.json"
 _FINGERPRINTED = {".bin", ".jinja", ".json", ".model", ".safetensors", ".txt"}

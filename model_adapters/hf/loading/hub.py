@@ -13,8 +13,6 @@ from huggingface_hub.errors import (
 
 from infthor_eval.errors import ModelError
 
-__all__ = ["fetch"]
-
 # `.metadata` is that of a distributed checkpoint, by which it is told from one that models load.
 _FILES = ["*.json", "*.jinja", "*.model", "*.py", "*.safetensors", "*.txt", ".metadata"]
 _TIMEOUT_S = 10.0

@@ -22,8 +22,6 @@ from infthor_eval.process_settings import keep_freed_memory
 from model_adapters.hf.loading.resampling import FILTERS, Resize, find_resize
 from model_adapters.options.checkpoints import FrameScaling
 
-__all__ = ["image_backend", "load_image_processor", "splitting_setting"]
-
 _SPLITTING = ("do_image_splitting", "crop_to_patches", "do_pan_and_scan")
 
 _LEVELS = 256  # of a pixel

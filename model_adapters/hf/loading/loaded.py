@@ -9,8 +9,6 @@ from model_adapters.hf.family import Family
 from model_adapters.hf.prompting.rendering import prompt_end
 from model_adapters.thinking import MARKERS, opening_marker
 
-__all__ = ["LoadedCheckpoint"]
-
 
 @dataclass(frozen=True)
 class LoadedCheckpoint:

@@ -13,8 +13,6 @@ import torch
 from torch.utils.weak import WeakTensorKeyDictionary
 from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
 
-__all__ = ["pack_attention"]
-
 # A tower hands everything over at once to a kernel that has "flash" in its name.
 _NAME = "sdpa_in_place_of_flash"
 # Places by bounds, for as long as these are there: all layers of a tower are given the same tensor,

@@ -25,8 +25,6 @@ from model_adapters.hf.loading.without_torchvision import (
 )
 from model_adapters.options.checkpoints import FrameScaling
 
-__all__ = ["load_processor"]
-
 _VIDEO = "video_processor"
 # Files that may name the processor's class, in transformers' order.
 _NAMING = ("processor_config.json", "preprocessor_config.json", "tokenizer_config.json")

@@ -13,8 +13,6 @@ from numba import njit
 from numpy.typing import NDArray
 from PIL import Image
 
-__all__ = ["FILTERS", "Resize", "find_resize"]
-
 Pixels = NDArray[np.uint8]
 Resize = Callable[[Pixels], Pixels]
 

@@ -16,8 +16,6 @@ from transformers.modeling_rope_utils import ROPE_INIT_FUNCTIONS
 from infthor_eval.errors import ModelError
 from model_adapters.options.checkpoints import parse_rope
 
-__all__ = ["LengthRope", "apply_rope", "take_length_rope"]
-
 _FIXED = "fixed"  # a rope_type whose frequencies transformers does not recompute
 # transformers scales attention by this factor, whatever the length; 1 leaves it as it is.
 _PUBLISHED_LONGROPE_FACTOR = 1.0

@@ -9,8 +9,6 @@ import re
 from collections.abc import Mapping
 from typing import TypeVar
 
-__all__ = ["published_name", "with_published_names"]
-
 # Parts of CLIP's and SigLIP's towers; Pixtral's has others and no such level.
 _FLAT = re.compile(
     r"^((?:model\.)?vision_tower\.)(?=(?:embeddings|encoder|pre_layrnorm|post_layernorm|head)\.)"

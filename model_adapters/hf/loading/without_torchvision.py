@@ -22,8 +22,6 @@ from transformers import image_processing_backends
 from transformers.models.auto.image_processing_auto import IMAGE_PROCESSOR_MAPPING_NAMES
 from transformers.utils import is_torchvision_available
 
-__all__ = ["available_class", "register_image_processor", "torchvision_or_stand_in"]
-
 _FUNCTIONS = "torchvision.transforms.v2.functional"
 
 

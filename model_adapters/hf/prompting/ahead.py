@@ -16,8 +16,6 @@ from model_adapters.hf.family import Family, Pixels
 from model_adapters.hf.prompting.hashing import hash_frame
 from model_adapters.hf.prompting.prompt import Clip, Frame
 
-__all__ = ["Ahead", "PixelsAhead", "read_pixels"]
-
 _MOST_THREADS = 8  # more of them wait for Python's lock
 
 

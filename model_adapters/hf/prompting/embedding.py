@@ -12,8 +12,6 @@ from model_adapters.hf.family import Family
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.prompt import Clip, Frame, Piece
 
-__all__ = ["Embed", "Embedder", "Span", "piece_starts", "word_span"]
-
 
 @dataclass(frozen=True)
 class Span:

@@ -11,8 +11,6 @@ from model_adapters.hf.prompting.ahead import PixelsAhead
 from model_adapters.hf.prompting.hashing import hash_frames
 from model_adapters.hf.prompting.prompt import Clip, Frame
 
-__all__ = ["FeatureCache"]
-
 
 class _Kept(Protocol):
     @property

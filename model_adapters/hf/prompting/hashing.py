@@ -14,8 +14,6 @@ import torch
 from infthor_eval.storage.digests import digest
 from model_adapters.hf.family import Pixels
 
-__all__ = ["hash_context", "hash_frame", "hash_frames", "split_frames"]
-
 _SIZE = 4  # bytes of a hash: a record has two
 _ROW = 1024  # values of a row
 

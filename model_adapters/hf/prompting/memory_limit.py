@@ -6,8 +6,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
 
-__all__ = ["OutOfMemoryError", "limit_memory"]
-
 _SIZE = Path("/proc/self/statm")  # its first number is the process's address space in pages
 _MB = 1024 * 1024
 # Of two nested limits, the second would restore the first as if it were the original.

@@ -16,8 +16,6 @@ from model_adapters.hf.prompting.embedding import Embed, Span, piece_starts, wor
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.prompt import Frame, Piece, token_ids
 
-__all__ = ["EncodedImage", "MergingFamily", "NativeEmbedder"]
-
 # Outputs of vision encoders that are not for the language model, if `pooler_output` is there.
 _INNER = ("last_hidden_state", "hidden_states", "attentions")
 _ENCODED = "mm_encoder_outputs"  # the model's input

@@ -13,11 +13,10 @@ from typing import Any
 
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.pictures.video import Video
 from model_adapters.hf.family import ClipShape, Family, Size, VideoInput
 from model_adapters.hf.prompting.rendering import Marks, render, starts_with_bos, writes_videos
-from model_adapters.protocols import Turn, Video
-
-__all__ = ["Clip", "Frame", "Piece", "Prompter", "n_common", "n_tokens", "token_ids"]
+from model_adapters.protocols import Turn
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,11 @@ from transformers.utils.chat_template_utils import _compile_jinja_template
 
 from infthor_eval.errors import ModelError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.pictures.video import Video
 from infthor_eval.storage.deadlines import limit_time
 from infthor_eval.storage.limits import TEMPLATE_CHARACTERS, TEMPLATE_MB, TEMPLATE_SECONDS
 from model_adapters.hf.prompting.memory_limit import OutOfMemoryError, limit_memory
-from model_adapters.protocols import Part, Turn, Video
-
-__all__ = ["Marks", "prompt_end", "render", "starts_with_bos", "writes_videos"]
+from model_adapters.protocols import Part, Turn
 
 # Errors of a template that is broken or does not support the turns: Jinja's, and those of its
 # expressions.

@@ -9,8 +9,6 @@ from transformers import ProcessorMixin
 from infthor_eval.errors import ModelError
 from model_adapters.hf.family import Family
 
-__all__ = ["chat_template", "plain_template"]
-
 # The form of prompts in training on bare sequences of texts and frames.
 _PLAIN = """\
 {%- for message in messages -%}

@@ -20,8 +20,6 @@ from torch.utils._pytree import tree_leaves, tree_map
 
 from model_adapters.hf.rehearsal.kernels import Attention, attention_of
 
-__all__ = ["DEVICE", "ShapesDevice"]
-
 DEVICE = torch.device("meta")
 _CPU = torch.device("cpu")
 _MOST_VALUES = (

@@ -14,8 +14,6 @@ from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
 from model_adapters.hf.rehearsal.device import ShapesDevice
 from model_adapters.hf.rehearsal.kernels import Attention
 
-__all__ = ["FLASH_ATTENTION", "flash_attention", "flash_problem"]
-
 FLASH_ATTENTION = "flash_attention_2"
 _LARGEST_HEAD = 256
 _SUM_BYTES = 4  # of a row's sum, which is kept in float32

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 
 import torch
 
-__all__ = ["EFFICIENT", "FLASH", "MATH", "Attention", "attention_of"]
-
 FLASH = "flash"
 EFFICIENT = "memory-efficient"
 MATH = "math"

@@ -16,8 +16,6 @@ from transformers import PreTrainedTokenizerFast
 
 from infthor_eval.formats.yaml_files import read_yaml
 
-__all__ = ["KnownCheckpoint", "known_checkpoints"]
-
 _TABLE = Path(__file__).with_name("checkpoints.yaml")
 _UNKNOWN = "<unk>"
 

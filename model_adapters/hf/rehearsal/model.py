@@ -31,8 +31,6 @@ from model_adapters.hf.rehearsal.known import known_checkpoints
 from model_adapters.hf.uncached import expand_image_tokens
 from model_adapters.options.checkpoints import CheckpointOptions
 
-__all__ = ["RehearsedModel", "load_shapes"]
-
 _CONFIG = "config.json"
 
 

@@ -26,8 +26,6 @@ from model_adapters.hf.rehearsal.flash import flash_attention, flash_problem
 from model_adapters.hf.rehearsal.kernels import Attention
 from model_adapters.hf.rehearsal.model import RehearsedModel
 
-__all__ = ["FrameWork", "Kernels", "Rehearsal", "Usage"]
-
 _QUESTION = 60  # tokens of a question and what is around it, as in benchmarks/cost.md
 _TOGETHER = 25  # most questions on a trajectory of the published set
 _MIB = 2**20

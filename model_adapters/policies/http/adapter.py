@@ -13,8 +13,6 @@ from model_adapters.policies.http.json_numpy import decode_numbers, encode_array
 from model_adapters.policies.policy import arm_deltas
 from model_adapters.protocols import ArmDelta, Capabilities
 
-__all__ = ["HttpPolicy", "VlaHttp"]
-
 
 class HttpPolicy:
     """A policy behind a server."""

@@ -10,8 +10,6 @@ from typing import Any
 from infthor_eval.errors import ModelError, in_one_line
 from infthor_eval.storage.deadlines import limit_time
 
-__all__ = ["JsonClient"]
-
 _LARGEST = 16 * 2**20  # bytes of the largest accepted reply
 _PIECE = 2**16
 _FIRST_WAIT_S = 0.5  # pause before the second attempt; it doubles before each further one

@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["decode_numbers", "encode_array"]
-
 _MARK = "__numpy__"
 _KINDS = "fiu"  # numbers only: object arrays could run code when they are created
 

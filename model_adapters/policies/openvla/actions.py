@@ -7,8 +7,6 @@ import numpy as np
 
 from model_adapters.policies.statistics import Actions
 
-__all__ = ["ActionBins"]
-
 
 @dataclass(frozen=True)
 class ActionBins:

@@ -17,8 +17,6 @@ from model_adapters.policies.policy import PolicyAdapter, VlaPolicy
 from model_adapters.policies.statistics import ActionStatistics, select_statistics
 from model_adapters.policies.weights import empty_parameters, load_weights
 
-__all__ = ["MODEL_TYPE", "OpenVLA", "OpenVLADescription", "describe_openvla", "load_openvla"]
-
 MODEL_TYPE = "openvla"
 _FINE_TUNED = "dataset_statistics.json"
 

@@ -8,8 +8,6 @@ from transformers import LlamaConfig
 from infthor_eval.errors import ModelError
 from model_adapters.policies.openvla.vision import TOWERS, TowerShape
 
-__all__ = ["OpenVLAConfig"]
-
 
 class OpenVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
     """`config.json`.

@@ -17,8 +17,6 @@ from model_adapters.policies.preprocessing import normalise, resize
 from model_adapters.policies.statistics import ACTION_SIZE, Actions
 from model_adapters.policies.weights import Layout
 
-__all__ = ["OpenVLANetwork", "OpenVLAWeights", "prompt", "prompt_ids", "weights_layout"]
-
 _DINOV2 = ((0.484375, 0.455078125, 0.40625), (0.228515625, 0.2236328125, 0.224609375))
 _SIGLIP = ((0.5, 0.5, 0.5), (0.5, 0.5, 0.5))
 _SPACE = 29871  # Llama's token of a single space, which precedes every action in the training data

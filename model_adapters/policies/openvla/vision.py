@@ -9,8 +9,6 @@ from torch.nn.functional import gelu, scaled_dot_product_attention
 
 from model_adapters.policies.weights import Shape, empty_parameters
 
-__all__ = ["TOWERS", "Tower", "TowerShape", "unused_keys"]
-
 _EPS = 1e-6
 _REGISTERS = 4
 

@@ -9,8 +9,6 @@ import numpy as np
 from infthor_eval.errors import ModelError
 from model_adapters.policies.statistics import ACTION_SIZE, Actions
 
-__all__ = ["TOKENS_PER_STEP", "ProcessorConfig", "SpatialBins"]
-
 TOKENS_PER_STEP = 3
 _GRIPPER_IDS = 2  # closed, open
 

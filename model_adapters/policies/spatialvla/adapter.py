@@ -18,8 +18,6 @@ from model_adapters.policies.spatialvla.network import SpatialVLANetwork, Spatia
 from model_adapters.policies.statistics import select_statistics
 from model_adapters.policies.weights import empty_parameters, load_weights
 
-__all__ = ["MODEL_TYPE", "SpatialVLA", "load_spatialvla"]
-
 MODEL_TYPE = "spatialvla"
 
 

@@ -9,8 +9,6 @@ from infthor_eval.errors import ModelError
 from model_adapters.options.policies import DEFAULT_INTRINSICS
 from model_adapters.policies.spatialvla.actions import CameraIntrinsics
 
-__all__ = ["published_intrinsics", "thor_intrinsics"]
-
 
 def published_intrinsics(
     cameras: Mapping[str, CameraIntrinsics], unnorm_key: str, image_size: int, pretrained: str

@@ -7,8 +7,6 @@ from transformers import Gemma2Config, SiglipVisionConfig, ZoeDepthConfig
 
 from infthor_eval.errors import ModelError
 
-__all__ = ["SpatialVLAConfig"]
-
 
 class SpatialVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
     """`config.json`.

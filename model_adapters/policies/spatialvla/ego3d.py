@@ -6,8 +6,6 @@ from torch.nn.functional import interpolate, pad
 
 from model_adapters.policies.preprocessing import normalise
 
-__all__ = ["Ego3DEmbedding", "back_project", "estimate_depth"]
-
 _HALF = (0.5, 0.5, 0.5)
 # Metres; the point in front of the camera that coordinates are relative to.
 _CENTRE = (0.0, 0.0, 2.0)

@@ -26,8 +26,6 @@ from model_adapters.policies.spatialvla.ego3d import Ego3DEmbedding, back_projec
 from model_adapters.policies.statistics import Actions
 from model_adapters.policies.weights import Layout
 
-__all__ = ["SpatialVLANetwork", "SpatialVLAWeights", "View", "checkpoint_key", "prompt"]
-
 _HALF = (0.5, 0.5, 0.5)
 _IMAGE = "<image>"
 _BEGIN = "<bos>"

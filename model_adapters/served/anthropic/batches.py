@@ -19,8 +19,6 @@ from model_adapters.served.completion import decode_reply
 from model_adapters.served.endpoint import Endpoint, is_transient
 from model_adapters.served.wire import Call
 
-__all__ = ["AnthropicBatches"]
-
 _PAGE = 100
 _CLOCKS_S = 3600  # by which the server's clock may be behind ours
 

@@ -12,8 +12,6 @@ from model_adapters.served.endpoint import Endpoint
 from model_adapters.served.frames import EncodedFrames
 from model_adapters.served.options import AnthropicOptions
 
-__all__ = ["AnthropicDialect"]
-
 _VERSION = "2023-06-01"
 _HOTTEST = 1.0
 

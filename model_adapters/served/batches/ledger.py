@@ -12,8 +12,6 @@ from infthor_eval.errors import DataError, in_one_line, wrap_errors
 from infthor_eval.storage.files import remove, write_atomically, writing_hint
 from model_adapters.served.batches.service import Batch, BatchReply
 
-__all__ = ["Ledger"]
-
 _BATCH = ".json"
 _REQUESTS = ".requests.jsonl"
 _REPLIES = ".replies.jsonl"

@@ -24,8 +24,6 @@ from model_adapters.served.batches.service import (
 from model_adapters.served.endpoint import NoAnswerError, is_transient
 from model_adapters.served.wire import StatusError
 
-__all__ = ["BatchQueue", "BatchRules", "BatchedReply"]
-
 _FIRST_POLL_S = 2.0  # pause between two looks at a server; it grows by half
 _LONGEST_POLL_S = 120.0
 _NAP_S = 0.1  # a pause ends so soon after the run is stopped

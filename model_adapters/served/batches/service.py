@@ -11,8 +11,6 @@ from typing import Any, Literal, Protocol
 import msgspec
 from msgspec.structs import replace
 
-__all__ = ["Batch", "BatchReply", "BatchService", "BatchStatus", "custom_id", "one_each"]
-
 _MISSING = "the batch has ended without a line for it"
 _CONTRADICTION = "it gives several that differ, and none counts"
 

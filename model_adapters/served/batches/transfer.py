@@ -12,8 +12,6 @@ from model_adapters.served.completion import decode_reply
 from model_adapters.served.endpoint import Endpoint
 from model_adapters.served.wire import Answer, Call
 
-__all__ = ["LARGEST", "TRANSFER_S", "ServerId", "Transfer"]
-
 # A server's name of a batch or a file, which becomes a part of addresses.
 ServerId = Annotated[str, msgspec.Meta(pattern=r"\A[\w./:@=+~-]{1,300}\Z")]
 

@@ -18,8 +18,6 @@ from model_adapters.served.completion import decode_reply
 from model_adapters.served.endpoint import Endpoint, is_transient
 from model_adapters.served.wire import Call
 
-__all__ = ["GeminiBatches"]
-
 _PAGE = 100
 _STATUS = {1: 499, 3: 400, 4: 504, 5: 404, 7: 403, 8: 429, 9: 400, 13: 500, 14: 503, 16: 401}
 

@@ -8,12 +8,11 @@ import msgspec
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.protocols import Turn, Video
+from infthor_eval.formats.pictures.video import Video
+from model_adapters.protocols import Turn
 from model_adapters.served.completion import TokenUsage, read_error, read_usage
 from model_adapters.served.frames import EncodedFrames, require_user_frames
 from model_adapters.served.wire import StatusError
-
-__all__ = ["GeneratedContent", "to_contents"]
 
 _WHY = {
     "MAX_TOKENS": ": the token limit was reached before any text; give --max-thinking-tokens N",

@@ -12,8 +12,6 @@ from model_adapters.served.gemini.batches import GeminiBatches
 from model_adapters.served.gemini.contents import GeneratedContent, to_contents
 from model_adapters.served.options import GeminiOptions
 
-__all__ = ["GeminiDialect"]
-
 _MOST_STOPS = 5  # stop strings that the server accepts
 _SEEDS = 2**31
 

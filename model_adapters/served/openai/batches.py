@@ -14,8 +14,6 @@ from model_adapters.served.batches.transfer import TRANSFER_S, ServerId, Transfe
 from model_adapters.served.endpoint import Endpoint, is_transient
 from model_adapters.served.wire import Call
 
-__all__ = ["OpenAIBatches"]
-
 _NAME = "infthor_eval_batch"  # key of our metadata
 _PAGE = 100
 _CLOCKS_S = 86_400  # by which the server's clock may be ahead of ours, or behind

@@ -6,8 +6,6 @@ from infthor_eval.errors import ModelError
 from model_adapters.served.completion import TokenUsage, read_error, read_usage
 from model_adapters.served.wire import StatusError
 
-__all__ = ["ChatCompletion"]
-
 # By finish_reason. Unknown ones are not quoted, because a server may put any text there.
 _FILTERED = ": the server's content filter blocked it; change the question"
 _WHY = {

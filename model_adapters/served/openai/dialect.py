@@ -14,8 +14,6 @@ from model_adapters.served.openai.completions import ChatCompletion
 from model_adapters.served.openai.messages import to_messages
 from model_adapters.served.options import OpenAIOptions
 
-__all__ = ["OpenAIDialect"]
-
 _MOST_STOPS = 4  # stop strings that servers accept
 _SEEDS = 2**31  # servers accept seeds of few more bits
 

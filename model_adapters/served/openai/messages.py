@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
-from model_adapters.protocols import Part, Turn, Video
+from infthor_eval.formats.pictures.video import Video
+from model_adapters.protocols import Part, Turn
 from model_adapters.served.frames import EncodedFrames, require_user_frames
-
-__all__ = ["to_messages"]
 
 
 def to_messages(

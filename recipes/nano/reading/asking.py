@@ -15,8 +15,6 @@ from recipes.nano.reading.frame_units import ChangedFrame
 from recipes.nano.reading.homes import Home
 from recipes.nano.reading.network import FrameEvents
 
-__all__ = ["Asker", "ReadingSequence", "question_intro"]
-
 _N_TAILS = 50_000  # encoded questions that are kept
 
 

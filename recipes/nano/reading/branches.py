@@ -16,8 +16,6 @@ from infthor_eval.training.encoding import TrainingSequence
 from model_adapters.hf.family import Family
 from model_adapters.hf.prompting.prompt import Frame, n_tokens, token_ids
 
-__all__ = ["BranchedSequence", "collate_branched", "with_branches"]
-
 
 @dataclass(frozen=True)
 class BranchedSequence(TrainingSequence):

@@ -14,8 +14,6 @@ from infthor_eval.nieh.samples import find_samples
 from infthor_eval.training.encoding import SkippedSequence
 from recipes.nano.reading.events import Happening, read_events
 
-__all__ = ["Episode", "RecordedQuestion", "World", "read_episodes"]
-
 _N_WORLDS = 2
 
 

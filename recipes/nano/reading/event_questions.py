@@ -22,8 +22,6 @@ from recipes.nano.reading.events import Event
 from recipes.nano.seen_objects import SeenFrame
 from recipes.nano.synthetic_questions import AskedText
 
-__all__ = ["EventQuestions"]
-
 _MOST_IDLE = 3  # pairs of frames without an event among those with one
 
 

@@ -14,8 +14,6 @@ from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.step_log import iter_object_states, read_steps
 from infthor_eval.household.wording import canonical_type
 
-__all__ = ["Event", "Happening", "events_in", "read_events"]
-
 _FAR = 2  # frames with more steps between them are not compared
 
 

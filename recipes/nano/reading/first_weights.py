@@ -22,8 +22,6 @@ from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from recipes.nano.seeing.units import Role, Units
 from recipes.nano.spelling import spellings
 
-__all__ = ["Part", "part_width", "set_first_weights"]
-
 
 class Part(IntEnum):
     """Parts of the width."""

@@ -17,8 +17,6 @@ from model_adapters.hf.prompting.prompt import Frame
 from recipes.nano.seeing.units import Role, Units
 from recipes.nano.tower import patch_states, unit_logits
 
-__all__ = ["ChangedFrame", "FrameUnits", "read_frame_units"]
-
 _READER_THREADS = 2
 _BATCH = 64  # frames in the tower at once
 _OPEN = 3.0  # of the unit of something that is turned open

@@ -19,8 +19,6 @@ from recipes.nano.seeing.units import Units
 from recipes.nano.seen_objects import SeenFrame, SeenObject
 from recipes.nano.settings import ReadingSettings
 
-__all__ = ["Home", "Homes"]
-
 _OTHERWISE = {"yes": "no", "no": "yes"}
 
 

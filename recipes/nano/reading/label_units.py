@@ -14,8 +14,6 @@ from recipes.nano.reading.frame_units import FrameUnits
 from recipes.nano.seeing.units import Role, Units
 from recipes.nano.seen_objects import SeenFrame, SeenObject
 
-__all__ = ["label_units"]
-
 # A box is in a token's part of the picture if it has so large a share of the part, or of what it
 # has in the part with most of it.
 _OF_TOKEN = 0.4

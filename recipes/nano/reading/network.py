@@ -16,8 +16,6 @@ from recipes.nano.reading.events import Event
 from recipes.nano.reading.frame_units import FrameUnits
 from recipes.nano.seeing.units import Units
 
-__all__ = ["FrameEvents", "ReadingNetwork"]
-
 _EVENT_LAYER = 2  # layers before the loss of events: those after it can use what it asks for
 _EVENT_BIAS = -4.0  # at first: hardly anything happens
 

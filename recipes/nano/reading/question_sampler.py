@@ -22,8 +22,6 @@ from recipes.nano.seen_objects import SeenFrame
 from recipes.nano.settings import ReadingSettings
 from recipes.nano.synthetic_questions import AskedText, Kind, SyntheticQuestions
 
-__all__ = ["QuestionSampler"]
-
 _MOST_TOKENS = 2500  # of a sequence
 # Kinds of questions that few frames are good for, and how often frames are sought for each.
 _SOUGHT = {Kind.OPENNESS: 3, Kind.WHETHER_THERE: 2, Kind.CONTENTS: 2}

@@ -19,8 +19,6 @@ from infthor_eval.household.wording import (
     with_article,
 )
 
-__all__ = ["Renaming", "Vocabulary"]
-
 _N_TEMPLATES = 100_000  # that are kept
 
 

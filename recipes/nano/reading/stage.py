@@ -19,8 +19,6 @@ from recipes.nano.reading.question_sampler import QuestionSampler
 from recipes.nano.settings import NanoRecipe
 from recipes.nano.steps import Stage, adamw
 
-__all__ = ["reading_stage"]
-
 _BATCHES = 4  # that the sequences of a step are computed in
 _Sequence = TypeVar("_Sequence", ReadingSequence, TrainingSequence)
 

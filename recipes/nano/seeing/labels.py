@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from recipes.nano.seeing.units import Role
 from recipes.nano.seeing.view_dataset import ViewBatch
 
-__all__ = ["cell_shares", "token_labels"]
-
 # Something is in a token's part of the picture if it has so many pixels there, and either so large
 # a share of what it has in the part with most of it, or of the part.
 _LEAST = 60

@@ -12,8 +12,6 @@ import torch
 from torch import Tensor
 from torch.nn import Parameter
 
-__all__ = ["Muon"]
-
 # A polynomial that brings singular values between 0 and 1 near 1 in a few rounds (Jordan et al.,
 # 2024, https://kellerjordan.github.io/posts/muon).
 _COEFFICIENTS = (3.4445, -4.7750, 2.0315)

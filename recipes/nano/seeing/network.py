@@ -11,8 +11,6 @@ from recipes.nano.seeing.units import Role
 from recipes.nano.seeing.view_dataset import ViewBatch, ViewDataset
 from recipes.nano.tower import patch_states, unit_logits
 
-__all__ = ["SeeingNetwork"]
-
 _ROLE_WEIGHTS = {Role.SHOWN: 1.0, Role.HELD: 2.0, Role.OPEN: 2.0, Role.AROUND: 1.0}
 _PATCH_WEIGHT = 3.0  # of the loss of patches' names
 _LOOSE_WEIGHT = 3.0  # more, of patches that show something loose

@@ -14,8 +14,6 @@ from recipes.nano.settings import NanoRecipe
 from recipes.nano.steps import Stage, adamw
 from recipes.nano.whitening import whiten_patches
 
-__all__ = ["lower_thresholds", "raise_units", "seeing_stage"]
-
 _WHITENED_FRAMES = 600
 _SHIFT = 2.0  # logits by which units are raised when the tower is trained
 _RAISED = 1.0  # logits by which those of what is shown are once more, when the decoder is

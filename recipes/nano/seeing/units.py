@@ -10,8 +10,6 @@ from enum import IntEnum
 
 from infthor_eval.household.wording import canonical_type
 
-__all__ = ["Role", "Units"]
-
 
 class Role(IntEnum):
     """What is said of a type: it is there, in the hand, open, or what something loose is in."""

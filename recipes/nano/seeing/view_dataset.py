@@ -17,8 +17,6 @@ from infthor_eval.storage.digests import digest_of_files
 from recipes.nano.seeing.units import Units
 from recipes.nano.views.labelled_views import LabelledViews, read_views
 
-__all__ = ["ViewBatch", "ViewDataset", "in_merge_order"]
-
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 _RENDERED_SIDE = 300  # pixels of the frames that labels are of
 _LEAST_PIXELS = 80  # of something that a crop is taken around

@@ -12,8 +12,6 @@ from typing import Any
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector
 
-__all__ = ["arrange", "choose_pose"]
-
 # State changes, what they need, and the share of the things that could be changed and are.
 _CHANGES: tuple[tuple[str, str, float, dict[str, str]], ...] = (
     ("SliceObject", "sliceable", 0.3, {}),

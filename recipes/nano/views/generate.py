@@ -33,8 +33,6 @@ from recipes.nano.views.labelled_views import (
     write_views,
 )
 
-__all__ = ["ViewJob", "ViewSet", "cell_pixels", "generate_views"]
-
 _LEAST_PIXELS = 8  # of an object that is labelled
 # Bundled sets have pictures of few colours, and so have half of the arrangements.
 _FEW_COLORS_SHARE = 0.5

@@ -26,8 +26,6 @@ from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import DAMAGED_ZIP
 from infthor_eval.storage.files import write_atomically, writing_hint
 
-__all__ = ["LabelledViews", "ThingInView", "read_views", "views_of", "write_views"]
-
 _NONE = -1
 _COLOURS = 3
 _MALFORMED = (*DAMAGED_ZIP, ValueError, TypeError, MemoryError)

@@ -15,8 +15,6 @@ from infthor_eval.cli.options.values import PATH
 if TYPE_CHECKING:
     from infthor_eval.generation.bundle import Manifest, TwinsManifest
 
-__all__ = ["command"]
-
 
 @click.command(
     "bundle",

@@ -9,8 +9,6 @@ import click
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
 
-__all__ = ["command"]
-
 _PICTURE = "card.png"
 _DAY = re.compile(r"\d{4}-\d{2}-\d{2}")
 

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from infthor_eval.generation.generate_set import GenerationSummary
 
-__all__ = ["command"]
-
 
 @click.command(
     "generate",

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from infthor_eval.generation.twins.final_task_set import FinalTaskSummary
     from infthor_eval.generation.twins.twin_set import TwinSummary
 
-__all__ = ["parse_kinds", "questions", "twins"]
-
 
 @click.command(
     "questions", cls=ExampleCommand, example="infthor-eval questions SET --out SET/qa_set_mine.csv"

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from infthor_eval.generation.replay_summary import ReplaySummary
 
-__all__ = ["command"]
-
 _MAX_SHOWN = 20  # failures and divergences printed one by one; all are in the JSON summary
 
 

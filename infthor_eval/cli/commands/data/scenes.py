@@ -7,8 +7,6 @@ import click
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
 from infthor_eval.cli.options.values import PATH, SceneName, floor_plans_option
 
-__all__ = ["command"]
-
 _PICTURES = (".png", ".jpg", ".jpeg")
 
 

@@ -30,8 +30,6 @@ from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare_all
 from infthor_eval.runs.stored.labels import label_runs
 
-__all__ = ["command", "validate"]
-
 
 @click.command(
     "validate",
