@@ -39,8 +39,9 @@ def test_scenes_are_those_of_the_trajectories(bundled):
 
 def test_a_set_with_logs_is_audited_by_who_knows_their_facts_and_without_whole_scenes(bundled):
     audited = audit(bundled)
-    assert len(audited.guessers) == len(GUESSERS) + 1
-    assert "facts" in audited.guessers[-1]
+    assert len(audited.guessers) == len(GUESSERS) + 2
+    assert "facts" in audited.guessers[-2]
+    assert audited.guessers[-1] == "blind"
     assert all(
         len(item.scores) == len(item.scene_scores) == len(audited.guessers)
         for item in audited.questions
