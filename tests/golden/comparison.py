@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from difflib import SequenceMatcher
 from itertools import zip_longest
-from os.path import commonprefix
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ _NOTHING = object()
 def compare(old: Mapping[str, bytes], new: Mapping[str, bytes]) -> Iterator[tuple[str, str]]:
     """Yield each difference: the file, and what differs there. A case that one of them does not
     have is one difference."""
-    cases = {name.partition("/")[0] for name in old}, {name.partition("/")[0] for name in new}
+    cases = [{name.partition("/")[0] for name in files} for files in (old, new)]
     for case in sorted(cases[0] ^ cases[1]):
         yield case, "is gone" if case in cases[0] else "is new"
     for name in sorted(old.keys() | new.keys()):
@@ -41,11 +40,12 @@ def read_named(path: Path) -> dict[str, str]:
         ValueError: a line has no reason.
     """
     named = {}
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else ()
+    for line in filter(str.strip, lines):
         pattern, _, reason = map(str.strip, line.rpartition("  # "))
-        if line.strip() and not (pattern and reason):
+        if not (pattern and reason):
             raise ValueError(f"{path}: {line!r} is not PATTERN, two spaces, # REASON")
-        named |= {pattern: reason} if pattern else {}
+        named[pattern] = reason
     return named
 
 
@@ -55,8 +55,7 @@ def print_differences(differences: Iterable[tuple[str, str]], named: Mapping[str
     unnamed: Counter[str] = Counter()
     for file, difference in differences:
         line = f"{file}: {difference}"
-        name = next((pattern for pattern in named if re.search(pattern, line)), None)
-        if name is not None:
+        if name := next((pattern for pattern in named if re.search(pattern, line)), None):
             excused[name] += 1
             continue
         unnamed[file] += 1
@@ -73,11 +72,9 @@ def print_differences(differences: Iterable[tuple[str, str]], named: Mapping[str
 
 
 def _parse(name: str, text: str) -> Any:
-    if name.endswith(".json"):
-        return json.loads(text)
     if name.endswith(".jsonl"):
         return [json.loads(line) for line in text.splitlines()]
-    return text
+    return json.loads(text) if name.endswith(".json") else text
 
 
 def _differ(where: str, old: Any, new: Any) -> Iterator[str]:
@@ -116,6 +113,7 @@ def _write(value: Any) -> str:
 
 def _shorten(old: str, new: str) -> str:
     """Both texts, from shortly before they differ."""
-    at = max(0, len(commonprefix([old, new])) - 20)
+    pairs = enumerate(zip(old, new, strict=False))
+    at = max(0, next((n for n, (one, two) in pairs if one != two), len(min(old, new))) - 20)
     cut = [f"{'…' * (at > 0)}{text[at : at + _WIDTH]}" for text in (old, new)]
     return f"{cut[0]} -> {cut[1]}"

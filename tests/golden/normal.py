@@ -9,8 +9,6 @@ import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-__all__ = ["normalise", "normalise_text", "read_golden", "write_golden"]
-
 # Patterns, and what stands in their places. Nothing else is lost.
 _RULES: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     # pictures in pages and exports: their bytes are still compared
@@ -24,13 +22,16 @@ _RULES: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     (r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", "UUID"),
     (r"_[0-9a-f]{16}(?=\.eval)", "_ID"),
     (r'("(?:eval_id|task_id)": ")[0-9a-f]{16}', r"\g<1>ID"),
+    # lm-eval's of a sample's `doc`, which has the folder of its set, and of a task: both are
+    # compared themselves
+    (r'("(?:doc_hash|(?:nieh|infthor|manipulathor)_\w+)": ")[0-9a-f]{64}', r"\g<1>HASH"),
 )
 _COMPILED = [(re.compile(pattern), put) for pattern, put in _RULES]
 _DATA = re.compile(r'(<script id="(\w+)" type="application/json">)(.*?)(</script>)', re.DOTALL)
 
 
 def normalise(folder: Path, root: Path) -> dict[str, bytes]:
-    """Return the files below a folder by their normalised paths; archives and pages in parts.
+    """Return the files below a folder by their normalised paths; pages in parts.
 
     Args:
         folder: has a folder for each case.
@@ -68,11 +69,11 @@ def _normalise_content(content: bytes, places: Mapping[str, str]) -> bytes:
 
 
 def _parts(name: str, content: bytes) -> list[tuple[str, bytes]]:
-    """The members of an archive; the data of a page apart from it, which has a line for a tag."""
+    """A log of inspect as one JSON object; a page's data apart from it, which has a line a tag."""
     if name.endswith(".eval"):
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            members = archive.namelist()
-            return [(f"{name}/{member}", archive.read(member)) for member in members]
+        with zipfile.ZipFile(io.BytesIO(content)) as log:
+            members = [f"{json.dumps(it)}: {log.read(it).decode()}" for it in log.namelist()]
+        return [(f"{name}.json", ("{" + ",\n".join(members) + "}").encode())]
     if name.endswith(".html"):
         page = content.decode()
         data = [(f"{name}/{found[2]}.json", found[3].encode()) for found in _DATA.finditer(page)]
