@@ -31,8 +31,9 @@ def no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @contextmanager
-def serve(answer: Answer, path: str = "/act") -> Iterator[str]:
-    """The address of a server that answers POSTs to a path, for as long as it is needed."""
+def serve(answer: Answer, path: str = "/act", port: int = 0) -> Iterator[str]:
+    """The address of a server that answers POSTs to a path, for as long as it is needed; at a port
+    that is free if none is given."""
 
     class Handler(BaseHTTPRequestHandler):
         def do_POST(self) -> None:
@@ -47,7 +48,7 @@ def serve(answer: Answer, path: str = "/act") -> Iterator[str]:
         def log_message(self, *args: Any) -> None:
             pass
 
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
     server.daemon_threads = True
     thread = threading.Thread(
         target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True

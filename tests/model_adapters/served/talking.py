@@ -84,9 +84,9 @@ def always_send(status: int, body: bytes, headers: dict[str, str] | None = None)
 
 
 @contextmanager
-def serve_chat(answer: Answer = talkative) -> Iterator[str]:
+def serve_chat(answer: Answer = talkative, port: int = 0) -> Iterator[str]:
     """The base_url of a server, for as long as it is needed."""
-    with serve(answer, PATH) as url:
+    with serve(answer, PATH, port) as url:
         yield f"{url}/v1"
 
 
