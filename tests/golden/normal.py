@@ -18,6 +18,8 @@ _RULES: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     (r'("date": )\d+\.\d+', r"\g<1>0"),
     # how long it took: usage.json
     (r'("seconds": )\d+(\.\d+)?(e-\d+)?(?=,\n  "written")', r"\g<1>0"),
+    # the same of memories: the last two columns of their table
+    (r"(?m) +\d+\.\d{3} +\d+\.\d{3}  $", " SECONDS"),
     # made of a run's identity: names of Every Eval Ever's files, names and ids of inspect's logs
     (r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", "UUID"),
     (r"_[0-9a-f]{16}(?=\.eval)", "_ID"),

@@ -64,7 +64,7 @@ CASES = {
     ),
     "imported": (  # needs the first
         f"{_EXPORTED}/inspect/1-qwen2.5-vl-nano/*.eval {_SET}",
-        f"{_EXPORTED}/every-eval-ever/0-blind/data/*/*/*/*.jsonl {_SET}",
+        f"{_EXPORTED}/every-eval-ever/3-random/data/*/*/*/*.jsonl {_SET}",
     ),
 }
 # By format: what it needs to be told.
@@ -77,7 +77,7 @@ EXPORTS = {
 _WITH_FRAMES = ("twins", "memory")  # requests of few frames
 _REPLAYED = ("plans",)  # as a replay costs as much as the run
 _DATE = 1_700_000_000  # of every journal
-_SECONDS = re.compile(r'("seconds":)[0-9.e-]+')
+_SECONDS = re.compile(r'("(?:seconds|build_s|recall_s)":)[0-9.e-]+')
 _PROGRESS = re.compile(r".*: [\d,]+ of [\d,]+ \(\d+ %\).*")  # comes where a unit takes long
 _WORDS = ("yes", "no", "1", "2", "fridge", "MoveAhead", "RotateRight", "LookDown")
 
