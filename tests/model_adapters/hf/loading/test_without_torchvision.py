@@ -95,8 +95,10 @@ def test_pixels_are_those_of_torchvision(tmp_path: Path) -> None:
 def test_transformers_finds_what_is_registered_and_no_torchvision(
     family: str, tmp_path: Path
 ) -> None:
-    from transformers import AutoImageProcessor
+    from transformers import CONFIG_MAPPING, AutoImageProcessor
 
+    if family not in CONFIG_MAPPING:  # Molmo 2 came with 5.20
+        pytest.skip(f"transformers {transformers.__version__} has no {family}")
     config = AutoConfig.for_model(family)
     with torchvision_or_stand_in():
         register_image_processor(config)
