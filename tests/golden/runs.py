@@ -145,6 +145,8 @@ def _call(name: str, command: str) -> None:
             main([str(next(Path().glob(it))) if "*" in it else it for it in command.split()])
     except SystemExit as ended:
         code = ended.code
+    if code in (130, 143):  # by Ctrl-C, or SIGTERM
+        raise KeyboardInterrupt
     for stream in streams:
         stream.seek(0)
     said = [line for line in read_remarks(err.read()) if not _PROGRESS.fullmatch(line)]
