@@ -7,7 +7,7 @@
 people type, and keeps every file and every printed text: the runs' folders with their journals,
 replies, scores and results, tables, comparisons, the page with its data, and all exports. FOLDER is
 a folder or an archive, as its name ends. With names of cases behind it, only these are run. It
-takes one core about four minutes.
+takes one core about four minutes. One `make` at a time on a machine: the served model has a port.
 
 What cannot be equal twice is replaced, by the rules of `normal.py` alone. An identity of a run is
 kept in `identities.json` and has a placeholder everywhere else, so that a changed one is seen once.

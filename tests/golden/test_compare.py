@@ -35,6 +35,9 @@ def test_records_are_those_of_one_unit_wherever_they_stand() -> None:
     first, second = '{"id": "a", "reply": "yes"}', '{"id": "b", "reply": "no"}'
     lines = _lines(f"{first}\n{second}", f"{second.replace('no', 'yes')}\n{first}", "journal.jsonl")
     assert lines == ['journal.jsonl: b/reply: "no" -> "yes"']
+    (line,) = _lines(f"{first}\n{second}", f"{second}\n{first}", "samples.jsonl")
+    assert "written otherwise" in line
+    assert _lines(f"{first}\n{second}", f"{second}\n{first}", "run/journal/0.jsonl") == []
 
 
 def test_texts_differ_by_lines_shown_from_shortly_before_they_differ() -> None:
