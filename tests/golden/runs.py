@@ -66,6 +66,10 @@ CASES = {
         f"{_EXPORTED}/inspect/1-qwen2.5-vl-nano/*.eval {_SET}",
         f"{_EXPORTED}/every-eval-ever/3-random/data/*/*/*/*.jsonl {_SET}",
     ),
+    "replies": (
+        "--model oracle --tasks nieh_mini_gt",
+        f"import-replies replies.jsonl --model me {_SET}",
+    ),
 }
 # By format: what it needs to be told.
 EXPORTS = {
@@ -74,6 +78,17 @@ EXPORTS = {
     "inspect": "",
     "lm-eval": "",
 }
+# What models say to a question, right, in part and wrong, in words that scorers take apart.
+_FORMS = (
+    "{first}",
+    "{every}, lamp",
+    "It is the {every}.",
+    "{every} and {first}",
+    "Not {every}",
+    "I saw it.\n{every}",
+    "{every} or lamp",
+    "A {first}s",
+)
 _WITH_FRAMES = ("twins", "memory")  # requests of few frames
 _REPLAYED = ("plans",)  # as a replay costs as much as the run
 _DATE = 1_700_000_000  # of every journal
@@ -104,6 +119,8 @@ def _answer(request: dict[str, Any], _handler: BaseHTTPRequestHandler) -> dict[s
 
 def _run_case(name: str) -> None:
     for number, command in enumerate(CASES[name]):
+        if "replies.jsonl" in command:
+            _write_replies()
         _call(f"run{number}.txt", f"{command} --out runs/{number}")
     _set_times()
     runs = sorted(path.parent for path in Path("runs").glob("*/*/*/results.json"))
@@ -124,6 +141,19 @@ def _run_case(name: str) -> None:
         frames = "--frames" * (kind == "inspect" and name in _WITH_FRAMES)
         words = f"--format {kind} --out exported/{kind}/{label} {EXPORTS[kind]} {frames}"
         _call(f"{kind}-{label}.txt", f"export {run} {words}")
+
+
+def _write_replies() -> None:
+    """Answer the questions of the first run, those with several answers each in another form."""
+    (samples,) = Path("runs/0").rglob("samples_*.jsonl")
+    docs = [json.loads(line)["doc"] for line in samples.read_text(encoding="utf-8").splitlines()]
+    answers = {doc["question_id"]: json.loads(doc["answers"]) for doc in docs}
+    lines = []
+    for number, name in enumerate(sorted(answers, key=lambda it: (-len(answers[it]), it))):
+        words = {"first": answers[name][0], "every": ", ".join(map(str, answers[name]))}
+        reply = _FORMS[number % len(_FORMS)].format(**words)
+        lines.append(json.dumps({"question_id": name, "reply": reply}) + "\n")
+    Path("replies.jsonl").write_text("".join(lines), encoding="utf-8")
 
 
 def _set_times() -> None:
