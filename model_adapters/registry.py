@@ -134,7 +134,7 @@ def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
 def build(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
     """Build the model or the policy of this name without checking its members; see `load`."""
     adapter = _adapter(name)
-    parsed = parse(name, _options(name) if name in BUILT_IN else adapter.Options, options)
+    parsed = read_options(name, options)
     if name in BUILT_IN:
         return adapter.build(name, parsed, seed)
     with wrap_adapter_errors(f"model {name}: build() fails"):

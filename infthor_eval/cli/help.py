@@ -8,8 +8,6 @@ import click
 class SuiteOption(click.Option):
     """An option for tasks of some suites alone, named in its `suites`."""
 
-    suites: tuple[str, ...] = ()
-
     def __init__(self, *arguments: Any, suites: tuple[str, ...], **settings: Any) -> None:
         super().__init__(*arguments, **settings)
         self.suites = suites

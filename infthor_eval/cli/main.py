@@ -173,9 +173,9 @@ def main(args: list[str] | None = None) -> None:
 
 
 @noticed()
-def run_program(program: click.Group, args: list[str] | None) -> None:
-    """Run the commands of a program; errors meant for people are printed as one line on standard
-    error."""
+def run_program(program: click.Command, args: list[str] | None = None) -> None:
+    """Run a program, of one command or several; errors meant for people are printed as one line on
+    standard error."""
     name = str(program.name)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

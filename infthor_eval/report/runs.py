@@ -60,17 +60,6 @@ class ReportRun:
         return ", ".join(self.header.config.simulators)
 
 
-def label_report_runs(folders: Sequence[Path], headers: Sequence[RunHeader]) -> list[str]:
-    """Return a label per run: its name, with options or folder to tell equal names apart.
-
-    Raises:
-        DataError: the `run.yaml` of a run is not what it should be.
-    """
-    return [
-        with_frames(*named) for named in zip(distinct_names(folders, headers), headers, strict=True)
-    ]
-
-
 def distinct_names(folders: Sequence[Path], headers: Sequence[RunHeader]) -> list[str]:
     """Return a name per run; the frames are not part of it, since tables add them to the name."""
     names = label_runs(list(zip(folders, headers, strict=True)), ignore={"frames"})

@@ -1,6 +1,5 @@
 """`python -m recipes.nano`: train the small model from scratch."""
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -8,14 +7,15 @@ from typing import Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.main import run_program
 from infthor_eval.cli.options.values import PATH, parse_pairs
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.cli.progress.bar import StepBars
 from infthor_eval.cli.progress.notes import NOTES, print_note
-from infthor_eval.errors import InfthorError, unknown_name
+from infthor_eval.errors import unknown_name
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.storage.files import hold_folder
-from infthor_eval.terminal import console, print_error, progress_bar
+from infthor_eval.terminal import console, progress_bar
 from infthor_eval.training.export import export
 from infthor_eval.training.recipe import read_recipe_file
 from infthor_eval.workers import WorkerSettings
@@ -29,6 +29,7 @@ _STAGES = {"vision": "recognising objects", "reading": "answering and acting"}
 
 
 @click.command(
+    "python -m recipes.nano",
     cls=ExampleCommand,
     example="python -m recipes.nano --recipe small --out runs/small --workers 2",
 )
@@ -122,8 +123,4 @@ def train(
 
 
 if __name__ == "__main__":
-    try:
-        command(prog_name="python -m recipes.nano")
-    except InfthorError as error:
-        print_error(str(error))
-        sys.exit(error.exit_code)
+    run_program(command)

@@ -5,7 +5,7 @@ as a model that is tuned on other homes would know them.
 """
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -123,25 +123,29 @@ def _means(rows: Sequence[tuple[float, ...]]) -> tuple[float, ...]:
     return tuple(sum(column) / len(rows) for column in zip(*rows, strict=True))
 
 
-def chance_of(questions: Sequence[Question]) -> float:
+def chance_of(questions: Sequence[Question], *, own: bool = False) -> float:
     """Return the mean strict score of an answer that is drawn from those to questions of one form.
 
     It is drawn from the different answers on other trajectories, or to other questions if all are
     on one; of none it is 0. A list that is drawn has partial credit, so for lists this is more than
     one over their number.
+
+    Args:
+        questions: the questions.
+        own: draw from all of their answers, the question's own included.
     """
     samples = list(map(sample_on_clues, questions))
     groups = list(map(held_out(samples), samples))
     holders: dict[str, set[str]] = {}  # of each answer, those who have it
     for question, group in zip(questions, groups, strict=True):
         holders.setdefault(doc_target(question).lower(), set()).add(group)
-    total = 0.0
+    totals: defaultdict[int, float] = defaultdict(float)  # by the number of answers drawn from
     golds = Counter((it.answers, group) for it, group in zip(questions, groups, strict=True))
     scored = cache(partial(score, scorer="strict"))
     for (gold, group), n in golds.items():
-        others = [answer for answer, has in holders.items() if has != {group}]
-        total += n * sum(scored(answer, gold) for answer in others) / max(1, len(others))
-    return total / len(questions)
+        drawn = [answer for answer, has in holders.items() if own or has != {group}]
+        totals[len(drawn)] += n * sum(scored(answer, gold) for answer in drawn)
+    return sum(total / n for n, total in totals.items() if n) / len(questions)
 
 
 def _yes_no(question: Question) -> str:

@@ -21,10 +21,10 @@ from dataclasses import dataclass, replace
 
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.docs import doc_target
+from infthor_eval.nieh.guessing.audit import chance_of
 from infthor_eval.nieh.guessing.blind import score_guesses
 from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS
-from infthor_eval.nieh.scoring import score
 
 MARGIN = 0.03
 
@@ -67,22 +67,8 @@ def balance(questions: Sequence[Question]) -> Balanced:
     means = [n_right / len(left) for n_right in _right_by_guesser(left, right)]
     best = max(range(len(means)), key=means.__getitem__)
     by_form = _by_form(left)
-    chance = sum(_chance(group) * len(group) for group in by_form.values()) / len(left)
+    chance = sum(chance_of(group, own=True) * len(group) for group in by_form.values()) / len(left)
     return Balanced(left, chance, GUESSERS[best].name, means[best], kept)
-
-
-def _chance(questions: Sequence[Question]) -> float:
-    """Return the mean strict score of an answer that is drawn from all those of a form.
-
-    Balance is one of the set's answers, so a question's own counts, which `audit.chance_of` leaves
-    out: of few trajectories nearly all others are wrong, and questions would go until none is left.
-    """
-    answers = {doc_target(question).lower() for question in questions}
-    golds = Counter(question.answers for question in questions)
-    total = sum(
-        n * sum(score(answer, gold, "strict") for answer in answers) for gold, n in golds.items()
-    )
-    return total / len(answers) / len(questions)
 
 
 def _name(question: Question) -> str:
@@ -148,7 +134,9 @@ def _surplus(
     """Return half of what each form's best guesser gets beyond chance, where above the margin."""
     surplus = {}
     for form, group in _by_form(questions).items():
-        chance = _chance(group)
+        # Without a question's own answer, of few trajectories nearly all others are wrong, and
+        # questions would go until none is left.
+        chance = chance_of(group, own=True)
         best = max(_right_by_guesser(group, right))
         if best > (chance + MARGIN) * len(group):
             surplus[form] = max(1, round((best - chance * len(group)) / 2))

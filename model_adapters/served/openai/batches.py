@@ -19,7 +19,6 @@ _PAGE = 100
 _CLOCKS_S = 86_400  # by which the server's clock may be ahead of ours, or behind
 _RUNNING = ("validating", "in_progress", "finalizing", "cancelling")
 _BUSY = "token_limit_exceeded"
-_EXPIRED = "batch_expired"
 _CANCELLED = "batch_cancelled"
 
 
