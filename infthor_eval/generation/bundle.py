@@ -5,24 +5,31 @@ of them. The copy of it in the set also has the digest of every file, so that a 
 the same files are built again.
 
 A set is built in a hidden folder within the new one, and moved out of it when it is whole. A build
-that was stopped goes on there with the trajectories that it had.
+that was stopped goes on there with the trajectories that it had. Twins are copied without what
+their questions do not need.
 """
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, TypeVar
 
 import msgspec
 from msgspec import Meta
+from msgspec.structs import replace
 from PIL import Image
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.reading import read_json
-from infthor_eval.generation.compact.twins import copy_compactly
+from infthor_eval.formats.shared_frames import write_frame_names
+from infthor_eval.formats.step_log import pack_steps
+from infthor_eval.formats.twins import ComparedFrame, TwinPair, read_pairs, write_pairs
+from infthor_eval.generation.compact.pictures import PictureStore
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.generate import GeneratedQuestions, generate_questions
 from infthor_eval.generation.replay_set import replay_set, select
@@ -44,6 +51,7 @@ _WORK = ".building-"  # of the hidden folder; the fingerprint of the manifest fo
 _TRAJECTORIES = "trajectories"
 _REPLAYED = "replayed"
 _SET = "set"
+_SET_INFO = "set.json"
 
 
 class TrajectoryRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -273,3 +281,56 @@ def _reduce_colors(path: Path, colors: int) -> None:
 def _digests(root: Path) -> dict[str, str]:
     files = sorted(path for path in root.rglob("*") if path.is_file() and path.name != MANIFEST)
     return {str(path.relative_to(root)): digest_of_file(path) for path in files}
+
+
+def copy_compactly(source: Path, out: Path, colors: int) -> None:
+    """Copy the worlds that questions are asked in: their logs, packed, and pictures.
+
+    Left out are drafts, trajectories (`traj_data.json`), and actions and states in words.
+
+    Args:
+        source: a set of twins.
+        out: folder of the copy, which exists and is empty.
+        colors: number of colours of the pictures of one base trajectory.
+
+    Raises:
+        DataError: the set cannot be read.
+    """
+    data = NiehSet(source)
+    by_base: dict[str, list[TwinPair]] = {}
+    pairs = read_pairs(source)
+    for pair in pairs:
+        by_base.setdefault(pair.base, []).append(pair)
+    names: dict[str, Sequence[str]] = {}
+    for group in by_base.values():
+        names.update(_copy_worlds(data, group, out, colors))
+    write_pairs(out, [_compared(pair, names) for pair in pairs])
+    for file in (_SET_INFO, *(f"{name}.csv" for name in data.files)):
+        shutil.copyfile(source / file, out / file)
+
+
+def _copy_worlds(
+    data: NiehSet, pairs: Sequence[TwinPair], out: Path, colors: int
+) -> Iterator[tuple[str, Sequence[str]]]:
+    """Copy the worlds of one base trajectory, and yield the names of each one's pictures."""
+    worlds: dict[str, Sequence[FrameRef]] = {
+        name: data.frames(name) for pair in pairs for name in pair.traj_ids
+    }
+    pictures = PictureStore(out, chain.from_iterable(worlds.values()), colors)
+    for name, frames in worlds.items():
+        folder = out / "metadata" / name
+        folder.mkdir(parents=True)
+        stored = [pictures.name(frame) for frame in frames]
+        write_frame_names(folder, stored, packed=True)
+        pack_steps(data.folder(name), folder)
+        yield name, stored
+
+
+def _compared(pair: TwinPair, names: Mapping[str, Sequence[str]]) -> TwinPair:
+    """Return a pair with what is equal now: fewer colours can make more pictures equal."""
+    stored = zip(*(names[world] for world in pair.traj_ids), strict=True)
+    frames = (
+        ComparedFrame(first == second, frame.changed)
+        for frame, (first, second) in zip(pair.frames, stored, strict=True)
+    )
+    return replace(pair, frames=tuple(frames))

@@ -14,10 +14,10 @@ from infthor_eval.generation.bundle import (
     MANIFEST,
     TwinsManifest,
     build_twins,
+    copy_compactly,
     differing_files,
     read_manifest,
 )
-from infthor_eval.generation.compact.twins import copy_compactly
 from infthor_eval.nieh.scoring import score
 from infthor_eval.storage.digests import digest_of_file
 from infthor_eval.storage.folders import packaged_folder

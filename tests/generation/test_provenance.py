@@ -7,8 +7,8 @@ import json
 import pytest
 
 from infthor_eval.errors import UsageError
-from infthor_eval.generation import provenance as module
-from infthor_eval.generation.provenance import provenance
+from infthor_eval.generation import draft as module
+from infthor_eval.generation.draft import provenance
 
 from ..helpers.command_line import option_words
 

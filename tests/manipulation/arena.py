@@ -8,11 +8,11 @@ from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.manipulation.actors import ArmActor, ArmSituation, Step
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, Grasp
+from infthor_eval.manipulation.evaluation import ArmRunner
 from infthor_eval.manipulation.expert import replay_expert
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import ArmRecord
-from infthor_eval.manipulation.runner import ArmRunner
 from infthor_eval.manipulation.task import ManipulationTask
 from infthor_eval.manipulation.trajectories import ArmEpisode, arm_episodes
 from infthor_eval.runs import TaskFile, TaskRequest

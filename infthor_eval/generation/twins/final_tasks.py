@@ -6,13 +6,15 @@ walk, so that no plan says where the object is. In both worlds the planner carri
 
 import random
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import msgspec
+from msgspec.structs import replace
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.trajectory import SubTask, SubTrajectory, Trajectory, encode_trajectory
@@ -29,9 +31,9 @@ from infthor_eval.generation.twins.drafting import (
     name_worlds,
 )
 from infthor_eval.generation.twins.episode import Episode, read_episode
-from infthor_eval.generation.twins.final_places import Errand, errands
+from infthor_eval.generation.twins.exchanges import Exchange
+from infthor_eval.generation.twins.final_places import Errand, are_apart, errands, place_in
 from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Proposal, Worlds
-from infthor_eval.generation.twins.prospects import Prospects, seen_around
 from infthor_eval.generation.twins.rewriting import without_traces
 from infthor_eval.generation.walking import Walker
 from infthor_eval.household.first_place import FirstPlace, first_place, is_looked_at
@@ -41,7 +43,7 @@ from infthor_eval.storage.digests import digest
 from infthor_eval.storage.files import file_name, write_atomically
 from infthor_eval.thor.recorder import object_log
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import AgentPose
+from infthor_eval.thor.view import AgentPose, teleport_call
 
 # Kinds of edits after which an object may be far from where it is in the twin.
 MOVING_KINDS = ("swap", "swap-task", "move")
@@ -50,6 +52,10 @@ _MOST_STEPS = 30  # of the planner to the object, so that the limit of a plan le
 _LEAST_STEPS = 40  # of the history
 _TRIALS = 4  # final tasks at most that are carried out for one pair
 _WORLD = "twin"  # what a world is called before it has its name
+# Degrees of the agent, and of its camera, in looking around.
+_HEADINGS = (0.0, 90.0, 180.0, 270.0)
+_HORIZONS = (0.0, 30.0)
+_MIN_PIXELS = 45  # of 90,000: half of what counts as shown
 
 
 class FinalTaskDraft(msgspec.Struct):
@@ -109,7 +115,7 @@ class _Maker:
         self._episode = episode
         self._replays = replays
         self._out = out
-        self._prospects = Prospects(episode, replays.simulator, _LEAST_STEPS)
+        self._prospects = _Prospects(episode, replays.simulator, _LEAST_STEPS)
 
     def try_kind(self, name: str) -> None:
         """Try the edits of a kind until enough are kept, or have been proposed."""
@@ -266,7 +272,7 @@ class _FinalRun:
         object_type = simulator.view.objects[item].object_type
         self.task = Task(TaskType.PLACE, object_type, receptacle)
         start = simulator.view.agent
-        if item in seen_around(simulator):
+        if item in _seen_around(simulator):
             raise Difference("the object is seen by looking around")
         self.trace = Trace(simulator, len(world.plan.high_pddl))
         rollout = Rollout(self.trace, Walker(self.trace))
@@ -341,3 +347,79 @@ def _tasks(world: Trajectory) -> list[SubTask]:
     final = world.long_horizon_task
     apart = final is not None and len(world.sub_trajs) == len(world.sub_tasks) + 1
     return [*world.sub_tasks, final] if apart and final is not None else list(world.sub_tasks)
+
+
+class _Prospects:
+    """Where the history of an episode may end, and what an agent that turns around sees there.
+
+    Attributes:
+        seen: ids of the objects that are seen by turning around, by the frame of each end.
+    """
+
+    def __init__(self, episode: Episode, simulator: Simulator, least_steps: int) -> None:
+        """Carry the episode out, and look around after each sub-goal.
+
+        Args:
+            episode: the episode.
+            simulator: a simulator.
+            least_steps: actions of the shortest history.
+
+        Raises:
+            SimulatorError: the simulator fails.
+        """
+        self._episode = episode
+        low_actions = episode.trajectory.plan.low_actions
+        ends = {low.high_idx: number for number, low in enumerate(low_actions, 1)}
+        report = ReplayReport(episode.trajectory.traj_id, "", "")
+        replayed = ActionReplay(simulator, episode.trajectory, report)
+        self.seen: Mapping[int, frozenset[str]] = {}
+        seen = {}
+        for number, low in enumerate(low_actions, 1):
+            replayed.execute(number - 1, low)
+            if number >= least_steps and number in ends.values():
+                seen[number] = _seen_around(simulator)
+        self.seen = seen
+
+    def may_be_needed(self, proposal: Proposal) -> bool:
+        """Return whether an edit may give a final task; of other edits than exchanges, True.
+
+        After an exchange an object is where its partner is in the episode.
+        """
+        if not isinstance(proposal, Exchange):
+            return True
+        history = self._episode.history
+        return any(
+            self._fits(history, end, [proposal.partner(world, obj).object_id for world in (0, 1)])
+            for obj, end in product(proposal.objects, self.seen)
+            if history.is_only_one(0, obj.object_id)
+        )
+
+    def hides(self, end: int, keys: Sequence[str]) -> bool:
+        """Return True if an agent at the end of a history sees none of these by turning around."""
+        return not self.seen.get(end, frozenset()) & set(keys)
+
+    def _fits(self, history: TrajectoryHistory, end: int, keys: Sequence[str]) -> bool:
+        if not self.hides(end, keys) or any(s.held for s in history.states(end).values()):
+            return False
+        fixtures = self._episode.start.objects
+        try:
+            one, other = (place_in(history, end, key, fixtures) for key in keys)
+        except Difference:
+            return False
+        return are_apart((one, other), fixtures)
+
+
+def _seen_around(simulator: Simulator) -> frozenset[str]:
+    """Return the ids of the objects that an agent sees that turns around where it stands.
+
+    Raises:
+        SimulatorError: the simulator fails.
+    """
+    start = simulator.view.agent
+    seen: set[str] = set()
+    for heading, horizon in product(_HEADINGS, _HORIZONS):
+        pose = replace(start, rotation=heading, horizon=horizon)
+        instances = simulator.query(**teleport_call(pose), renderImage=False).instances or {}
+        seen |= {key for key, instance in instances.items() if instance.pixels >= _MIN_PIXELS}
+    simulator.query(**teleport_call(start), renderImage=False)
+    return frozenset(seen)

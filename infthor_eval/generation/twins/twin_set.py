@@ -1,7 +1,8 @@
 """Making the twins of many trajectories into one set; the same command resumes an interrupted run.
 
 The draft of each trajectory is written when its worlds are complete, and is not made again. The
-choice of questions is made at the end, from all drafts, so it does not depend on the workers.
+balanced choice of questions is made at the end, from all drafts, so it does not depend on the
+workers.
 """
 
 import time
@@ -18,13 +19,12 @@ from infthor_eval.errors import DataError, InfthorError
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.set_info import claim_for_simulator
-from infthor_eval.formats.twins import TwinPair, write_pairs
+from infthor_eval.formats.twins import PairedQuestion, TwinPair, write_pairs
 from infthor_eval.generation.replay_set import Selection
 from infthor_eval.generation.simulator_jobs import (
     SimulatorWorker,
     collect_outcomes,
 )
-from infthor_eval.generation.twins.choosing import ChosenQuestion, choose_pairs
 from infthor_eval.generation.twins.draft_files import (
     DRAFTS,
     DraftOutcome,
@@ -34,12 +34,31 @@ from infthor_eval.generation.twins.draft_files import (
     failure_line,
 )
 from infthor_eval.generation.twins.drafting import TwinDraft, TwinSettings, draft_twins
+from infthor_eval.generation.twins.final_tasks import (
+    TRAJECTORIES,
+    FinalTaskDraft,
+    draft_final_tasks,
+)
 from infthor_eval.generation.twins.pairing import ScoreReply
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings, run_jobs
 
+_MOST = 0.3  # of a set's pairs are of one kind, if there are enough kinds for that
 _QUESTIONS = "qa_set_twins.csv"
+
+
+@dataclass(frozen=True)
+class _ChosenQuestion:
+    """A question of a pair of worlds."""
+
+    pair: TwinPair
+    question: PairedQuestion
+
+    @property
+    def fact(self) -> str:
+        """Name of the fact, in the whole set."""
+        return f"{self.pair.id}/{self.question.fact}"
 
 
 class TwinSummary(msgspec.Struct):
@@ -140,9 +159,9 @@ def _require_distinct(drafts: Iterable[TwinDraft]) -> None:
             raise DataError(f"{name}: two worlds have this name; choose another --seed and --out")
 
 
-def _write_set(out: Path, chosen: Sequence[ChosenQuestion]) -> None:
+def _write_set(out: Path, chosen: Sequence[_ChosenQuestion]) -> None:
     """Write pairs and questions; both worlds' questions have the name of their pair."""
-    by_pair: dict[str, list[ChosenQuestion]] = {}
+    by_pair: dict[str, list[_ChosenQuestion]] = {}
     for one in sorted(chosen, key=lambda one: (one.pair.id, one.question.text)):
         by_pair.setdefault(one.pair.id, []).append(one)
     pairs: list[TwinPair] = []
@@ -156,7 +175,7 @@ def _write_set(out: Path, chosen: Sequence[ChosenQuestion]) -> None:
     write_questions(out / _QUESTIONS, questions)
 
 
-def _question(chosen: ChosenQuestion, number: int, side: int) -> Question:
+def _question(chosen: _ChosenQuestion, number: int, side: int) -> Question:
     paired = chosen.question
     return Question(
         chosen.pair.traj_ids[side],
@@ -175,7 +194,7 @@ class _Numbers:
     """Counts drafts, and what was chosen of them."""
 
     drafts: Sequence[TwinDraft]
-    chosen: Sequence[ChosenQuestion]
+    chosen: Sequence[_ChosenQuestion]
 
     def summary(self, n_resumed: int, failures: list[str], seconds: float) -> TwinSummary:
         """Return the numbers of the set."""
@@ -195,3 +214,127 @@ class _Numbers:
             failures=failures,
             seconds=seconds,
         )
+
+
+def choose_pairs(
+    trajectories: Sequence[Sequence[TwinPair]], per_trajectory: int
+) -> list[_ChosenQuestion]:
+    """Choose paired questions, so that kinds, forms and facts are about as frequent as each other.
+
+    Args:
+        trajectories: the pairs of worlds of each trajectory.
+        per_trajectory: most questions of one trajectory.
+    """
+    counts: Counter[tuple[str, str]] = Counter()
+    remaining = [
+        [_ChosenQuestion(pair, question) for pair in pairs for question in pair.questions]
+        for pairs in trajectories
+    ]
+    chosen: list[_ChosenQuestion] = []
+    # Round by round, so that no trajectory takes all of what is seldom.
+    for _ in range(per_trajectory):
+        for candidates in remaining:
+            if candidates:
+                best = min(candidates, key=lambda candidate: _use(counts, candidate))
+                candidates.remove(best)
+                chosen.append(best)
+                counts.update(_keys(best))
+    return _without_excess(chosen)
+
+
+def _keys(candidate: _ChosenQuestion) -> list[tuple[str, str]]:
+    return [
+        ("fact", candidate.fact),
+        ("kind", candidate.pair.kind),
+        ("form", candidate.question.form),
+    ]
+
+
+def _use(counts: Counter[tuple[str, str]], candidate: _ChosenQuestion) -> tuple[int, int, str]:
+    fact, kind, form = (counts[key] for key in _keys(candidate))
+    return fact, kind + form, f"{candidate.pair.id}/{candidate.question.text}"
+
+
+def _without_excess(chosen: Iterable[_ChosenQuestion]) -> list[_ChosenQuestion]:
+    """Leave out the last of kinds that are too frequent."""
+    kept = list(chosen)
+    kinds = Counter(candidate.pair.kind for candidate in kept)
+    while kept and len(kinds) * _MOST > 1:
+        kind, count = max(kinds.items(), key=lambda item: (item[1], item[0]))
+        if count <= _MOST * len(kept):
+            break
+        last = max(index for index, one in enumerate(kept) if one.pair.kind == kind)
+        del kept[last]
+        kinds[kind] -= 1
+    return kept
+
+
+class FinalTaskSummary(msgspec.Struct):
+    """Numbers of a set of twins for agents, as `--json` prints them.
+
+    Attributes:
+        trajectories: number of trajectories that twins were made of.
+        resumed: number of these of earlier runs.
+        proposed: number of proposed edits by kind.
+        kept: number of those that became a pair, by kind.
+        rejected: number of the others by reason.
+        pairs: number of pairs.
+        failures: trajectories that twins cannot be made of, one line each.
+        seconds: wall time of this run.
+    """
+
+    trajectories: int
+    resumed: int
+    proposed: dict[str, int]
+    kept: dict[str, int]
+    rejected: dict[str, int]
+    pairs: int
+    failures: list[str]
+    seconds: float
+
+
+def make_final_tasks(
+    selection: Selection,
+    launch: Launch,
+    out: Path,
+    settings: TwinSettings,
+    *,
+    worker_settings: WorkerSettings,
+    progress: Callable[[bool], None] = lambda _: None,
+    say: Callable[[str], None] = lambda _: None,
+) -> FinalTaskSummary:
+    """Make twins with final tasks; arguments and errors are those of `make_twins`."""
+    started = time.monotonic()
+    for name in (TRAJECTORIES, DRAFTS):
+        (out / name).mkdir(parents=True, exist_ok=True)
+    claim_for_simulator(out, launch.label)
+    run_job = partial(_draft_final_task, out=out, settings=settings)
+    start = partial(SimulatorWorker, partial(Simulator, launch), run_job)
+    items = selection.items
+
+    def failed(number: int, error: InfthorError) -> DraftOutcome[FinalTaskDraft]:
+        return DraftOutcome[FinalTaskDraft](failure=failure_line(items[number], error))
+
+    outcomes = collect_outcomes(run_jobs(start, items, worker_settings, say), failed, progress)
+    failures = [failure.message for failure in selection.failures]
+    failures += [outcome.failure for outcome in outcomes if outcome.failure]
+    drafts = [outcome.draft for outcome in outcomes if outcome.draft is not None]
+    proposed, kept, rejected = count_edits(drafts)
+    return FinalTaskSummary(
+        trajectories=len(drafts),
+        resumed=sum(outcome.is_resumed for outcome in outcomes),
+        proposed=proposed,
+        kept=kept,
+        rejected=rejected,
+        pairs=sum(len(draft.worlds) for draft in drafts),
+        failures=failures,
+        seconds=round(time.monotonic() - started, 1),
+    )
+
+
+def _draft_final_task(
+    item: Item, simulator: Simulator, out: Path, settings: TwinSettings
+) -> DraftOutcome[FinalTaskDraft]:
+    source, trajectory = item
+    make = partial(draft_final_tasks, trajectory, source.digest, settings, simulator, out)
+    return draft_item(item, out, settings, FinalTaskDraft, make)

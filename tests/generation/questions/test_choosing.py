@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_eval.generation.questions.candidates import Candidate
-from infthor_eval.generation.questions.choosing import Chooser
+from infthor_eval.generation.questions.generate import Chooser
 
 OBJECTS = ("Mug", "Fridge", "Sofa", "Bed")
 FORMS = {

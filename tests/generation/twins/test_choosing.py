@@ -3,7 +3,7 @@
 from collections import Counter
 
 from infthor_eval.formats.twins import PairedQuestion, TwinPair
-from infthor_eval.generation.twins.choosing import choose_pairs
+from infthor_eval.generation.twins.twin_set import choose_pairs
 
 
 def question(fact, form="Was {} open?"):

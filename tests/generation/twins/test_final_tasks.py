@@ -7,7 +7,7 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.generation.replay_set import select
 from infthor_eval.generation.twins.drafting import TwinSettings
-from infthor_eval.generation.twins.final_task_set import make_final_tasks
+from infthor_eval.generation.twins.twin_set import make_final_tasks
 from infthor_eval.household.first_place import apart, is_looked_at
 from infthor_eval.household.scout import reachable_grid
 from infthor_eval.plans.environment import PlanEnvironment

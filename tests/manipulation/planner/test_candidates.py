@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from infthor_eval.manipulation.geometry import Corners
-from infthor_eval.manipulation.planner.candidates import PutGoal, passing_poses, release_poses
 from infthor_eval.manipulation.planner.linkage import ArmStand
 from infthor_eval.manipulation.planner.obstacles import obstacles_of
 from infthor_eval.manipulation.planner.places import Entry, Places, support
+from infthor_eval.manipulation.planner.putting import PutGoal, passing_poses, release_poses
 from infthor_eval.manipulation.planner.roadmap import Contact, Terrain
 
 from .test_places import lattice

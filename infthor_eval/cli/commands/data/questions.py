@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from infthor_eval.generation.twins.final_task_set import FinalTaskSummary
-    from infthor_eval.generation.twins.twin_set import TwinSummary
+    from infthor_eval.generation.twins.twin_set import FinalTaskSummary, TwinSummary
 
 
 @click.command(
@@ -175,8 +174,7 @@ def twins(
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.generation.replay_set import select
     from infthor_eval.generation.twins.drafting import TwinSettings
-    from infthor_eval.generation.twins.final_task_set import make_final_tasks
-    from infthor_eval.generation.twins.twin_set import make_twins
+    from infthor_eval.generation.twins.twin_set import make_final_tasks, make_twins
     from infthor_eval.nieh.scoring import score
     from infthor_eval.storage.files import hold_folder
     from infthor_eval.terminal import console, error_console, progress_bar
