@@ -5,8 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from infthor_sim.arm.metadata import arm_metadata
-from infthor_sim.geometry import Array, corners, euler_matrix, matrix_euler, round_vector, round_xyz
+from infthor_sim.arm.arm import Arm
+from infthor_sim.arm.holding import touched_objects
+from infthor_sim.geometry import (
+    Array,
+    axis_angle,
+    corners,
+    euler_matrix,
+    matrix_euler,
+    round_vector,
+    round_xyz,
+)
 from infthor_sim.objects import DOOR_SWING, SimObject
 from infthor_sim.physics.obstacles import door_leaf
 from infthor_sim.pictures.cameras import ThirdPartyCamera, map_camera
@@ -21,6 +30,9 @@ _LEGACY: dict[str, Any] = {
     "actionFloatReturn": 0.0, "actionFloatsReturn": [], "actionStringsReturn": [],
     "actionVector3sReturn": [],
 }  # fmt: skip
+_DIGITS = 6
+
+
 """Keys of old actions, which Unity sends empty with every reply."""
 
 
@@ -125,7 +137,7 @@ def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
         },
         "heldObjectPose": pose,
         "hand": pose,
-        "arm": None if world.arm is None else arm_metadata(world, world.arm),
+        "arm": None if world.arm is None else _arm_metadata(world, world.arm),
         "fov": sim.settings.field_of_view,
         "cameraPosition": round_xyz(agent.camera_position()),
         "cameraOrthSize": _orthographic_size(sim, outcome),
@@ -218,3 +230,48 @@ def _axis_aligned(item: SimObject) -> dict[str, Any]:
 def _box(center: Any, size: Any) -> dict[str, Any]:
     points = [round_vector(point) for point in corners(center, size)]
     return {"cornerPoints": points, "center": round_xyz(center), "size": round_xyz(size)}
+
+
+def _arm_metadata(world: World, arm: Arm) -> dict[str, Any]:
+    """Return the arm as AI2-THOR reports it: metres; rotations as axis and `w`, degrees."""
+    near = touched_objects(world, arm)
+    return {
+        "joints": _joints(world, arm),
+        "heldObjects": list(arm.held),
+        "pickupableObjects": [o.object_id for o in near.pickupable],
+        "touchedNotHeldObjects": [o.object_id for o in near.loose],
+        "handSphereCenter": round_xyz(arm.sphere(world.agent)),
+        "handSphereRadius": arm.radius,
+    }
+
+
+def _joints(world: World, arm: Arm) -> list[dict[str, Any]]:
+    base = arm.base(world.agent)
+    joints = arm.rig.joints([arm.pose])
+    listed: list[dict[str, Any]] = []
+    parent = np.eye(3)
+    for name, position, turn in zip(
+        arm.rig.joint_names, joints.positions[0], joints.turns[0], strict=True
+    ):
+        listed.append({
+            "name": name,
+            "position": round_xyz(base.point(position)),
+            "rootRelativePosition": round_xyz(position),
+            "rotation": _axis_angle(base.turn @ turn),
+            "rootRelativeRotation": _axis_angle(turn),
+            "localRotation": _axis_angle(parent.T @ turn),
+            "armBaseHeight": None,
+            "elbowOrientation": None,
+        })  # fmt: skip
+        parent = turn
+    if arm.rig.has_elbow:  # Unity reports these with the first joint alone
+        listed[0] |= {
+            "armBaseHeight": round(arm.pose.base, _DIGITS),
+            "elbowOrientation": round(arm.pose.elbow, _DIGITS),
+        }
+    return listed
+
+
+def _axis_angle(turn: Array) -> dict[str, float]:
+    axis, degrees = axis_angle(turn)
+    return {**round_xyz(axis), "w": round(degrees, _DIGITS)}

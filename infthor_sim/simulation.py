@@ -1,20 +1,35 @@
-"""A running simulator's state: scene, settings, cameras, random numbers, saved states."""
+"""A running simulator's state: scene, settings, cameras, random numbers, saved states.
 
-from collections.abc import Iterator
+Each agent mode has its camera and arm.
+"""
+
+import copyreg
+import io
+import pickle
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from infthor_sim.arm.equipment import equip
+from infthor_sim.agent import CAMERA_HEIGHT, CROUCH, MAX_DOWN
+from infthor_sim.arm.arm import Arm
+from infthor_sim.arm.holding import drop_all
+from infthor_sim.arm.kinova import Kinova
+from infthor_sim.arm.rig import Rig
+from infthor_sim.arm.stretch import Stretch
+from infthor_sim.object_types import ObjectType, type_named
 from infthor_sim.objects import SimObject
 from infthor_sim.physics.crowd import set_agent_count
+from infthor_sim.physics.falling import let_fall
 from infthor_sim.pictures.cameras import ThirdPartyCamera
 from infthor_sim.pictures.views import Display, Views
 from infthor_sim.pictures.vision import AgentVision
-from infthor_sim.saved_state import SavedState
 from infthor_sim.scenes.catalogue import Catalogue
-from infthor_sim.settings import SimulatorSettings
+from infthor_sim.settings import LOCOBOT, SimulatorSettings
 from infthor_sim.world import World
+
+_RIGS: dict[str, type[Kinova] | type[Stretch]] = {"arm": Kinova, "stretch": Stretch}
 
 
 @dataclass
@@ -56,7 +71,7 @@ class Simulation:
         self.cameras.clear()
         self.object_filter = None
         self.random = np.random.default_rng(world.seed)
-        self._saved: dict[int, SavedState] = {}
+        self._saved: dict[int, _SavedState] = {}
         equip(world, self.settings.agent_mode)
         self.world = world
         self._show(world)
@@ -78,7 +93,7 @@ class Simulation:
 
     def save(self, slot: int) -> None:
         """Keep a copy of the scene's state and random numbers, in place of what the slot held."""
-        self._saved[slot] = SavedState(self.world, self.random)
+        self._saved[slot] = _SavedState(self.world, self.random)
 
     def restore(self, slot: int) -> bool:
         """Bring back a slot's state, which stays kept; return False if none is of this scene."""
@@ -131,3 +146,65 @@ class Simulation:
         return [
             o for o in objects if self.object_filter is None or o.object_id in self.object_filter
         ]
+
+
+class _Camera(NamedTuple):
+    """The camera of an agent mode, from Unity's sources.
+
+    Attributes:
+        eye: position relative to the agent's (right, up, ahead), metres.
+        crouch: metres that crouching lowers it.
+        max_down: degrees that it tilts below the horizon at most.
+    """
+
+    eye: tuple[float, float, float]
+    crouch: float
+    max_down: float
+
+
+_USUAL = _Camera((0.0, CAMERA_HEIGHT, 0.0), CROUCH, MAX_DOWN)
+
+
+_CAMERAS = {
+    "stretch": _Camera((0.00192, 0.5447, 0.06788), 0.0, MAX_DOWN),
+    LOCOBOT: _Camera((0.0, -0.0312, 0.0), 0.0, 30.0),
+}
+
+
+def equip(world: World, agent_mode: str) -> None:
+    """Give an agent the camera and the resting arm of an agent mode; what it held falls."""
+    if world.arm is not None:
+        drop_all(world, world.arm)
+    rig: Rig | None = _RIGS[agent_mode]() if agent_mode in _RIGS else None
+    if (rig is not None or agent_mode == LOCOBOT) and world.agent.held is not None:
+        held = world.objects[world.agent.held]
+        world.let_go(held)
+        let_fall(world, held, held.center)
+    world.arm = None if rig is None else Arm(rig, rig.rest())
+    camera = _CAMERAS.get(agent_mode, _USUAL)
+    world.agent.eye, world.agent.crouch, world.agent.max_down = camera
+    world.mark_changed()
+
+
+class _SavedState:
+    """A copy of a world and of the random numbers that its actions draw.
+
+    Pickled bytes are several times quicker to make and to read than copied objects.
+    """
+
+    def __init__(self, world: World, random: np.random.Generator) -> None:
+        buffer = io.BytesIO()
+        pickler = pickle.Pickler(buffer, protocol=pickle.HIGHEST_PROTOCOL)
+        pickler.dispatch_table = {**copyreg.dispatch_table, ObjectType: _reduce_type}
+        pickler.dump((world, random))
+        self._content = buffer.getvalue()
+
+    def copy(self) -> tuple[World, np.random.Generator]:
+        """Return the state anew; it shares nothing with earlier copies."""
+        world, random = pickle.loads(self._content)
+        return world, random
+
+
+def _reduce_type(record: ObjectType) -> tuple[Callable[[str], ObjectType], tuple[str]]:
+    """Have a type's record looked up again: it is never changed, so states can share it."""
+    return type_named, (record.name,)

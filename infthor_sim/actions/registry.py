@@ -1,15 +1,17 @@
 # ruff: noqa: SIM905 - tables of names read best as words
-"""The table of actions, and the checks of their arguments, which imitate Unity's dispatcher."""
+"""The table of actions, and the checks of their arguments, which imitate Unity's dispatcher.
+
+Messages about wrong arguments print their types in Unity's words.
+"""
 
 import inspect
 import json
 import types
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Concatenate, TypeGuard
 
-from infthor_sim.actions.signatures import Vector3, type_name, unknown_arguments_text
 from infthor_sim.errors import ActionError, ErrorCode
 from infthor_sim.settings import AGENT_MODES
 from infthor_sim.simulation import Simulation
@@ -109,7 +111,7 @@ def bind(message: Mapping[str, Any], mode: str = "default") -> tuple[Action, dic
         if key not in called.parameters or (key in other_names and passed[key] is not None)
     ]
     if unknown and not called.lenient:
-        text = unknown_arguments_text(called.name, unknown, called.parameters, passed)
+        text = _unknown_arguments_text(called.name, unknown, called.parameters, passed)
         raise ActionError(text, ErrorCode.INVALID_ARGUMENT)
     arguments = {key: value for key, value in passed.items() if key in called.parameters}
     for key, value in arguments.items():
@@ -147,7 +149,7 @@ def _check_type(called: Action, key: str, value: Any) -> None:
     annotation = called.parameters[key].annotation
     if _matches(value, annotation):
         return
-    expected = type_name(annotation)
+    expected = _type_name(annotation)
     text = value if isinstance(value, str) else json.dumps(value)
     # Unity's dispatcher converts scalars itself and reports a code. A scalar in place of a vector
     # or list fails earlier, in its JSON parser, without a code.
@@ -198,3 +200,44 @@ def is_vector(value: Any) -> TypeGuard[dict[str, float]]:
 def _is_number(value: Any) -> bool:
     """Return whether a value is a finite number of usable size; Python's JSON has NaN, too."""
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _LARGEST
+
+
+class Vector3(dict[str, float]):
+    """A position (metres) or rotation (degrees): `{"x", "y", "z"}`, any of them absent."""
+
+
+_SCALARS = {int: "int", float: "float", str: "String", bool: "Boolean", Vector3: "Vector3"}
+
+
+def _type_name(annotation: Any) -> str:
+    """Return Unity's name of a type; an optional type is called as its value."""
+    origin = typing.get_origin(annotation)
+    inner = typing.get_args(annotation)
+    if origin in (types.UnionType, typing.Union):
+        return _type_name(next(option for option in inner if option is not types.NoneType))
+    if origin is list:
+        return f"{_type_name(inner[0])}[]"
+    return _SCALARS.get(annotation, "Object")
+
+
+def _unknown_arguments_text(
+    name: str, unknown: Sequence[str], parameters: Mapping[str, inspect.Parameter], passed: Any
+) -> str:
+    """Return Unity's message about unknown arguments, with those that the action takes."""
+    plural = "s" if len(unknown) > 1 else ""
+    expected = ", ".join(_parameter_text(parameter) for parameter in parameters.values())
+    return (
+        f'\n\tAction: "{name}" called with invalid argument{plural}: {_quote(unknown)}'
+        f"\n\tExpected arguments: {expected}\n\tYour arguments: {_quote(passed)}"
+    )
+
+
+def _parameter_text(parameter: inspect.Parameter) -> str:
+    text = f"{_type_name(parameter.annotation)} {parameter.name}"
+    if parameter.default is inspect.Parameter.empty:
+        return text
+    return f"{text} = {'' if parameter.default is None else parameter.default}"
+
+
+def _quote(names: Any) -> str:
+    return ", ".join(f"'{name}'" for name in names)

@@ -1,6 +1,6 @@
 """The interface of an arm: a pose, and a rig that computes joints and boxes from it.
 
-To add a robot arm: a rig in this package, and its line in `infthor_sim/arm/equipment.py`.
+To add a robot arm: a rig in this package, and its line in `infthor_sim/simulation.py`.
 """
 
 from collections.abc import Sequence

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_sim.metadata import Outcome
-from infthor_sim.player.packing import MetadataPacker
+from infthor_sim.player.server import MetadataPacker
 
 from .harness import Bench
 from .test_invariants import PROPERTY, SCENES, STEP, play

@@ -274,14 +274,14 @@ def test_unknown_types_are_plain_boxes():
 
 
 def test_kernels_are_recompiled_when_a_source_changes(tmp_path):
-    from infthor_sim.render import kernel_cache
+    from infthor_sim.render import picture
 
-    for name in kernel_cache._SOURCES:
+    for name in picture._SOURCES:
         (tmp_path / name).write_text("a = 1", encoding="ascii")
-    kernel_cache.drop_stale_kernels(tmp_path)
+    picture.drop_stale_kernels(tmp_path)
     compiled = tmp_path / "__pycache__" / "shading_numba._shade-1.py311.1.nbc"
     compiled.write_text("", encoding="ascii")
-    assert not kernel_cache.drop_stale_kernels(tmp_path)
+    assert not picture.drop_stale_kernels(tmp_path)
     (tmp_path / "patterns.py").write_text("a = 2", encoding="ascii")
-    assert kernel_cache.drop_stale_kernels(tmp_path)
+    assert picture.drop_stale_kernels(tmp_path)
     assert not compiled.exists()

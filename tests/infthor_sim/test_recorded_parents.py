@@ -5,8 +5,7 @@ from collections.abc import Iterator, Sequence
 import pytest
 
 from infthor_sim.rearrange import NamedPose, set_poses
-from infthor_sim.scenes.catalogue import Catalogue
-from infthor_sim.scenes.dataset import FloorPlanData
+from infthor_sim.scenes.catalogue import Catalogue, FloorPlanData
 
 from .conftest import need_data
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from infthor_sim.arm.equipment import equip
 from infthor_sim.arm.sweep import moving_boxes, stance
+from infthor_sim.simulation import equip
 
 from ..harness import Bench
 

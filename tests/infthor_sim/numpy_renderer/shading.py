@@ -15,8 +15,8 @@ from infthor_sim.render.lighting import (
     SUN_DIRECTION,
     Lights,
 )
-from infthor_sim.render.normals import surface
 from infthor_sim.render.patterns import PATTERNS
+from infthor_sim.render.picture import surface
 from infthor_sim.render.primitives import COLOR, EMISSION, MATERIAL
 
 __all__ = ["brightness_at", "crease_factors", "shade"]
