@@ -4,7 +4,7 @@ The checks use the protocols only, so they apply to every back end. A violated c
 error of one line.
 
 To add or change a rule of adapters' contract: a check here, its line in `contract.py: model_checks`
-or `policy.py: policy_checks`, and in `docs/own-models.md`.
+or `policy_checks` there, and in `docs/own-models.md`.
 """
 
 from model_adapters.check.clauses import ContractError

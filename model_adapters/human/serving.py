@@ -8,7 +8,7 @@ import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from socket import socket
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 from starlette.background import BackgroundTask
@@ -21,8 +21,8 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.pages.server import file_route, serve_pages
 from model_adapters.human.adapter import HumanOptions
-from model_adapters.human.desk import Desk, StaleError
-from model_adapters.human.view import frames_of, state_of
+from model_adapters.human.desk import Desk, Question, StaleError
+from model_adapters.protocols import Turn
 
 _WAIT_S = 20.0  # a page asks again after so long without a change
 _LOOK_S = 0.03  # and hears of one so soon
@@ -90,7 +90,7 @@ class _Page:
             with self._desk.reading():
                 while self._desk.version == seen and time.monotonic() < end:
                     await asyncio.sleep(_LOOK_S)
-        state = state_of(self._desk)
+        state = _state_of(self._desk)
         told = BackgroundTask(self._desk.tell_closed) if state["closed"] else None
         return JSONResponse(state, background=told)
 
@@ -99,7 +99,7 @@ class _Page:
         question = self._desk.question
         if question is None or question.number != _number(request.path_params["number"]):
             return _problem("this question is not asked any more", 409)
-        frames = frames_of(question.inquiry.turns)
+        frames = _frames_of(question.inquiry.turns)
         index = _number(request.path_params["index"])
         if index is None or index >= len(frames):
             return _problem("there is no such frame", 404)
@@ -141,7 +141,7 @@ def _take(desk: Desk, form: _AnswerForm) -> Response:
         and text not in question.inquiry.decoding.choices
     ):
         return _problem("only the listed replies are possible here", 400)
-    n_frames = 0 if question is None else len(frames_of(question.inquiry.turns))
+    n_frames = 0 if question is None else len(_frames_of(question.inquiry.turns))
     try:
         desk.give(form.number, text, min(max(0, form.watched), n_frames))
     except StaleError:
@@ -174,3 +174,54 @@ def _has_screen() -> bool:
     return sys.platform in ("darwin", "win32") or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )
+
+
+def _state_of(desk: Desk) -> dict[str, Any]:
+    """Return what the page shows now.
+
+    `parts` has the texts and frames that a model would be given, in order: `{"text": ...}` or
+    `{"frame": n}`, n being the frame's place among all frames.
+    """
+    version = desk.version
+    question = desk.question
+    return {
+        "version": version,
+        "closed": desk.is_closed,
+        "stopped": desk.is_stopped,
+        "answered": desk.n_answered,
+        "question": None if question is None else _question(question),
+    }
+
+
+def _frames_of(turns: tuple[Turn, ...]) -> list[FrameRef]:
+    """Return all frames, in the order in which a model is given them."""
+    return [part for turn in turns for part in turn.parts if isinstance(part, FrameRef)]
+
+
+def _parts(turns: tuple[Turn, ...]) -> Iterator[dict[str, Any]]:
+    n_frames = 0
+    for turn in turns:
+        for part in turn.parts:
+            if isinstance(part, FrameRef):
+                yield {"frame": n_frames}
+                n_frames += 1
+            else:
+                yield {"text": str(part)}
+
+
+def _question(question: Question) -> dict[str, Any]:
+    inquiry = question.inquiry
+    notice = inquiry.notice
+    return {
+        "number": question.number,
+        "seconds": round(question.clock.seconds or 0.0, 1),
+        "title": notice.title,
+        "unit": notice.unit,
+        "position": inquiry.position,
+        "facts": [list(fact) for fact in notice.facts],
+        "news": notice.news,
+        "words": list(notice.words),
+        "replies": list(inquiry.decoding.choices or notice.replies),
+        "only": bool(inquiry.decoding.choices),
+        "parts": list(_parts(inquiry.turns)),
+    }

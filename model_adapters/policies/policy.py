@@ -1,5 +1,6 @@
 """A loaded network as a `Policy`: scaling, averaging and checking of its actions."""
 
+from collections import deque
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -11,11 +12,12 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.hf.global_settings import torch_threads
 from model_adapters.options.policies import ActionOptions, CheckpointPolicyOptions
 from model_adapters.policies.checkpoint import PolicyCheckpoint, find_policy_checkpoint
-from model_adapters.policies.ensemble import ExponentialEnsemble
 from model_adapters.policies.preprocessing import crop_centre
 from model_adapters.policies.statistics import ACTION_SIZE, Actions, ActionStatistics
 from model_adapters.protocols import ArmDelta, Capabilities
 from model_adapters.refusals import wrap_request_errors
+
+_RATE = 0.8
 
 
 class Network(Protocol):
@@ -161,3 +163,33 @@ class PolicyAdapter:
             DataError: a file beside the weights is missing or damaged.
         """
         return cls.load(name, find_policy_checkpoint(options.pretrained, options.revision), options)
+
+
+class ExponentialEnsemble:
+    """Averages this and earlier chunks' predictions of a step; the newest has the most weight.
+
+    The weight of prediction i, counted from the oldest, is exp(0.8 i), as in the published
+    evaluations of SpatialVLA (SimplerEnv's ActionEnsembler with a temperature of -0.8).
+    """
+
+    def __init__(self) -> None:
+        self._chunks: deque[Actions] = deque()
+
+    def reset(self) -> None:
+        """Drop all chunks."""
+        self._chunks.clear()
+
+    def step(self, chunk: Actions) -> Actions:
+        """Return the current step, (1, 7).
+
+        Args:
+            chunk: new predictions, (steps, 7), beginning with the current step; each call is one
+                step later.
+        """
+        self._chunks.append(chunk)
+        while len(self._chunks) > len(chunk):
+            self._chunks.popleft()
+        age = range(len(self._chunks) - 1, -1, -1)
+        predictions = np.stack([earlier[at] for at, earlier in zip(age, self._chunks, strict=True)])
+        weights = np.exp(_RATE * np.arange(len(predictions)))
+        return (weights[:, None] * predictions).sum(axis=0, keepdims=True) / weights.sum()

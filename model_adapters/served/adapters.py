@@ -29,7 +29,7 @@ class OpenAI:
             ModelError: a required key is missing.
         """
         from model_adapters.served.model import ServedModel
-        from model_adapters.served.openai.dialect import OpenAIDialect
+        from model_adapters.served.openai import OpenAIDialect
 
         return ServedModel(name, options, _key(options), OpenAIDialect(name, options))
 
@@ -47,7 +47,7 @@ class Anthropic:
         seed: int,  # noqa: ARG003
     ) -> "ServedModel":
         """See `OpenAI`."""
-        from model_adapters.served.anthropic.dialect import AnthropicDialect
+        from model_adapters.served.anthropic import AnthropicDialect
         from model_adapters.served.model import ServedModel
 
         return ServedModel(name, options, _key(options), AnthropicDialect(name, options))
@@ -61,7 +61,7 @@ class Gemini:
     @classmethod
     def build(cls, name: str, options: GeminiOptions, seed: int) -> "ServedModel":  # noqa: ARG003
         """See `OpenAI`."""
-        from model_adapters.served.gemini.dialect import GeminiDialect
+        from model_adapters.served.gemini import GeminiDialect
         from model_adapters.served.model import ServedModel
 
         return ServedModel(name, options, _key(options), GeminiDialect(name, options))

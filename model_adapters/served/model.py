@@ -1,9 +1,13 @@
-"""A model behind a server as a `Model`."""
+"""A model behind a server as a `Model`, and the protocol of the dialect that the server speaks.
 
-from collections.abc import Callable, Sequence
+To add a dialect: a module here, as `openai.py`; its options in `options.py`, its adapter in
+`adapters.py`, its line in `model_adapters/built_in.py`.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import msgspec
 
@@ -14,9 +18,8 @@ from infthor_eval.storage.digests import SIZE, canonical_json, digest
 from model_adapters.backend import BackendConversation
 from model_adapters.protocols import Capabilities, Conversation, Decoding, Reply, Turn
 from model_adapters.served.batches.queue import BatchQueue, BatchRules
-from model_adapters.served.batches.service import BatchReply
+from model_adapters.served.batches.service import BatchReply, BatchService
 from model_adapters.served.completion import Completion, TokenUsage
-from model_adapters.served.dialect import Dialect
 from model_adapters.served.endpoint import Endpoint
 from model_adapters.served.options import ServedOptions
 from model_adapters.served.secret import Secret
@@ -25,6 +28,41 @@ from model_adapters.served.wire import Call, StatusError
 from model_adapters.thinking import cut_at_stop
 
 _JSON = {"Content-Type": "application/json"}
+
+
+class Dialect(Protocol):
+    """How requests to a server and its replies are written.
+
+    Attributes:
+        path: path of requests, below the server's address.
+        hint: how to fix a request that is refused.
+        guides: true if replies can be restricted to choices.
+    """
+
+    path: str
+    hint: str
+    guides: bool
+
+    def headers(self, key: str | None) -> Mapping[str, str]:
+        """Return the headers of every request; `key` is the API key, if there is one."""
+
+    def request(self, turns: Sequence[Turn], decoding: Decoding) -> dict[str, Any]:
+        """Return a request as JSON values.
+
+        Raises:
+            DataError: a frame cannot be read.
+            ModelError: the server does not take these turns.
+        """
+
+    def read(self, where: str, content: bytes) -> Completion:
+        """Parse the reply of the server that `where` names.
+
+        Raises:
+            ModelError: it is no reply of this dialect.
+        """
+
+    def batch_service(self, endpoint: Endpoint) -> BatchService:
+        """Return the part of the server that takes batches."""
 
 
 class ServedModel:

@@ -1,7 +1,7 @@
 """Options of models behind a server: address, form of requests, rate limits, spend caps, batches.
 
 To add an option of served models: a field here, in `in_identity` if it can change a reply; its
-effect in `model.py` or `endpoint.py`, or, of one dialect alone, in its `dialect.py`.
+effect in `model.py` or `endpoint.py`, or, of one dialect alone, in its module.
 """
 
 import re

@@ -18,8 +18,7 @@ from model_adapters import (
     wrap_request_errors,
 )
 from model_adapters.check.clauses import start_conversation
-from model_adapters.check.contract import model_checks
-from model_adapters.check.policy import policy_checks
+from model_adapters.check.contract import model_checks, policy_checks
 from tests.model_adapters.check.test_policy import Scripted
 
 from .blocks import ROOT, written_files

@@ -1,9 +1,13 @@
 """From the turns of a conversation to the text that the checkpoint's chat template renders."""
 
+import resource
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import date
+from pathlib import Path
+from threading import Lock
 from typing import Any
 
 from jinja2 import TemplateError
@@ -14,7 +18,6 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.pictures.video import Video
 from infthor_eval.storage.deadlines import limit_time
 from infthor_eval.storage.limits import TEMPLATE_CHARACTERS, TEMPLATE_MB, TEMPLATE_SECONDS
-from model_adapters.hf.prompting.memory_limit import OutOfMemoryError, limit_memory
 from model_adapters.protocols import Part, Turn
 
 # Errors of a template that is broken or does not support the turns: Jinja's, and those of its
@@ -31,6 +34,10 @@ _REFUSALS = (
 # What templates that write the date (Mistral Small's) take for today: the same prompt every day.
 _TODAY = date(2025, 1, 1)
 _PRINTED = "{'type': 'text'"  # appears where a template that expects a string prints a list
+_SIZE = Path("/proc/self/statm")  # its first number is the process's address space in pages
+_MB = 1024 * 1024
+# Of two nested limits, the second would restore the first as if it were the original.
+_LOCK = Lock()
 
 
 @dataclass(frozen=True)
@@ -165,10 +172,10 @@ def _apply(
     with (
         limit_time(seconds, ModelError(late)),
         wrap_errors(
-            problem, f"fix it; {TEMPLATE_MB.hint}", catch=OutOfMemoryError, raise_as=ModelError
+            problem, f"fix it; {TEMPLATE_MB.hint}", catch=_OutOfMemoryError, raise_as=ModelError
         ),
         wrap_errors(problem, "use other turns, or fix it", catch=_REFUSALS, raise_as=ModelError),
-        limit_memory(TEMPLATE_MB.value),
+        _limit_memory(TEMPLATE_MB.value),
     ):
         # transformers takes no function from outside for a template.
         _compile_jinja_template(template).globals["strftime_now"] = _TODAY.strftime
@@ -222,3 +229,42 @@ def _in_order(text: str, parts: Iterable[str]) -> bool:
             return False
         at += len(part)
     return True
+
+
+class _OutOfMemoryError(Exception):
+    """Code needed more memory than allowed."""
+
+
+@contextmanager
+def _limit_memory(megabytes: int) -> Iterator[None]:
+    """Refuse allocations beyond the process's current memory plus this limit; no limit if the
+    system has no /proc.
+
+    The operating system enforces it, because Python has many ways to build a large text. The limit
+    applies to the whole process, other threads included, and one thread at a time may set it.
+
+    Raises:
+        OutOfMemoryError: more memory was needed.
+    """
+    with _LOCK:
+        before, highest = resource.getrlimit(resource.RLIMIT_AS)
+        bound = _bound(
+            megabytes, [limit for limit in (before, highest) if limit != resource.RLIM_INFINITY]
+        )
+        resource.setrlimit(resource.RLIMIT_AS, (before if bound is None else bound, highest))
+        try:
+            yield
+        except MemoryError as error:
+            raise _OutOfMemoryError(f"it takes more than {megabytes} MB of memory") from error
+        finally:
+            resource.setrlimit(resource.RLIMIT_AS, (before, highest))
+
+
+def _bound(megabytes: int, others: list[int]) -> int | None:
+    """Return the allowed address space of the process in bytes; lower limits of others are kept."""
+    try:
+        pages = int(_SIZE.read_text().split()[0])
+    except OSError:
+        return None
+    # setrlimit cannot represent larger values.
+    return min(pages * resource.getpagesize() + megabytes * _MB, 2**62, *others)

@@ -12,11 +12,10 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.hf.loading.card import read_card_words
 from model_adapters.options.policies import VlaHttpOptions
 from model_adapters.policies.checkpoint import PolicyCheckpoint
-from model_adapters.policies.http.adapter import HttpPolicy
-from model_adapters.policies.http.json_numpy import encode_array
+from model_adapters.policies.http.adapter import HttpPolicy, encode_array
 from model_adapters.policies.statistics import select_statistics
 from model_adapters.served.completion import decode_reply
-from model_adapters.served.openai.completions import ChatCompletion
+from model_adapters.served.openai import ChatCompletion
 
 from ..damage import Form
 from ..reader import Reader

@@ -7,8 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from model_adapters import Decoding, Notice, Turn
-from model_adapters.human.clock import ScreenClock
-from model_adapters.human.desk import Answer, Desk, Inquiry, StaleError
+from model_adapters.human.desk import Answer, Desk, Inquiry, ScreenClock, StaleError
 
 ASKED = Inquiry((Turn("user", ("Where is the mug?",)),), Decoding(max_new_tokens=5), Notice())
 
@@ -132,7 +131,7 @@ def test_a_page_that_waits_for_news_is_waited_for_longer_than_one_that_may_be_cl
 
 def test_the_clock_goes_while_a_page_shows_the_question(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr("model_adapters.human.clock.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("model_adapters.human.desk.time.monotonic", lambda: now[0])
     clock = ScreenClock()
     now[0] += 30.0  # the frames are on their way
     assert clock.seconds is None

@@ -1,5 +1,6 @@
 """A network as a policy: what is scaled, averaged, cut, and refused."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import ArmDelta, Policy, check_adapter
 from model_adapters.options.policies import PolicyOptions
-from model_adapters.policies.policy import VlaPolicy, arm_deltas
+from model_adapters.policies.policy import ExponentialEnsemble, VlaPolicy, arm_deltas
 from model_adapters.policies.statistics import ActionStatistics
 
 STATISTICS = ActionStatistics(q01=[-2.0] * 7, q99=[2.0] * 7, mask=[True] * 6 + [False])
@@ -135,3 +136,42 @@ def test_the_identity_tells_how_chunks_are_used() -> None:
 def test_options_that_do_not_fit_are_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         PolicyOptions(**options)
+
+
+def _chunk(*firsts: float) -> np.ndarray:
+    return np.array([[first] + [0.0] * 6 for first in firsts])
+
+
+def _firsts(ensemble: ExponentialEnsemble, *chunks: np.ndarray) -> list[float]:
+    return [float(ensemble.step(chunk)[0, 0]) for chunk in chunks]
+
+
+def test_what_several_chunks_say_of_a_step_is_averaged_the_newest_counting_most() -> None:
+    averages = _firsts(
+        ExponentialEnsemble(),
+        _chunk(1, 10, 100),
+        _chunk(2, 20, 200),
+        _chunk(3, 30, 300),
+        _chunk(4, 40, 400),
+    )
+    one, two = math.exp(0.8), math.exp(1.6)
+    assert averages == pytest.approx(
+        [
+            1,
+            (10 + one * 2) / (1 + one),
+            (100 + one * 20 + two * 3) / (1 + one + two),
+            (200 + one * 30 + two * 4)
+            / (1 + one + two),  # the first chunk says nothing of the fourth step
+        ]
+    )
+
+
+def test_an_episode_begins_without_the_last_one() -> None:
+    ensemble = ExponentialEnsemble()
+    _firsts(ensemble, _chunk(1, 10))
+    ensemble.reset()
+    assert _firsts(ensemble, _chunk(5, 50)) == [5]
+
+
+def test_chunks_of_one_step_are_given_out_as_they_are() -> None:
+    assert _firsts(ExponentialEnsemble(), _chunk(1), _chunk(2), _chunk(3)) == [1, 2, 3]

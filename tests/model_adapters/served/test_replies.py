@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from infthor_eval.errors import ModelError
 from model_adapters.served.completion import decode_reply
-from model_adapters.served.openai.completions import ChatCompletion
+from model_adapters.served.openai import ChatCompletion
 
 from ..policies.servers import Answer, send
 from .talking import always_say, always_send, ask_once, completion, open_model, read_refusal

@@ -2,8 +2,7 @@
 
 import pytest
 
-from model_adapters.hf.rehearsal.known import known_checkpoints
-from model_adapters.hf.rehearsal.model import load_shapes
+from model_adapters.hf.rehearsal.model import known_checkpoints, load_shapes
 from model_adapters.options.families import HfVlmOptions
 from model_adapters.registry import read_options
 

@@ -1,6 +1,9 @@
 """The client against servers that answer, and that fail."""
 
+import base64
+import json
 import socket
+import struct
 import threading
 from collections.abc import Callable
 from contextlib import suppress
@@ -13,7 +16,8 @@ import pytest
 from infthor_eval.errors import DataError, ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
-from model_adapters.policies.http import client
+from model_adapters.policies.http import adapter
+from model_adapters.policies.http.adapter import decode_numbers, encode_array
 from model_adapters.policies.policy import VlaPolicy
 
 from ..servers import Answer, policy_answers, read_image, send, serve
@@ -25,7 +29,7 @@ ACTION = [0.1, 0.2, 0.3, -0.1, -0.2, -0.3, 1.0]
 @pytest.fixture(autouse=True)
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """No waiting between attempts."""
-    monkeypatch.setattr(client, "_FIRST_WAIT_S", 0.001)
+    monkeypatch.setattr(adapter, "_FIRST_WAIT_S", 0.001)
 
 
 def _act(url: str, frame: FrameRef, **settings: str) -> Any:
@@ -214,7 +218,7 @@ def test_a_server_that_is_not_there_is_one_line(plain_frames: Frames) -> None:
 def test_a_reply_without_end_is_not_read(
     monkeypatch: pytest.MonkeyPatch, plain_frames: Frames
 ) -> None:
-    monkeypatch.setattr(client, "_LARGEST", 1000)
+    monkeypatch.setattr(adapter, "_LARGEST", 1000)
     message = _refused(
         lambda _, handler: send(handler, 200, b"[" + b"0.1," * 5000), plain_frames[0]
     )
@@ -257,3 +261,61 @@ def test_the_identity_is_how_it_is_asked() -> None:
         "execute": None,
     }
     assert not policy.capabilities.deterministic
+
+
+def test_an_array_is_its_bytes_its_type_and_its_shape() -> None:
+    assert encode_array(np.array([[1, 2, 255]], dtype=np.uint8)) == {
+        "__numpy__": "AQL/",
+        "dtype": "|u1",
+        "shape": [1, 3],
+    }
+
+
+def test_an_array_that_is_a_view_is_written_in_its_own_order() -> None:
+    turned = np.array([[1, 2], [3, 4]], dtype=np.uint8).T
+    assert base64.b64decode(encode_array(turned)["__numpy__"]) == bytes([1, 3, 2, 4])
+
+
+NUMBERS = [0.5, -1.0, 2.0]
+ARRAY = {
+    "__numpy__": base64.b64encode(struct.pack("<3d", *NUMBERS)).decode(),
+    "dtype": "<f8",
+    "shape": [3],
+}
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (NUMBERS, NUMBERS),
+        ([1, 2], [1.0, 2.0]),
+        ([NUMBERS, NUMBERS], [NUMBERS, NUMBERS]),
+        (ARRAY, NUMBERS),
+        ([ARRAY, NUMBERS], [NUMBERS, NUMBERS]),
+        (json.dumps(ARRAY), NUMBERS),  # as OpenVLA's server answers a request in encoded form
+        (encode_array(np.array([[1.5]], dtype=">f4")), [[1.5]]),
+    ],
+)
+def test_numbers_come_in_several_forms(value: Any, expected: Any) -> None:
+    assert decode_numbers(value).tolist() == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("error", "the text 'error'"),
+        ({"action": NUMBERS}, "dict"),
+        ([*NUMBERS, "1"], "str '1' among numbers"),
+        ([True], "bool"),
+        (None, "NoneType"),
+        ([NUMBERS, [1.0]], "inhomogeneous"),
+        (ARRAY | {"dtype": "|O8"}, "array of object"),
+        (ARRAY | {"shape": [4]}, "reshape"),
+        (ARRAY | {"__numpy__": "*"}, "damaged array"),
+        (ARRAY | {"dtype": "left"}, "damaged array"),
+        ({"__numpy__": ARRAY["__numpy__"]}, "damaged array"),
+    ],
+)
+def test_anything_else_is_refused(value: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        decode_numbers(value)

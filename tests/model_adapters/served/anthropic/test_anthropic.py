@@ -17,7 +17,7 @@ from PIL import Image
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
-from model_adapters.served.anthropic.messages import Message
+from model_adapters.served.anthropic import Message
 from model_adapters.served.completion import decode_reply
 
 from ...asking import up_to

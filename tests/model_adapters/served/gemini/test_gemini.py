@@ -17,7 +17,7 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
 from model_adapters.served import endpoint
 from model_adapters.served.completion import decode_reply
-from model_adapters.served.gemini.contents import GeneratedContent
+from model_adapters.served.gemini import GeneratedContent
 
 from ...asking import up_to
 from ..batches.server import serve_batches

@@ -12,7 +12,7 @@ from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Turn
 from model_adapters.served.frames import EncodedFrames
-from model_adapters.served.openai.messages import to_messages
+from model_adapters.served.openai import to_messages
 
 
 def _pixels(address: str) -> np.ndarray:

@@ -1,1 +1,0 @@
-"""Servers of OpenAI's chat completions: vLLM, SGLang, transformers, commercial."""
