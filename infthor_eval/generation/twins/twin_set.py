@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Generic, TypeVar
 
 import msgspec
 from msgspec.structs import replace
@@ -18,20 +19,15 @@ from msgspec.structs import replace
 from infthor_eval.errors import DataError, InfthorError
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.set_info import claim_for_simulator
+from infthor_eval.formats.trajectory import Trajectory, TrajectorySource
 from infthor_eval.formats.twins import PairedQuestion, TwinPair, write_pairs
-from infthor_eval.generation.replay_set import Selection
+from infthor_eval.generation.replay_set import Selection, wrap_malformed
 from infthor_eval.generation.simulator_jobs import (
     SimulatorWorker,
     collect_outcomes,
-)
-from infthor_eval.generation.twins.draft_files import (
-    DRAFTS,
-    DraftOutcome,
-    Item,
-    count_edits,
-    draft_item,
-    failure_line,
+    freeze_existing_objects,
 )
 from infthor_eval.generation.twins.drafting import TwinDraft, TwinSettings, draft_twins
 from infthor_eval.generation.twins.final_tasks import (
@@ -40,12 +36,18 @@ from infthor_eval.generation.twins.final_tasks import (
     draft_final_tasks,
 )
 from infthor_eval.generation.twins.pairing import ScoreReply
+from infthor_eval.storage.files import file_name, is_written, write_atomically
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings, run_jobs
 
 _MOST = 0.3  # of a set's pairs are of one kind, if there are enough kinds for that
 _QUESTIONS = "qa_set_twins.csv"
+_DRAFTS = "drafts"  # folder in that of the set
+_HINT = "remove it, or choose another --out"
+
+_Item = tuple[TrajectorySource, Trajectory]
+_Draft = TypeVar("_Draft", TwinDraft, FinalTaskDraft)
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,15 @@ class TwinSummary(msgspec.Struct):
     seconds: float
 
 
+@dataclass(frozen=True)
+class _DraftOutcome(Generic[_Draft]):
+    """The outcome of one trajectory: its draft, or why there is none."""
+
+    draft: _Draft | None = None
+    is_resumed: bool = False
+    failure: str = ""
+
+
 def make_twins(
     selection: Selection,
     launch: Launch,
@@ -122,15 +133,15 @@ def make_twins(
         DataError: the set is another simulator's, or two worlds have one name.
     """
     started = time.monotonic()
-    for name in ("metadata", DRAFTS):
+    for name in ("metadata", _DRAFTS):
         (out / name).mkdir(parents=True, exist_ok=True)
     claim_for_simulator(out, launch.label)
     run_job = partial(_draft_one, out=out, settings=settings, score=score)
     start = partial(SimulatorWorker, partial(Simulator, launch), run_job)
     items = selection.items
 
-    def failed(number: int, error: InfthorError) -> DraftOutcome[TwinDraft]:
-        return DraftOutcome[TwinDraft](failure=failure_line(items[number], error))
+    def failed(number: int, error: InfthorError) -> _DraftOutcome[TwinDraft]:
+        return _DraftOutcome[TwinDraft](failure=_failure_line(items[number], error))
 
     outcomes = collect_outcomes(run_jobs(start, items, worker_settings, say), failed, progress)
     drafts = [outcome.draft for outcome in outcomes if outcome.draft is not None]
@@ -145,11 +156,11 @@ def make_twins(
 
 
 def _draft_one(
-    item: Item, simulator: Simulator, out: Path, settings: TwinSettings, score: ScoreReply
-) -> DraftOutcome[TwinDraft]:
+    item: _Item, simulator: Simulator, out: Path, settings: TwinSettings, score: ScoreReply
+) -> _DraftOutcome[TwinDraft]:
     source, trajectory = item
     make = partial(draft_twins, trajectory, source.digest, settings, score, simulator, out)
-    return draft_item(item, out, settings, TwinDraft, make)
+    return _draft_item(item, out, settings, TwinDraft, make)
 
 
 def _require_distinct(drafts: Iterable[TwinDraft]) -> None:
@@ -198,7 +209,7 @@ class _Numbers:
 
     def summary(self, n_resumed: int, failures: list[str], seconds: float) -> TwinSummary:
         """Return the numbers of the set."""
-        proposed, kept, rejected = count_edits(self.drafts)
+        proposed, kept, rejected = _count_edits(self.drafts)
         found = (len(pair.questions) for draft in self.drafts for pair in draft.pairs)
         return TwinSummary(
             trajectories=len(self.drafts),
@@ -305,21 +316,21 @@ def make_final_tasks(
 ) -> FinalTaskSummary:
     """Make twins with final tasks; arguments and errors are those of `make_twins`."""
     started = time.monotonic()
-    for name in (TRAJECTORIES, DRAFTS):
+    for name in (TRAJECTORIES, _DRAFTS):
         (out / name).mkdir(parents=True, exist_ok=True)
     claim_for_simulator(out, launch.label)
     run_job = partial(_draft_final_task, out=out, settings=settings)
     start = partial(SimulatorWorker, partial(Simulator, launch), run_job)
     items = selection.items
 
-    def failed(number: int, error: InfthorError) -> DraftOutcome[FinalTaskDraft]:
-        return DraftOutcome[FinalTaskDraft](failure=failure_line(items[number], error))
+    def failed(number: int, error: InfthorError) -> _DraftOutcome[FinalTaskDraft]:
+        return _DraftOutcome[FinalTaskDraft](failure=_failure_line(items[number], error))
 
     outcomes = collect_outcomes(run_jobs(start, items, worker_settings, say), failed, progress)
     failures = [failure.message for failure in selection.failures]
     failures += [outcome.failure for outcome in outcomes if outcome.failure]
     drafts = [outcome.draft for outcome in outcomes if outcome.draft is not None]
-    proposed, kept, rejected = count_edits(drafts)
+    proposed, kept, rejected = _count_edits(drafts)
     return FinalTaskSummary(
         trajectories=len(drafts),
         resumed=sum(outcome.is_resumed for outcome in outcomes),
@@ -333,8 +344,67 @@ def make_final_tasks(
 
 
 def _draft_final_task(
-    item: Item, simulator: Simulator, out: Path, settings: TwinSettings
-) -> DraftOutcome[FinalTaskDraft]:
+    item: _Item, simulator: Simulator, out: Path, settings: TwinSettings
+) -> _DraftOutcome[FinalTaskDraft]:
     source, trajectory = item
     make = partial(draft_final_tasks, trajectory, source.digest, settings, simulator, out)
-    return draft_item(item, out, settings, FinalTaskDraft, make)
+    return _draft_item(item, out, settings, FinalTaskDraft, make)
+
+
+def _draft_item(
+    item: _Item, out: Path, settings: TwinSettings, form: type[_Draft], make: Callable[[], _Draft]
+) -> _DraftOutcome[_Draft]:
+    """Return the draft of a trajectory: of an earlier run if it is the same, else made and written.
+
+    Args:
+        item: the trajectory.
+        out: folder of the set.
+        settings: how twins are made.
+        form: type of the draft.
+        make: makes it.
+    """
+    source, trajectory = item
+    # Not `.json`, so that the set may be read as a folder of trajectories.
+    file = out / _DRAFTS / f"{file_name(trajectory.traj_id)}.draft"
+    try:
+        if is_written(file):
+            return _DraftOutcome(_read(file, source.digest, settings, form), is_resumed=True)
+        with freeze_existing_objects(), wrap_malformed():
+            draft = make()
+        with write_atomically(file) as partial_file:
+            partial_file.write_bytes(msgspec.json.encode(draft) + b"\n")
+    except InfthorError as error:
+        return _DraftOutcome(failure=_failure_line(item, error))
+    return _DraftOutcome(draft)
+
+
+def _failure_line(item: _Item, error: InfthorError) -> str:
+    """Return why twins of a trajectory cannot be made, in one line."""
+    source, trajectory = item
+    return f"{source.place}: {trajectory.traj_id}: {error}"
+
+
+def _count_edits(
+    drafts: Iterable[TwinDraft | FinalTaskDraft],
+) -> tuple[dict[str, int], dict[str, int], dict[str, int]]:
+    """Return the numbers of edits proposed and kept by kind, and of those rejected by reason."""
+    proposed = Counter[str]()
+    kept = Counter[str]()
+    reasons = Counter[str]()
+    for draft in drafts:
+        proposed.update(draft.proposed)
+        kept.update(draft.proposed)
+        for kind, rejected in draft.rejected.items():
+            kept[kind] -= sum(rejected.values())
+            reasons.update(rejected)
+    return dict(sorted(proposed.items())), dict(sorted(kept.items())), dict(reasons.most_common())
+
+
+def _read(file: Path, base: str, settings: TwinSettings, form: type[_Draft]) -> _Draft:
+    """Return the draft of an earlier run, if it is of the same trajectory and settings."""
+    draft = read_json(file, _HINT, form)
+    if draft.digest != base:
+        raise DataError(f"{file}: made of another trajectory of this name; {_HINT}")
+    if draft.settings != settings:
+        raise DataError(f"{file}: made with other kinds, seed or --per-kind; {_HINT}")
+    return draft

@@ -14,6 +14,7 @@ from typing import Any
 
 import torch
 from torch.utils.flop_counter import FlopCounterMode
+from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
 
 from infthor_eval.errors import ModelError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
@@ -22,7 +23,7 @@ from model_adapters.hf.cached.branch_attention import layer_windows
 from model_adapters.hf.cached.prefix import Prefix, chunks
 from model_adapters.hf.prompting.ahead import Ahead
 from model_adapters.hf.prompting.prompt import Frame, Piece, n_tokens
-from model_adapters.hf.rehearsal.flash import flash_attention, flash_problem
+from model_adapters.hf.rehearsal.device import ShapesDevice
 from model_adapters.hf.rehearsal.kernels import Attention
 from model_adapters.hf.rehearsal.model import RehearsedModel
 
@@ -36,6 +37,9 @@ _TOKEN = 0  # any token of text
 Kernels = Counter[
     tuple[str, bool, int]
 ]  # calls by kernel, by whether they have a mask, by head size
+_FLASH_ATTENTION = "flash_attention_2"
+_LARGEST_HEAD = 256
+_SUM_BYTES = 4  # of a row's sum, which is kept in float32
 
 
 @dataclass(frozen=True)
@@ -133,7 +137,7 @@ class Rehearsal:
     def flash_problem(self) -> str:
         """Why the decoder cannot attend by flash-attn; empty if it can."""
         heads = {call.head_size for call in self._probe}
-        return flash_problem(self._rehearsed.model, max(heads), self._embed.sees_ahead)
+        return _flash_problem(self._rehearsed.model, max(heads), self._embed.sees_ahead)
 
     def usage(self, n_context: int) -> Usage:
         """Return the memory of a context of so many tokens.
@@ -197,7 +201,7 @@ class Rehearsal:
             stack.enter_context(torch.inference_mode())
             if self._flash:
                 decoder = model.get_decoder().config
-                stack.enter_context(flash_attention(decoder, self._device))
+                stack.enter_context(_flash_attention(decoder, self._device))
             # Any error is possible: code that needs numbers finds none.
             problem = f"{model.config.model_type} cannot be rehearsed"
             stack.enter_context(
@@ -290,3 +294,59 @@ def _counted(calls: Sequence[Attention], n_context: int) -> Kernels:
         for call in calls
         if call.n_keys > n_context // 2
     )
+
+
+def _flash_problem(model: Any, largest_head: int, sees_ahead: bool) -> str:
+    """Return why a model cannot run with flash-attn; empty if it can.
+
+    Args:
+        model: the transformers model.
+        largest_head: numbers of its largest head.
+        sees_ahead: whether tokens of a frame attend to later ones of it.
+    """
+    if not getattr(model, "_supports_flash_attn", False):
+        return "the model's code does not support it"
+    if largest_head > _LARGEST_HEAD:
+        return f"heads of {largest_head} are larger than {_LARGEST_HEAD}"
+    return "it cannot attend in both directions over a frame" if sees_ahead else ""
+
+
+@contextmanager
+def _flash_attention(config: Any, device: ShapesDevice) -> Iterator[None]:
+    """Let a decoder with this config attend by flash-attn within the context.
+
+    It may be installed or not. It takes no mask and knows by itself who attends to whom, by windows
+    of layers too; heads that share keys are not repeated. So it needs less memory than torch's
+    attention with a mask.
+    """
+
+    def attend(
+        module: Any,  # noqa: ARG001 - the form of transformers' attention functions
+        query: torch.Tensor,
+        key: torch.Tensor,
+        value: torch.Tensor,
+        *_: Any,
+        **__: Any,
+    ) -> tuple[torch.Tensor, None]:
+        batch, heads, n_queries, head = query.shape
+        call = Attention(
+            kernel=_FLASH_ATTENTION,
+            has_mask=False,
+            n_queries=n_queries,
+            n_keys=key.shape[-2],
+            head_size=head,
+            flop=2 * batch * heads * n_queries * key.shape[-2] * (head + value.shape[-1]),
+            own_bytes=batch * heads * n_queries * _SUM_BYTES,
+        )
+        device.attention.append(call)
+        device.use(call.own_bytes)
+        return query.new_empty((batch, n_queries, heads, value.shape[-1])), None
+
+    before = config._attn_implementation
+    ALL_ATTENTION_FUNCTIONS[_FLASH_ATTENTION] = attend
+    config._attn_implementation = _FLASH_ATTENTION
+    try:
+        yield
+    finally:
+        config._attn_implementation = before
+        del ALL_ATTENTION_FUNCTIONS[_FLASH_ATTENTION]

@@ -16,7 +16,7 @@ from PIL import Image
 from transformers import AutoConfig
 from transformers.models.auto.image_processing_auto import IMAGE_PROCESSOR_MAPPING_NAMES
 
-from model_adapters.hf.loading.without_torchvision import (
+from model_adapters.hf.loading.processors import (
     available_class,
     register_image_processor,
     torchvision_or_stand_in,
