@@ -38,9 +38,6 @@ def prepare_script(script: str) -> tuple[ModuleType, CodeType]:
 
     Args:
         script: a file, or a folder or zip with `__main__.py`, as typed.
-
-    Raises:
-        DataError: there is none.
     """
     # Joined as python does it: neither dots nor links are resolved.
     place = os.path.join(os.getcwd(), script)  # noqa: PTH109, PTH118

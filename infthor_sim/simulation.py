@@ -77,11 +77,7 @@ class Simulation:
         self._show(world)
 
     def configure(self, settings: SimulatorSettings) -> None:
-        """Give the agents other settings and the arm of their agent mode.
-
-        Raises:
-            ActionError: there is no room for so many agents.
-        """
+        """Give the agents other settings and the arm of their agent mode."""
         self.settings = settings
         equip(self.world, settings.agent_mode)
         self.world.agent.drawn = settings.bodies_drawn

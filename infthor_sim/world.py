@@ -111,11 +111,7 @@ class World:
         return [(index, a) for index, a in enumerate(self.agents) if index != self.active]
 
     def get(self, object_id: str) -> SimObject:
-        """Return the object with this id.
-
-        Raises:
-            ActionError: there is none.
-        """
+        """Return the object with this id."""
         item = self.objects.get(object_id)
         if item is None:
             raise ActionError(

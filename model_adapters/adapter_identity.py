@@ -15,9 +15,6 @@ def package_identity(point: EntryPoint) -> dict[str, Any]:
 
     The digest covers all modules of the top-level package, because an adapter may be edited without
     a new version. Nothing is imported.
-
-    Raises:
-        ModelError: the module does not exist, or its source cannot be read.
     """
     package = point.module.partition(".")[0]
     try:

@@ -30,9 +30,6 @@ def function_adapter(name: str, function: Callable[..., Any]) -> "FunctionAdapte
     Args:
         name: FILE.py:NAME, as the user gave it.
         function: what has that name in the file.
-
-    Raises:
-        ModelError: its parameters are those of no model and no policy.
     """
     return FunctionAdapter(read_function(name, function, (_IMAGES, _PARTS, _ACTION)))
 
@@ -92,12 +89,7 @@ class FunctionModel:
         """Return None: tokens are not counted."""
 
     def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
-        """Return what the function returns, cut at the first stop string.
-
-        Raises:
-            ModelError: it returns no text.
-            DataError: a frame cannot be read.
-        """
+        """Return what the function returns, cut at the first stop string."""
         parts = _parts_of(turns)
         if self._function.takes == _PARTS:
             text = self._function.call(parts, **self._options)

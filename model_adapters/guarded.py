@@ -57,9 +57,6 @@ def guard(name: str, adapter: Any) -> Model | Policy:
     Args:
         name: the name by which the user asked for it, for messages.
         adapter: a model, or a policy.
-
-    Raises:
-        ModelError: its name or its capabilities are not what they should be.
     """
     with wrap_adapter_errors(f"model {name}: its name or capabilities fail"):
         own_name = adapter.name

@@ -31,10 +31,6 @@ def load_from_file(name: str, kind: str = "class") -> Any:
     Args:
         name: FILE.py:NAME.
         kind: what is behind the name in words, for messages.
-
-    Raises:
-        ModelError: the file or the name in it does not exist, or the file fails when it is
-            imported.
     """
     path = _path(name)
     module = _module(path, _source(path))
@@ -47,11 +43,7 @@ def load_from_file(name: str, kind: str = "class") -> Any:
 
 
 def file_identity(name: str) -> dict[str, Any]:
-    """Return the file's name and its content's digest, as JSON values, whatever its folder.
-
-    Raises:
-        ModelError: the file cannot be read.
-    """
+    """Return the file's name and its content's digest, as JSON values, whatever its folder."""
     path = _path(name)
     return {"file": path.name, "source": digest(_source(path))}
 

@@ -43,9 +43,6 @@ def read_function(
         name: FILE.py:NAME, as the user gave it.
         function: the function.
         forms: names of the first parameters of all functions that could be meant.
-
-    Raises:
-        ModelError: it has other parameters, or one that no option can set.
     """
     signature = inspect.signature(function)
     parameters = list(signature.parameters.values())

@@ -57,11 +57,7 @@ def refuse_deferring(subject: Subject) -> None:
 
 
 def check_chunk(name: str, chunk: Sequence[object]) -> None:
-    """Check that the policy of this name gives steps of 7 finite numbers each, at least one.
-
-    Raises:
-        ModelError: it does not.
-    """
+    """Check that the policy of this name gives steps of 7 finite numbers each, at least one."""
     if not chunk:
         raise ModelError(f"{name} gives no movement; a policy gives at least one")
     for step in chunk:
@@ -96,9 +92,6 @@ def wrap_adapter_errors(problem: str) -> AbstractContextManager[None]:
 
     Args:
         problem: the model and what it fails to do, for the message.
-
-    Raises:
-        AdapterError: the adapter raised an error that is not one of ours.
     """
     return wrap_user_code(problem, "fix the adapter, or report it", AdapterError)
 
@@ -109,9 +102,6 @@ def wrap_closing(name: str) -> Iterator[None]:
 
     Args:
         name: the model, for the message.
-
-    Raises:
-        AdapterError: the adapter fails, or takes longer than `limits.OWN_CODE_SECONDS`.
     """
     problem = f"{name}: close() fails"
     with wrap_adapter_errors(problem), limit_by(OWN_CODE_SECONDS, problem, AdapterError):

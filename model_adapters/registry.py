@@ -96,12 +96,7 @@ def check_options(name: str, options: Mapping[str, str]) -> None:
 
 
 def read_options(name: str, options: Mapping[str, str]) -> Any:
-    """Return the options that a model's adapter is given, of the adapter's own type.
-
-    Raises:
-        UsageError: a name is unknown, or a value does not fit its option.
-        ModelError: the adapter cannot be imported.
-    """
+    """Return the options that a model's adapter is given, of the adapter's own type."""
     return parse(name, _options(name), options)
 
 

@@ -36,9 +36,6 @@ def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> Non
         archive: the tar file, compressed or not.
         target: the folder to create; it has the name of the archive's top folder.
         max_bytes: maximum size of the unpacked content, in bytes.
-
-    Raises:
-        DataError: the archive is damaged, has an unsafe member, or does not fit on the disk.
     """
     require_file(archive, "fetch it again")
     damaged = (tarfile.TarError, gzip.BadGzipFile, *DAMAGED)

@@ -47,10 +47,6 @@ def read_rows(
         hint: the way to fix a bad file.
         line_breaks: True if a cell may have several lines; otherwise a line break means an unclosed
             quote.
-
-    Raises:
-        DataError: the file cannot be read, lacks a column or has it twice, or has a quote that is
-            never closed.
     """
     _check_lines(path, hint)
     text = read_text(path, hint)

@@ -30,20 +30,12 @@ _HOUSE_HINT = "give the JSON of one house, as ProcTHOR generates it"
 
 
 def floor_plan_names(root: Path) -> list[str]:
-    """Return the names of the recorded floor plans in a folder.
-
-    Raises:
-        DataError: the folder's `objects.jsonl.gz` is missing or malformed.
-    """
+    """Return the names of the recorded floor plans in a folder."""
     return [scene for scene, _ in _read_scenes(root / _OBJECTS)]
 
 
 def floor_plans_digest(root: Path) -> str:
-    """Return the hash of a folder of recorded floor plans.
-
-    Raises:
-        DataError: the folder's `objects.jsonl.gz` is missing, or a file cannot be read.
-    """
+    """Return the hash of a folder of recorded floor plans."""
     if not (root / _OBJECTS).is_file():
         raise DataError(f"{root}: has no {_OBJECTS}; give the folder of recorded floor plans")
     with wrap_errors(f"{root}: cannot be read", "restore it, or give another folder"):
@@ -65,10 +57,6 @@ def write_floor_plan(
         objects: metadata of every object from AI2-THOR.
         cells: reachable (x, z), metres.
         overwrite: True to replace a different recording of the same name.
-
-    Raises:
-        DataError: the folder has a different recording of the scene, or `objects.jsonl.gz` cannot
-            be read or written.
     """
     if file_name(scene) != scene:
         raise DataError(f"{scene!r:.80} cannot name a file; give the name of a scene")
@@ -130,11 +118,7 @@ def _without_corners(metadata: dict[str, Any]) -> dict[str, Any]:
 
 
 def read_house(path: Path) -> tuple[str, dict[str, Any]]:
-    """Return a house's name as a scene, by its content, and its JSON.
-
-    Raises:
-        DataError: the file cannot be read, or is no house.
-    """
+    """Return a house's name as a scene, by its content, and its JSON."""
     house = read_json(path, _HOUSE_HINT)
     if not isinstance(house, dict) or not all(isinstance(house.get(part), list) for part in _PARTS):
         raise DataError(f"{path}: has not the lists {', '.join(_PARTS)} of a house; {_HOUSE_HINT}")

@@ -399,11 +399,8 @@ class _Log(msgspec.Struct):
 
 
 def _read_action_log(path: Path, positions: Mapping[str, int]) -> dict[int, tuple[int, ...]]:
-    """Return the frames of each low-level action that has any; `positions` are those of file stems.
-
-    Raises:
-        DataError: the file is missing, has another form, or names frames not in `positions`.
-    """
+    """Return the frames of each low-level action that has any; `positions` are those of file
+    stems."""
     log = read_json(path, _REPLAY_HINT, _Log)
     with wrap_errors(
         f"{path}: not a log of actions and their frames", _REPLAY_HINT, catch=KeyError

@@ -101,11 +101,7 @@ def find_outline(folder: Path, traj_id: str) -> Path | None:
 
 
 def read_outline(path: Path) -> Outline:
-    """Read a trajectory's file.
-
-    Raises:
-        DataError: the file cannot be read, or is not a trajectory.
-    """
+    """Read a trajectory's file."""
     content = read_bytes(path, "restore it")
     with wrap_errors(f"{path}: not a trajectory", "restore it", catch=NOT_JSON):
         outline = msgspec.json.decode(content, type=Outline, strict=False)
@@ -116,11 +112,7 @@ def read_outline(path: Path) -> Outline:
 
 
 def read_states(path: Path) -> dict[int, str]:
-    """Read a `state_summary.json`: states by low-level action; empty if there is no such file.
-
-    Raises:
-        DataError: the file cannot be read, or has another form.
-    """
+    """Read a `state_summary.json`: states by low-level action; empty if there is no such file."""
     if not path.exists():
         return {}
     content = read_bytes(path, "replay it again")

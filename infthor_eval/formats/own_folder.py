@@ -39,12 +39,8 @@ class OwnFolder:
     folders: Mapping[str, Path]
 
     def read_questions(self) -> list[Question | SkippedQuestion]:
-        """Read the CSV file; a row that cannot be used is a `SkippedQuestion` that names its line.
-
-        Raises:
-            DataError: the file or a folder cannot be read, a column is misspelt, or no row of it is
-                a question.
-        """
+        """Read the CSV file; a row that cannot be used is a `SkippedQuestion` that names its
+        line."""
         rows = list(read_rows(self.file, _COLUMNS, _HINT))
         self._refuse_misspelt(rows[0].columns if rows else ())
         images = {name: find_images(folder) for name, folder in self.folders.items()}
@@ -98,10 +94,6 @@ def find_own_folder(root: Path) -> OwnFolder | None:
     Args:
         root: its folder, or its CSV file: that may be one of several there, but a question file of
             the published form is none.
-
-    Raises:
-        DataError: it cannot be read, has frames but several CSV files, or frames both in itself
-            and in folders.
     """
     given = [root] if root.is_file() else None
     root = root.parent if given else root

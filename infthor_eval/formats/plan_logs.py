@@ -99,11 +99,7 @@ class _Row(msgspec.Struct, frozen=True):
 
 
 def is_plan_log(path: Path) -> bool:
-    """Return whether the first JSON object of a log has counts of plans.
-
-    Raises:
-        DataError: the file cannot be read.
-    """
+    """Return whether the first JSON object of a log has counts of plans."""
     for _, line in lines_of(path, _HINT):
         try:
             entry = json_value(line)
@@ -115,11 +111,7 @@ def is_plan_log(path: Path) -> bool:
 
 
 def read_plan_log(path: Path) -> PlanLog:
-    """Read a log; a bad line, such as a last one that is cut, is kept apart with the reason.
-
-    Raises:
-        DataError: the file cannot be read, or has no counts of plans.
-    """
+    """Read a log; a bad line, such as a last one that is cut, is kept apart with the reason."""
     lines = list(lines_of(path, _HINT))
     rows: dict[str, LoggedPlans] = {}
     unread = []

@@ -87,11 +87,7 @@ class PublishedTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @cache
 def published_tables(suite: str) -> tuple[PublishedTable, ...]:
-    """Return the published tables of a suite, in the order of their file names.
-
-    Raises:
-        DataError: a file is malformed.
-    """
+    """Return the published tables of a suite, in the order of their file names."""
     folder = packaged_folder("results") / "published"
     tables = [_read(path) for path in sorted(folder.glob("*.yaml"))]
     return tuple(table for table in tables if table.suite == suite)

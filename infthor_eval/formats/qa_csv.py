@@ -36,12 +36,8 @@ _LARGEST = 2**63  # JSON readers refuse larger numbers
 
 
 def read_questions(path: Path) -> list[Question | SkippedQuestion]:
-    """Read a question file; a row with a malformed cell is a `SkippedQuestion` that names its line.
-
-    Raises:
-        DataError: the file cannot be read, is not a CSV file of this form, or no row of it is a
-            question.
-    """
+    """Read a question file; a row with a malformed cell is a `SkippedQuestion` that names its
+    line."""
     hint = (
         f"a question file is a UTF-8 CSV file with the columns {', '.join(_COLUMNS)}, or question "
         "and answer beside frames of your own"

@@ -51,11 +51,7 @@ def file_problem(path: Path) -> str | None:
 
 
 def require_file(path: Path, hint: str, max_mb: int | None = None) -> None:
-    """Check that a path is a file that can be read, of at most `max_mb` MiB.
-
-    Raises:
-        DataError: it is missing, a folder, a pipe or a device, or too large.
-    """
+    """Check that a path is a file that can be read, of at most `max_mb` MiB."""
     reason = file_problem(path)
     if reason is not None:
         raise DataError(f"{path}: {reason}; {hint}")
@@ -64,11 +60,7 @@ def require_file(path: Path, hint: str, max_mb: int | None = None) -> None:
 
 
 def require_plain_files(folder: Path, hint: str) -> None:
-    """Check that a folder has no pipes or devices in it, before another library reads its files.
-
-    Raises:
-        DataError: it has one, or a broken link.
-    """
+    """Check that a folder has no pipes or devices in it, before another library reads its files."""
     with wrap_errors(f"{folder}: cannot be read", hint):
         for path in sorted(folder.iterdir()):
             if not path.is_dir():
@@ -76,11 +68,7 @@ def require_plain_files(folder: Path, hint: str) -> None:
 
 
 def read_bytes(path: Path, hint: str) -> bytes:
-    """Return the content of a file; `hint` is the way to fix a bad one, for the message.
-
-    Raises:
-        DataError: it is not a file, too large, or cannot be read.
-    """
+    """Return the content of a file; `hint` is the way to fix a bad one, for the message."""
     require_file(path, hint, FILE_MB.value)
     with wrap_errors(f"{path}: cannot be read", hint):
         return path.read_bytes()
@@ -93,11 +81,7 @@ def find_packed(path: Path) -> Path:
 
 
 def read_packed_bytes(path: Path, hint: str) -> bytes:
-    """Return the unpacked content of a file that may be packed (`.xz`).
-
-    Raises:
-        DataError: as `read_bytes`, or it is damaged.
-    """
+    """Return the unpacked content of a file that may be packed (`.xz`)."""
     if path.suffix != PACKED:
         return read_bytes(path, hint)
     packed = read_bytes(path, hint)
@@ -113,11 +97,8 @@ def read_packed_bytes(path: Path, hint: str) -> bytes:
 
 
 def read_text(path: Path, hint: str) -> str:
-    """Return the content of a UTF-8 file (`.xz` too) without byte order mark; line ends are kept.
-
-    Raises:
-        DataError: as `read_packed_bytes`, or the content is not UTF-8.
-    """
+    """Return the content of a UTF-8 file (`.xz` too) without byte order mark; line ends are
+    kept."""
     with wrap_errors(f"{path}: not UTF-8 text", hint, catch=UnicodeDecodeError):
         return read_packed_bytes(path, hint).decode("utf-8-sig")
 
@@ -127,12 +108,7 @@ def read_json(path: Path, hint: str) -> Any: ...
 @overload
 def read_json(path: Path, hint: str, data_type: type[T]) -> T: ...
 def read_json(path: Path, hint: str, data_type: Any = Any) -> Any:
-    """Return the content of a JSON file (`.xz` too) as the type that `msgspec` decodes it to.
-
-    Raises:
-        DataError: as `read_packed_bytes`, or the content is not JSON, nested too deep, or does not
-            match the type.
-    """
+    """Return the content of a JSON file (`.xz` too) as the type that `msgspec` decodes it to."""
     content = read_packed_bytes(path, hint)
     expected = "valid JSON" if data_type is Any else "in its documented form"
     with wrap_errors(f"{path}: not {expected}", hint, catch=NOT_JSON):
@@ -140,11 +116,7 @@ def read_json(path: Path, hint: str, data_type: Any = Any) -> Any:
 
 
 def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:
-    """Yield number (from 1) and content of the lines of a file (`.gz` too) that are not empty.
-
-    Raises:
-        DataError: it is not a file, damaged, or a line or the whole file exceeds its limit.
-    """
+    """Yield number (from 1) and content of the lines of a file (`.gz` too) that are not empty."""
     require_file(path, hint)
     number = 0
     try:
@@ -183,11 +155,7 @@ def json_value(text: bytes) -> Any:
 
 
 def json_lines_of(path: Path, hint: str) -> Iterator[dict[str, Any]]:
-    """Yield the JSON objects of a file that has one per line.
-
-    Raises:
-        DataError: as `lines_of`, or a line is not a JSON object.
-    """
+    """Yield the JSON objects of a file that has one per line."""
     for number, line in lines_of(path, hint):
         with wrap_errors(
             f"{path}, line {number}: not JSON", hint, catch=(ValueError, RecursionError)

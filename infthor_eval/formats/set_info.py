@@ -17,9 +17,6 @@ def simulator_of(root: Path) -> str | None:
     """Return what rendered the set's frames ("embedded", "unity"), or None if it is not recorded.
 
     Published sets do not record it.
-
-    Raises:
-        DataError: `set.json` is not a JSON object, or has another format version.
     """
     path = root / _FILE
     simulator = _read(path).get("simulator") if path.exists() else None
@@ -29,23 +26,14 @@ def simulator_of(root: Path) -> str | None:
 
 
 def writer_of(root: Path) -> str | None:
-    """Return the version of infthor-eval that wrote a set, or None if it is not recorded.
-
-    Raises:
-        DataError: as `simulator_of`.
-    """
+    """Return the version of infthor-eval that wrote a set, or None if it is not recorded."""
     path = root / _FILE
     version = _read(path).get("infthor_eval") if path.exists() else None
     return None if version is None else str(version)
 
 
 def claim_for_simulator(root: Path, simulator: str) -> None:
-    """Record the simulator of a set that is about to be written or continued.
-
-    Raises:
-        DataError: another simulator, or another version of this package, has rendered the existing
-            frames.
-    """
+    """Record the simulator of a set that is about to be written or continued."""
     path = root / _FILE
     version = infthor_eval.__version__
     if not is_written(path):

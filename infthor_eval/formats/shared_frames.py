@@ -75,9 +75,6 @@ def read_shared_frames(
         numbers: numbers of its frames, in time order.
         known: frames of other trajectories of the set by their line, which are returned where they
             are the same; those of this one are added.
-
-    Raises:
-        DataError: a name is none of ours, or there is not one for each number.
     """
     path = find_packed(folder / _NAMES)
     if not path.is_file():

@@ -161,9 +161,6 @@ def read_steps(folder: Path) -> list[Step]:
     """Read the log of the trajectory in `metadata/<traj_id>`: an entry a frame, in file order.
 
     A folder of frames alone, without a log, has an entry a frame that says only which it is.
-
-    Raises:
-        DataError: the file is missing, not JSON, or has none of the known layouts.
     """
     path = log_file(folder)
     images = _unlogged_images(folder)
@@ -196,11 +193,7 @@ def iter_object_states(steps: Sequence[Step]) -> Iterator[dict[str, ObjectState]
 
 
 def layout_of(folder: Path) -> Layout:
-    """Return the layout of the log of the trajectory in `metadata/<traj_id>`.
-
-    Raises:
-        DataError: the file is missing, not JSON, or has none of the known layouts.
-    """
+    """Return the layout of the log of the trajectory in `metadata/<traj_id>`."""
     if _unlogged_images(folder):
         return Layout.NONE
     path = log_file(folder)

@@ -117,11 +117,7 @@ class TwinWorld(msgspec.Struct, frozen=True):
 
 
 def read_pairs(folder: Path) -> list[TwinPair]:
-    """Read the pairs of a set.
-
-    Raises:
-        DataError: the file cannot be read, or a line is no pair.
-    """
+    """Read the pairs of a set."""
     path = folder / _TWINS
     pairs = []
     for number, line in enumerate(read_bytes(path, _HINT).splitlines(), 1):

@@ -15,12 +15,7 @@ class PlainLoader(yaml.SafeLoader):
 
 
 def read_yaml(path: Path, hint: str, loader: type[PlainLoader] = PlainLoader) -> Any:
-    """Return the content of a YAML file, whose custom tags the loader knows.
-
-    Raises:
-        DataError: the file cannot be read, is not YAML, has duplicate keys or a recursive alias, or
-            exceeds the limit of values once its aliases are expanded.
-    """
+    """Return the content of a YAML file, whose custom tags the loader knows."""
     text = read_text(path, hint)
     with wrap_errors(
         f"{path}: not YAML", hint, catch=(yaml.YAMLError, RecursionError, ValueError, TypeError)

@@ -115,11 +115,7 @@ _AnyManifest = TypeVar("_AnyManifest", Manifest, TwinsManifest)
 
 
 def read_manifest(path: Path) -> Manifest | TwinsManifest:
-    """Read a manifest, of questions or of twins.
-
-    Raises:
-        DataError: the file cannot be read or is not a manifest.
-    """
+    """Read a manifest, of questions or of twins."""
     is_of_twins = read_json(path, _HINT, _AnyForm).twins is not None
     if is_of_twins:
         return read_json(path, _HINT, TwinsManifest)
@@ -142,9 +138,6 @@ def build_bundle(
 
     Returns:
         The manifest with the digests of the new files, and the questions.
-
-    Raises:
-        DataError: the folder is not empty, or a trajectory could not be generated or replayed.
     """
     with _building(manifest, out) as work:
         _generate(manifest, simulator, work / _TRAJECTORIES, progress)
@@ -181,10 +174,6 @@ def build_twins(
 
     Returns:
         The manifest with the digests of the new files, and the numbers of the set.
-
-    Raises:
-        DataError: the folder is not empty, a trajectory could not be generated, or twins could not
-            be made of it.
     """
     with _building(manifest, out) as work:
         with Simulator(embedded_launch(), image=False) as simulator:
@@ -216,11 +205,7 @@ def differing_files(
 
 @contextmanager
 def _building(manifest: Manifest | TwinsManifest, out: Path) -> Iterator[Path]:
-    """Yield the hidden folder of a build; what is in its `_SET` at the end is moved to `out`.
-
-    Raises:
-        DataError: `out` has a whole set, or other files than those of a build that was stopped.
-    """
+    """Yield the hidden folder of a build; what is in its `_SET` at the end is moved to `out`."""
     recipe = msgspec.to_builtins(msgspec.structs.replace(manifest, files={}))
     work = out / f"{_WORK}{fingerprint(recipe)}"
     out.mkdir(parents=True, exist_ok=True)
@@ -292,9 +277,6 @@ def copy_compactly(source: Path, out: Path, colors: int) -> None:
         source: a set of twins.
         out: folder of the copy, which exists and is empty.
         colors: number of colours of the pictures of one base trajectory.
-
-    Raises:
-        DataError: the set cannot be read.
     """
     data = NiehSet(source)
     by_base: dict[str, list[TwinPair]] = {}

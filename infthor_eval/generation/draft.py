@@ -196,9 +196,6 @@ def provenance() -> dict[str, Any]:
       installed from a release or a folder
     - `created`: seconds since 1970, from the environment variable SOURCE_DATE_EPOCH; null without
       it
-
-    Raises:
-        UsageError: the environment variable is not a whole number.
     """
     return {
         "generator": f"infthor-eval {__version__}",

@@ -69,10 +69,6 @@ def generate(
         settings: settings of the trajectory.
         simulator: the simulator.
         tell: told how far it is, after each task that was tried.
-
-    Raises:
-        UsageError: the trajectory gave up, with fewer steps than `save_floor`.
-        SimulatorError: the simulator fails, or has no such scene.
     """
     factory = _Factory(settings, simulator, tell)
     try:
@@ -163,9 +159,6 @@ class _Factory:
         """Return the longest trajectory so far, if it has `save_floor` steps.
 
         The embedded simulator repeats every action exactly, so all of its prefixes replay.
-
-        Raises:
-            UsageError: it has fewer, or none are to be kept.
         """
         self._note_longest()
         self._draft = self._longest

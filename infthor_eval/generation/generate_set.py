@@ -156,9 +156,6 @@ def generate_set(
         simulator: simulator to generate them in.
         out: folder of the files; created if it does not exist.
         progress: called after each trajectory, with True if it is of an earlier run.
-
-    Raises:
-        DataError: a trajectory cannot be written; those before it remain.
     """
     out.mkdir(parents=True, exist_ok=True)
     outcomes = (_generate_one(job, simulator, out) for job in jobs)

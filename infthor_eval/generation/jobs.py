@@ -45,9 +45,6 @@ def trajectory_jobs(
         words: the words of tasks, plain English or the published generator's.
         scene_goal_filter: False to sample task types that a scene's room type has not, too.
         houses: ProcTHOR houses among the scenes, by their names.
-
-    Raises:
-        UsageError: the number of trajectories, or of their actions or sub-goals, exceeds the limit.
     """
     _check_length("--min-steps", min_steps)
     _check_length("--min-subgoals", min_subgoals)
@@ -87,11 +84,7 @@ def _check_length(option: str, length: int) -> None:
 
 
 def without_bathrooms(scenes: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the scenes without the bathrooms, and the bathrooms in alphabetical order.
-
-    Raises:
-        UsageError: all scenes are bathrooms.
-    """
+    """Return the scenes without the bathrooms, and the bathrooms in alphabetical order."""
     chosen = [scene for scene in scenes if scene_type(scene) != BATHROOM]
     skipped = sorted(set(scenes) - set(chosen))
     if not chosen:

@@ -52,10 +52,6 @@ def look_around_files(path: Path, out: Path, min_run: int = MIN_RUN) -> LookArou
         path: a `.json` file, or a folder of them.
         out: the new file, or the folder of the new files, which have the same names.
         min_run: see `level_walks`.
-
-    Raises:
-        DataError: a file is no trajectory, has insertions already, or cannot be written; those
-            before it remain.
     """
     summary = LookAroundSummary()
     for source in _sources(path):
@@ -79,11 +75,7 @@ def _sources(path: Path) -> Iterable[TrajectorySource]:
 
 
 def _document(source: TrajectorySource) -> dict[str, Any]:
-    """Return a checked trajectory's JSON as it is in the file.
-
-    Raises:
-        DataError: it is no trajectory.
-    """
+    """Return a checked trajectory's JSON as it is in the file."""
     source.read()
     with wrap_errors(f"{source.place}: not JSON", _HINT, catch=(ValueError, RecursionError)):
         document = json.loads(source.raw)
@@ -108,10 +100,6 @@ def add_look_around(document: dict[str, Any], place: str, min_run: int = MIN_RUN
 
     Returns:
         The number of inserted actions.
-
-    Raises:
-        DataError: there are insertions already, which the published script would count once more in
-            the ranges; or the range of a task begins outside of the low-level actions.
     """
     actions = document["plan"]["low_actions"]
     if any(action.get("inserted") == INSERTED for action in actions):

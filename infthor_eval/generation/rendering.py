@@ -74,11 +74,7 @@ class RenderSettings(msgspec.Struct, frozen=True):
         folder: Path,
         tell: TellProgress = tell_nobody,
     ) -> "RenderReport":
-        """Write the pictures and the timeline of a trajectory.
-
-        Raises:
-            SimulatorError: the simulator fails, or has no such scene.
-        """
+        """Write the pictures and the timeline of a trajectory."""
         scene = trajectory.scene.floor_plan
         report = RenderReport(trajectory.traj_id, source.digest, scene, self.smooth, settings=self)
         actions = ActionReplay(simulator, trajectory, report, tell)

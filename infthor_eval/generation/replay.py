@@ -97,9 +97,6 @@ def replay(
         frames: number of frames of each action that moves the agent or its camera; other actions
             have one.
         tell: told how far it is, after each action.
-
-    Raises:
-        SimulatorError: the simulator fails, or has no such scene.
     """
     report = ReplayReport(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames)
     actions = ActionReplay(simulator, trajectory, report, tell)
@@ -170,9 +167,6 @@ class ActionReplay:
     """Executes the actions of a trajectory in a simulator, from its restored scene on.
 
     What is accepted, refused or not restored is added to the report.
-
-    Raises:
-        SimulatorError: the simulator fails, or has no such scene.
     """
 
     def __init__(

@@ -119,11 +119,7 @@ class ReplayedSet:
 def select(
     paths: Iterable[Path], limit: int | None = None, per_floor_plan: int | None = None
 ) -> Selection:
-    """Read trajectories of files and folders, at most `limit`, and `per_floor_plan` on one plan.
-
-    Raises:
-        DataError: a path has no trajectory file.
-    """
+    """Read trajectories of files and folders, at most `limit`, and `per_floor_plan` on one plan."""
     selection = Selection()
     taken: Counter[str] = Counter()
     for source in _all_sources(paths, selection.failures):

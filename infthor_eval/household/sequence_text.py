@@ -52,9 +52,6 @@ def plan_text(high: HighAction, words: Words) -> str:
     of the ids in `planner_action` ("put the Mug in the Sink"), in GotoLocation the argument; a
     sub-goal without a template is empty. `Words.NATURAL` are the arguments ("put the mug in the
     sink"); a sub-goal without a template, or without arguments, has its name.
-
-    Raises:
-        DataError: published words lack a name.
     """
     return _published_plan(high) if words is Words.PUBLISHED else _natural_plan(high)
 
@@ -112,9 +109,6 @@ def action_text(action: ApiAction, words: Words) -> str:
 
     `Words.PUBLISHED` are those of the published script (`serialize_action`): what follows an
     underscore in the name is cut, and a missing id leaves its place holder.
-
-    Raises:
-        DataError: published words do not know the action.
     """
     if words is Words.NATURAL:
         return str(text_of(action.action, action.object_id, action.receptacle_id))

@@ -150,10 +150,6 @@ def task_of(recorded: SubTask) -> Task:
     """Return the task in a trajectory, ours, published or ALFRED's; the inverse of `sub_task`.
 
     Object types get their AI2-THOR 5.x names. Fields that the task type does not need are ignored.
-
-    Raises:
-        DataError: the goal is missing or of an unknown type, or an object type that it needs is
-            missing.
     """
     info = recorded.task_info
     params = recorded.pddl_params

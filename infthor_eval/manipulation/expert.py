@@ -56,10 +56,6 @@ def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
     """Replay the expert with AI2-THOR's default agent; keep states before pick-ups and puts.
 
     A state is kept if the action succeeds.
-
-    Raises:
-        SceneError: the simulator has no such scene.
-        SimulatorError: the simulator fails.
     """
     restore(simulator, trajectory.scene)
     grounding = Grounding(simulator.view)

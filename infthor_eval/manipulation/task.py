@@ -134,12 +134,7 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
     """A task file that was read, with its episodes, each with its trajectory."""
 
     def __init__(self, file: TaskFile, request: TaskRequest[ManipulationOptions]) -> None:
-        """Check the file and find its episodes.
-
-        Raises:
-            UsageError: an option does not fit, or there are no episodes.
-            DataError: the file is malformed, or none of its trajectories can be used.
-        """
+        """Check the file and find its episodes."""
         file.require("dataset_kwargs")
         overrides = {"radius": request.options.radius_metres}
         overrides |= {name: getattr(request.options, name) for name in _GIVEN}

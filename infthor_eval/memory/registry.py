@@ -228,12 +228,7 @@ class _FunctionMemory:
         self._steps.append(observation)
 
     def recall(self, query: Query, budget: int | None) -> Recalled:
-        """Return the steps that the function names, as many as fit.
-
-        Raises:
-            UserCodeError: it returns no numbers of images.
-            DataError: a frame cannot be read.
-        """
+        """Return the steps that the function names, as many as fit."""
         steps = list(self._steps)
         numbers = self._function.call(_Images(steps), query.text, **self._options)
         chosen = list(dict.fromkeys(self._checked(numbers, len(steps))))
@@ -285,9 +280,6 @@ def _function_memory(name: str, function: Callable[..., Any]) -> Callable[..., _
     Args:
         name: FILE.py:NAME, as the user gave it.
         function: what has that name in the file.
-
-    Raises:
-        ModelError: it takes other parameters.
     """
     own = read_function(name, function, (_FORM,))
     fields = dataclasses.fields(own.options)

@@ -80,11 +80,7 @@ class Clip(_Nearest):
         self._query = query
 
     def vector(self, query: Query) -> Any:
-        """See `_Nearest`.
-
-        Raises:
-            DataError: the goal is to be compared, and is not known.
-        """
+        """See `_Nearest`."""
         if self._query == "question":
             return self.retriever.text(query.text)
         if not query.present.goal:

@@ -45,9 +45,6 @@ def write_page_file(
         script: texts of its script, in order.
         filters: the template's own filters.
         images: sources of images.
-
-    Raises:
-        DataError: it cannot be written.
     """
     css, js = "".join(style), "".join(script)
     text = _compiled(template, tuple((filters or {}).items())).render(

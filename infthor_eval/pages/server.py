@@ -54,9 +54,6 @@ def serve_pages(
         routes: Starlette's routes; the one with path "/" is the first page.
         port: port on 127.0.0.1; 0 for a free one.
         listening: a socket of `listen` to use instead; it is closed at the end.
-
-    Raises:
-        UsageError: the extra `page` is not installed, or the port cannot be had.
     """
     require_page_extra()
     token = secrets.token_urlsafe(_TOKEN_BYTES)
@@ -87,11 +84,7 @@ def file_route(path: str, package: str, name: str) -> Route:
 
 
 def require_page_extra() -> None:
-    """Import what pages need, so that a command says that it is missing before it begins.
-
-    Raises:
-        UsageError: the extra `page` is not installed.
-    """
+    """Import what pages need, so that a command says that it is missing before it begins."""
     problem = "a page needs Starlette and uvicorn"
     hint = "pip install 'infthor-eval[page]'"
     with wrap_errors(problem, hint, catch=ImportError, raise_as=UsageError):
@@ -100,11 +93,7 @@ def require_page_extra() -> None:
 
 
 def listen(port: int) -> socket.socket:
-    """Take a port on 127.0.0.1, 0 for a free one, before there is something to serve on it.
-
-    Raises:
-        UsageError: the port cannot be had.
-    """
+    """Take a port on 127.0.0.1, 0 for a free one, before there is something to serve on it."""
     problem = f"--port {port}: cannot be had"
     hint = "give another, or none for a free one"
     with wrap_errors(problem, hint, catch=(OSError, OverflowError), raise_as=UsageError):

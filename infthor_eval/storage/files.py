@@ -55,11 +55,7 @@ def plain_name(text: str) -> str:
 
 
 def prepare_folder(path: Path, option: str = "--out") -> Path:
-    """Create an option's folder, and check that it is writable before results would be lost.
-
-    Raises:
-        DataError: the path is a file, or the folder cannot be created or written to.
-    """
+    """Create an option's folder, and check that it is writable before results would be lost."""
     require_writable(path, option)
     with wrap_errors(f"{path}: cannot be written to", _other_place(option)):
         path.mkdir(parents=True, exist_ok=True)
@@ -68,12 +64,7 @@ def prepare_folder(path: Path, option: str = "--out") -> Path:
 
 @contextmanager
 def hold_folder(path: Path, option: str = "--out") -> Iterator[Path]:
-    """Prepare an option's folder, and keep other commands from writing into it meanwhile.
-
-    Raises:
-        UsageError: another command is writing into it.
-        DataError: see `prepare_folder`.
-    """
+    """Prepare an option's folder, and keep other commands from writing into it meanwhile."""
     prepare_folder(path, option)
     with _hold_lock(path / _LOCK, path):
         yield path
@@ -98,11 +89,7 @@ def _other_place(option: str) -> Callable[[BaseException], str]:
 
 
 def require_writable(path: Path, option: str = "--out") -> None:
-    """Check that the folder of an option can be written to, or created; nothing is left behind.
-
-    Raises:
-        DataError: the folder cannot be written to or created.
-    """
+    """Check that the folder of an option can be written to, or created; nothing is left behind."""
     catch = (OSError, ValueError)  # ValueError: a null character in the name
     with wrap_errors(f"{path}: cannot be written to", _other_place(option), catch=catch):
         nearest = next(folder for folder in (path, *path.absolute().parents) if _is_there(folder))
@@ -123,11 +110,7 @@ def _is_there(path: Path) -> bool:
 
 
 def prepare_file(path: Path, option: str = "--out") -> Path:
-    """Check that the file of an option can be written or replaced, and create its folder.
-
-    Raises:
-        DataError: the path is a folder, a pipe or a device, or its folder cannot be written to.
-    """
+    """Check that the file of an option can be written or replaced, and create its folder."""
     prepare_folder(path.parent, option)
     with wrap_errors(f"{path}: cannot be written to", _other_place(option)):
         if path.exists() and not path.is_file():
@@ -136,11 +119,7 @@ def prepare_file(path: Path, option: str = "--out") -> Path:
 
 
 def refuse_overwrite(path: Path, content: bytes) -> None:
-    """Refuse to replace a file by different content: somebody may have edited it.
-
-    Raises:
-        DataError: the file exists and its content differs.
-    """
+    """Refuse to replace a file by different content: somebody may have edited it."""
     with wrap_errors(f"{path}: cannot be read", OVERWRITE_HINT):
         if path.is_file() and path.read_bytes() != content:
             raise DataError(f"{path}: exists already with different content; {OVERWRITE_HINT}")
@@ -176,9 +155,6 @@ def is_written(path: Path) -> bool:
     """Return whether a path that `write_atomically` writes is there, and need not be written.
 
     What a killed process left beside it is removed, as no other writer would.
-
-    Raises:
-        UsageError: another process is writing it, and does not end within a minute.
     """
     if not path.exists():
         return False

@@ -12,11 +12,7 @@ from infthor_eval.errors import DataError, wrap_errors
 
 
 def packaged_folder(name: str) -> Path:
-    """Return the package's data folder of this name ("tasks", "results", "sets/nieh_mini").
-
-    Raises:
-        DataError: the installation lacks the folder.
-    """
+    """Return the package's data folder of this name ("tasks", "results", "sets/nieh_mini")."""
     package = resources.files("infthor_eval")
     for folder in (package.joinpath(name), package.joinpath("..", name)):
         with wrap_errors(

@@ -32,10 +32,6 @@ class SafeController(ai2thor.controller.Controller):
         Args:
             scene: name of the scene, or a house description.
             options: options of ai2thor's Controller (`width`, `renderInstanceSegmentation`, ...).
-
-        Raises:
-            SceneError: the simulator refuses the scene.
-            SimulatorError: the simulator does not start.
         """
         self.server: SafeFifoServer | None = None
         self._launch = launch

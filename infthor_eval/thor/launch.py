@@ -51,9 +51,6 @@ def embedded_launch(
             compiles the renderer, which takes ten seconds of a processor. Several at once on a busy
             machine take minutes, and one that is stopped in the middle would have to restart from
             the beginning.
-
-    Raises:
-        UsageError: the time limit of an action, `limits.ACTION_SECONDS`, is set to no number.
     """
     return Launch(
         player_command(data, supplement),
@@ -67,9 +64,6 @@ def embedded_launch(
 def unity_launch(executable: Path | None = None, *, platform: str | None = None) -> Launch:
     """Return the launch of a Unity build of AI2-THOR: a local executable, or the build that ai2thor
     downloads.
-
-    Raises:
-        UsageError: the time limit of an action, `limits.UNITY_ACTION_SECONDS`, is set to no number.
     """
     return Launch(
         None if executable is None else shlex.quote(str(executable)),

@@ -38,10 +38,6 @@ def fetch_scene(scene: str, folder: Path, host: str = HOST, overwrite: bool = Fa
         scene: one of `PUBLISHED_SCENES`.
         host: where the repositories' files are.
         overwrite: True to replace a different recording of the scene.
-
-    Raises:
-        DataError: a file cannot be had or is not what it should be; or the folder has a different
-            recording of the scene, or cannot be written.
     """
     objects = _objects(f"{host}/{_OBJECTS.format(scene)}")
     cells = _cells(f"{host}/{_CELLS.format(scene)}")
@@ -72,11 +68,7 @@ def _cells(address: str) -> list[tuple[float, float]]:
 
 
 def _download(address: str) -> bytes:
-    """Return the content of a file on the network, which is an http or https address.
-
-    Raises:
-        DataError: it cannot be had, or is too large.
-    """
+    """Return the content of a file on the network, which is an http or https address."""
     hint = "check the connection, or name the scenes that you need"
     with (
         wrap_errors(f"{address}: cannot be downloaded", hint),

@@ -38,9 +38,6 @@ class Recorder:
             high_idx: index of the action's sub-goal.
             target: id of the object acted on.
             receptacle: id of the receptacle acted on.
-
-        Raises:
-            SimulatorError: the simulator sent no frame.
         """
         number = len(self.steps)
         entry = Step(

@@ -62,11 +62,7 @@ class RestoreReport:
 
 
 def restore(simulator: Simulator, scene: Scene) -> RestoreReport:
-    """Reset a simulator to the scene of a trajectory, and restore the recorded initial state.
-
-    Raises:
-        SimulatorError: the simulator has no such scene, or fails.
-    """
+    """Reset a simulator to the scene of a trajectory, and restore the recorded initial state."""
     loaded = simulator.reset(scene.house or scene.floor_plan)
     report = RestoreReport()
     calls = _state_calls(scene)
@@ -222,9 +218,6 @@ def settle(
 
     Returns:
         The refused calls with the simulator's messages, and what is off by more than 2 cm.
-
-    Raises:
-        SimulatorError: the simulator fails.
     """
     refused: list[str] = []
 

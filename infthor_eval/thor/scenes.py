@@ -29,11 +29,7 @@ _HIDDEN = 40  # objects that a frame's whole area would show
 
 
 def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return the scene from above, and from where most of it is seen: uint8 [height, width, 3].
-
-    Raises:
-        SimulatorError: the simulator does not have the scene, or sends no frames.
-    """
+    """Return the scene from above, and from where most of it is seen: uint8 [height, width, 3]."""
     first = simulator.reset(scene).frame
     if first is None:
         raise SimulatorError(
@@ -56,10 +52,6 @@ def dump_scene(simulator: Simulator, scene: str, folder: Path, overwrite: bool =
 
     Args:
         overwrite: True to replace a different recording of the scene.
-
-    Raises:
-        SimulatorError: the simulator does not have the scene.
-        DataError: the folder has a different recording of the scene, or cannot be written.
     """
     simulator.reset(scene)
     objects = simulator.metadata["objects"]

@@ -131,10 +131,6 @@ class Simulator:
         Args:
             scene: name of the scene (`FloorPlan10`, `kitchen-3`), description of a ProcTHOR house,
                 or None for the current scene.
-
-        Raises:
-            SceneError: the simulator refuses the scene.
-            SimulatorError: the simulator cannot be started.
         """
         self._scene = scene or self._scene
         self._episode = []
@@ -148,12 +144,7 @@ class Simulator:
                 self._recover_from(fault)
 
     def step(self, action: str, **arguments: Any) -> SimulatorView:
-        """Run an action and return the state after it; `success` and `error` tell of a refusal.
-
-        Raises:
-            SimulatorError: the simulator failed more often than `max_restarts`, or an action of the
-                repeated episode ended differently.
-        """
+        """Run an action and return the state after it; `success` and `error` tell of a refusal."""
         call = {"action": action, **arguments}
         while True:
             try:
@@ -203,9 +194,6 @@ class Simulator:
             exactly: True to restore the state bit by bit. If False, an agent that only walked since
                 the mark is teleported back, which is faster, but can differ by rounding errors and
                 hence by single pixels.
-
-        Raises:
-            SimulatorError: as `step`.
         """
         done = self._is_at(mark) or (not exactly and self._walk_back(mark)) or self._restore(mark)
         if not done:

@@ -47,9 +47,6 @@ def transfer(simulator: Simulator, target: SimulatorView) -> list[str]:
 
     Returns:
         Sorted ids of the objects that are missing, or could not be moved to their position.
-
-    Raises:
-        SimulatorError: the simulator fails.
     """
     # First, so that the slices exist when objects are moved.
     for key in _objects_to_slice(simulator.view, target):

@@ -29,10 +29,6 @@ def recorded_segments(
             used.
         frames: frame of each step.
         words: words of plans and actions.
-
-    Raises:
-        DataError: a task has no goal, a plan is of an unknown kind or cannot be said in these
-            words, or an action has no frame.
     """
     plans = plans_of(trajectory, words)
     tasks = tasks_of(trajectory)
@@ -78,10 +74,6 @@ def windows(
         segments: history of the trajectory.
         limit: most tokens of a sequence, frames expanded; plans that exceed it alone are skipped
             items.
-
-    Raises:
-        DataError: a frame cannot be read, or a text of the history contains a mark.
-        ModelError: the template refuses the history.
     """
     first = 0
     while first < len(segments):

@@ -38,12 +38,7 @@ class Batch(TypedDict):
 
 
 def collate(sequences: Sequence[TrainingSequence], family: Family, pad_id: int) -> Batch:
-    """Combine one or more sequences to a batch.
-
-    Raises:
-        DataError: a sequence has no token with loss; the first token never has any, because nothing
-            predicts it.
-    """
+    """Combine one or more sequences to a batch."""
     ids = [torch.tensor(list(token_ids(sequence.pieces))) for sequence in sequences]
     labels = [_labels(sequence, own) for sequence, own in zip(sequences, ids, strict=True)]
     return Batch(

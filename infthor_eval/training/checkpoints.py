@@ -35,11 +35,7 @@ class Checkpoints:
     about: Mapping[str, Any]
 
     def save(self, step: int, model: torch.nn.Module, *optimizers: torch.optim.Optimizer) -> None:
-        """Write the state after some finished steps, then remove the previous one.
-
-        Raises:
-            DataError: the state cannot be written.
-        """
+        """Write the state after some finished steps, then remove the previous one."""
         path = prepare_folder(self.folder) / f"step-{step:06d}"
         with (
             wrap_errors(
@@ -57,12 +53,7 @@ class Checkpoints:
                 shutil.rmtree(older)
 
     def restore(self, model: torch.nn.Module, *optimizers: torch.optim.Optimizer) -> int:
-        """Load the last state, if there is one, and return the number of finished steps.
-
-        Raises:
-            DataError: the state is damaged.
-            UsageError: the state is of another run.
-        """
+        """Load the last state, if there is one, and return the number of finished steps."""
         places = self._places()
         if not places:
             return 0

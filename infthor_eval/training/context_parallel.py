@@ -77,11 +77,6 @@ class ContextParallel:
 
         Returns:
             A float32 scalar, 0 on a rank whose chunks have no labels.
-
-        Raises:
-            DataError: a frame cannot be read.
-            ModelError: processor and model disagree on the number of a frame's tokens, or the model
-                uses sliding-window attention.
         """
         if len(batch["input_ids"]) != 1:
             raise ValueError("ranks share one sequence at a time")
@@ -156,9 +151,6 @@ class ContextParallel:
 
         Returns:
             The outputs, (batch, own tokens, heads, head size), and None instead of weights.
-
-        Raises:
-            ModelError: the model uses sliding-window attention.
         """
         if sliding_window is not None:
             raise ModelError(

@@ -57,11 +57,6 @@ def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]
         encoder: builds the sequences.
         folders: folders of the sets, in the form of NIEH sets; sequences of questions need a
             question file.
-
-    Raises:
-        UsageError: a setting of a context is not valid.
-        DataError: a folder is not a set, or no sequence is left.
-        ModelError: the model's template refuses the sequences.
     """
     encoded = [sequence for folder in folders for sequence in _read_set(recipe, encoder, folder)]
     sequences = [sequence for sequence in encoded if isinstance(sequence, TrainingSequence)]
@@ -131,11 +126,7 @@ def trajectory_names(data: NiehSet) -> list[str]:
 
 
 def read_history(data: NiehSet, name: str, words: Words) -> tuple[Trajectory, list[PlanSegment]]:
-    """Return a trajectory of a set and its true history in these words.
-
-    Raises:
-        DataError: the trajectory is not in the set, or does not match its replay.
-    """
+    """Return a trajectory of a set and its true history in these words."""
     path = data.outline_file(name)
     if path is None:
         raise DataError("its trajectory is not in the set")
@@ -163,10 +154,6 @@ def question_sequences(
         encoder: builds the sequences.
         task: the samples.
         limit: most tokens of a sequence, frames expanded; longer ones are skipped.
-
-    Raises:
-        UsageError: the context needs a memory.
-        ModelError: the template refuses the turns.
     """
     for skipped in task.skipped:
         yield SkippedSequence(_name(skipped.question.id, skipped.variant), skipped.reason)

@@ -81,12 +81,8 @@ class Encoder:
         )
 
     def pieces(self, parts: Sequence[Part], system: str | None = None) -> list[Piece]:
-        """Return the prompt of a user turn with these parts, after a system's turn if there is one.
-
-        Raises:
-            DataError: a frame cannot be read.
-            ModelError: the template refuses the parts.
-        """
+        """Return the prompt of a user turn with these parts, after a system's turn if there is
+        one."""
         told = () if system is None else (Turn("system", (system,)),)
         return self._prompter.pieces([*told, Turn("user", tuple(parts))])
 
@@ -95,10 +91,6 @@ class Encoder:
     ) -> TrainingSequence:
         """Encode a user's turn of goals, plans, actions and frames, after a system's turn if there
         is one, with loss on the actions and the marks around them (appendix B).
-
-        Raises:
-            DataError: a frame cannot be read, or a text but the actions contains a mark.
-            ModelError: the template refuses the parts.
         """
         pieces = self.pieces(parts, system)
         n_actions = sum(isinstance(part, str) and part.startswith(ACT) for part in parts)
@@ -109,22 +101,13 @@ class Encoder:
         return TrainingSequence(name, tuple(pieces), tuple(self._is_between_marks(pieces)))
 
     def frame_tokens(self, frame: FrameRef) -> int:
-        """Return the tokens of a frame, without those that the template writes around it.
-
-        Raises:
-            DataError: the frame cannot be read.
-        """
+        """Return the tokens of a frame, without those that the template writes around it."""
         return len(self._prompter.frame(frame).ids)
 
     def answer(
         self, name: str, parts: Sequence[Part], answer: str, system: str | None = None
     ) -> TrainingSequence:
-        """Encode question and answer, with loss on the answer and the token that ends the turn.
-
-        Raises:
-            DataError: a frame cannot be read.
-            ModelError: the template refuses the question.
-        """
+        """Encode question and answer, with loss on the answer and the token that ends the turn."""
         prompt = self.pieces(parts, system)
         reply: list[int] = [
             *self._tokenizer(answer, add_special_tokens=False)["input_ids"],

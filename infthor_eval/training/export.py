@@ -56,9 +56,6 @@ def export(
     title of the recipe and the words of plans and actions. The folder is created; each file appears
     in it when it is whole, and the config, which makes it a checkpoint, last. `weights` are the
     gathered ones of a sharded model.
-
-    Raises:
-        DataError: the checkpoint cannot be written.
     """
     with wrap_errors(
         f"{folder}: the checkpoint cannot be written",

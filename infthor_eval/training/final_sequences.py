@@ -58,10 +58,6 @@ def memory_sequences(
         segments: its history.
         kind: which memory.
         limit: most tokens of a sequence, frames expanded; longer ones are skipped.
-
-    Raises:
-        DataError: it has no memory, or one of another form; a frame cannot be read.
-        ModelError: the template refuses the turns.
     """
     memory = _State(data, trajectory) if kind == "text" else _Retrieved(data, trajectory)
     frames = [segments[0].before, *(frame for segment in segments for _, frame in segment.steps)]
@@ -197,10 +193,6 @@ def goal_windows(
         segments: history of the trajectory.
         limit: most tokens of a sequence as the trainer counts: a text is one, so that the true
             number is up to a twentieth above. A plan that exceeds it alone ends where it does.
-
-    Raises:
-        DataError: a frame cannot be read, or a text contains a mark.
-        ModelError: the template refuses the sequence.
     """
     if not segments:
         return
@@ -219,11 +211,8 @@ def goal_windows(
 def goals_of_actions(
     segments: Sequence[PlanSegment], limit: int, frame_tokens: int
 ) -> Iterator[list[Part]]:
-    """Yield the texts and frames of each window; `frame_tokens` is the number of tokens of a frame.
-
-    Raises:
-        DataError: not one action with its frame fits.
-    """
+    """Yield the texts and frames of each window; `frame_tokens` is the number of tokens of a
+    frame."""
     if 1 + frame_tokens >= limit:
         raise DataError(
             f"max_tokens is {limit}, too few for one action and its frame ({1 + frame_tokens})"

@@ -81,13 +81,7 @@ class TrainingRun:
 
 
 def prepare_run(recipe: Recipe, folders: Sequence[Path]) -> TrainingRun:
-    """Load the model and build the sequences from folders of replayed sets.
-
-    Raises:
-        UsageError: the recipe's model or one of its settings is unknown.
-        ModelError: the model cannot be loaded.
-        DataError: there is nothing to train on.
-    """
+    """Load the model and build the sequences from folders of replayed sets."""
     loaded = load_starting_model(
         recipe.model, recipe.model_args, recipe.prompt, recipe.seed, recipe.max_tokens
     )
@@ -106,12 +100,6 @@ def fine_tune(run: TrainingRun, out: Path, on_step: StepCallback) -> Path:
 
     Returns:
         The folder of the checkpoint.
-
-    Raises:
-        UsageError: the folder belongs to another run, or the number of processes does not suit the
-            recipe.
-        DataError: a file cannot be read or written.
-        ModelError: the model cannot be trained in this way.
     """
     with _processes(), ExitStack() as held:
         is_first = not dist.is_initialized() or dist.get_rank() == 0
@@ -203,11 +191,7 @@ def _claim_folder(out: Path, document: dict[str, Any]) -> None:
 
 
 def _add_adapters(network: SequenceModel, settings: Lora) -> Any:
-    """Add adapters to the decoder's linear layers, freeze the rest, and return peft's model.
-
-    Raises:
-        UsageError: peft is not installed, or the decoder has none of the target layers.
-    """
+    """Add adapters to the decoder's linear layers, freeze the rest, and return peft's model."""
     try:
         import peft
     except ImportError as error:
@@ -322,10 +306,6 @@ def _train_with_trainer(
         recipe: recipe of the run.
         out: folder of the checkpoints.
         on_step: called after every step, in the first process.
-
-    Raises:
-        UsageError: the sequences of a step cannot be divided evenly among the processes.
-        DataError: the last checkpoint cannot be read, or a new one cannot be written.
     """
     n_tokens = sum(sequence.n_tokens for sequence in sequences)
     trainer = _SequenceTrainer(

@@ -60,9 +60,6 @@ class Loop:
         folder: folder of its states.
         ranks: position of this process among all.
         on_step: called after every step, on the first process.
-
-    Raises:
-        UsageError: there are no sequences, or nothing to train.
     """
 
     def __init__(
@@ -96,12 +93,6 @@ class Loop:
 
         All processes have to call this, with the same folder. With an unchanged number of
         processes, the final weights are bit for bit those of a run that was never interrupted.
-
-        Raises:
-            DataError: a frame cannot be read, a sequence has no token with loss, or a state is
-                damaged or cannot be written.
-            ModelError: the gradient is not finite, or the model cannot be trained in this way.
-            UsageError: the state is of another run.
         """
         n_done = self._checkpoints.restore(self._model.model, self._optimizer)
         self._broadcast_weights()

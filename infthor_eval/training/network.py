@@ -72,10 +72,6 @@ class SequenceModel(torch.nn.Module):
 
         Returns:
             "loss": cross entropy in nats, a float32 scalar.
-
-        Raises:
-            DataError: a frame cannot be read.
-            ModelError: processor and model disagree on the number of a frame's tokens.
         """
         embeds = self.embed(input_ids, slots, self.features(frames))
         hidden = self.decode(embeds, position_ids, attention_mask)
@@ -85,12 +81,7 @@ class SequenceModel(torch.nn.Module):
         return {"loss": total / torch.as_tensor(n_items, device=total.device)}
 
     def features(self, frames: Sequence[Frame]) -> list[Tensor]:
-        """Return the features of each frame, (slots, hidden); repeated frames are computed once.
-
-        Raises:
-            DataError: a frame cannot be read.
-            ModelError: processor and model disagree on the number of a frame's tokens.
-        """
+        """Return the features of each frame, (slots, hidden); repeated frames are computed once."""
         distinct = list(dict.fromkeys(frames))
         computed: list[Tensor] = []
         with torch.set_grad_enabled(torch.is_grad_enabled() and self.trains_vision):
@@ -215,10 +206,6 @@ def freeze(model: SequenceModel, parts: Collection[str]) -> None:
     Args:
         model: the model.
         parts: names of `PARTS`.
-
-    Raises:
-        UsageError: a part is unknown, only one of two parts with shared weights would be frozen, or
-            nothing would be left to train.
     """
     for name in parts:
         if name not in PARTS:

@@ -72,9 +72,6 @@ def find_weights(place: str, revision: str | None = None) -> Path:
         place: its folder, a folder of `step-N` of which the last is taken as in the published
             trainer, or such a folder of a hub's repository (`owner/name/folder`).
         revision: branch, tag or commit on the hub; the default branch where None.
-
-    Raises:
-        ModelError: there is no such folder, here or on the hub.
     """
     folder, _ = fetch(place, revision, option="", extra_patterns=("*.distcp",))
     if (folder / ".metadata").is_file():
@@ -96,9 +93,6 @@ def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
     Args:
         loaded: the model that training started from, with the marks of sequences as tokens.
         folder: folder of the checkpoint.
-
-    Raises:
-        DataError: the folder is not such a checkpoint, or has another model's weights.
     """
     with wrap_errors(f"{folder}: not a distributed checkpoint", _HINT, catch=Exception):
         reader = _Reader(folder)

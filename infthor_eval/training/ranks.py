@@ -44,9 +44,6 @@ def assign_ranks(n_context: int = 1) -> Ranks:
 
     Args:
         n_context: number of parts of each sequence.
-
-    Raises:
-        UsageError: the number of processes is not divisible by the number of parts.
     """
     world = dist.get_world_size() if dist.is_initialized() else 1
     if n_context < 1 or world % n_context:

@@ -200,10 +200,6 @@ def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe:
         name: one of `recipe_names()`, or a path that ends in .yaml.
         changes: settings that replace those of the file, as for `read_recipe_file`. Another model
             does not get the `model_args` of the file, which are options of the file's model.
-
-    Raises:
-        UsageError: the recipe does not exist, or a setting is unknown or not valid.
-        DataError: the file is not YAML, or no mapping.
     """
     path = Path(name) if name.endswith(".yaml") else packaged_folder(_FOLDER) / f"{name}.yaml"
     if not path.is_file() and not name.endswith(".yaml"):
@@ -212,12 +208,7 @@ def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe:
 
 
 def read_recipe_file(path: Path, changes: Mapping[str, Any], form: type[_Form]) -> _Form:
-    """Read a recipe of some form, with changed settings: dots for nested ones (`optimizer.lr`).
-
-    Raises:
-        UsageError: a setting is unknown or not valid.
-        DataError: the file is not YAML, or no mapping.
-    """
+    """Read a recipe of some form, with changed settings: dots for nested ones (`optimizer.lr`)."""
     document = read_yaml(path, _EXAMPLES)
     if not isinstance(document, dict):
         raise DataError(f"{path}: not a recipe (no mapping of settings); {_EXAMPLES}")

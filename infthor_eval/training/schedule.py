@@ -38,9 +38,6 @@ class LoopSettings:
             epoch may have fewer.
         seed: seed of the order of the sequences and of dropout.
         save_every: steps between states; None for one at the end only.
-
-    Raises:
-        UsageError: a value is out of its range.
     """
 
     learning_rate: float

@@ -24,10 +24,6 @@ def load_starting_model(
         max_tokens: most tokens of a sequence of the training. Where rotary frequencies depend on
             the length, all sequences have those of this length, as in the published trainer; None
             for a model that is not trained.
-
-    Raises:
-        UsageError: a name or an option is unknown, or the model cannot be trained here.
-        ModelError: the model cannot be loaded.
     """
     loaded_model = (
         load(model, {**options, "prompt": prompt}, seed) if has_option(model, "prompt") else None

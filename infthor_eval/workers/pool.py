@@ -132,11 +132,7 @@ class Pool:
         ]
 
     def open(self) -> Any:
-        """Start all workers, wait for the first of them, and return its greeting.
-
-        Raises:
-            InfthorError: no worker can be opened; the reason of the last one.
-        """
+        """Start all workers, wait for the first of them, and return its greeting."""
         for thread in self._threads:
             thread.start()
         greeting = self._ready.get()

@@ -21,9 +21,6 @@ def ray_actors(open_worker: OpenWorker, address: str, gpus_per_worker: float | N
         open_worker: creates a worker.
         address: address of the cluster, for `ray.init`.
         gpus_per_worker: GPUs of each worker; None for one if the cluster has any.
-
-    Raises:
-        UsageError: Ray is not installed, or there is no cluster at the address.
     """
     try:
         import ray

@@ -53,11 +53,7 @@ class WorkerSettings:
         return self.workers == 1 and self.ray_address is None
 
     def connect(self, open_worker: OpenWorker) -> Connect:
-        """Return links to the workers.
-
-        Raises:
-            UsageError: Ray is not installed, or there is no cluster at the address.
-        """
+        """Return links to the workers."""
         if self.ray_address is None:
             return _processes(open_worker, self.workers)
         from infthor_eval.workers.ray_cluster import ray_actors  # an extra, and slow to import

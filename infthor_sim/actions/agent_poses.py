@@ -28,12 +28,8 @@ def get_reachable_positions(
     directionsRelativeAgent: bool = False,
     gridSize: float | None = None,
 ) -> list[dict[str, float]]:
-    """Return positions that the agent can reach by steps of `gridSize`, along the axes or its own.
-
-    Raises:
-        ActionError: the grid is too fine, or there are more than `maxStepCount` positions per
-            square metre of a step.
-    """
+    """Return positions that the agent can reach by steps of `gridSize`, along the axes or its
+    own."""
     step = sim.settings.grid_size if gridSize is None else gridSize
     if step < _FINEST:
         raise ActionError(f"gridSize must be at least {_FINEST}, not {step}")

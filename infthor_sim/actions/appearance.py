@@ -117,11 +117,7 @@ def _material_sets(
     test: bool | None,
     external: bool | None,
 ) -> dict[str, bool]:
-    """Return which sets of materials are used, by default those of the scene's own split.
-
-    Raises:
-        ActionError: none is.
-    """
+    """Return which sets of materials are used, by default those of the scene's own split."""
     split = _split(sim.world.scene)
     used = {
         "useTrainMaterials": split == "train" if train is None else train,

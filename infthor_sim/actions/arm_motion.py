@@ -40,9 +40,6 @@ def follow(
         target: end of the path, as the message names it.
         return_to_start: go back after a collision; else agent and arm stay at the last free stance.
         body_contact: first contact of the agent's body on the path; None if it has none.
-
-    Raises:
-        ActionError: something is in the way.
     """
     arm = agent_arm(sim)
     checked = path if body_contact is None else path[: body_contact[0] + 1]

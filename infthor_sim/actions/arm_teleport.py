@@ -51,11 +51,7 @@ def teleport_arm(
 
 
 def _rotation_matrix(rotation: dict[str, float]) -> Array:
-    """Return the rotation (3, 3) of an axis and an angle.
-
-    Raises:
-        ActionError: there is no axis.
-    """
+    """Return the rotation (3, 3) of an axis and an angle."""
     numbers = [rotation.get(key, 0.0) for key in "xyzw"]
     if not all(isinstance(n, int | float) and np.isfinite(n) for n in numbers) or not any(
         numbers[:3]

@@ -108,11 +108,7 @@ def toggle_map_view(sim: Simulation) -> None:
 
 
 def _check(camera: ThirdPartyCamera) -> None:
-    """Refuse a lens that draws nothing.
-
-    Raises:
-        ActionError: the camera has one.
-    """
+    """Refuse a lens that draws nothing."""
     size, angle = camera.orthographic_size, camera.field_of_view
     if size is not None and size <= 0:
         raise ActionError(f"orthographicSize must be positive, not {size}")

@@ -46,11 +46,7 @@ def _turns(sim: Simulation) -> list[int]:
 
 
 def _next_step(sim: Simulation, goal: Array) -> str | None:
-    """Return the step or turn towards the standing place nearest to a point (3,); None there.
-
-    Raises:
-        ActionError: there is no way.
-    """
+    """Return the step or turn towards the standing place nearest to a point (3,); None there."""
     world = sim.world
     here = world.agent.position
     way = world.nav.path((here[0], here[2]), world.nav.nearest(goal[0], goal[2]))
@@ -78,11 +74,7 @@ def _next_step(sim: Simulation, goal: Array) -> str | None:
 
 
 def _next_look(sim: Simulation, item: SimObject) -> str:
-    """Return the turn or tilt of the fewest that show an object from here.
-
-    Raises:
-        ActionError: none does.
-    """
+    """Return the turn or tilt of the fewest that show an object from here."""
     agent = sim.world.agent
     tilts = np.arange(-MAX_UP, agent.max_down + 1.0, TILT)
     poses = [

@@ -115,11 +115,8 @@ def enable_object(sim: Simulation, objectId: str) -> None:
 def _first_free(
     world: World, item: SimObject, positions: list[Vector3], turn: Array, force: bool
 ) -> SimObject:
-    """Return a copy of an object at the first of some positions with room; if forced, at the first.
-
-    Raises:
-        ActionError: there is room at none.
-    """
+    """Return a copy of an object at the first of some positions with room; if forced, at the
+    first."""
     obstacle: str | None = None
     for position in positions:
         pose = _copy(item)

@@ -14,12 +14,7 @@ from infthor_sim.simulation import Simulation
 
 @action("GetScenesInBuild", query=True)
 def get_scenes_in_build(sim: Simulation) -> list[str]:
-    """Return the names of scenes; ai2thor's Controller refuses others, or takes one of them.
-
-    Raises:
-        ActionError: the recorded floor plans cannot be read. By its code the Controller takes it as
-            a build without this action, and goes on to Reset, which says so.
-    """
+    """Return the names of scenes; ai2thor's Controller refuses others, or takes one of them."""
     try:
         return sim.catalogue.names()
     except DataError as error:
@@ -66,11 +61,7 @@ def _goal(
 
 
 def nearest_of_type(sim: Simulation, object_type: str | None) -> SimObject:
-    """Return the object of a type that is nearest to the agent.
-
-    Raises:
-        ActionError: there is none.
-    """
+    """Return the object of a type that is nearest to the agent."""
     candidates = [o for o in sim.world.objects.values() if o.object_type == object_type]
     if not candidates:
         raise ActionError(f"No object of type {object_type!r} is in the scene")

@@ -89,11 +89,7 @@ def action_names(mode: str = "default") -> list[str]:
 
 
 def bind(message: Mapping[str, Any], mode: str = "default") -> tuple[Action, dict[str, Any]]:
-    """Return the action that a message names in an agent mode, and its checked arguments.
-
-    Raises:
-        ActionError: no such action; an argument is unknown, missing or of the wrong type.
-    """
+    """Return the action that a message names in an agent mode, and its checked arguments."""
     name = message.get("action")
     called = _ACTIONS[mode].get(name) if isinstance(name, str) else None
     if called is None:
@@ -140,12 +136,7 @@ def _chosen_overload(called: Action, passed: Mapping[str, Any]) -> Overload:
 
 
 def _check_type(called: Action, key: str, value: Any) -> None:
-    """Refuse an argument of the wrong type.
-
-    Raises:
-        ActionError: with a code only where Unity has one, as the client raises ValueError by the
-            code.
-    """
+    """Refuse an argument of the wrong type."""
     annotation = called.parameters[key].annotation
     if _matches(value, annotation):
         return

@@ -36,11 +36,7 @@ def object_action(*names: str) -> Callable[[ObjectFunction], ObjectFunction]:
 def interactable(
     sim: Simulation, object_id: str | None, force: bool, x: float | None, y: float | None
 ) -> SimObject:
-    """Return the object with this id, or that at (x, y), shares of the frame from its top left.
-
-    Raises:
-        ActionError: there is no such object, or the agent does not see it within reach.
-    """
+    """Return the object with this id, or that at (x, y), shares of the frame from its top left."""
     if object_id is None:
         assert x is not None
         assert y is not None
@@ -60,32 +56,20 @@ def interactable(
 
 
 def held_object(sim: Simulation, message: str) -> SimObject:
-    """Return what the agent holds in its hand.
-
-    Raises:
-        ActionError: nothing, with this message.
-    """
+    """Return what the agent holds in its hand."""
     if sim.world.agent.held is None:
         raise ActionError(message, ErrorCode.NOT_IN_INVENTORY)
     return sim.world.objects[sim.world.agent.held]
 
 
 def check_in_frame(x: float, y: float) -> None:
-    """Refuse a point outside the frame.
-
-    Raises:
-        ActionError: it is outside.
-    """
+    """Refuse a point outside the frame."""
     if not (0 <= x <= 1 and 0 <= y <= 1):
         raise ActionError(f"x/y must be in [0:1], not (x={x}, y={y})")
 
 
 def object_at(sim: Simulation, x: float, y: float) -> str | None:
-    """Return the id of the object at (x, y), shares of the frame from its top left, or None.
-
-    Raises:
-        ActionError: the point is outside the frame.
-    """
+    """Return the id of the object at (x, y), shares of the frame from its top left, or None."""
     check_in_frame(x, y)
     picture = sim.views.agent_view()
     height, width = picture.instances.shape

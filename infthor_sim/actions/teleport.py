@@ -62,11 +62,7 @@ def teleport_full(
 
 
 def _place_on_floor(world: World, target: Array, horizon: float) -> Array:
-    """Return the target (3,) at the agent's height above the floor.
-
-    Raises:
-        ActionError: the agent cannot be there.
-    """
+    """Return the target (3,) at the agent's height above the floor."""
     lowest = world.agent.max_down
     if not -MAX_UP <= horizon <= lowest:
         raise ActionError(f"Each horizon must be in [{-MAX_UP:g}:{lowest:g}]. You gave {horizon}.")

@@ -26,9 +26,6 @@ def set_agent_count(world: World, count: int, step: float) -> None:
         world: the scene; what the agents hold that are taken out of it falls.
         count: number of agents.
         step: metres; places are twice as far apart.
-
-    Raises:
-        ActionError: there is no room for so many.
     """
     world.active = 0
     for agent in world.agents[1:]:

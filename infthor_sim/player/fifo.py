@@ -77,11 +77,7 @@ class FifoPipes:
         self._write(_END)
 
     def receive(self) -> dict[str, Any] | None:
-        """Return the next action, or None when the Controller has closed the pipe.
-
-        Raises:
-            SimulatorError: what arrives is not an action message.
-        """
+        """Return the next action, or None when the Controller has closed the pipe."""
         if self._in is None:
             self._in = self._open_in()
             if self._in is None:
@@ -167,11 +163,7 @@ def _widen(pipe: int) -> None:
 
 
 def parse_action(field_type: int, body: bytes) -> dict[str, Any]:
-    """Return the action in the body of a frame.
-
-    Raises:
-        SimulatorError: it is not an action message.
-    """
+    """Return the action in the body of a frame."""
     if field_type != FieldType.ACTION:
         raise SimulatorError(
             f"the controller sent a frame of type {field_type} where an action (2) is expected"

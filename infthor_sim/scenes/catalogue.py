@@ -65,11 +65,7 @@ class Catalogue:
         self._supplement: Mapping[str, Supplement] | None = None if supplement is not None else {}
 
     def load(self, name: str) -> World:
-        """Return the world of a scene name.
-
-        Raises:
-            DataError: the name is unknown, or its data are missing; the message says which.
-        """
+        """Return the world of a scene name."""
         name = name.removesuffix("_physics")
         if name == "Procedural":  # which the client loads before it creates a house
             return self.empty()
@@ -82,11 +78,7 @@ class Catalogue:
         raise DataError(f"Scene {name!r} is unknown; use {names}, or FloorPlan<N> with --data")
 
     def names(self) -> list[str]:
-        """Return names as AI2-THOR has them: recorded floor plans, the first procedural scenes.
-
-        Raises:
-            DataError: the recorded floor plans cannot be read.
-        """
+        """Return names as AI2-THOR has them: recorded floor plans, the first procedural scenes."""
         recorded = [] if self._data is None else self._data.scenes()
         return [
             *(f"{name}_physics" if _ITHOR.fullmatch(name) else name for name in recorded),
@@ -103,11 +95,7 @@ class Catalogue:
         )
 
     def house(self, house: Mapping[str, Any]) -> World:
-        """Return the world of a ProcTHOR house.
-
-        Raises:
-            DataError: it does not have ProcTHOR's form.
-        """
+        """Return the world of a ProcTHOR house."""
         from infthor_sim.scenes.procthor import build_house, read_asset_sizes
 
         if self._assets is None:
@@ -149,19 +137,11 @@ class FloorPlanData:
         self._lines: dict[str, str] | None = None
 
     def scenes(self) -> list[str]:
-        """Return the names of the floor plans, in the order of the file.
-
-        Raises:
-            DataError: the file cannot be read.
-        """
+        """Return the names of the floor plans, in the order of the file."""
         return list(self._index())
 
     def objects(self, scene: str) -> list[dict[str, Any]]:
-        """Return the metadata of every object of a floor plan.
-
-        Raises:
-            DataError: the file or the floor plan is not there, or its line is not JSON.
-        """
+        """Return the metadata of every object of a floor plan."""
         line = self._index().get(scene)
         path = self._root / _OBJECTS
         if line is None:
@@ -177,11 +157,7 @@ class FloorPlanData:
         return objects
 
     def cells(self, scene: str) -> Array | None:
-        """Return a floor plan's reachable (x, z), metres (n, 2); None without a layout of it.
-
-        Raises:
-            DataError: the layout is not an array of that form.
-        """
+        """Return a floor plan's reachable (x, z), metres (n, 2); None without a layout of it."""
         path = self._root / _LAYOUTS / f"{scene}-layout.npy"
         if not path.exists():
             return None

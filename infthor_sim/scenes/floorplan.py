@@ -48,10 +48,6 @@ def build_floor_plan(
         entries: `metadata["objects"]` of the floor plan.
         layout: reachable (x, z), metres (n, 2); None if unknown.
         extra: additions from trajectories.
-
-    Raises:
-        DataError: neither a layout nor trajectories give a cell to stand on, or an entry is
-            malformed.
     """
     cells = [] if layout is None else [(float(x), float(z)) for x, z in layout]
     cells += extra.cells
@@ -190,11 +186,8 @@ def _clear(world: World, points: Array) -> NDArray[np.bool_]:
 
 
 def _recorded_object(entry: Mapping[str, Any]) -> SimObject:
-    """Return an upright object from an entry of `metadata["objects"]`; its box takes a small tilt.
-
-    Raises:
-        DataError: a required field is missing or malformed.
-    """
+    """Return an upright object from an entry of `metadata["objects"]`; its box takes a small
+    tilt."""
     try:
         return _object(entry)
     except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:

@@ -35,11 +35,7 @@ SCENE_TYPES = (*_FURNISH, "house")
 
 
 def build_scene(scene_type: str, seed: int) -> World:
-    """Return the world of `<scene_type>-<seed>`: the first draw with every room accessible.
-
-    Raises:
-        SimulatorError: no draw does.
-    """
+    """Return the world of `<scene_type>-<seed>`: the first draw with every room accessible."""
     for attempt in range(_DRAWS):
         # Each attempt of each scene has a random stream of its own, whatever the attempts before it
         # drew.

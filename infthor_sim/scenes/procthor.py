@@ -33,11 +33,8 @@ Span = tuple[float, float, float, float]
 
 
 def read_asset_sizes(root: Path) -> dict[str, tuple[float, float, float]]:
-    """Return the sizes (width, height, depth) of ProcTHOR's assets by id; empty without the file.
-
-    Raises:
-        DataError: the file is there but not readable.
-    """
+    """Return the sizes (width, height, depth) of ProcTHOR's assets by id; empty without the
+    file."""
     path = root / _ASSETS
     if not path.exists():
         return {}
@@ -62,9 +59,6 @@ def build_house(
     Args:
         house: ProcTHOR's JSON: `rooms`, `walls`, `doors`, `windows`, `objects`, `metadata`.
         assets: sizes of assets by id; others get their type's usual size.
-
-    Raises:
-        DataError: the JSON does not have that form, or leaves nowhere to stand.
     """
     try:
         return _build(house, assets)

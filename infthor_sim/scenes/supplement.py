@@ -35,11 +35,7 @@ class Supplement:
 
 
 def read_supplement(path: Path) -> dict[str, Supplement]:
-    """Return the entries of a supplement file by floor plan.
-
-    Raises:
-        DataError: the file is missing or not of the documented form.
-    """
+    """Return the entries of a supplement file by floor plan."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:

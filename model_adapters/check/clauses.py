@@ -41,9 +41,6 @@ def check_members(adapter: Any) -> None:
     """Check that a model and its conversation, or a policy, have all members of their protocols.
 
     An object with `act` counts as a policy, any other as a model.
-
-    Raises:
-        ContractError: a member is missing; the message names it.
     """
     if hasattr(adapter, "act"):
         _require_members(adapter, Policy)

@@ -38,31 +38,19 @@ class CheckpointAdapter:
         options: CheckpointOptions,
         seed: int,  # noqa: ARG003
     ) -> TransformersModel:
-        """Load a checkpoint; the seed is not used.
-
-        Raises:
-            ModelError: the checkpoint cannot be loaded, or its parts do not belong together.
-        """
+        """Load a checkpoint; the seed is not used."""
         return load_model(name, cls.locate(options), cls.family)
 
     @classmethod
     def locate(cls, options: R) -> LocatedCheckpoint[R]:
-        """Find a checkpoint of this family, for any engine.
-
-        Raises:
-            ModelError: the checkpoint does not exist, or is of another family.
-        """
+        """Find a checkpoint of this family, for any engine."""
         located = locate(options)
         require_model_type(located, cls.model_types)
         return located
 
 
 def require_model_type(located: LocatedCheckpoint[Any], model_types: Sequence[str]) -> None:
-    """Refuse a checkpoint of another `model_type`.
-
-    Raises:
-        ModelError: the checkpoint's is none of these.
-    """
+    """Refuse a checkpoint of another `model_type`."""
     model_type = located.config.model_type
     if model_type not in model_types:
         raise ModelError(
@@ -74,12 +62,7 @@ def require_model_type(located: LocatedCheckpoint[Any], model_types: Sequence[st
 def load_model(
     name: str, located: LocatedCheckpoint[CheckpointOptions], family: MakeFamily
 ) -> TransformersModel:
-    """Load a checkpoint of a known family and test it on one frame.
-
-    Raises:
-        ModelError: the checkpoint cannot be loaded, or processor and model disagree on a frame's
-            tokens.
-    """
+    """Load a checkpoint of a known family and test it on one frame."""
     loaded = load_checkpoint(located, family)
     pretrained = located.options.pretrained
     with wrap_mismatch_errors(pretrained), torch.inference_mode():
@@ -97,9 +80,6 @@ def load_model(
 def wrap_mismatch_errors(pretrained: str) -> Iterator[None]:
     """Turn errors of a model on the pixels or tokens of another checkpoint's processor into one
     line.
-
-    Raises:
-        ModelError: the model failed on them.
     """
     # Any error is possible: the processor's settings come from a file and end up in arithmetic and
     # shapes.

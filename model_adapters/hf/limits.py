@@ -18,9 +18,6 @@ def check_limit(
     """Check that context and reply, in tokens, are within their common limit; None for none.
 
     `option` is the model's option that sets the limit, for the message.
-
-    Raises:
-        ModelError: context and reply exceed the limit.
     """
     if limit is not None and n_context + max_new_tokens > limit:
         raise ModelError(
@@ -31,11 +28,8 @@ def check_limit(
 
 @contextmanager
 def wrap_model_errors(name: str) -> Iterator[None]:
-    """Turn a model's or its processor's error on a request into one line, so that the run goes on.
-
-    Raises:
-        ModelError: the model failed on the request.
-    """
+    """Turn a model's or its processor's error on a request into one line, so that the run goes
+    on."""
     with wrap_errors(
         f"{name} fails on the request",
         "change the request, or report it",
@@ -50,9 +44,6 @@ def wrap_memory_errors(name: str, n_context: int) -> Iterator[None]:
     """Turn a lack of memory into one line with the size of the context.
 
     The error keeps no tensors alive, so their memory is free for the next request.
-
-    Raises:
-        ModelError: memory ran out.
     """
     try:
         yield

@@ -38,12 +38,7 @@ class Retriever:
     are cosines."""
 
     def __init__(self, name: str, revision: str | None = None) -> None:
-        """Load a checkpoint from a folder or the hub; its default branch where revision is None.
-
-        Raises:
-            UsageError: the checkpoint cannot be found or loaded, or is not one of CLIP.
-            DataError: the user's cache cannot be written.
-        """
+        """Load a checkpoint from a folder or the hub; its default branch where revision is None."""
         try:
             # Old CLIP checkpoints on the hub have no safetensors.
             folder, commit = fetch(
@@ -72,11 +67,7 @@ class Retriever:
         }
 
     def frames(self, frames: Sequence[FrameRef]) -> np.ndarray:
-        """Return the vectors of frames, (frames, dimensions).
-
-        Raises:
-            DataError: a frame cannot be decoded.
-        """
+        """Return the vectors of frames, (frames, dimensions)."""
         missing = {frame.digest: frame for frame in frames if frame.digest not in self._vectors}
         keys = list(missing)
         for at in range(0, len(keys), _BATCH):

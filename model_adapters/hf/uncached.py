@@ -35,10 +35,6 @@ def process_turns(processor: Any, template: str, turns: Sequence[Turn]) -> Any:
     """Return the tensors that transformers' processor makes of a conversation.
 
     Frames are passed as a flat list, as in the published results.
-
-    Raises:
-        DataError: a frame cannot be read.
-        ModelError: the template refuses the turns.
     """
     text = render(processor.tokenizer, template, turns, Marks(image_token(processor)))
     images = [part.load() for turn in turns for part in turn.parts if isinstance(part, FrameRef)]
@@ -55,9 +51,6 @@ def image_token(processor: Any) -> str:
 
     Processors look for their `image_token`. Most that have a `boi_token`, too, write it around what
     they expand that to (Gemma 4, Cohere 2 Vision); the first ones have nothing else (Kosmos 2).
-
-    Raises:
-        ModelError: the processor names none.
     """
     token = getattr(processor, "image_token", None) or getattr(processor, "boi_token", None)
     if not isinstance(token, str):
@@ -155,11 +148,7 @@ class UncachedModel(HfModel):
             return process_turns(self._processor, self._loaded.template, turns)
 
     def try_generate(self, turns: Sequence[Turn]) -> None:
-        """Have `generate` reply with two tokens, whatever the context limit is.
-
-        Raises:
-            ModelError: it fails, or does not return the tokens that are chosen here.
-        """
+        """Have `generate` reply with two tokens, whatever the context limit is."""
         with torch_threads(self._threads):
             self._generate(self._inputs(turns), 0, Decoding(max_new_tokens=2))
 

@@ -17,11 +17,7 @@ class VectorFile:
     cost little."""
 
     def __init__(self, path: Path, width: int) -> None:
-        """Open the file, or create it and its folder; `width` is the dimensions of a vector.
-
-        Raises:
-            DataError: the file cannot be written.
-        """
+        """Open the file, or create it and its folder; `width` is the dimensions of a vector."""
         self._row_type = np.dtype([("key", "S32"), ("vector", "<f4", (width,))])
         self._rows: dict[str, int] = {}
         self._n_rows = 0
@@ -44,9 +40,6 @@ class VectorFile:
             keys: keys of 32 ASCII characters each; if another process has added a key meanwhile,
                 its vector is kept.
             vectors: vectors, (keys, width).
-
-        Raises:
-            DataError: the disk is full.
         """
         rows = np.zeros(len(keys), self._row_type)
         rows["key"] = keys

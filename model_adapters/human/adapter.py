@@ -45,11 +45,7 @@ class Human:
 
     @classmethod
     def build(cls, name: str, options: HumanOptions, seed: int) -> "HumanModel":  # noqa: ARG003
-        """Build the model and take its port; the page opens with the first question.
-
-        Raises:
-            UsageError: the extra `page` is not installed, or the port cannot be had.
-        """
+        """Build the model and take its port; the page opens with the first question."""
         require_page_extra()
         from model_adapters.human.model import HumanModel
 

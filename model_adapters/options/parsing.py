@@ -59,10 +59,6 @@ def parse(model: str, options: type, texts: Mapping[str, str]) -> Any:
         options: a dataclass, whose fields are str, int, float, bool, or one of these or None; one
             without a default must be given.
         texts: option names to values as typed.
-
-    Raises:
-        UsageError: an option is unknown (the message has the nearest one) or missing, or a value
-            does not fit its type.
     """
     hints = typing.get_type_hints(options)
     for name in texts:
@@ -101,11 +97,7 @@ def _value(name: str, hint: Any, text: str) -> Any:
 
 
 def read_pairs(texts: Iterable[str], option: str) -> dict[str, str]:
-    """Return keys and values written as `k=v`; messages name the option that they belong to.
-
-    Raises:
-        UsageError: an item is not `k=v`, or a key is given twice.
-    """
+    """Return keys and values written as `k=v`; messages name the option that they belong to."""
     pairs: dict[str, str] = {}
     for text in filter(None, (part.strip() for part in texts)):
         key, equals, value = text.partition("=")

@@ -46,12 +46,7 @@ class PolicyCheckpoint:
     origin: dict[str, Any]
 
     def require_model_type(self, model_type: str) -> None:
-        """Check that the checkpoint is of this family.
-
-        Raises:
-            ModelError: the checkpoint is of another family; the message names it.
-            DataError: the config cannot be read.
-        """
+        """Check that the checkpoint is of this family."""
         own_type = self._config().model_type
         if own_type != model_type:
             raise ModelError(
@@ -60,11 +55,7 @@ class PolicyCheckpoint:
             )
 
     def read(self, name: str, data_type: type[T]) -> T:
-        """Read one of the JSON files as an instance of a type.
-
-        Raises:
-            DataError: the file is missing, is not JSON, or has another form.
-        """
+        """Read one of the JSON files as an instance of a type."""
         return read_json(self.folder / name, _HINT, data_type)
 
     def has_file(self, name: str) -> bool:
@@ -74,10 +65,6 @@ class PolicyCheckpoint:
     def tokenizer(self) -> Tokenizer:
         """Load the tokenizer from `tokenizer.json` directly; transformers would need the
         checkpoint's remote code.
-
-        Raises:
-            DataError: the file is missing.
-            ModelError: the file is damaged.
         """
         path = self.folder / "tokenizer.json"
         require_file(path, _HINT)
@@ -85,12 +72,7 @@ class PolicyCheckpoint:
             return Tokenizer.from_file(str(path))
 
     def resolve_placement(self, options: Placement) -> tuple[torch.device, torch.dtype]:
-        """Return device and type of the weights; the type defaults to that of the config.
-
-        Raises:
-            UsageError: the device or the type is unknown.
-            ModelError: this machine has no GPU.
-        """
+        """Return device and type of the weights; the type defaults to that of the config."""
         config = self._config()
         dtype = resolve_dtype(options)
         if isinstance(dtype, str):
@@ -118,11 +100,7 @@ class PolicyCheckpoint:
 
 
 def find_policy_checkpoint(pretrained: str, revision: str | None) -> PolicyCheckpoint:
-    """Find or download a checkpoint.
-
-    Raises:
-        ModelError: the checkpoint does not exist, or cannot be downloaded.
-    """
+    """Find or download a checkpoint."""
     folder, commit = fetch(pretrained, revision)
     require_plain_files(folder, _HINT)
     return PolicyCheckpoint(folder, pretrained, origin(folder, commit, pretrained))

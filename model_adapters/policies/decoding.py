@@ -30,9 +30,6 @@ def decode_greedily(
         constrained: choose among these ids only. If false, choose among all ids and clip, as the
             original implementations do. All places are decoded in either case: an end-of-text token
             does not end the sequence.
-
-    Raises:
-        ModelError: the logits are not finite.
     """
     ids: list[int] = []
     logits = first

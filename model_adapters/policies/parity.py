@@ -70,12 +70,7 @@ class ParityReport:
 
 
 def load_policy(name: str, options: Mapping[str, str]) -> Policy:
-    """Load the policy to compare; chunks are not averaged unless the options say so.
-
-    Raises:
-        UsageError: the name is unknown or not that of a policy, or the options do not fit.
-        ModelError: the policy cannot be loaded.
-    """
+    """Load the policy to compare; chunks are not averaged unless the options say so."""
     defaults = {"ensemble": "none"} if has_option(name, "ensemble") else {}
     policy = load(name, {**defaults, **options}, seed=0)
     if not isinstance(policy, Policy):
@@ -85,11 +80,7 @@ def load_policy(name: str, options: Mapping[str, str]) -> Policy:
 
 
 def reference_policy(url: str, unnorm_key: str | None) -> HttpPolicy:
-    """Return the other implementation, a server with the `/act` convention, as a policy.
-
-    Raises:
-        UsageError: the address is not valid.
-    """
+    """Return the other implementation, a server with the `/act` convention, as a policy."""
     try:
         return HttpPolicy("reference", VlaHttpOptions(url=url, unnorm_key=unnorm_key))
     except ValueError as error:
@@ -103,22 +94,13 @@ def compare_policies(
     instructions: Sequence[str],
     tolerance: float,
 ) -> ParityReport:
-    """Compare both's actions on the same frames and instructions, each the first of an episode.
-
-    Raises:
-        ModelError: one of them cannot act.
-        DataError: a frame cannot be read.
-    """
+    """Compare both's actions on the same frames and instructions, each the first of an episode."""
     rows = tuple(_row(ours, theirs, frames, instruction) for instruction in instructions)
     return ParityReport(ours.name, rows, tolerance)
 
 
 def frames_in_folder(folder: Path) -> list[FrameRef]:
-    """Return the pictures of a folder, sorted by name.
-
-    Raises:
-        DataError: the folder has no pictures, cannot be read, or has two of one name.
-    """
+    """Return the pictures of a folder, sorted by name."""
     paths = find_images(folder).values() if folder.is_dir() else ()
     if not paths:
         raise DataError(f"{folder}: has no pictures (PNG, JPEG, WebP); give a folder of frames")

@@ -40,9 +40,6 @@ def arm_deltas(name: str, actions: Actions) -> tuple[ArmDelta, ...]:
     """Return actions as steps of an arm, with the gripper clipped to 0 (closed) to 1 (open).
 
     Actions are (steps, 7): x, y, z, roll, pitch, yaw, gripper.
-
-    Raises:
-        ModelError: there are no actions, they have another shape, or one is not finite.
     """
     if actions.ndim != 2 or actions.shape[1] != ACTION_SIZE or not len(actions):
         raise ModelError(
@@ -155,13 +152,7 @@ class PolicyAdapter:
         options: CheckpointPolicyOptions,
         seed: int,  # noqa: ARG003
     ) -> VlaPolicy:
-        """Load a checkpoint; the seed is not used.
-
-        Raises:
-            ModelError: the checkpoint cannot be loaded, or is of another family.
-            UsageError: the unnorm_key, the device or the dtype is unknown.
-            DataError: a file beside the weights is missing or damaged.
-        """
+        """Load a checkpoint; the seed is not used."""
         return cls.load(name, find_policy_checkpoint(options.pretrained, options.revision), options)
 
 

@@ -48,11 +48,6 @@ def select_statistics(
         known: the checkpoint's statistics by dataset; "action" of each has those of the actions.
         unnorm_key: key of the dataset, or None if there is only one.
         pretrained: name of the checkpoint, for messages.
-
-    Raises:
-        UsageError: the dataset is unknown, or none is given and there are several; the message
-            lists them.
-        ModelError: the statistics are not those of actions of seven numbers.
     """
     listed = ", ".join(sorted(known)) or "none"
     if unnorm_key is None and len(known) != 1:

@@ -76,12 +76,7 @@ class Layout:
         return {**self.shapes, **self.unused}
 
     def check(self, actual: Mapping[str, Shape], pretrained: str) -> None:
-        """Check that files have exactly these keys, in these shapes.
-
-        Raises:
-            ModelError: keys are missing, unknown or of another shape; the message has the first
-                ones and their number.
-        """
+        """Check that files have exactly these keys, in these shapes."""
         expected = self.all_shapes()
         faults = {
             "lacks": sorted(expected.keys() - actual.keys()),
@@ -119,9 +114,6 @@ def load_weights(
         pretrained: name of the checkpoint, for messages.
         device: device of the parameters.
         dtype: type of the parameters.
-
-    Raises:
-        ModelError: there are no files, or their keys differ from the layout.
     """
     paths = sorted(folder.glob("*.safetensors"))
     if not paths:

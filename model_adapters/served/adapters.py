@@ -23,11 +23,7 @@ class OpenAI:
 
     @classmethod
     def build(cls, name: str, options: OpenAIOptions, seed: int) -> "ServedModel":  # noqa: ARG003
-        """Build the client; the first request is sent by the first reply.
-
-        Raises:
-            ModelError: a required key is missing.
-        """
+        """Build the client; the first request is sent by the first reply."""
         from model_adapters.served.model import ServedModel
         from model_adapters.served.openai import OpenAIDialect
 

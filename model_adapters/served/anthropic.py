@@ -101,10 +101,6 @@ def _to_messages(
 
     `cache` is put at the last frame: what is before the question is the same for all questions on a
     trajectory, and for all steps of an episode.
-
-    Raises:
-        DataError: a frame cannot be read.
-        ModelError: a turn other than the user's has a frame.
     """
     fields: dict[str, Any] = {"messages": []}
     last_image: dict[str, Any] | None = None
@@ -227,9 +223,6 @@ class _AnthropicBatches:
         """See `BatchService`; of those that may be ours, too.
 
         If one that may be ours is not, it has none of our requests in the end, and they are asked.
-
-        Raises:
-            ModelError: there are several that may be ours, as they have not ended.
         """
         candidates = []
         for found in self._since(batch.prepared_at - _CLOCKS_S):

@@ -68,11 +68,7 @@ class Completion(Protocol):
 
 
 def decode_reply(where: str, content: bytes, kind: type[T], what: str) -> T:
-    """Parse a server's reply, which may be anything; what is left raw in it is text in UTF-8.
-
-    Raises:
-        ModelError: the body is not of this kind.
-    """
+    """Parse a server's reply, which may be anything; what is left raw in it is text in UTF-8."""
     try:
         content.decode()
         return msgspec.json.decode(content, type=kind)

@@ -40,11 +40,7 @@ class EncodedFrames:
         return f"data:{self.media_type};base64,{self.base64(frame)}"
 
     def base64(self, frame: FrameRef) -> str:
-        """Return the frame in base64, always the same for the same frame.
-
-        Raises:
-            DataError: the frame cannot be read.
-        """
+        """Return the frame in base64, always the same for the same frame."""
         # Held while encoding: threads with the same frames wait instead of encoding them again.
         with self._lock:
             encoded = self._cache.get(frame.digest)

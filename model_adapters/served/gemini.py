@@ -103,10 +103,6 @@ class GeneratedContent(msgspec.Struct, frozen=True, rename="camel"):
 def _to_contents(name: str, turns: Sequence[Turn], frames: EncodedFrames) -> dict[str, Any]:
     """Return the fields `systemInstruction` and `contents` of a conversation, with texts and frames
     in order.
-
-    Raises:
-        DataError: a frame cannot be read.
-        ModelError: a turn other than the user's has a frame.
     """
     fields: dict[str, Any] = {"contents": []}
     for turn in turns:

@@ -47,10 +47,6 @@ def to_messages(
 ) -> list[dict[str, Any]]:
     """Return a conversation's messages, with texts and frames in order; each frame has this
     `detail` unless it is None.
-
-    Raises:
-        DataError: a frame cannot be read.
-        ModelError: a turn other than the user's has a frame, which no server supports.
     """
     return [{"role": turn.role, "content": _content(name, turn, frames, detail)} for turn in turns]
 

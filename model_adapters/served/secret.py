@@ -29,9 +29,6 @@ def read_key(variable: str, *, usual: str, needed: bool) -> Secret:
     `usual` is the variable's name unless a user gives another.
 
     Messages do not repeat the name of the variable: it may be the key, given by mistake.
-
-    Raises:
-        ModelError: a required key is missing, or the value cannot be a key.
     """
     value = os.environ.get(variable, "").strip()
     if not value:

@@ -97,11 +97,7 @@ class Spend:
 
     @contextmanager
     def request(self) -> Iterator[Charge]:
-        """Account for one request; what the charge is filled with counts even if it fails later.
-
-        Raises:
-            NotAskedError: a cap is reached or cannot be enforced; the request must not be sent.
-        """
+        """Account for one request; what the charge is filled with counts even if it fails later."""
         charge = Charge()
         self._admit()
         try:
@@ -112,9 +108,6 @@ class Spend:
     def room(self) -> int | None:
         """Return how many requests may be sent together, if each takes as much as the largest so
         far; None without caps. The first one is unpredictable, so it goes alone.
-
-        Raises:
-            NotAskedError: as `request`.
         """
         with self._changed:
             reason = self._refusal()

@@ -90,11 +90,7 @@ class Wire:
     """
 
     def __init__(self, options: ServedOptions, headers: Mapping[str, str]) -> None:
-        """Take the options, and the headers of every request.
-
-        Raises:
-            UsageError: the proxy that the environment names cannot be used.
-        """
+        """Take the options, and the headers of every request."""
         problem = "ALL_PROXY, HTTPS_PROXY, HTTP_PROXY or NO_PROXY cannot be used"
         hint = "name a proxy as http://HOST:PORT, or unset them"
         broken = (ImportError, ValueError, httpx2.InvalidURL)  # socks5:// needs one more library

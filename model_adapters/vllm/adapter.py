@@ -42,11 +42,7 @@ class _FamilyOnVllm:
 
     @classmethod
     def build(cls, name: str, options: VllmOptions, seed: int) -> VllmModel:  # noqa: ARG003
-        """Start vLLM with a checkpoint; the seed is not used.
-
-        Raises:
-            ModelError: vLLM is not installed, or the checkpoint cannot be read or run.
-        """
+        """Start vLLM with a checkpoint; the seed is not used."""
         import_vllm(name)  # fails before gigabytes are downloaded
         return _start(name, cls.hf_adapter.locate(options), cls.hf_adapter.family)
 
@@ -79,12 +75,7 @@ class HfVlmOnVllm:
 
     @classmethod
     def build(cls, name: str, options: HfVlmOnVllmOptions, seed: int) -> VllmModel:  # noqa: ARG003
-        """Start vLLM with any checkpoint that it supports.
-
-        Raises:
-            UsageError: no checkpoint is given.
-            ModelError: vLLM is not installed, or the checkpoint cannot be read or run.
-        """
+        """Start vLLM with any checkpoint that it supports."""
         import_vllm(name)
         located = HfVlm.locate(name, options)
         family = family_of(located.config)

@@ -51,9 +51,6 @@ def model_arguments(
     """Return the arguments of a model that answers in conversations.
 
     A context extension is in the config already. `max_tokens` limits context and reply together.
-
-    Raises:
-        ModelError: vLLM does not support the context extension for this model.
     """
     frames = {"count": max_frames, "width": options.frame_size, "height": options.frame_size}
     arguments = engine_arguments(folder, options) | {
@@ -78,9 +75,6 @@ def model_arguments(
 def token_limit(pretrained: str, limit: int | None, options: VllmOptions) -> int:
     """Return the most tokens of context and reply together: the options' or the checkpoint's limit,
     which is extended.
-
-    Raises:
-        ModelError: neither the options nor the config has a limit.
     """
     n_tokens = options.max_model_len or limit
     if n_tokens is None:
@@ -98,10 +92,6 @@ def rope_overrides(config: Any, rope: str) -> dict[str, Any]:
 
     vLLM replaces `rope_parameters` as a whole, so all of them are given, as `apply_rope` has
     written them.
-
-    Raises:
-        ModelError: vLLM would read past its table of angles, or silently drop the model's
-            three-axis positions.
     """
     rope_type, factor = parse_rope(rope)
     text = config.get_text_config()

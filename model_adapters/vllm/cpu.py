@@ -76,9 +76,6 @@ def check_kernels(name: str, config: Any) -> None:
 
     One with heads of another size would start and fail at each request, and one that looks both
     ways within a frame would look back alone, without a word.
-
-    Raises:
-        ModelError: there is no kernel.
     """
     text_config = config.get_text_config()
     kernels = importlib.import_module("vllm.v1.attention.backends.cpu_attn").CPUAttentionBackend

@@ -63,11 +63,7 @@ class EngineOutput:
 
 
 def import_vllm(name: str) -> Any:
-    """Return the package vllm.
-
-    Raises:
-        ModelError: the package is not installed, or cannot be imported.
-    """
+    """Return the package vllm."""
     os.environ[plugin.ACTIVE] = "1"
     # Standard output is for tables.
     os.environ.setdefault("VLLM_LOGGING_STREAM", "ext://sys.stderr")
@@ -91,11 +87,7 @@ def import_vllm(name: str) -> Any:
 
 
 def require_version(name: str, least: str, option: str) -> None:
-    """Refuse an option that an older vLLM has no argument for.
-
-    Raises:
-        ModelError: vLLM is older, or not installed.
-    """
+    """Refuse an option that an older vLLM has no argument for."""
     version = str(import_vllm(name).__version__)
     if Version(version) < Version(least):
         raise ModelError(
@@ -116,9 +108,6 @@ class Engine:
         version: version of vLLM.
         batch_invariant: true if replies do not depend on what runs in the same batch (vLLM's
             batch-invariant mode).
-
-    Raises:
-        ModelError: vLLM is not installed, or does not start.
     """
 
     def __init__(self, name: str, arguments: Mapping[str, Any], threads: int | None = None) -> None:
@@ -141,9 +130,6 @@ class Engine:
         """Continue all requests independently, with these arguments of `vllm.SamplingParams`.
 
         If there are choices, each reply is one of them.
-
-        Raises:
-            ModelError: vLLM refuses one, memory ran out, or it died; no output is returned then.
         """
         if not requests:
             return []

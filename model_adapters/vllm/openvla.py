@@ -31,13 +31,7 @@ class OpenVLAOnVllm:
         options: OpenVLAOnVllmOptions,
         seed: int,  # noqa: ARG003
     ) -> "VllmPolicy":
-        """Start vLLM with a checkpoint; the seed is not used.
-
-        Raises:
-            ModelError: vLLM is not installed, or the checkpoint cannot be run.
-            UsageError: the unnorm_key is unknown.
-            DataError: a file beside the weights is missing or damaged.
-        """
+        """Start vLLM with a checkpoint; the seed is not used."""
         import_vllm(name)  # fails before gigabytes are downloaded
         checkpoint = find_policy_checkpoint(options.pretrained, options.revision)
         description = describe_openvla(checkpoint, options.unnorm_key)
@@ -72,10 +66,6 @@ class _TokenizerConfig(msgspec.Struct):
 def _check_begin_token(name: str, checkpoint: PolicyCheckpoint) -> None:
     """Refuse a checkpoint that does not name the begin token, before which vLLM would put the frame
     without a word.
-
-    Raises:
-        ModelError: the tokenizer's config does not name it.
-        DataError: the config cannot be read.
     """
     file = "tokenizer_config.json"
     if not checkpoint.has_file(file) or not checkpoint.read(file, _TokenizerConfig).bos_token:

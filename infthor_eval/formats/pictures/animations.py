@@ -26,11 +26,7 @@ _HINT = writing_hint(", or give another place with --out")
 
 
 def require_animation_name(path: Path) -> None:
-    """Check that a file name has the suffix of a known format.
-
-    Raises:
-        UsageError: it has another suffix.
-    """
+    """Check that a file name has the suffix of a known format."""
     if path.suffix.lower() not in ANIMATION_FORMATS:
         raise UsageError(
             f"--out {path}: unknown format; give a file name that ends in "
@@ -45,10 +41,6 @@ def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: flo
         path: the file; its suffix is one of `ANIMATION_FORMATS`.
         pictures: one or more RGB pictures, all of one size with even sides.
         per_second: frame rate, pictures per second.
-
-    Raises:
-        UsageError: the file name has another suffix.
-        DataError: the file cannot be written.
     """
     require_animation_name(path)
     write = _write_gif if path.suffix.lower() == ".gif" else _write_mp4

@@ -17,9 +17,6 @@ def blank_like(frame: FrameRef) -> FrameRef:
 
     One file per size is kept in the user's cache. A frame that cannot be read is returned as it is:
     reading its pixels then raises the error that says what is wrong with it.
-
-    Raises:
-        DataError: the file cannot be written.
     """
     try:
         size = frame.size

@@ -81,9 +81,6 @@ def read_video(path: Path, fps: float) -> Video:
 
     OpenCV decodes the film at the first call for its content and the rate. The name of the cache
     folder has the digest of the content, the rate and the version of the decoder.
-
-    Raises:
-        DataError: the film cannot be decoded to its end, or its frames cannot be stored.
     """
     import cv2
 

@@ -45,11 +45,7 @@ class AnswerKey:
     ids: Mapping[str, str]
 
     def question(self, public_id: str) -> Question:
-        """Return the question, with its answers, that has this id in the public part.
-
-        Raises:
-            DataError: the key has none.
-        """
+        """Return the question, with its answers, that has this id in the public part."""
         question = self._questions.get(self.ids.get(public_id, ""))
         if question is None:
             raise DataError(
@@ -64,11 +60,7 @@ class AnswerKey:
 
 
 def read_key(folder: Path) -> AnswerKey:
-    """Read the key in a folder.
-
-    Raises:
-        DataError: there is none, it is not one, or of another format.
-    """
+    """Read the key in a folder."""
     if not (folder / _KEY).is_file():
         raise DataError(f"{folder}: no {_KEY} in it; {_HINT}")
     document = read_json(folder / _KEY, _HINT, _Document)

@@ -76,21 +76,13 @@ class _Sample(msgspec.Struct, frozen=True):
 
 
 def inspect_rows(path: Path) -> Iterator[tuple[int, Callable[[], Sequence[LoggedReply]]]]:
-    """Yield the number of each sample, from 1, and what reads its reply.
-
-    Raises:
-        DataError: the file is no such log, or too large.
-    """
+    """Yield the number of each sample, from 1, and what reads its reply."""
     for number, (spec, document) in enumerate(_samples(path), start=1):
         yield number, partial(_read, number, document, spec)
 
 
 def inspect_documents(path: Path) -> Iterator[Mapping[str, Any]]:
-    """Yield the document of each sample that is a JSON object.
-
-    Raises:
-        DataError: as `inspect_rows`.
-    """
+    """Yield the document of each sample that is a JSON object."""
     yield from (document for _, document in _samples(path) if isinstance(document, Mapping))
 
 

@@ -77,9 +77,6 @@ def read_reply_log(path: Path) -> Iterator[LoggedReply | UnreadRow]:
     """Yield the replies of a log in order; a bad line, such as a cut last one, is an `UnreadRow`.
 
     A row that repeats a reply for another metric yields nothing.
-
-    Raises:
-        DataError: the file cannot be read, or has no replies by its form.
     """
     if path.suffix in _WITHOUT_REPLIES:
         raise DataError(

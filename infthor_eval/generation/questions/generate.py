@@ -104,10 +104,6 @@ def generate_questions(
 
     Returns:
         The questions, and the trajectories whose log cannot be read.
-
-    Raises:
-        UsageError: further forms are asked for in the published words.
-        DataError: the set has no trajectory, or another format version.
     """
     if further and published_words:
         raise UsageError(

@@ -73,11 +73,7 @@ class TrajectoryHistory:
     """
 
     def __init__(self, traj_id: str, steps: list[Step], share: float = DEFAULT_SHARE) -> None:
-        """Read a log with the fields that a replay adds.
-
-        Raises:
-            DataError: the log is empty, or lacks the fields that questions are generated from.
-        """
+        """Read a log with the fields that a replay adds."""
         if not steps or any(step.seen is None for step in steps):
             raise DataError(
                 f"{traj_id}: the log does not say what the frames show; replay the trajectory again"

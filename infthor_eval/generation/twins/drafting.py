@@ -93,10 +93,6 @@ def draft_twins(
         score: the strict score of a reply.
         simulator: a simulator.
         out: folder of the set.
-
-    Raises:
-        DataError: it cannot be restored or replayed.
-        SimulatorError: the simulator fails.
     """
     draft = TwinDraft(base, settings, trajectory.scene.floor_plan)
     episode = read_episode(trajectory, simulator)

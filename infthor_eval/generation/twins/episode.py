@@ -92,12 +92,7 @@ class Episode:
 
 
 def read_episode(trajectory: Trajectory, simulator: Simulator) -> Episode:
-    """Restore and replay a trajectory.
-
-    Raises:
-        DataError: the scene cannot be restored, or an action is refused.
-        SimulatorError: the simulator fails.
-    """
+    """Restore and replay a trajectory."""
     restored = restore(simulator, trajectory.scene)
     if restored.dropped or restored.refused:
         reason = [*restored.dropped, *restored.refused][0]

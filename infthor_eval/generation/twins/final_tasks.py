@@ -89,10 +89,6 @@ def draft_final_tasks(
         settings: how twins are made.
         simulator: a simulator.
         out: folder of the set.
-
-    Raises:
-        DataError: it has no tasks, or cannot be restored or replayed.
-        SimulatorError: the simulator fails.
     """
     if not trajectory.sub_trajs:
         raise DataError("it has no tasks for a final one to follow; give a long trajectory")
@@ -363,9 +359,6 @@ class _Prospects:
             episode: the episode.
             simulator: a simulator.
             least_steps: actions of the shortest history.
-
-        Raises:
-            SimulatorError: the simulator fails.
         """
         self._episode = episode
         low_actions = episode.trajectory.plan.low_actions
@@ -410,11 +403,7 @@ class _Prospects:
 
 
 def _seen_around(simulator: Simulator) -> frozenset[str]:
-    """Return the ids of the objects that an agent sees that turns around where it stands.
-
-    Raises:
-        SimulatorError: the simulator fails.
-    """
+    """Return the ids of the objects that an agent sees that turns around where it stands."""
     start = simulator.view.agent
     seen: set[str] = set()
     for heading, horizon in product(_HEADINGS, _HORIZONS):

@@ -128,9 +128,6 @@ def make_twins(
         worker_settings: number and place of the workers; they do not change the set.
         progress: called after each trajectory, with True if an earlier run made its draft.
         say: called with messages about the workers.
-
-    Raises:
-        DataError: the set is another simulator's, or two worlds have one name.
     """
     started = time.monotonic()
     for name in ("metadata", _DRAFTS):

@@ -32,10 +32,6 @@ def arm_curves(runs: Sequence[ArmRun], tasks: str | None = None) -> RewardCurves
 
     Args:
         tasks: names separated by commas; None for all that the runs share.
-
-    Raises:
-        UsageError: they share no task or several of a kind, or their successes earn differently.
-        DataError: they share no trajectory, or a journal is damaged.
     """
     shared = shared_episodes(runs, tasks)
     facets = _facets(list(task_kinds(runs, shared.tasks)))

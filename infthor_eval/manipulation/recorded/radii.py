@@ -58,10 +58,6 @@ def success_by_radius(runs: Sequence[ArmRun], tasks: str | None = None) -> Succe
     Args:
         runs: at least one run.
         tasks: names of the tasks, separated by commas; None for all that the runs share.
-
-    Raises:
-        UsageError: two runs have one label and radius, or see `shared_episodes`.
-        DataError: see `shared_episodes`.
     """
     shared = shared_episodes(runs, tasks, one_radius=False)
     kinds = task_kinds(runs, shared.tasks)

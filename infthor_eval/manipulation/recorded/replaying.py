@@ -74,10 +74,6 @@ def recorded_episodes(run: ArmRun, task: str | None, trajectory: str | None) -> 
 
     Args:
         task: name of the task; None for all of them, if they are of different kinds.
-
-    Raises:
-        UsageError: there is no such task or trajectory, or none is given where there are several.
-        DataError: it is not a run of manipulation, or has no record yet.
     """
     tasks = list(run.config.tasks)
     kinds = [config.kind for config in run.config.tasks.values()]

@@ -55,11 +55,6 @@ def shared_episodes(
         runs: at least one run.
         tasks: names of the tasks, separated by commas; None for all that they share.
         one_radius: whether to note that the radius of the hand differs.
-
-    Raises:
-        UsageError: they share no task, or several of a kind, or a success earns more in one run
-            than in another.
-        DataError: they share no trajectory, or one is not a run of manipulation.
     """
     chosen = shared_tasks(
         runs, None if tasks is None else [name.strip() for name in tasks.split(",")]

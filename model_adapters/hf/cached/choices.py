@@ -34,9 +34,6 @@ def read_choices(tokenizer: Any, decoding: Decoding) -> Choices | None:
 
     Each text has one spelling, the tokenizer's own: other sequences of tokens with the same text
     are not allowed.
-
-    Raises:
-        ModelError: a text has more tokens than the reply may have.
     """
     ids: dict[tuple[int, ...], str] = {}
     for text in decoding.choices:

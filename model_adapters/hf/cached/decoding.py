@@ -54,11 +54,7 @@ class Generation:
 
 
 def read_generation(config: GenerationConfig) -> Generation:
-    """Return the settings that are used.
-
-    Raises:
-        ModelError: a setting would change replies and is not supported, or has no valid value.
-    """
+    """Return the settings that are used."""
     for name, off in _UNSUPPORTED.items():
         if getattr(config, name, None) not in off:
             raise ModelError(
@@ -148,9 +144,6 @@ class ReplyState:
             likeliest: token with the largest score.
             score: the largest score.
             second: the second largest; read only if margins are kept.
-
-        Raises:
-            ModelError: no token has a score.
         """
         if not score > -math.inf:  # the maximum is NaN if any score is
             raise ModelError(
@@ -235,9 +228,6 @@ def extend_replies(replies: Sequence[tuple[ReplyState, torch.Tensor]]) -> None:
     """Choose the next token of each reply by its logits, (vocabulary,), or end the reply.
 
     The device is read once for all replies, because each read waits for the whole step.
-
-    Raises:
-        ModelError: no token of a reply has a score.
     """
     scores = torch.stack([reply.scores(logits) for reply, logits in replies])
     if not all(reply.decoding.greedy for reply, _ in replies):

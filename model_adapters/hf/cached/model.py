@@ -75,9 +75,6 @@ class TransformersModel(HfModel):
         (prompts, vocabulary).
 
         The last piece of each is fed by itself, as tokens of replies are.
-
-        Raises:
-            ModelError: the model cannot answer continuations together.
         """
         common = n_common([prompt[:-1] for prompt in prompts])
         self._prefix.reset()

@@ -146,10 +146,6 @@ class Prefix:
 
         Returns:
             Logits of the token that follows the last piece, (vocabulary,).
-
-        Raises:
-            DataError: a frame cannot be read.
-            ModelError: processor and model disagree on the number of a frame's tokens.
         """
         self._cache.reserve(self.n_tokens + n_tokens(pieces) + reserve)
         self._embed.expect(pieces)

@@ -18,11 +18,7 @@ def begin_reply(
     *,
     keep_margins: bool = False,
 ) -> ReplyState:
-    """Return an empty reply; the context has all ids before it.
-
-    Raises:
-        ModelError: one of the choices has more tokens than the reply may have.
-    """
+    """Return an empty reply; the context has all ids before it."""
     ends = stop_ids(loaded.tokenizer, decoding)
 
     def has_stopped(ids: list[int]) -> bool:

@@ -50,11 +50,7 @@ R = TypeVar("R", bound=CheckpointReading)
 
 
 class ProcessorFamily(PlainFamily):
-    """A family whose processor expands frames and whose model merges them into the prompt.
-
-    Raises:
-        ModelError: the processor names no image token.
-    """
+    """A family whose processor expands frames and whose model merges them into the prompt."""
 
     def __init__(self, model: Any, image_processor: Any, tokenizer: Any, processor: Any) -> None:
         super().__init__(model, image_processor, tokenizer)
@@ -183,13 +179,7 @@ class HfVlm:
 
     @classmethod
     def build(cls, name: str, options: HfVlmOptions, seed: int) -> Model:  # noqa: ARG003
-        """Load a checkpoint; the seed is not used.
-
-        Raises:
-            UsageError: no checkpoint is given.
-            ModelError: the checkpoint cannot be loaded, has no vision, its parts do not belong
-                together, or it cannot share prefixes.
-        """
+        """Load a checkpoint; the seed is not used."""
         located = cls.locate(name, options)
         family = family_of(located.config)
         if family is not None:
@@ -206,13 +196,7 @@ class HfVlm:
 
     @classmethod
     def locate(cls, name: str, options: R) -> LocatedCheckpoint[R]:
-        """Find a checkpoint of a vision-language model, for any engine.
-
-        Raises:
-            UsageError: no checkpoint is given.
-            ModelError: the checkpoint does not exist, has no vision, or is of another model than a
-                built-in name says.
-        """
+        """Find a checkpoint of a vision-language model, for any engine."""
         if not options.pretrained:
             raise UsageError(f"{name} needs pretrained=..., a hub id or a folder")
         located = locate(options)

@@ -41,10 +41,6 @@ def check_loaded(model: TransformersModel | UncachedModel, processor: Any, pretr
         model: the checkpoint, as it is going to be run.
         processor: the checkpoint's processor of images and text.
         pretrained: name of the checkpoint, for messages.
-
-    Raises:
-        ModelError: the checkpoint's parts do not belong together, or it is run otherwise than its
-            own code runs it; the message says which option to use.
     """
     with ScratchFolder() as folder:
         turns = [Turn("user", _sample(folder))]
@@ -61,9 +57,6 @@ def check_loaded(model: TransformersModel | UncachedModel, processor: Any, pretr
 def require_same_ids(loaded: LoadedCheckpoint, processor: Any, pretrained: str, hint: str) -> None:
     """Refuse a checkpoint whose processor makes other token ids of a sample than the parts of a
     conversation have.
-
-    Raises:
-        ModelError: the ids differ; the message ends in `hint`.
     """
     prompter = Prompter(loaded.tokenizer, loaded.template, loaded.family)
     with ScratchFolder() as folder, wrap_mismatch_errors(pretrained):

@@ -14,11 +14,7 @@ from model_adapters.options.families import PixtralOptions
 
 
 class PixtralFamily(PlainFamily):
-    """The family of LLaVA models with Pixtral's vision tower.
-
-    Raises:
-        ModelError: the checkpoint is another LLaVA, or its tokenizer lacks these tokens.
-    """
+    """The family of LLaVA models with Pixtral's vision tower."""
 
     def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:
         super().__init__(model, image_processor, tokenizer)

@@ -127,11 +127,7 @@ class Qwen25VLNano(CheckpointAdapter):
 
     @classmethod
     def build(cls, name: str, options: CheckpointOptions, seed: int) -> TransformersModel:
-        """Load the checkpoint of the package, or another one of the same form.
-
-        Raises:
-            ModelError: the checkpoint cannot be loaded.
-        """
+        """Load the checkpoint of the package, or another one of the same form."""
         pretrained = options.pretrained or str(packaged_folder(NANO_FOLDER))
         return super().build(name, replace(options, pretrained=pretrained), seed)
 

@@ -59,11 +59,7 @@ class LocatedCheckpoint(Generic[R_co]):
 
 
 def locate(options: R) -> LocatedCheckpoint[R]:
-    """Find or download a checkpoint and read its config.
-
-    Raises:
-        ModelError: the checkpoint does not exist, cannot be downloaded, or is a trainer's.
-    """
+    """Find or download a checkpoint and read its config."""
     folder, commit = fetch(options.pretrained, options.revision)
     require_plain_files(folder, "restore the checkpoint")
     if (folder / ".metadata").is_file():
@@ -82,12 +78,7 @@ def locate(options: R) -> LocatedCheckpoint[R]:
 def load_checkpoint(
     located: LocatedCheckpoint[CheckpointOptions], family: MakeFamily
 ) -> LoadedCheckpoint:
-    """Load everything that a conversation needs, including the weights.
-
-    Raises:
-        ModelError: the checkpoint is incomplete or damaged.
-        UsageError: the dtype or the device is unknown.
-    """
+    """Load everything that a conversation needs, including the weights."""
     return read_checkpoint(located, family, _load_model)
 
 
@@ -100,10 +91,6 @@ def read_checkpoint(
 
     A context extension is written into the config; `build_model` builds its model,
     `build_meta_model` without weights.
-
-    Raises:
-        ModelError: the checkpoint is incomplete or damaged.
-        UsageError: raised by `build_model`.
     """
     options = located.options
     folder = located.folder
@@ -152,11 +139,7 @@ def assemble(
     max_tokens: int | None,
     origin: Mapping[str, Any],
 ) -> LoadedCheckpoint:
-    """Combine loaded parts and derive their identity, which begins with the weights' `origin`.
-
-    Raises:
-        ModelError: the generation settings are not supported, or min_pixels exceeds max_pixels.
-    """
+    """Combine loaded parts and derive their identity, which begins with the weights' `origin`."""
     _check_pixels(image_processor)
     pack_attention(model)
     # torch rounds convolutions in float32 to ten bits on a GPU, and vision towers begin with one.
@@ -225,12 +208,7 @@ def versions() -> dict[str, str]:
 
 
 def resolve_device(options: Placement) -> torch.device:
-    """Return the torch device of the options; auto is the GPU if there is one.
-
-    Raises:
-        UsageError: torch does not know the device.
-        ModelError: this machine has no such device.
-    """
+    """Return the torch device of the options; auto is the GPU if there is one."""
     name = options.device
     if name == "auto":
         name = "cuda" if torch.cuda.is_available() else "cpu"
@@ -259,11 +237,7 @@ def resolve_device(options: Placement) -> torch.device:
 
 
 def resolve_dtype(options: Placement) -> torch.dtype | str:
-    """Return the torch type of the options, or "auto".
-
-    Raises:
-        UsageError: torch does not have the type.
-    """
+    """Return the torch type of the options, or "auto"."""
     dtype = "auto" if options.dtype == "auto" else getattr(torch, options.dtype, None)
     if not (dtype == "auto" or dtype in _DTYPES):
         raise UsageError(
@@ -278,9 +252,6 @@ def wrap_loading_errors(pretrained: str) -> Iterator[None]:
     """Turn errors of transformers' loading into one line, and hide its progress bars and warnings.
 
     What its warnings say is either an error here (missing weights) or of no concern to users.
-
-    Raises:
-        ModelError: a part of the checkpoint cannot be loaded.
     """
     problem = f"the checkpoint {pretrained} cannot be loaded"
     hint = "restore its files, or give another checkpoint"

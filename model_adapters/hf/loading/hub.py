@@ -41,10 +41,6 @@ def fetch(
 
     Returns:
         The folder, and the commit that it holds (None for a folder of the user's).
-
-    Raises:
-        ModelError: the checkpoint is neither a folder nor in the hub or its cache; the message says
-            what to do.
     """
     path = Path(pretrained).expanduser()
     if path.is_dir():

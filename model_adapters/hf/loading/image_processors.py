@@ -42,9 +42,6 @@ def load_image_processor(
         options: options of the model; those of `FrameScaling` are used if it has them.
         trust_remote_code: run code that comes with the checkpoint.
         settings: settings of the image processor.
-
-    Raises:
-        ModelError: the image processor cannot split frames, and should.
     """
     keep_freed_memory()
     scaling = options if isinstance(options, FrameScaling) else FrameScaling()
@@ -64,11 +61,7 @@ def image_backend(image_processor: Any) -> str:
 
 
 def splitting_setting(image_processor: Any) -> str:
-    """Return the name of the setting that splits frames.
-
-    Raises:
-        ModelError: the image processor has none.
-    """
+    """Return the name of the setting that splits frames."""
     known = getattr(image_processor, "valid_kwargs", None)
     name = next(
         (name for name in _SPLITTING if name in getattr(known, "__annotations__", {})), None

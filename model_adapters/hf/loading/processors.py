@@ -42,12 +42,7 @@ _FUNCTIONS = "torchvision.transforms.v2.functional"
 
 
 def load_processor(located: LocatedCheckpoint[Any]) -> Any:
-    """Return the checkpoint's processor, for architectures without a family.
-
-    Raises:
-        ModelError: the checkpoint has none, it cannot be loaded, or it needs a package that is not
-            installed.
-    """
+    """Return the checkpoint's processor, for architectures without a family."""
     options = located.options
     pretrained = options.pretrained
     remote = {"trust_remote_code": options.trust_remote_code}

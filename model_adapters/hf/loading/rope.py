@@ -36,9 +36,6 @@ def apply_rope(config: Any, rope: str | None) -> int | None:
 
     Returns:
         The context limit in tokens, or None if the config has none.
-
-    Raises:
-        ModelError: the model has no RoPE to scale, or several.
     """
     text = config.get_text_config()
     limit: int | None = getattr(text, "max_position_embeddings", None)

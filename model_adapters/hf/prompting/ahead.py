@@ -45,9 +45,6 @@ def read_pixels(family: Family, piece: Frame | Clip) -> Pixels:
     """Return what the family's image processor makes of a frame or a clip.
 
     All pixels that a model of a known family sees are made here.
-
-    Raises:
-        DataError: a frame cannot be decoded.
     """
     if isinstance(piece, Frame):
         return family.prepare(piece.ref.load())
@@ -85,11 +82,7 @@ class PixelsAhead:
             self._begin()
 
     def take(self, piece: Frame | Clip) -> Pixels:
-        """Return the pixels of a piece, and no longer keep them; prepare them if nobody has.
-
-        Raises:
-            DataError: a frame cannot be decoded.
-        """
+        """Return the pixels of a piece, and no longer keep them; prepare them if nobody has."""
         begun = self._begun.pop(piece, None)
         if begun is None:
             if piece in self._coming:

@@ -50,12 +50,7 @@ class Embed(ABC):
 
     @abstractmethod
     def __call__(self, pieces: Sequence[Piece], start: int, before: Sequence[Piece]) -> Span:
-        """Prepare pieces that begin at the position `start`, behind the pieces `before` them.
-
-        Raises:
-            DataError: a frame cannot be read.
-            ModelError: processor and model disagree on the number of a frame's tokens.
-        """
+        """Prepare pieces that begin at the position `start`, behind the pieces `before` them."""
 
     @abstractmethod
     def words(self, tokens: Sequence[int], starts: Sequence[int]) -> Span:

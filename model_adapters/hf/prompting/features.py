@@ -49,11 +49,8 @@ class FeatureCache(Generic[T]):
 
     @torch.inference_mode()
     def get(self, pieces: Sequence[Frame | Clip]) -> list[T]:
-        """Return each piece's features, (slots, hidden), in order; computes missing ones together.
-
-        Raises:
-            DataError: a frame cannot be decoded.
-        """
+        """Return each piece's features, (slots, hidden), in order; computes missing ones
+        together."""
         requested = dict.fromkeys(pieces)
         missing = [piece for piece in requested if piece not in self._cache]
         features = {piece: self._cache[piece] for piece in requested if piece in self._cache}

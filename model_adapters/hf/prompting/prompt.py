@@ -107,13 +107,7 @@ class Prompter:
         return writes_videos(self._tokenizer, self._template, self._marks)
 
     def pieces(self, turns: Sequence[Turn]) -> list[Piece]:
-        """Return the prompt that asks for the reply to these turns.
-
-        Raises:
-            DataError: a frame cannot be read, or differs in size from the others of its video.
-            ModelError: the template refuses the turns, or does not write one placeholder per frame
-                and video.
-        """
+        """Return the prompt that asks for the reply to these turns."""
         parts = [part for turn in turns for part in turn.parts]
         text = render(self._tokenizer, self._template, turns, self._marks)
         needs_bos = not starts_with_bos(self._tokenizer, text)
@@ -134,11 +128,7 @@ class Prompter:
         ]
 
     def frame(self, ref: FrameRef) -> Frame:
-        """Return a frame as a piece of a prompt.
-
-        Raises:
-            DataError: the frame cannot be read.
-        """
+        """Return a frame as a piece of a prompt."""
         frame = self._frames.get(ref.digest)
         if frame is None:
             size = ref.size
@@ -151,11 +141,7 @@ class Prompter:
         return frame
 
     def _clips(self, video: Video, converter: VideoInput) -> list[Clip]:
-        """Return a video as pieces of a prompt.
-
-        Raises:
-            DataError: a frame cannot be read, or differs in size from the others.
-        """
+        """Return a video as pieces of a prompt."""
         per_clip = converter.clip_frames
         refs = video.frames
         size = refs[0].size

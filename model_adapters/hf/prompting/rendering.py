@@ -63,9 +63,6 @@ def render(tokenizer: Any, template: str, turns: Sequence[Turn], marks: Marks) -
     or videos away from between the texts, the turn is passed as one text that contains their
     tokens. Some templates (Pixtral's) accept a system turn only as a string instead of a list of
     texts.
-
-    Raises:
-        ModelError: the template refuses the turns, or drops a text.
     """
     trials = [_render_alone(tokenizer, template, turn) for turn in turns]
     ordered = [

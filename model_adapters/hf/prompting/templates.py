@@ -22,9 +22,6 @@ _PLAIN = """\
 def chat_template(folder: Path, tokenizer: Any) -> str:
     """Return the processor's chat template if the checkpoint has one, else the tokenizer's; of
     named ones the default.
-
-    Raises:
-        ModelError: the checkpoint has no chat template, or only others with names.
     """
     settings, _ = ProcessorMixin.get_processor_dict(folder)
     template = settings.get("chat_template") or tokenizer.chat_template

@@ -103,13 +103,7 @@ class RehearsedModel:
 
 
 def load_shapes(options: CheckpointOptions) -> RehearsedModel:
-    """Build a checkpoint's model from its config alone.
-
-    Raises:
-        UsageError: no checkpoint is named, its config is neither in a folder nor kept here, or an
-            option cannot be rehearsed.
-        ModelError: the config is of no vision-language model that transformers has.
-    """
+    """Build a checkpoint's model from its config alone."""
     _refuse_options(options)
     if options.pretrained and (Path(options.pretrained) / _CONFIG).is_file():
         return _load(options, f"{options.pretrained}/{_CONFIG}")

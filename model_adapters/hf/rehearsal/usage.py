@@ -93,9 +93,6 @@ class Rehearsal:
         rehearsed: the model.
         frames: pictures of the set's size, at least one.
         flash: whether its decoder attends by flash-attn instead of the kernel of its options.
-
-    Raises:
-        ModelError: the model cannot be run on shapes.
     """
 
     def __init__(
@@ -140,11 +137,7 @@ class Rehearsal:
         return _flash_problem(self._rehearsed.model, max(heads), self._embed.sees_ahead)
 
     def usage(self, n_context: int) -> Usage:
-        """Return the memory of a context of so many tokens.
-
-        Raises:
-            ModelError: the model fails.
-        """
+        """Return the memory of a context of so many tokens."""
         if n_context not in self._usages:
             self._usages[n_context] = self._measure(n_context)
         return self._usages[n_context]

@@ -160,12 +160,7 @@ class _JsonClient:
         self._opener = urllib.request.build_opener(_NoRedirect)
 
     def post(self, content: object) -> Any:
-        """Return the server's reply to a POST request, as JSON values.
-
-        Raises:
-            ModelError: no connection, no reply in time, an error status, or a reply that is not
-                JSON.
-        """
+        """Return the server's reply to a POST request, as JSON values."""
         body = json.dumps(content).encode()
         reply = self._send(body)
         try:

@@ -41,13 +41,8 @@ class OpenVLADescription:
 
 
 def describe_openvla(checkpoint: PolicyCheckpoint, unnorm_key: str | None) -> OpenVLADescription:
-    """Read the files beside OpenVLA's weights; without an unnorm_key, they must be of one dataset.
-
-    Raises:
-        ModelError: the checkpoint is of another family, or damaged.
-        UsageError: the unnorm_key is unknown.
-        DataError: a file is missing or damaged.
-    """
+    """Read the files beside OpenVLA's weights; without an unnorm_key, they must be of one
+    dataset."""
     checkpoint.require_model_type(MODEL_TYPE)
     config = checkpoint.read("config.json", OpenVLAConfig)
     # OpenVLA's fine-tuning writes the statistics of new data to a separate file.

@@ -44,11 +44,7 @@ class OpenVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
         return config
 
     def image_size(self, pretrained: str) -> int:
-        """Return width and height of both towers' images, in pixels.
-
-        Raises:
-            ModelError: the checkpoint needs another preprocessing of frames.
-        """
+        """Return width and height of both towers' images, in pixels."""
         is_known = self.use_fused_vision_backbone and self.image_resize_strategy == "resize-naive"
         if (
             not is_known
@@ -65,11 +61,7 @@ class OpenVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
         return self.image_sizes[0]
 
     def towers(self, pretrained: str) -> tuple[TowerShape, TowerShape]:
-        """Return the sizes of both towers, DINOv2's first.
-
-        Raises:
-            ModelError: the checkpoint has other towers.
-        """
+        """Return the sizes of both towers, DINOv2's first."""
         unknown = [name for name in self.timm_model_ids if name not in TOWERS]
         shapes = self.vision_towers or [
             TOWERS[name] for name in self.timm_model_ids if name in TOWERS

@@ -92,10 +92,6 @@ class SpatialBins:
     ) -> "SpatialBins":
         """Return the bins of a checkpoint, by its first action token, their number and the config
         of its processor.
-
-        Raises:
-            ModelError: the numbers of bins and tokens contradict each other, or translations are
-                not spherical.
         """
         policy = config.bin_policy
         counts = config.action_config.num_bins

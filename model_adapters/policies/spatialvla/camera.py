@@ -21,9 +21,6 @@ def published_intrinsics(
         unnorm_key: key of the dataset.
         image_size: width and height that frames are squashed to.
         pretrained: name of the checkpoint, for the message.
-
-    Raises:
-        ModelError: the checkpoint has neither camera, or its entry is not valid.
     """
     camera = cameras.get(unnorm_key) or cameras.get(DEFAULT_INTRINSICS)
     rows = [] if camera is None else camera.intrinsic

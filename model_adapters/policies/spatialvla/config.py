@@ -38,12 +38,7 @@ class SpatialVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
     use_vision_zoe: bool = True
 
     def check(self, pretrained: str) -> None:
-        """Check that this variant is supported.
-
-        Raises:
-            ModelError: it has no depth or no separate action tokens, or these are not the last of
-                the vocabulary.
-        """
+        """Check that this variant is supported."""
         at_end = self.action_token_begin_idx + self.spatial_token_num == self.text().vocab_size
         if not (self.use_spatial_token and self.use_vision_zoe and at_end):
             raise ModelError(
@@ -52,11 +47,7 @@ class SpatialVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
             )
 
     def sides(self, pretrained: str) -> tuple[int, int, int]:
-        """Return the sides, in pixels, of the image, its patches, and the image for depth.
-
-        Raises:
-            ModelError: one of them is not a square.
-        """
+        """Return the sides, in pixels, of the image, its patches, and the image for depth."""
         vision = self.vision()
         backbone = self.zoe().backbone_config
         sides = vision.image_size, vision.patch_size, getattr(backbone, "image_size", None)

@@ -162,11 +162,7 @@ class SpatialVLANetwork:
     view: View
 
     def prompt_ids(self, instruction: str) -> list[int]:
-        """Return one image token for each patch, followed by the ids of the prompt.
-
-        Raises:
-            ModelError: the tokenizer has another image token.
-        """
+        """Return one image token for each patch, followed by the ids of the prompt."""
         text = f"{_IMAGE * self.view.n_patches}{_BEGIN}{prompt(instruction)}\n"
         ids: list[int] = self.tokenizer.encode(text, add_special_tokens=False).ids
         if ids.count(self.image_id) != self.view.n_patches or ids[0] != self.image_id:

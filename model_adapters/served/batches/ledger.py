@@ -27,11 +27,8 @@ class Ledger:
     """
 
     def __init__(self, folder: Path) -> None:
-        """Read a folder, or create it; requests that a killed process left incomplete are removed.
-
-        Raises:
-            DataError: a file is not of this form, or the folder cannot be written.
-        """
+        """Read a folder, or create it; requests that a killed process left incomplete are
+        removed."""
         self._folder = folder
         with wrap_errors(f"{folder}: cannot be written", writing_hint("")):
             folder.mkdir(parents=True, exist_ok=True)
@@ -77,11 +74,7 @@ class Ledger:
         remove(self.requests_file(batch.name))
 
     def replies(self, batch: Batch) -> list[BatchReply]:
-        """Return the replies of a batch that has ended.
-
-        Raises:
-            DataError: their file cannot be read.
-        """
+        """Return the replies of a batch that has ended."""
         path = self._folder / f"{batch.name}{_REPLIES}"
         decode = msgspec.json.Decoder(BatchReply).decode
         try:

@@ -105,11 +105,7 @@ class BatchQueue:
         report: Callable[[str], None],
         should_stop: Callable[[], bool],
     ) -> None:
-        """Read the batches of earlier commands.
-
-        Raises:
-            DataError: they cannot be read, or the folder cannot be written.
-        """
+        """Read the batches of earlier commands."""
         self._ledger = Ledger(folder)
         self._service = service
         self._rules = rules
@@ -155,11 +151,6 @@ class BatchQueue:
     def ask(self, request: str, make: Callable[[], dict[str, Any]]) -> BatchedReply:
         """Return the reply to a request, which is named by its hash; while requests are gathered,
         put it into a batch unless it is in one.
-
-        Raises:
-            NotAskedError: there is no reply yet, or the caps allow none.
-            ModelError: the request failed.
-            DataError: the request cannot be made.
         """
         with self._lock:
             if not self._is_gathering:
@@ -170,12 +161,7 @@ class BatchQueue:
         raise NotAskedError("not asked yet: it is gathered for a batch")
 
     def fetch(self) -> bool:
-        """Submit what was gathered and wait for all batches; return whether to gather once more.
-
-        Raises:
-            ModelError: the server refuses a batch, or cannot be reached.
-            DataError: a file cannot be written.
-        """
+        """Submit what was gathered and wait for all batches; return whether to gather once more."""
         if self._fault is not None:
             raise self._fault
         n_answered = len(self._answered)

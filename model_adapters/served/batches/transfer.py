@@ -61,9 +61,6 @@ class Transfer:
         """Yield the replies of a batch in a file; `read` makes one of a request and its line.
 
         A line that is damaged is the fault of its request alone.
-
-        Raises:
-            ModelError: no line names a request.
         """
         call = Call(method="GET", path=path, largest=LARGEST, timeout_s=TRANSFER_S)
         lines = self.send(call).content.splitlines()
@@ -82,9 +79,6 @@ class Transfer:
     def pages(self, path: str, kind: type[T], after: Callable[[T], str]) -> Iterator[T]:
         """Yield the pages of the server's list of batches; `after` returns what the address of the
         next one has more, empty for none.
-
-        Raises:
-            ModelError: the list has no end.
         """
         seen: list[str] = []
         more = ""
