@@ -15,6 +15,7 @@ from infthor_eval.memory import Observation, Query, TrajectoryFacts, open_memory
 from infthor_eval.nieh.asking.recalling import recall_all
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 from infthor_eval.nieh.samples import find_samples
+from infthor_eval.settings import read
 from model_adapters.hf.retrieval import open_retriever
 
 TEXTS = ("Is there a mug?", "Where was the plate?", "What did you put on the table?")
@@ -230,4 +231,4 @@ def test_so_many_frames_cannot_be():
             with pytest.raises(
                 UsageError, match=f"{name} is .*whole number|Expected `int`.*{name}"
             ):
-                ContextSettings.read({name: value})
+                read(ContextSettings, {name: value})
