@@ -4,11 +4,16 @@ A thing that has settings is a frozen dataclass. The type of a field has the lim
 (`msgspec.Meta`), its `Setting` the rest, and from both are made: the options on the command line,
 the settings of task files, the config of a run and so its hash, the tables of the documentation,
 the refusal of an option without effect, and the names of `explain`.
+
+To add or change a setting: a field with its `Setting` in the suite's class, such as
+`infthor_eval/nieh/options.py` or the task settings that `docs/own-tasks.md` names; then
+`python -m tests.docs.settings_tables`.
 """
 
+import difflib
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from types import NoneType
 from typing import Annotated, Any, NamedTuple, TypeVar
@@ -16,9 +21,11 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 import msgspec
 from msgspec import Meta
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import DataError, UsageError
 
 T = TypeVar("T")
+_LARGE = 10**9  # a limit from it on keeps typing errors out, and is not said
+_BOUNDS = {"gt": "above", "ge": "from", "lt": "below", "le": "at most"}
 _KINDS = {bool: "true or false", int: "whole number", float: "number", str: "text", dict: "mapping"}
 
 
@@ -100,10 +107,12 @@ class Declared(NamedTuple):
             return self.is_a
         limits = _limits(self.type)
         words = f"a {self.is_a}" + (f" of {setting.of}" if setting.of else "")
-        above = (f" from {limits['ge']}",) if "ge" in limits else ()
-        above = (f" above {limits['gt']}",) if "gt" in limits else above
-        most = (f", at most {limits['le']:,}",) if limits.get("le", 2**53) < 2**53 else ()
-        return "".join((words, *above, *most))
+        bounds = [
+            f"{said} {limits[name]:,}"
+            for name, said in _BOUNDS.items()
+            if limits.get(name, _LARGE) < _LARGE
+        ]
+        return " ".join((words, ", ".join(bounds))).rstrip()
 
     def takes(self, value: Any) -> bool:
         """Return whether a value is a valid one."""
@@ -139,18 +148,37 @@ def check_options(options: Any) -> None:
             raise UsageError(f"--{name.replace('_', '-')} {value}: give {declared.valid}")
 
 
+def check_names(
+    kind: type, raw: Mapping[Any, Any], location: str, others: Iterable[str] = ()
+) -> None:
+    """Check that a mapping has no key that is no setting, as a misspelt one is.
+
+    Args:
+        others: further keys that it may have.
+
+    Raises:
+        DataError: names the key, and the nearest setting.
+    """
+    known = sorted((*others, *settings_of(kind)))
+    for key in raw:
+        if key not in known:
+            near = difflib.get_close_matches(str(key), known, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
+            raise DataError(f"{location}: {key} is not known; {hint}")
+
+
 def read(kind: type[T], raw: Mapping[str, Any], location: str = "dataset_kwargs") -> T:
     """Return a dataclass with the values of a mapping at a location (for messages); other keys are
     ignored.
 
     Raises:
-        UsageError: a value is not valid; the message has location, setting and valid values.
+        DataError: a value is not valid; the message has location, setting and valid values.
     """
     declared = settings_of(kind)
     given = {name: raw[name] for name in declared if raw.get(name) is not None}
     for name, value in given.items():
         if not declared[name].takes(value):
-            raise UsageError(f"{location}: {name} is {value!r:.60}; it is {declared[name].valid}")
+            raise DataError(f"{location}: {name} is {value!r:.60}; it is {declared[name].valid}")
     return kind(**{name: msgspec.convert(given[name], declared[name].type) for name in given})
 
 
@@ -190,8 +218,9 @@ def causes_of(config: type) -> dict[str, str]:
 
 
 def _setting(hint: Any) -> Setting | None:
-    metadata = getattr(hint, "__metadata__", ())
-    return next((item for item in metadata if isinstance(item, Setting)), None)
+    """Return what is said of a setting, by its type or by that behind `... | None`."""
+    said = (item for item in getattr(hint, "__metadata__", ()) if isinstance(item, Setting))
+    return next(said, None) or next(filter(None, map(_setting, typing.get_args(hint))), None)
 
 
 def _bare(hint: Any) -> Any:
@@ -206,8 +235,7 @@ def _bare(hint: Any) -> Any:
 def _limits(hint: Any) -> dict[str, Any]:
     """Return the limits of a number by their names in `msgspec.Meta`."""
     metas = [item for item in getattr(hint, "__metadata__", ()) if isinstance(item, Meta)]
-    names = ("gt", "ge", "le")
-    found = {name: getattr(meta, name) for meta in metas for name in names}
+    found = {name: getattr(meta, name) for meta in metas for name in _BOUNDS}
     inner = [one for one in typing.get_args(hint) if typing.get_origin(hint) is not tuple]
     limits = {name: at for name, at in found.items() if at is not None}
     return {name: at for one in inner for name, at in _limits(one).items()} | limits

@@ -66,7 +66,8 @@ def run(task, *stride):
 haystack = "nieh_haystack_8k"
 run(haystack), run(haystack, "--stride", "3")
 runs = [path.parent for path in sorted(Path(sys.argv[2]).glob("*/*/results.json"))]
-configs = [json.loads(next((run / "journal").iterdir()).open().readline())["config"] for run in runs]
+journals = [next((run / "journal").iterdir()).read_text().splitlines() for run in runs]
+configs = [json.loads(journal[0])["config"] for journal in journals]
 table = "<!-- settings: infthor_eval.nieh.contexts:ContextSettings -->\\n<!-- end -->"
 print(json.dumps({
     "help": typed("run", "--help"),

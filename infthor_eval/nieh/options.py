@@ -1,8 +1,8 @@
 """Settings of NIEH: its options on the command line, of which task files have some too.
 
-To add a setting: a field here with its `Setting`. One of `NiehSettings` is an option and a setting
-of task files, one of `NiehOptions` an option alone, and one of `ContextSettings`
-(`infthor_eval/nieh/contexts/base.py`) a setting of task files alone.
+A field of `NiehSettings` is an option and a setting of task files, one of `NiehOptions` an option
+alone, and one of `ContextSettings` (`infthor_eval/nieh/contexts/base.py`) a setting of task files
+alone.
 """
 
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class NiehSettings:
     context: Annotated[
         str | None,
         Setting(
-            help="Contexts of tasks that leave it open (nieh_twins), a run with each: clues, "
+            help="What is shown in tasks that leave it open (nieh_twins), a run with each: clues, "
             "trajectory, haystack, truncate_head, memory, video; default: clues.",
             stands_for="clues",
             where="context",

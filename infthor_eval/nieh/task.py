@@ -1,6 +1,5 @@
 """A task of NIEH: its file, its samples, and how their replies become records."""
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -23,7 +22,7 @@ from infthor_eval.nieh.other_homes import without_alike
 from infthor_eval.nieh.samples import TaskSamples, find_samples, find_set
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
-from infthor_eval.settings import read, settings_of
+from infthor_eval.settings import check_names, read
 from infthor_eval.storage.folders import packaged_folder
 from model_adapters import Decoding, cut_at_stop
 
@@ -174,12 +173,8 @@ def check_task_file(file: TaskFile) -> None:
     file.require("dataset_kwargs")
     location = f"{file.path}: dataset_kwargs"
     raw = file.settings["dataset_kwargs"]
-    known = (*_OF_SETS, *settings_of(ContextSettings))
-    for key in raw if isinstance(raw, Mapping) else ():
-        if key not in known:
-            near = difflib.get_close_matches(str(key), known, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(sorted(known))}"
-            raise DataError(f"{location}: {key} is not known; {hint}")
+    if isinstance(raw, Mapping):
+        check_names(ContextSettings, raw, location, _OF_SETS)
     if not isinstance(raw, Mapping) or not (
         isinstance(raw.get("context"), str) or _leaves_context_open(raw)
     ):

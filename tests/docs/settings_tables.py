@@ -1,8 +1,5 @@
 """The tables of settings in docs/own-tasks.md, from the code: `python -m
 tests.docs.settings_tables` writes them.
-
-To add or change a setting of task files: a field of the suite's class that `docs/own-tasks.md`
-names; then run this.
 """
 
 import importlib
@@ -13,6 +10,8 @@ from infthor_eval.settings import settings_of
 
 PAGE = Path(__file__).parents[2] / "docs" / "own-tasks.md"
 _PLACE = re.compile(r"(<!-- settings: (\S+):(\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+
+
 def with_tables(page: str) -> str:
     """The page with a table in each place that names a class of settings."""
     return _PLACE.sub(lambda match: f"{match[1]}{_table(match[2], match[3])}{match[5]}", page)
@@ -20,10 +19,11 @@ def with_tables(page: str) -> str:
 
 def _table(module: str, name: str) -> str:
     lines = ["| setting | is a | default | |", "|---|---|---|---|"]
-    for name, declared in settings_of(getattr(importlib.import_module(module), name)).items():
+    settings = getattr(importlib.import_module(module), name)
+    for setting, declared in settings_of(settings).items():
         default = declared.setting.stands_for if declared.default is None else declared.default
         said = declared.setting.help.replace("|", "\\|")
-        lines.append(f"| `{name}` | {declared.is_a} | {_shown(default)} | {said} |")
+        lines.append(f"| `{setting}` | {declared.is_a} | {_shown(default)} | {said} |")
     return "\n".join(lines) + "\n"
 
 

@@ -33,7 +33,7 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
         option = next(iter(by_suite.values()))
         kind, setting = option.kind, option.setting
         choices = () if setting.each else tuple(map(str, setting.choices))
-        types = {bool: None, int: WholeNumber()}
+        types = {bool: None, int: WholeNumber()} if not setting.each else {kind: str}
         command = click.option(
             f"--{name.replace('_', '-')}",
             cls=SuiteOption,
@@ -75,7 +75,7 @@ def expand_suite_options(suite: str, params: Mapping[str, Any], used: Collection
         value = _value(name, option, params)
         if value is not None:
             typed = split_names(value, f"--{name}") if option.setting.each else (value,)
-            values[name] = [msgspec.convert(value, option.kind, strict=False) for value in typed]
+            values[name] = [_convert(name, option, value) for value in typed]
         elif option.default is MISSING:
             raise UsageError(
                 f"--{name.replace('_', '-')}: {suite} needs it, as its field has no "
@@ -85,6 +85,13 @@ def expand_suite_options(suite: str, params: Mapping[str, Any], used: Collection
         options_class(suite)(**dict(zip(values, chosen, strict=True)))
         for chosen in product(*values.values())
     ]
+
+
+def _convert(name: str, option: Declared, text: Any) -> Any:
+    try:
+        return msgspec.convert(text, option.kind, strict=False)
+    except msgspec.ValidationError as error:
+        raise UsageError(f"--{name.replace('_', '-')} {text}: give {option.valid}") from error
 
 
 def refuse_duplicate_options(command: Callable[..., Any]) -> None:
