@@ -9,9 +9,6 @@ and tables. Each further object exists only once all that it needs is known:
 
 `SuiteUnit` is the suite's unit, `Payload` the payload of its records.
 
-To add an option of a suite: a field with its help in the suite's options, as in
-`infthor_eval/nieh/options.py`; `is_place` in its metadata if it may name a file.
-
 To add or change what people see of a suite: its `overview` first, its `tables` with everything; its
 one number, `primary_metrics`.
 """

@@ -347,9 +347,9 @@ def test_nothing_to_evaluate_is_refused_in_one_line(prepare_run, tmp_path):
 
 
 @pytest.mark.parametrize(("option", "value", "expected"), [
-    ("radius", "0.7", "--radius 0.7: is a length of 0.04 to 0.5 metres"),
-    ("radius", "wide", "--radius wide: is a length"),
-    ("frames", "black", "--frames black: tasks in a simulator have shown, blank"),
+    ("radius", "0.7", "--radius 0.7: give a number of metres from 0.04, at most 0.5"),
+    ("radius", "wide", "--radius wide: give a number of metres"),
+    ("frames", "black", "--frames black: give shown or blank"),
     ("instruction", "do it", "must have {object}"),
     ("scenes", "/nowhere/at/all", "/nowhere/at/all"),
 ])  # fmt: skip

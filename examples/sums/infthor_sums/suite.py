@@ -6,8 +6,8 @@ is imported here.
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
 
 import msgspec
 
@@ -22,6 +22,7 @@ from infthor_eval.runs import (
     UnitRecord,
 )
 from infthor_eval.runs.suite import BaselineSubject
+from infthor_eval.settings import Setting
 from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["Calculator", "Sum", "SumsConfig", "SumsOptions", "SumsSuite", "SumsSummary"]
@@ -76,16 +77,11 @@ class SumsSummary(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class SumsOptions:
-    """Options of `infthor-eval run` for this suite.
+    """Options of `infthor-eval run` for this suite."""
 
-    Attributes:
-        question: text of the question.
-    """
-
-    question: str = field(
-        default="What is {a} + {b}? Answer with a number.",
-        metadata={"help": "Text of a question, with {a} and {b} for the numbers."},
-    )
+    question: Annotated[
+        str, Setting(help="Text of a question, with {a} and {b} for the numbers.")
+    ] = "What is {a} + {b}? Answer with a number."
 
 
 class Calculator(BaselineSubject):
