@@ -15,7 +15,6 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from infthor_eval.cli.results import read_run_results
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.published import published_tables
 from infthor_eval.nieh.guessing.audit import audit
@@ -23,6 +22,7 @@ from infthor_eval.nieh.results.cells import Cell
 from infthor_eval.nieh.results.evidence_tables import short_name
 from infthor_eval.nieh.results.summary import DISTANCES, SHOWN_CLUES, NiehSummary, TaskSummary
 from infthor_eval.report.figures.style import LEGEND, add_legend, looks_of, save_figure
+from infthor_eval.run import Run
 
 DOCS = Path(__file__).parents[1] / "docs"
 MODES = {
@@ -41,7 +41,7 @@ def main() -> None:
     options = parser.parse_args()
     tasks: dict[str, TaskSummary] = {}
     for folder in options.runs:
-        summary = read_run_results(folder).summary.summary
+        summary = Run.open(folder).own_summary.summary
         assert isinstance(summary, NiehSummary)
         tasks |= summary.tasks
     tasks = {name: tasks[name] for name in MODES}

@@ -6,7 +6,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from infthor_eval.errors import UsageError
-from infthor_eval.report.presented import PresentedRun
+from infthor_eval.run import Run
 from infthor_eval.runs import RunHeader, read_header
 
 UNKNOWN = "unknown"
@@ -65,7 +65,7 @@ def require_one_model(headers: Sequence[RunHeader[Any]]) -> None:
             )
 
 
-def model_facts(run: PresentedRun, model_id: str | None = None) -> ModelFacts:
+def model_facts(run: Run, model_id: str | None = None) -> ModelFacts:
     """Return what a run says of its model; `model_id` is its name where that is wrong.
 
     The name is the run's own: the one that tells it from other runs beside it has options, and

@@ -6,8 +6,8 @@ import json
 import pytest
 
 from infthor_eval.cli import main
-from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
+from infthor_eval.run import open_runs
 
 from ..helpers.command_line import option_words
 
@@ -31,7 +31,7 @@ def folders(install, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def page(folders):
-    return build_page(read_report_runs(folders), PageRequest())
+    return build_page(open_runs(folders), PageRequest())
 
 
 def test_its_results_are_shown_and_exported(folders, run_cli):

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from infthor_eval.report.figures.style import LEGEND, add_legend, inline_svg, looks_of
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import Description
-from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.sections import Chart
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord
 from infthor_sums.suite import KINDS, Sum
 
@@ -40,7 +40,7 @@ class SumsPresenter(PlainPresenter):
         """See `Presenter.details`: none, the description has it all."""
         return {}
 
-    def charts(self, runs: Sequence[ReportRun]) -> list[Chart]:
+    def charts(self, runs: Sequence[Run]) -> list[Chart]:
         """See `Presenter.charts`: right sums by kind, a chart per task."""
         tasks = dict.fromkeys(task for run in runs for task in run.summary.summary.tasks)
         return [
@@ -49,7 +49,7 @@ class SumsPresenter(PlainPresenter):
         ]
 
 
-def _chart(task: str, runs: Sequence[ReportRun]) -> Chart:
+def _chart(task: str, runs: Sequence[Run]) -> Chart:
     looks = looks_of(run.label for run in runs)  # colours that the colour-blind can tell apart
     shares = {run.label: run.summary.summary.tasks[task] for run in runs}
 

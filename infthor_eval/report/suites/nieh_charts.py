@@ -17,11 +17,11 @@ from infthor_eval.nieh.results.summary import (
     TaskSummary,
     main_metric,
 )
-from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.memory_chart import memory_charts
 from infthor_eval.report.svg.dots import Dot, DotRow, DotsChart, class_row, dot_of, dots_chart
 from infthor_eval.report.svg.drawing import Series
 from infthor_eval.report.web.sections import Chart
+from infthor_eval.run import Run
 from infthor_eval.statistics import MeanEstimate
 from infthor_eval.tables import Column, Row, Table
 
@@ -40,7 +40,7 @@ class _Line(NamedTuple):
         return main_metric(self.task)
 
 
-def nieh_charts(runs: Sequence[ReportRun]) -> list[Chart]:
+def nieh_charts(runs: Sequence[Run]) -> list[Chart]:
     """Draw all charts that the runs have numbers for."""
     charts: list[Chart] = []
     for task in dict.fromkeys(name for run in runs for name in run.summary.summary.tasks):
@@ -184,7 +184,7 @@ def _describe(lines: Sequence[_Line]) -> str:
     return "; ".join(f"{label} {mean} %" for label, mean in totals)
 
 
-def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
+def _gains_chart(runs: Sequence[Run]) -> Chart | None:
     """Draw each run's gain over blank frames, a row per task; None without a run on blank ones."""
     summaries = [run.summary for run in runs]
     rows = []
@@ -196,7 +196,7 @@ def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
     return _by_rows("Gain over blank frames", caption, rows, "gain, in points")
 
 
-def _above_blind_chart(runs: Sequence[ReportRun]) -> Chart | None:
+def _above_blind_chart(runs: Sequence[Run]) -> Chart | None:
     """Draw the score above blind of each run, a row per task; None if no floor is known."""
     rows = [
         (f"{run.label}, {name}", above)
@@ -233,7 +233,7 @@ def _by_rows(
     )
 
 
-def _heat_map(run: ReportRun) -> Chart | None:
+def _heat_map(run: Run) -> Chart | None:
     """Draw accuracy by depth of the needle and context size; None if no task has depths."""
     from matplotlib.figure import Figure
 

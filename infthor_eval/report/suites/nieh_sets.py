@@ -9,7 +9,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import find_set
-from infthor_eval.report.runs import ReportRun
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.runs.stored.command import read_stored_command
 
@@ -23,7 +23,7 @@ class RunSets:
         problems: reason why a task has no set, by its name.
     """
 
-    def __init__(self, runs: Sequence[ReportRun], data: Path | None) -> None:
+    def __init__(self, runs: Sequence[Run], data: Path | None) -> None:
         """Open the sets; `data` is the folder of all, None for the one that each run names."""
         self.problems: dict[str, str] = {}
         self._sets: dict[str, tuple[NiehSet, Mapping[str, Question]]] = {}
@@ -43,7 +43,7 @@ class RunSets:
             question if question is not None and question.text == record.payload.question else None
         )
 
-    def _open(self, run: ReportRun, task: str, data: Path | None) -> None:
+    def _open(self, run: Run, task: str, data: Path | None) -> None:
         folder = data or run.data
         options = _options_of(run)
         try:
@@ -61,6 +61,6 @@ class RunSets:
         self._sets[task] = opened, {question.id: question for question in opened.questions}
 
 
-def _options_of(run: ReportRun) -> Mapping[str, Any]:
+def _options_of(run: Run) -> Mapping[str, Any]:
     command = read_stored_command(run.folder)
     return command.options if command else {}

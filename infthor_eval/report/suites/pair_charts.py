@@ -18,10 +18,10 @@ from infthor_eval.report.figures.style import (
     looks_of,
 )
 from infthor_eval.report.presenter import FigureRequest, FigureResult
-from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.svg.dots import DotsChart, class_row, dot_of, dots_chart, number_range
 from infthor_eval.report.svg.drawing import Series
 from infthor_eval.report.web.sections import Chart, Section
+from infthor_eval.run import Run
 from infthor_eval.tables import Column, Row, Table
 
 # inches
@@ -43,7 +43,7 @@ class _Line(NamedTuple):
         return Series(self.label, self.place)
 
 
-def pairs_section(runs: Sequence[ReportRun]) -> Section | None:
+def pairs_section(runs: Sequence[Run]) -> Section | None:
     """Return the section of the page on pairs; None if the runs have none."""
     tables = pair_tables([run.summary for run in runs])
     if not tables:
@@ -51,7 +51,7 @@ def pairs_section(runs: Sequence[ReportRun]) -> Section | None:
     return Section("pairs", "Pairs of twins", tuple(_charts(runs)), tuple(tables))
 
 
-def _charts(runs: Sequence[ReportRun]) -> Iterator[Chart]:
+def _charts(runs: Sequence[Run]) -> Iterator[Chart]:
     """Yield a chart per task and memory curve that has several classes."""
     for task in _tasks(runs):
         lines = _lines(runs, task)
@@ -61,7 +61,7 @@ def _charts(runs: Sequence[ReportRun]) -> Iterator[Chart]:
                 yield _chart(task, curve, names, lines)
 
 
-def build_pairs_figure(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+def build_pairs_figure(runs: Sequence[Run], request: FigureRequest) -> FigureResult:
     """Return the memory curves of a task as one figure, a panel each.
 
     Raises:
@@ -80,13 +80,13 @@ def build_pairs_figure(runs: Sequence[ReportRun], request: FigureRequest) -> Fig
     return FigureResult(_table(task, lines), lambda: _pairs_figure(task, lines))
 
 
-def _tasks(runs: Sequence[ReportRun]) -> list[str]:
+def _tasks(runs: Sequence[Run]) -> list[str]:
     """Return the tasks with pairs."""
     by_name = ((name, task) for run in runs for name, task in run.summary.summary.tasks.items())
     return list(dict.fromkeys(name for name, task in by_name if task.pairs is not None))
 
 
-def _lines(runs: Sequence[ReportRun], task: str) -> list[_Line]:
+def _lines(runs: Sequence[Run], task: str) -> list[_Line]:
     looks = looks_of(run.label for run in runs)
     summaries = [(run.label, run.summary.summary.tasks.get(task)) for run in runs]
     return [
