@@ -2,8 +2,6 @@
 
 A facet says once how a unit's class is told, and in which order classes stand. All else is a query:
 the units of each class, their mean with its interval, a row or a dot for it.
-
-To add a facet of questions: an entry in `nieh/results/facets.py`.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
