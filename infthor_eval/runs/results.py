@@ -39,9 +39,11 @@ def results_document(
 
 
 def _reproducible(summary: Any) -> dict[str, Any]:
-    """Return a summary without its field `took`, if it has one: times differ from run to run."""
+    """Return a summary as it says itself (`document`), else all its fields."""
+    if hasattr(summary, "document"):
+        return dict(summary.document())
     document: dict[str, Any] = msgspec.to_builtins(summary)
-    return {name: value for name, value in document.items() if name != "took"}
+    return document
 
 
 def write_run_files(

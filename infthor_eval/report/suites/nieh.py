@@ -8,6 +8,7 @@ from statistics import fmean
 from infthor_eval.nieh.records import BlindGuess, NiehAnswer
 from infthor_eval.nieh.rescoring.judging import JUDGED
 from infthor_eval.nieh.results.above_blind import score_above_blind, score_range
+from infthor_eval.nieh.results.facets import FACETS
 from infthor_eval.nieh.results.pair_summary import score_pairs
 from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.nieh.scoring import SCORERS
@@ -179,6 +180,9 @@ class NiehPresenter(PlainPresenter):
             details |= {
                 name: f"{score:+.2f}" for name, score in self.further_scores(record).items()
             }
+        for facet in FACETS:
+            told = None if facet.is_told else facet.class_of(record)
+            details |= {} if told is None else {facet.heading: told}
         if payload.thinking is not None:
             details[THOUGHT] = payload.thinking
         return details
