@@ -53,8 +53,8 @@ class Run:
 
     Attributes:
         folder: folder of the run.
-        listed: first line of the journal, the configs of tasks as JSON values: all that is known
-            without the suite.
+        listed: first line of the journal; until that is read, its configs are JSON values, so that
+            runs are listed without their suites.
         name: name of the run beside others.
     """
 
@@ -139,8 +139,9 @@ class Run:
 
     @cached_property
     def own_header(self) -> RunHeader:
-        """First line of the journal as it is."""
-        return self._log[0]
+        """First line of the journal as it is, the configs of tasks in the suite's types."""
+        self.listed = self._log[0]
+        return self.listed
 
     @cached_property
     def header(self) -> RunHeader:
