@@ -4,23 +4,24 @@ A trajectory has thousands of frames and a question refers to many of them, so r
 references and the model's adapter decodes. Caches recognise a frame by the digest of its content.
 
 A frame is a file, or a file with patches laid over it: twins have frames that differ in a small
-part (`shared_frames`).
+part (`shared_frames`). Pictures look as a browser shows them on white: nothing shows of colours
+under transparency, 16 bits of grey are read as 8, and EXIF data turn the picture.
 """
 
 import re
 import struct
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 
-from PIL import Image, UnidentifiedImageError
+from PIL import ExifTags, Image, UnidentifiedImageError
+from PIL.Image import Transpose
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.pictures.as_shown import as_shown, conversions, orientation
 from infthor_eval.formats.reading import file_problem, read_bytes, require_file
 from infthor_eval.storage.digests import digest, digest_of_file
 from infthor_eval.storage.limits import IMAGE_ASPECT, IMAGE_MEGAPIXELS
@@ -48,6 +49,10 @@ _DAMAGED = (
     zlib.error,
     Image.DecompressionBombError,
 )
+# By EXIF orientation, from 2; from 5 on width and height change places.
+_TURNS = {2: Transpose.FLIP_LEFT_RIGHT, 3: Transpose.ROTATE_180, 4: Transpose.FLIP_TOP_BOTTOM}
+_TURNS |= {5: Transpose.TRANSPOSE, 6: Transpose.ROTATE_270, 7: Transpose.TRANSVERSE}
+_TURNS |= {8: Transpose.ROTATE_90}
 
 
 @dataclass(frozen=True)
@@ -114,13 +119,13 @@ class FrameRef:
             DataError: as `load`, for errors that show in the header.
         """
         with _open(self.path) as image:
-            return image.size[::-1] if orientation(image) > 4 else image.size
+            return image.size[::-1] if _orientation(image) > 4 else image.size
 
     @cached_property
     def conversions(self) -> str:
         """What `load` does to the picture below the patches, in words; raises as `size`."""
         with _open(self.path) as image:
-            return conversions(image)
+            return _conversions(image)
 
     @cached_property
     def problem(self) -> str | None:
@@ -135,7 +140,7 @@ class FrameRef:
                 beyond the picture below it.
         """
         with _open(self.path) as image:
-            frame = as_shown(image)
+            frame = _as_shown(image)
         n_pixels = frame.width * frame.height
         for patch in self.patches:
             with _open(patch.path) as image:
@@ -251,3 +256,41 @@ def _wrong_size(path: Path, width: int, height: int) -> str | None:
     if max(width, height) > IMAGE_ASPECT.value * min(width, height):
         return f"{path}: an image of {width}x{height} pixels is too narrow; {IMAGE_ASPECT.hint}"
     return None
+
+
+def _as_shown(image: Image.Image) -> Image.Image:
+    """Return an opened picture in RGB, as it is shown."""
+    turn = _TURNS.get(_orientation(image))  # before decoding: browsers ignore EXIF data behind it
+    if image.mode.startswith("I"):
+        import numpy as np  # which commands without frames need not load
+
+        values, key = np.asarray(image), image.info.get("transparency")
+        image = Image.fromarray((values >> 8).astype(np.uint8))  # Pillow cuts what is above 255
+        if key is not None:
+            image.putalpha(Image.fromarray(np.where(values == key, 0, 255).astype(np.uint8)))
+    if image.has_transparency_data:
+        white = Image.new("RGBA", image.size, "white")
+        image = Image.alpha_composite(white, image.convert("RGBA"))
+    shown = image.convert("RGB")
+    return shown if turn is None else shown.transpose(turn)
+
+
+def _conversions(image: Image.Image) -> str:
+    """Return what `_as_shown` does to an opened picture, in words; empty if it needs nothing."""
+    done = {
+        "16-bit grey": image.mode.startswith("I"),
+        "CMYK": image.mode == "CMYK",
+        "transparency on white": image.has_transparency_data,
+        f"EXIF orientation {_orientation(image)}": _orientation(image) > 1,
+    }
+    return ", ".join(name for name, is_done in done.items() if is_done)
+
+
+def _orientation(image: Image.Image) -> int:
+    """Return the EXIF orientation of an opened picture, 1 to 8; 1 where none is."""
+    exif = Image.Exif()
+    if "exif" in image.info:
+        with suppress(SyntaxError, ValueError, LookupError, TypeError, struct.error):
+            exif.load(image.info["exif"])
+    stored = exif.get(ExifTags.Base.Orientation)
+    return stored if stored in _TURNS else 1

@@ -3,7 +3,9 @@
 The folder has the layout of the published data (hub dataset `PEARLS-Lab/infini-thor-nieh`):
 `qa_set*.csv` beside `metadata/<traj_id>/` with `img/` (or `img_768/`), `metadata.json`,
 `expert_log.json` and, in some sets, `<traj_id>_10fps.mp4`. The trajectory files are in a separate
-folder (published data) or inside the set (ours). Twins share pictures (`shared_frames`).
+folder (published data) or inside the set (ours). Twins share pictures (`shared_frames`). A low-level
+action has one frame in our sets, and possibly several in others (`expert_log.json`, or the step log
+of the layout that the branch `dev` reads).
 
 Question files alone, without `metadata/`, are a set too: for whatever needs no frame. So is a
 folder of one's own frames and questions (`own_folder`).
@@ -11,7 +13,7 @@ folder of one's own frames and questions (`own_folder`).
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import chain
@@ -21,17 +23,16 @@ from typing import TypeVar
 import msgspec
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.action_log import logged_action_frames, read_action_log
 from infthor_eval.formats.frames import FrameRef, find_images
 from infthor_eval.formats.outline import Outline, find_outline, read_outline, read_states
 from infthor_eval.formats.own_folder import OwnFolder, find_own_folder
 from infthor_eval.formats.pictures.video import Video, read_video
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.formats.reading import first_duplicate
+from infthor_eval.formats.reading import first_duplicate, read_json
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.shared_frames import read_shared_frames
-from infthor_eval.formats.step_log import log_file, read_steps
+from infthor_eval.formats.step_log import Step, log_file, read_steps
 from infthor_eval.formats.twins import TwinPair, read_pairs
 
 T = TypeVar("T")
@@ -43,6 +44,7 @@ _GIVE_A_SET = (
     "give the folder of an NIEH set, or download the published one with `infthor-eval fetch nieh`"
 )
 _IMAGE_FOLDERS = ("img", "img_768")
+_REPLAY_HINT = "replay it again"
 
 
 class NiehSet:
@@ -258,7 +260,7 @@ class NiehSet:
     def _read_action_frames(self, traj_id: str) -> dict[int, tuple[int, ...]]:
         path = self.folder(traj_id) / "expert_log.json"
         if not path.exists():
-            logged = logged_action_frames(
+            logged = _logged_action_frames(
                 sorted(read_steps(self.folder(traj_id)), key=lambda step: step.img_idx)
             )
             if logged is not None:
@@ -266,7 +268,7 @@ class NiehSet:
         positions = {
             Path(frame.name).stem: index for index, frame in enumerate(self.frames(traj_id))
         }
-        return read_action_log(path, positions)
+        return _read_action_log(path, positions)
 
     def states(self, traj_id: str) -> dict[int, str]:
         """Return the states of a trajectory in words, by low-level action.
@@ -384,3 +386,46 @@ def _read_frames(folder: Path, shared_frames: dict[str, FrameRef]) -> dict[int, 
         step.img_idx: FrameRef(by_stem.get(name, home / Path(step.img_filename).name))
         for step, name in zip(steps, names, strict=True)
     }
+
+
+class _Image(msgspec.Struct):
+    low_idx: int
+    image_name: str
+
+
+class _Log(msgspec.Struct):
+    images: list[_Image]
+
+
+def _read_action_log(path: Path, positions: Mapping[str, int]) -> dict[int, tuple[int, ...]]:
+    """Return the frames of each low-level action that has any; `positions` are those of file stems.
+
+    Raises:
+        DataError: the file is missing, has another form, or names frames not in `positions`.
+    """
+    log = read_json(path, _REPLAY_HINT, _Log)
+    with wrap_errors(
+        f"{path}: not a log of actions and their frames", _REPLAY_HINT, catch=KeyError
+    ):
+        return _by_action(
+            (image.low_idx, positions[Path(image.image_name).stem]) for image in log.images
+        )
+
+
+def _logged_action_frames(steps: Sequence[Step]) -> dict[int, tuple[int, ...]] | None:
+    """Return each low-level action's frames, by position, from the step log; None if it has none.
+
+    As in the published loader, frames of action 0 are left out with those before the first action:
+    both have 0 there.
+    """
+    if all(step.low_idx is None for step in steps):
+        return None
+    return _by_action((step.low_idx, index) for index, step in enumerate(steps) if step.low_idx)
+
+
+def _by_action(frames: Iterable[tuple[int, int]]) -> dict[int, tuple[int, ...]]:
+    """Return frames by their actions, in the order of these."""
+    positions: dict[int, list[int]] = {}
+    for action, position in frames:
+        positions.setdefault(action, []).append(position)
+    return {action: tuple(positions[action]) for action in sorted(positions)}

@@ -1,16 +1,20 @@
-"""Memories by name: built in, of other packages (entry points), and classes in a user's file.
+"""Memories by name: built in, of other packages (entry points), and of a user's file.
+
+A file has a class, or a function: `def recall(images, question)`.
 
 To add a memory: a class in this package and its line in `MEMORIES` (`docs/memories.md`).
 """
 
+import dataclasses
 import inspect
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import Any
+from typing import Any, overload
 
 import msgspec
+from PIL import Image
 
 from infthor_eval.errors import (
     ModelError,
@@ -19,8 +23,14 @@ from infthor_eval.errors import (
     in_one_line,
     wrap_user_code,
 )
-from infthor_eval.memory.functions import function_memory
-from infthor_eval.memory.protocol import Memory, MemoryCapabilities
+from infthor_eval.memory.protocol import (
+    Memory,
+    MemoryCapabilities,
+    Observation,
+    Query,
+    Recalled,
+    TrajectoryFacts,
+)
 from infthor_eval.plugins import PluginTable
 from infthor_eval.storage.deadlines import limit_time
 from infthor_eval.storage.digests import json_values
@@ -28,6 +38,7 @@ from infthor_eval.storage.limits import MEMORY_SECONDS
 from model_adapters.adapter_identity import package_identity
 from model_adapters.options.parsing import read_pairs
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
+from model_adapters.own_function import OwnFunction, read_function
 
 _FRAMES = "infthor_eval.memory.frames"
 _RETRIEVAL = "infthor_eval.memory.retrieval"
@@ -49,6 +60,7 @@ MEMORIES = PluginTable(
     "docs/memories.md",
 )
 MemoryOptions = tuple[tuple[str, Any], ...]  # sorted pairs
+_FORM = ("images", "question")
 
 
 def open_memory(name: str, options: MemoryOptions = ()) -> Memory:
@@ -154,7 +166,7 @@ def memory_class(name: str) -> Any:
     """
     if names_a_file(name):
         own = load_from_file(name)
-        return function_memory(name, own) if inspect.isfunction(own) else own
+        return _function_memory(name, own) if inspect.isfunction(own) else own
     return MEMORIES.load(name, Memory)
 
 
@@ -181,3 +193,108 @@ def _converted(name: str, kind: Any, options: Mapping[str, Any]) -> dict[str, An
                 f"the memory {name}: {key} is {value!r:.60} ({in_one_line(error)})"
             ) from error
     return values
+
+
+class _FunctionMemory:
+    """Recalls the images whose numbers a function returns, the most important first.
+
+    As many as the budget holds are shown, in time order.
+
+    Args:
+        function: takes all images of the trajectory and the question.
+        options: values of its further parameters.
+    """
+
+    # Whether it repeats itself is unknown, so that nobody relies on it.
+    capabilities = MemoryCapabilities(deterministic=False)
+
+    def __init__(self, function: OwnFunction, options: dict[str, Any]) -> None:
+        self._function = function
+        self._options = options
+        self._steps: list[Observation] = []
+        self._size: int | None = None
+
+    def identity(self) -> dict[str, Any]:
+        """Return nothing: the file and the options are known."""
+        return {}
+
+    def begin(self, facts: TrajectoryFacts) -> None:
+        """Forget everything; see `Memory`."""
+        self._steps = []
+        self._size = facts.tokens_per_frame
+
+    def observe(self, observation: Observation) -> None:
+        """Keep a step."""
+        self._steps.append(observation)
+
+    def recall(self, query: Query, budget: int | None) -> Recalled:
+        """Return the steps that the function names, as many as fit.
+
+        Raises:
+            UserCodeError: it returns no numbers of images.
+            DataError: a frame cannot be read.
+        """
+        steps = list(self._steps)
+        numbers = self._function.call(_Images(steps), query.text, **self._options)
+        chosen = list(dict.fromkeys(self._checked(numbers, len(steps))))
+        if budget is not None and self._size:
+            chosen = chosen[: budget // self._size]
+        return [steps[number] for number in sorted(chosen)]
+
+    def _checked(self, numbers: Any, n_images: int) -> list[int]:
+        try:
+            whole = [number.__index__() for number in numbers]
+        except (TypeError, AttributeError) as error:
+            raise self._problem(numbers, n_images) from error
+        if not all(0 <= number < n_images for number in whole):
+            raise self._problem(numbers, n_images)
+        return whole
+
+    def _problem(self, numbers: Any, n_images: int) -> UserCodeError:
+        allowed = (
+            f"the numbers of images, from 0 to {n_images - 1}: `return [0, 5]`"
+            if n_images
+            else "nothing where there are no images yet: `return []`"
+        )
+        return UserCodeError(f"{self._function.name} returned {numbers!r:.60}; return {allowed}")
+
+
+class _Images(Sequence[Image.Image]):
+    """The images of a trajectory, each read when it is looked at."""
+
+    def __init__(self, steps: Sequence[Observation]) -> None:
+        self._steps = steps
+
+    def __len__(self) -> int:
+        return len(self._steps)
+
+    @overload
+    def __getitem__(self, place: int) -> Image.Image: ...
+    @overload
+    def __getitem__(self, place: slice) -> list[Image.Image]: ...
+    def __getitem__(self, place: int | slice) -> Image.Image | list[Image.Image]:
+        if isinstance(place, slice):
+            return [step.frame.load() for step in self._steps[place]]
+        return self._steps[place].frame.load()
+
+
+@lru_cache(maxsize=8)  # the same maker each time, by which opened memories are known
+def _function_memory(name: str, function: Callable[..., Any]) -> Callable[..., _FunctionMemory]:
+    """Return what makes a memory of a function, with its further parameters as options.
+
+    Args:
+        name: FILE.py:NAME, as the user gave it.
+        function: what has that name in the file.
+
+    Raises:
+        ModelError: it takes other parameters.
+    """
+    own = read_function(name, function, (_FORM,))
+    fields = dataclasses.fields(own.options)
+
+    def make(**options: Any) -> _FunctionMemory:
+        return _FunctionMemory(own, dataclasses.asdict(own.options(**options)))
+
+    make.__signature__ = inspect.signature(own.options)  # type: ignore[attr-defined]
+    make.__annotations__ = {field.name: field.type for field in fields}
+    return make

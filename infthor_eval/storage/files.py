@@ -1,18 +1,20 @@
 """Writing files and folders atomically, and checking the output paths before the work starts."""
 
 import errno
+import fcntl
 import lzma
 import os
 import re
 import shutil
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
-from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.storage.digests import digest
-from infthor_eval.storage.locks import hold_lock
 
 PACKED = ".xz"  # ends the name of a packed file
 OVERWRITE_HINT = "give another --out, or --overwrite if nobody edited it"
@@ -30,6 +32,7 @@ _REMEDIES: dict[int | None, str] = {
     errno.EROFS: "make it writable",
 }
 _PROBE = b"x" * 4096  # a full disk still creates an empty file, so content is written too
+_RETRY_S = 0.05  # between two attempts
 
 
 def file_name(text: str) -> str:
@@ -72,7 +75,7 @@ def hold_folder(path: Path, option: str = "--out") -> Iterator[Path]:
         DataError: see `prepare_folder`.
     """
     prepare_folder(path, option)
-    with hold_lock(path / _LOCK, path):
+    with _hold_lock(path / _LOCK, path):
         yield path
 
 
@@ -160,7 +163,7 @@ def write_atomically(path: Path, known_as: str | None = None) -> Iterator[Path]:
     """
     # The name is fixed, so that what a killed process left is found and removed by the next one.
     partial, lock = _leftovers(path, known_as or path.name)
-    with hold_lock(lock, path, _WAIT_S):
+    with _hold_lock(lock, path, _WAIT_S):
         remove(partial)
         try:
             yield partial
@@ -181,7 +184,7 @@ def is_written(path: Path) -> bool:
         return False
     partial, lock = _leftovers(path, path.name)
     if lock.exists():
-        with hold_lock(lock, path, _WAIT_S):
+        with _hold_lock(lock, path, _WAIT_S):
             remove(partial)
     return True
 
@@ -207,3 +210,45 @@ def write_packed(path: Path, content: bytes) -> None:
     """
     packed = lzma.compress(content, check=lzma.CHECK_CRC32, preset=6 | lzma.PRESET_EXTREME)
     path.with_name(f"{path.name}{PACKED}").write_bytes(packed)
+
+
+@contextmanager
+def _hold_lock(path: Path, what: Path, wait_s: float = 0.0) -> Iterator[None]:
+    """Hold the lock of a file that exists only meanwhile; a killed process holds none.
+
+    Args:
+        path: the lock's file, in an existing folder.
+        what: what is written meanwhile, for the message.
+        wait_s: how long another process may hold it, seconds.
+
+    Raises:
+        UsageError: another process holds it.
+        OSError: the file cannot be created, or its file system has no locks.
+    """
+    deadline = time.monotonic() + wait_s
+    while (file := _try_lock(path)) is None:
+        if time.monotonic() >= deadline:
+            raise UsageError(f"{what}: another process is writing it; wait for it or stop it")
+        time.sleep(_RETRY_S)
+    with file:
+        try:
+            yield
+        finally:
+            path.unlink(missing_ok=True)  # before it is released, as it may be another's then
+
+
+def _try_lock(path: Path) -> BinaryIO | None:
+    """Return the locked file, or None if another process holds or has just removed it."""
+    file = path.open("ab")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if os.path.samestat(path.stat(), os.fstat(file.fileno())):
+            return file
+    except (BlockingIOError, FileNotFoundError):
+        file.close()
+        return None
+    except OSError:
+        file.close()
+        raise
+    file.close()
+    return None

@@ -1,4 +1,4 @@
-"""Training sequences of replayed sets."""
+"""Training sequences of replayed sets; those for answering are NIEH questions as evaluated."""
 
 import random
 from collections import Counter
@@ -6,18 +6,19 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
-from infthor_eval.nieh.samples import find_samples
+from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts.video import as_images
+from infthor_eval.nieh.docs import doc_target
+from infthor_eval.nieh.samples import TaskSamples, find_samples
 from infthor_eval.plans.history.segments import PlanSegment
 from infthor_eval.training.action_sequences import recorded_segments, windows
-from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
-from infthor_eval.training.goal_sequences import goal_windows
-from infthor_eval.training.memory_sequences import memory_sequences
-from infthor_eval.training.question_sequences import question_sequences
+from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence, within
+from infthor_eval.training.final_sequences import goal_windows, memory_sequences
 from infthor_eval.training.recipe import ActionData, Recipe
 
 
@@ -151,3 +152,41 @@ def _sample_share(
     for sequence in encoded:
         if isinstance(sequence, SkippedSequence) or share >= 1 or rng.random() < share:
             yield sequence
+
+
+def question_sequences(
+    encoder: Encoder, task: TaskSamples, limit: int
+) -> Iterator[TrainingSequence | SkippedSequence]:
+    """Yield a sequence for each sample of a task in a context, or a skipped item if unusable.
+
+    Args:
+        encoder: builds the sequences.
+        task: the samples.
+        limit: most tokens of a sequence, frames expanded; longer ones are skipped.
+
+    Raises:
+        UsageError: the context needs a memory.
+        ModelError: the template refuses the turns.
+    """
+    for skipped in task.skipped:
+        yield SkippedSequence(_name(skipped.question.id, skipped.variant), skipped.reason)
+    for sample in task.samples:
+        name = _name(sample.question.id, sample.variant)
+        try:
+            sequence = _sequence(encoder, task, sample, name)
+        except DataError as error:
+            yield SkippedSequence(name, str(error))
+            continue
+        yield within(sequence, limit)
+
+
+def _sequence(encoder: Encoder, task: TaskSamples, sample: Sample, name: str) -> TrainingSequence:
+    context, text = task.request(sample)
+    if sample.awaits_recall:
+        raise UsageError("training has no memory; use another context")
+    # It has no video input.
+    return encoder.answer(name, [*as_images(context), text], doc_target(sample.question))
+
+
+def _name(question: str, variant: str) -> str:
+    return f"{question} {variant}".rstrip()

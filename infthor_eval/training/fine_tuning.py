@@ -1,38 +1,52 @@
-"""A training run: from a recipe and sets to a checkpoint that its family's adapter loads."""
+"""A training run: from a recipe and sets to a checkpoint that its family's adapter loads.
+
+With transformers' Trainer: one device, DDP, or weights sharded over processes (FSDP2). The Trainer
+is given what it does not know: batches of sequences, the format of saved weights, and a loss per
+token.
+"""
 
 import json
+import math
 import os
+import shutil
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 import torch
 import torch.distributed as dist
+import transformers
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import load_model, save_model
+from transformers.trainer_pt_utils import safe_globals
 
-from infthor_eval.errors import UsageError, wrap_errors
+from infthor_eval.errors import UsageError, in_one_line, wrap_errors
 from infthor_eval.storage.digests import digest
 from infthor_eval.storage.files import hold_folder, is_written, write_atomically
+from infthor_eval.terminal import print_error
 from infthor_eval.training.batches import collate
 from infthor_eval.training.data import TrainingData, read_training_data
-from infthor_eval.training.encoding import Encoder
+from infthor_eval.training.encoding import Encoder, TrainingSequence
 from infthor_eval.training.export import export, gather_weights
 from infthor_eval.training.loop import Loop, LoopSettings, Progress
-from infthor_eval.training.lora import add_adapters
 from infthor_eval.training.network import SequenceModel, freeze
 from infthor_eval.training.ranks import assign_ranks
-from infthor_eval.training.recipe import Recipe
+from infthor_eval.training.recipe import Lora, Recipe
+from infthor_eval.training.schedule import linear_share
 from infthor_eval.training.starting_model import load_starting_model
-from infthor_eval.training.trainer import train_with_trainer
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
 _DESCRIPTION = "training.json"
 _STATES = "states"
 _CHECKPOINT = "checkpoint"
 StepCallback = Callable[[Progress], None]
+_WEIGHTS = "model.safetensors"
+_STATE = "trainer_state.json"
 
 
 @dataclass(frozen=True)
@@ -105,7 +119,7 @@ def fine_tune(run: TrainingRun, out: Path, on_step: StepCallback) -> Path:
             _claim_folder(held.enter_context(hold_folder(out)), run.document())
         network = SequenceModel(run.loaded)
         freeze(network, run.recipe.freeze)
-        adapters = add_adapters(network, run.recipe.lora) if run.recipe.lora is not None else None
+        adapters = _add_adapters(network, run.recipe.lora) if run.recipe.lora is not None else None
         if run.recipe.gradient_checkpointing:
             network.gradient_checkpointing_enable()
         _train(run, network, out / _STATES, on_step)
@@ -130,7 +144,7 @@ def _train(run: TrainingRun, network: SequenceModel, states: Path, on_step: Step
     pad_id = run.loaded.tokenizer.pad_token_id
     if recipe.parallel.context == 1:
         to_batch = partial(collate, family=run.loaded.family, pad_id=pad_id)
-        train_with_trainer(
+        _train_with_trainer(
             network, sequences, lambda batch: dict(to_batch(batch)), recipe, states, on_step
         )
         return
@@ -186,3 +200,230 @@ def _claim_folder(out: Path, document: dict[str, Any]) -> None:
         raise UsageError(
             f"{out} is a run of another {', '.join(changed)}; give another folder with --out"
         )
+
+
+def _add_adapters(network: SequenceModel, settings: Lora) -> Any:
+    """Add adapters to the decoder's linear layers, freeze the rest, and return peft's model.
+
+    Raises:
+        UsageError: peft is not installed, or the decoder has none of the target layers.
+    """
+    try:
+        import peft
+    except ImportError as error:
+        raise UsageError(
+            "a recipe with lora needs peft; pip install 'infthor-eval[train]'"
+        ) from error
+    in_decoder = {id(module) for module in network.decoder.modules()}
+    names = [
+        name
+        for name, module in network.model.named_modules()
+        if id(module) in in_decoder and name.rpartition(".")[2] in settings.targets
+    ]
+    config = peft.LoraConfig(
+        r=settings.rank,
+        lora_alpha=settings.alpha,
+        lora_dropout=settings.dropout,
+        target_modules=names,
+    )
+    problem = f"lora.targets {', '.join(settings.targets)}: the decoder has no such layers"
+    with wrap_errors(
+        problem, "name some of its linear layers", catch=ValueError, raise_as=UsageError
+    ):
+        return peft.LoraModel(network.model, {"default": config}, "default")
+
+
+class _SequenceTrainer(transformers.Trainer):
+    """Saves the transformers model's weights only, with tied ones once, as transformers does.
+
+    Weight decay and schedule are those of the published trainer: all weights decay, and
+    `linear_share`.
+    """
+
+    lr_scheduler: Any
+
+    def get_decay_parameter_names(self, model: torch.nn.Module) -> list[str]:
+        return [name for name, _ in model.named_parameters()]
+
+    def create_scheduler(self, num_training_steps: int, optimizer: Any = None) -> Any:
+        if self.lr_scheduler is None:
+            warmup_ratio = float(self.args.warmup_steps)
+
+            def share(step: int) -> float:
+                return linear_share(step, num_training_steps, warmup_ratio)
+
+            self.lr_scheduler = torch.optim.lr_scheduler.LambdaLR(
+                optimizer or cast(Any, self.optimizer), share
+            )
+        return self.lr_scheduler
+
+    def _save(
+        self, output_dir: str | None = None, state_dict: dict[str, Any] | None = None
+    ) -> None:
+        folder = Path(output_dir or str(self.args.output_dir))
+        folder.mkdir(parents=True, exist_ok=True)
+        if state_dict is not None:  # gathered from shards
+            super()._save(output_dir, state_dict)
+        else:
+            save_model(self.accelerator.unwrap_model(self.model).model, str(folder / _WEIGHTS))
+
+    def _save_checkpoint(self, model: torch.nn.Module, trial: Any) -> None:
+        # Of torch, RuntimeError; of safetensors, its own.
+        failures = (OSError, RuntimeError, SafetensorError)
+        hint = "make room there and run the same command again, which resumes from the one before"
+        problem = f"{self.args.output_dir}: a checkpoint cannot be written"
+        with wrap_errors(problem, hint, catch=failures):
+            super()._save_checkpoint(model, trial)
+
+    def _load_from_checkpoint(
+        self, resume_from_checkpoint: str, model: torch.nn.Module | None = None
+    ) -> None:
+        if self.is_fsdp_enabled:
+            super()._load_from_checkpoint(resume_from_checkpoint, model)
+        else:
+            network = self.accelerator.unwrap_model(model or self.model)
+            load_model(network.model, Path(resume_from_checkpoint) / _WEIGHTS)
+
+
+class _ReportSteps(transformers.TrainerCallback):
+    """Reports every step in the form of our own loop."""
+
+    def __init__(self, on_step: Callable[[Progress], None], tokens_per_step: float) -> None:
+        self._report = on_step
+        self._tokens_per_step = tokens_per_step
+        self._start = time.perf_counter()
+
+    def on_log(self, args: Any, state: Any, control: Any, logs: Any = None, **kwargs: Any) -> None:
+        if not (state.is_world_process_zero and logs and "loss" in logs):
+            return
+        now = time.perf_counter()
+        speed = self._tokens_per_step / (now - self._start)
+        self._start = now
+        loss = float(logs["loss"])
+        rate = float(logs["learning_rate"])
+        norm = float(logs["grad_norm"])
+        self._report(Progress(state.global_step, state.max_steps, loss, rate, norm, speed))
+
+
+def _train_with_trainer(
+    network: SequenceModel,
+    sequences: Sequence[TrainingSequence],
+    collate: Callable[[list[Any]], dict[str, Any]],
+    recipe: Recipe,
+    out: Path,
+    on_step: Callable[[Progress], None],
+) -> None:
+    """Train, resuming from the last checkpoint in the folder if there is one.
+
+    Args:
+        network: the network.
+        sequences: all sequences; each process uses its own share.
+        collate: combines sequences to a batch.
+        recipe: recipe of the run.
+        out: folder of the checkpoints.
+        on_step: called after every step, in the first process.
+
+    Raises:
+        UsageError: the sequences of a step cannot be divided evenly among the processes.
+        DataError: the last checkpoint cannot be read, or a new one cannot be written.
+    """
+    n_tokens = sum(sequence.n_tokens for sequence in sequences)
+    trainer = _SequenceTrainer(
+        model=network,
+        args=_arguments(recipe, out, network),
+        train_dataset=list(sequences),
+        data_collator=collate,
+        callbacks=[_ReportSteps(on_step, recipe.sequences_per_step * n_tokens / len(sequences))],
+    )
+    trainer.remove_callback(transformers.trainer_callback.PrinterCallback)
+    last = _last_whole_checkpoint(out)
+    problem = f"{last}: the checkpoint cannot be read"
+    hint = "remove it to resume from the one before"
+    with wrap_errors(problem, hint, catch=(OSError, ValueError, KeyError)):
+        trainer.train(resume_from_checkpoint=last)
+
+
+def _last_whole_checkpoint(out: Path) -> str | None:
+    """Return the last checkpoint that can be read, and remove later ones.
+
+    A run may be killed while writing one, and a disk may lose a part of one. The Trainer itself
+    would use the last folder, whatever it contains, and continue without the optimizer if that is
+    missing. The state file is the last to be written.
+    """
+    for folder in sorted(
+        out.glob("checkpoint-*"), key=lambda path: int(path.name.rpartition("-")[2]), reverse=True
+    ):
+        try:
+            _check_files(folder)
+        except Exception as error:  # noqa: BLE001 - whatever the readers raise on a damaged file
+            if (folder / _STATE).exists():  # else it was not written completely
+                print_error(f"{folder}: cannot be read ({in_one_line(error)}); left out")
+            # With all that is in it: parts of weights have a new name each time.
+            shutil.rmtree(folder, ignore_errors=True)  # another process of the run may, too
+            continue
+        return str(folder)
+    return None
+
+
+def _check_files(folder: Path) -> None:
+    """Read the files of a checkpoint as the Trainer will: no code in them is run."""
+    _ = transformers.TrainerState.load_from_json(str(folder / _STATE)).global_step + 1
+    for path in folder.iterdir():
+        if path.suffix == ".safetensors":
+            with safe_open(path, "pt"):
+                pass
+        elif path.suffix in (".pt", ".pth"):
+            with safe_globals():
+                torch.load(path, map_location="cpu", weights_only=True)
+
+
+def _arguments(recipe: Recipe, out: Path, network: SequenceModel) -> transformers.TrainingArguments:
+    optimizer = recipe.optimizer
+    model_type = recipe.model_args.get("dtype", "float32")
+    arguments = transformers.TrainingArguments(
+        output_dir=str(out),
+        per_device_train_batch_size=1,
+        num_train_epochs=recipe.epochs,
+        max_steps=recipe.max_steps or -1,
+        learning_rate=optimizer.lr,
+        adam_beta1=optimizer.betas[0],
+        adam_beta2=optimizer.betas[1],
+        weight_decay=optimizer.weight_decay,
+        max_grad_norm=optimizer.clip,
+        lr_scheduler_type="linear",
+        warmup_steps=optimizer.warmup_ratio,
+        optim="adamw_torch",
+        bf16=model_type == "bfloat16" and torch.cuda.is_available(),
+        seed=recipe.seed,
+        data_seed=recipe.seed,
+        average_tokens_across_devices=True,
+        ddp_find_unused_parameters=False,
+        remove_unused_columns=False,
+        logging_steps=1,
+        logging_nan_inf_filter=False,
+        save_steps=recipe.save_every,
+        save_total_limit=2,
+        report_to="none",
+        disable_tqdm=True,
+        use_cpu=not torch.cuda.is_available(),
+        dataloader_pin_memory=False,
+        **_sharding(recipe, network),
+    )
+    n_processes = arguments.world_size
+    if recipe.sequences_per_step % n_processes:
+        least = math.ceil(recipe.sequences_per_step / n_processes) * n_processes
+        raise UsageError(
+            f"sequences_per_step={recipe.sequences_per_step} is not a multiple of the "
+            f"{n_processes} processes; set it to {least}"
+        )
+    arguments.gradient_accumulation_steps = recipe.sequences_per_step // n_processes
+    return arguments
+
+
+def _sharding(recipe: Recipe, network: SequenceModel) -> dict[str, Any]:
+    """Return the settings that shard weights, gradients and optimizer by layers, which accelerate
+    does on GPUs only."""
+    if not (recipe.parallel.shard and torch.distributed.is_initialized()):
+        return {}
+    layers = sorted(getattr(network.model, "_no_split_modules", None) or ())
+    return {"fsdp": True, "fsdp_config": {"version": 2, "transformer_layer_cls_to_wrap": layers}}

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from infthor_eval.thor.axes import _angles, _matrix, modern_rotation
+from infthor_eval.thor.restore import _angles, _matrix, modern_rotation
 
 angles = st.fixed_dictionaries(dict.fromkeys("xyz", st.floats(-360, 360)))
 

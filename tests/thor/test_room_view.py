@@ -3,7 +3,7 @@
 import pytest
 
 from infthor_eval.thor.launch import embedded_launch
-from infthor_eval.thor.room_view import find_room_view
+from infthor_eval.thor.scenes import find_room_view
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView, Vector, teleport_call
 

@@ -9,8 +9,7 @@ import pytest
 from msgspec.structs import asdict
 
 from infthor_eval.formats.trajectory import InitAction, ObjectPose, Scene
-from infthor_eval.thor.restore import restore
-from infthor_eval.thor.settling import settle
+from infthor_eval.thor.restore import restore, settle
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import ThorObject, Vector
 

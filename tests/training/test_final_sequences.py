@@ -21,7 +21,7 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.plans.published.system_prompts import system_prompt
 from infthor_eval.training.data import read_history, read_training_data
 from infthor_eval.training.encoding import Encoder, SkippedSequence
-from infthor_eval.training.goal_sequences import goals_of_actions
+from infthor_eval.training.final_sequences import goals_of_actions
 from infthor_eval.training.recipe import ActionData, Recipe, read_recipe
 from infthor_eval.training.starting_model import load_starting_model
 from model_adapters.hf.prompting.prompt import Frame

@@ -15,7 +15,7 @@ from safetensors import SafetensorError
 from infthor_eval.errors import InfthorError
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.samples import find_samples
-from infthor_eval.training import trainer
+from infthor_eval.training import fine_tuning
 from infthor_eval.training.fine_tuning import fine_tune, prepare_run
 from infthor_eval.training.recipe import read_recipe
 from model_adapters import Decoding, load
@@ -260,10 +260,10 @@ def test_a_damaged_checkpoint_is_one_line_and_the_one_before_is_taken(
     *_, before, last = sorted(whole.glob("checkpoint-*"), key=lambda it: int(it.name[11:]))
     for name, (file, damage) in DAMAGED.items():
         states = shutil.copytree(whole, tmp_path / name)
-        assert trainer._last_whole_checkpoint(states) == str(states / last.name)
+        assert fine_tuning._last_whole_checkpoint(states) == str(states / last.name)
         damage(states / last.name / file)
         capsys.readouterr()
-        assert trainer._last_whole_checkpoint(states) == str(states / before.name), name
+        assert fine_tuning._last_whole_checkpoint(states) == str(states / before.name), name
         (line,) = capsys.readouterr().err.splitlines()
         assert f"{states / last.name}: cannot be read (" in line
         assert not (states / last.name).exists()

@@ -5,8 +5,8 @@ import pytest
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.samples import find_samples
+from infthor_eval.training.data import question_sequences
 from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
-from infthor_eval.training.question_sequences import question_sequences
 from infthor_eval.training.starting_model import load_starting_model
 from model_adapters import Turn
 

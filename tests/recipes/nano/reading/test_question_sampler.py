@@ -9,8 +9,8 @@ import pytest
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.household.wording import canonical_type, object_type
 from infthor_eval.nieh.samples import find_samples
+from infthor_eval.training.data import question_sequences
 from infthor_eval.training.encoding import Encoder
-from infthor_eval.training.question_sequences import question_sequences
 from recipes.nano.architecture import build_untrained
 from recipes.nano.corpus import corpus_texts
 from recipes.nano.reading.asking import Asker, question_intro
