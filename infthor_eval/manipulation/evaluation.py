@@ -17,7 +17,7 @@ from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.manipulation.runner import ArmRunner, arm_record
 from infthor_eval.manipulation.task import ManipulationTask
 from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory
-from infthor_eval.runs import Group, Session, TaskRequest, UnitKey, UnitRecord, UnitSample
+from infthor_eval.runs import Group, RunHeader, Session, TaskRequest, UnitDoc, UnitKey, UnitRecord
 from model_adapters import Policy, Subject
 
 ArmUnit = EpisodeUnit[ArmRecord, ArmTrajectory, ArmEpisode]
@@ -53,6 +53,21 @@ class ManipulationEvaluation(EpisodeEvaluation[ManipulationOptions, Manipulation
         else:
             raise TypeError(f"{subject} is neither a policy nor a baseline of manipulation")
         return BoundManipulation(self, create_actor, sees=isinstance(subject, Policy))
+
+    def to_doc(
+        self, header: RunHeader[ManipulationConfig], record: UnitRecord[ArmRecord]
+    ) -> UnitDoc:
+        """See `infthor_eval.runs.Evaluation.to_doc`."""
+        payload = record.payload
+        settings = self.tasks[record.task].settings
+        return UnitDoc(
+            number=self._numbers[record.key],
+            doc={"traj_id": record.cluster, "action": payload.index, "kind": payload.kind},
+            target=payload.instruction,
+            prompt=payload.instruction,
+            settings={"max_steps": settings.max_steps},
+            reply=payload.ended,
+        )
 
 
 class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
@@ -126,16 +141,3 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
                 record = runner.record(unit, fingerprints[unit.key], run, session)
                 yield msgspec.structs.replace(record, faults=(*faults, *record.faults))
                 faults = ()  # those of the expert's simulator are recorded once
-
-    def to_sample(self, record: UnitRecord[ArmRecord]) -> UnitSample:
-        """See `infthor_eval.runs.BoundEvaluation.to_sample`."""
-        payload = record.payload
-        settings = self._tasks[record.task].settings
-        return UnitSample(
-            number=self._numbers[record.key],
-            doc={"traj_id": record.cluster, "action": payload.index, "kind": payload.kind},
-            target=payload.instruction,
-            prompt=payload.instruction,
-            settings={"max_steps": settings.max_steps},
-            reply=payload.ended,
-        )

@@ -20,12 +20,13 @@ from infthor_eval.nieh.units import NiehUnit
 from infthor_eval.runs import (
     Cost,
     Group,
+    RunHeader,
     Session,
     Skipped,
     TaskRequest,
+    UnitDoc,
     UnitKey,
     UnitRecord,
-    UnitSample,
     Workload,
 )
 from infthor_eval.settings import config_values, settings_of
@@ -63,6 +64,7 @@ class NiehEvaluation:
         self._tasks = [NiehTask(file, request) for file in request.tasks]
         _refuse_empty([task.task_samples for task in self._tasks], self._tasks)
         self._refuse_unused()
+        self._prepared: dict[int | None, PreparedEvaluation] = {}  # by tokens of a frame
 
     def bind(self, subject: Subject) -> "BoundNieh":
         """See `infthor_eval.runs.Evaluation.bind`."""
@@ -71,7 +73,7 @@ class NiehEvaluation:
         _refuse_incapable(subject, self._options, self._tasks)
         tokens = self._tokens_per_frame(answerer)
         tasks = {task.name: task for task in self._tasks}
-        prepared = {name: task.prepare(tokens) for name, task in tasks.items()}
+        prepared = self._prepare(tokens).tasks
         _refuse_empty([ready.task_samples for ready in prepared.values()], self._tasks)
         answerer.fit({name: ready.task_samples for name, ready in prepared.items()})
         costs = {name: answerer.cost(ready) for name, ready in prepared.items()}
@@ -93,6 +95,17 @@ class NiehEvaluation:
             independent=not any(asks_model(ready.task_samples) for ready in prepared.values()),
         )
         return BoundNieh(workload, prepared, answerer)
+
+    def to_doc(self, header: RunHeader[NiehConfig], record: UnitRecord[NiehAnswer]) -> UnitDoc:
+        """See `infthor_eval.runs.Evaluation.to_doc`."""
+        return self._prepare(header.config.tokens_per_frame).to_doc(header, record)
+
+    def _prepare(self, tokens_per_frame: int | None) -> "PreparedEvaluation":
+        """Return the tasks for models that need so many tokens for a frame."""
+        if tokens_per_frame not in self._prepared:
+            tasks = {task.name: task.prepare(tokens_per_frame) for task in self._tasks}
+            self._prepared[tokens_per_frame] = PreparedEvaluation(tasks)
+        return self._prepared[tokens_per_frame]
 
     def _tokens_per_frame(self, answerer: Answerer) -> int | None:
         """Return the size of a frame where a context is measured in it: the option's value, or the
@@ -126,13 +139,39 @@ class NiehEvaluation:
 class PreparedEvaluation:
     """Samples of known contexts set up for a run of a model; see `infthor_eval.runs.Evaluation`."""
 
-    def __init__(self, prepared: Mapping[str, PreparedTask]) -> None:
+    def __init__(self, tasks: Mapping[str, PreparedTask]) -> None:
         """Take tasks by name."""
-        self._prepared = prepared
+        self.tasks = tasks
 
     def bind(self, subject: Subject) -> "BoundNieh":
         """See `infthor_eval.runs.Evaluation.bind`."""
-        return BoundNieh(Workload(_groups(self._prepared)), self._prepared, answerer_of(subject))
+        return BoundNieh(Workload(_groups(self.tasks)), self.tasks, answerer_of(subject))
+
+    def to_doc(self, header: RunHeader[NiehConfig], record: UnitRecord[NiehAnswer]) -> UnitDoc:
+        """See `infthor_eval.runs.Evaluation.to_doc`."""
+        prepared = self.tasks[record.task]
+        number = self._numbers[record.key.once]
+        sample = prepared.task_samples.samples[number]
+        if record.payload.recall is not None:
+            sample = apply_recall(sample, record.payload.recall)
+        videos = header.config.tasks[record.task].film == "video"
+        return UnitDoc(
+            number=number,
+            doc=doc_of(prepared.task_samples, sample),
+            target=doc_target(sample.question),
+            prompt=prompt_of(prepared.task_samples, sample, videos=videos),
+            settings=prepared.generation_kwargs,
+            reply=record.payload.reply or "",
+        )
+
+    @cached_property
+    def _numbers(self) -> dict[UnitKey, int]:
+        """Positions of the samples in their tasks."""
+        return {
+            UnitKey(name, sample.question.id, sample.variant): number
+            for name, prepared in self.tasks.items()
+            for number, sample in enumerate(prepared.task_samples.samples)
+        }
 
 
 class BoundNieh:
@@ -155,34 +194,8 @@ class BoundNieh:
             group.units, self._prepared[task], self._answerer.open(task, session), session
         )
 
-    def to_sample(self, record: UnitRecord[NiehAnswer]) -> UnitSample:
-        """See `infthor_eval.runs.BoundEvaluation.to_sample`."""
-        prepared = self._prepared[record.task]
-        number = self._numbers[record.key.once]
-        sample = prepared.task_samples.samples[number]
-        if record.payload.recall is not None:
-            sample = apply_recall(sample, record.payload.recall)
-        videos = bool(self._answerer.video_input)
-        return UnitSample(
-            number=number,
-            doc=doc_of(prepared.task_samples, sample),
-            target=doc_target(sample.question),
-            prompt=prompt_of(prepared.task_samples, sample, videos=videos),
-            settings=prepared.generation_kwargs,
-            reply=record.payload.reply or "",
-        )
-
     def close(self) -> None:
         """Nothing is held."""
-
-    @cached_property
-    def _numbers(self) -> dict[UnitKey, int]:
-        """Positions of the samples in their tasks."""
-        return {
-            UnitKey(name, sample.question.id, sample.variant): number
-            for name, prepared in self._prepared.items()
-            for number, sample in enumerate(prepared.task_samples.samples)
-        }
 
 
 def _groups(prepared: Mapping[str, PreparedTask], repeats: int = 1) -> list[Group[NiehUnit]]:

@@ -146,12 +146,12 @@ class Session(Protocol[Payload]):
 
 
 @dataclass(frozen=True)
-class UnitSample:
-    """A unit and its result, for readers that know no suites (lm-eval's format).
+class UnitDoc:
+    """A unit as lm-eval's files have it, which tell more of it than its record does.
 
     Attributes:
-        number: position among the samples of its task.
-        doc: the sample as JSON values.
+        number: position among the units of its task, repetitions counted once.
+        doc: what is asked, as JSON values, from the data set.
         target: the expected result in words.
         prompt: the request in words, with a placeholder for each frame.
         settings: decoding settings in lm-eval's words.
@@ -184,9 +184,6 @@ class BoundEvaluation(Protocol[SuiteUnit, Payload]):
                 only MemoryError ends the run.
         """
 
-    def to_sample(self, record: UnitRecord[Payload]) -> UnitSample:
-        """Convert a record of this workload for other readers; not after `close`."""
-
     def close(self) -> None:
         """Release what the work needed (simulators); called once, also if it was not finished."""
 
@@ -202,6 +199,9 @@ class Evaluation(Protocol[SuiteUnit, Payload]):
             DataError: the data do not match their format.
             ModelError: the model can take none of the units.
         """
+
+    def to_doc(self, header: RunHeader[Any], record: UnitRecord[Payload]) -> UnitDoc:
+        """Convert a record of a run of this work for lm-eval's files; nothing need be bound."""
 
 
 class Suite(Protocol[SuiteUnit, Payload]):

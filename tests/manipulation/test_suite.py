@@ -58,8 +58,7 @@ def test_the_planner_does_what_the_expert_did(prepare_run, data):
     assert all(record.payload.done and record.payload.reward == 2 for record in outcome.records)
     assert not any(record.failure or record.excluded or record.faults for record in outcome.records)
     numbers = {
-        record.key: sample.number
-        for record, sample in zip(outcome.records, outcome.samples, strict=True)
+        record.key: doc.number for record, doc in zip(outcome.records, outcome.docs, strict=True)
     }
     assert numbers[records[PUT, MUG, 21].key] == 0
     (table, *_) = outcome.run.suite.tables([outcome.summary])

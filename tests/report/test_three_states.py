@@ -17,7 +17,7 @@ from infthor_eval.report.live.state import LiveRun
 from infthor_eval.report.web.build import PageRequest, build_page
 from infthor_eval.report.web.page import write_page
 from infthor_eval.run import open_runs
-from infthor_eval.runs import RunSummary, TaskFile, UnitSample
+from infthor_eval.runs import RunSummary, TaskFile, UnitDoc
 
 from ..helpers.journals import write_journal
 from ..helpers.nieh_runs import make_config, make_header, make_record
@@ -144,13 +144,13 @@ def exported(records: list[Any], folder: Path) -> Any:
     task = TaskFile("nieh_gt", "nieh", Path("nieh_gt.yaml"), {})
     tasks = SimpleNamespace(tasks=[task], limit=None, seed=0)
     request = SimpleNamespace(tasks=tasks, model="m", model_options={})
-    samples = [
-        UnitSample(number, {"id": record.id}, "mug", "?", {}, record.payload.reply or "")
+    docs = [
+        UnitDoc(number, {"id": record.id}, "mug", "?", {}, record.payload.reply or "")
         for number, record in enumerate(records)
     ]
     run = SimpleNamespace(request=request, suite=NiehSuite())
     summary = RunSummary.of(NiehSuite(), header_of("m"), records)
-    outcome = {"run": run, "records": records, "samples": samples, "summary": summary}
+    outcome = {"run": run, "records": records, "docs": docs, "summary": summary}
     return convert_run(SimpleNamespace(**outcome, n_missing=2, folder=folder))  # type: ignore[arg-type]
 
 

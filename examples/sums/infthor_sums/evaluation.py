@@ -4,19 +4,21 @@ import random
 import time
 from collections.abc import Iterator, Mapping
 from itertools import groupby
+from typing import Any
 
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import (
     NOTHING,
     Group,
+    RunHeader,
     Session,
     TaskFile,
     TaskRequest,
     Tokens,
     Unit,
+    UnitDoc,
     UnitKey,
     UnitRecord,
-    UnitSample,
     Usage,
     Workload,
 )
@@ -53,6 +55,23 @@ class SumsEvaluation:
     def bind(self, subject: Subject) -> "BoundSums":
         """See `Evaluation.bind`."""
         return BoundSums(self, subject)
+
+    def to_doc(self, header: RunHeader[Any], record: UnitRecord[Sum]) -> UnitDoc:
+        """See `Evaluation.to_doc`."""
+        payload = record.payload
+        keys = [unit.key for unit in self.units]
+        return UnitDoc(
+            number=keys.index(record.key),
+            doc={"a": payload.a, "b": payload.b},
+            target=str(payload.a + payload.b),
+            prompt=self.prompt(payload),
+            settings={},
+            reply=payload.reply or "",
+        )
+
+    def prompt(self, payload: Sum) -> str:
+        """Return the question of a sum."""
+        return self.question.format(a=payload.a, b=payload.b)
 
 
 def _draw_sums(task: TaskFile) -> list[Sum]:
@@ -91,7 +110,7 @@ class BoundSums:
         for unit in group.units:
             decoding = self._evaluation.decodings[unit.key.task]
             inputs = fingerprint(
-                {"prompt": self._prompt(unit.payload), "decoding": decoding.document()}
+                {"prompt": self._evaluation.prompt(unit.payload), "decoding": decoding.document()}
             )
             done = session.find_record(unit, inputs)  # by an earlier run that was stopped
             yield done if done is not None else self._ask(unit, decoding, inputs)
@@ -103,7 +122,7 @@ class BoundSums:
         else:
             with wrap_request_errors(self._subject.name):
                 conversation = self._subject.conversation()
-                conversation.append(self._prompt(payload))
+                conversation.append(self._evaluation.prompt(payload))
                 reply = conversation.reply(decoding)
             usage = Usage.of([reply])
         return unit.record(
@@ -112,22 +131,6 @@ class BoundSums:
             seconds=round(time.monotonic() - start, 4),
             tokens=Tokens(reply.n_context_tokens, reply.n_cached_tokens, reply.n_reply_tokens),
             usage=usage,
-        )
-
-    def _prompt(self, payload: Sum) -> str:
-        return self._evaluation.question.format(a=payload.a, b=payload.b)
-
-    def to_sample(self, record: UnitRecord[Sum]) -> UnitSample:
-        """See `BoundEvaluation.to_sample`."""
-        payload = record.payload
-        keys = [unit.key for unit in self._evaluation.units]
-        return UnitSample(
-            number=keys.index(record.key),
-            doc={"a": payload.a, "b": payload.b},
-            target=str(payload.a + payload.b),
-            prompt=self._prompt(payload),
-            settings={},
-            reply=payload.reply or "",
         )
 
     def close(self) -> None:
