@@ -190,8 +190,14 @@ class BoundNieh:
     ) -> Iterator[UnitRecord[NiehAnswer]]:
         """See `infthor_eval.runs.BoundEvaluation.run`."""
         task = group.units[0].key.task
+        answerer = self._answerer
         yield from answer_units(
-            group.units, self._prepared[task], self._answerer.open(task, session), session
+            group.units,
+            self._prepared[task],
+            answerer.video_input,
+            answerer.open(task),
+            answerer.open_notebook(session),
+            session,
         )
 
     def close(self) -> None:

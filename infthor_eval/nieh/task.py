@@ -24,7 +24,7 @@ from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.settings import check_names, read
 from infthor_eval.storage.folders import packaged_folder
-from model_adapters import Decoding, cut_at_stop
+from model_adapters import Decoding
 
 # Keys of `dataset_kwargs` beside the settings of contexts.
 _OF_SETS = ("leaves_open", "data", "bundled")
@@ -43,7 +43,7 @@ class PreparedTask:
     """A task with what turns samples into records; `generation_kwargs` in lm-eval's words.
 
     Attributes:
-        stop: strings that end an answer behind thoughts; the decoding's own would end the thoughts.
+        stop: see `infthor_eval.questions.asking.Request`.
     """
 
     task_samples: TaskSamples
@@ -51,11 +51,6 @@ class PreparedTask:
     generation_kwargs: Mapping[str, Any]
     metrics: Metrics = PUBLISHED
     stop: tuple[str, ...] = ()
-
-    def cut(self, answer: str) -> str:
-        """Return an answer before its first stop string."""
-        before = cut_at_stop(answer, self.stop)
-        return answer if before is None else before
 
 
 class NiehTask:

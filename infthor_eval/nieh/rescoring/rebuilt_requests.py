@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.asking.answering import request_fingerprint
 from infthor_eval.nieh.asking.recalling import apply_recall
 from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.contexts import MEMORY, ContextPart, ContextSettings, Sample, context_named
@@ -20,6 +19,7 @@ from infthor_eval.nieh.frame_ablations import FrameAblation
 from infthor_eval.nieh.options import NiehSettings
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import TaskSamples
+from infthor_eval.questions.asking import request_fingerprint
 from infthor_eval.runs import RunHeader, UnitRecord
 from infthor_eval.settings import config_values, read
 
