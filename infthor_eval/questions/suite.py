@@ -267,7 +267,8 @@ class _Baseline(BaselineSubject):
 
     def __init__(self, name: str, predict: Callable[[Question], str], seed: int) -> None:
         super().__init__(seed)
-        self.name, self._predict = name, predict
+        self.name = name
+        self._predict = predict
 
     def reply(self, request: "_QuestionRequest") -> str:
         """Return the reply to a request; only this one fails with the function."""
@@ -359,7 +360,9 @@ class BoundQuestions:
 
     def __init__(self, suite: QuestionSuite, tasks: Mapping[str, _Task], subject: Subject) -> None:
         """Put the questions of each task into a group for each cluster."""
-        self._suite, self._tasks, self._subject = suite, tasks, subject
+        self._suite = suite
+        self._tasks = tasks
+        self._subject = subject
         configs = {name: task.config for name, task in tasks.items()}
         groups = []
         for name, task in tasks.items():
