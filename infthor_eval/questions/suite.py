@@ -1,8 +1,4 @@
-"""The smallest suite: questions, and a function that scores their replies.
-
-To add a suite of questions: `QuestionSuite(name, dataset, scorer)` in a package of your own, as in
-`examples/sums/`.
-"""
+"""The smallest suite: a dataset of questions, and a function that scores their replies."""
 
 import inspect
 import pickle
@@ -173,8 +169,10 @@ class QuestionSuite:
         Raises:
             UsageError: a function cannot be found by its name, as a lambda.
         """
-        self.name, self.metric = name, getattr(scorer, "__name__", "")
-        self._dataset, self.scorer = dataset, scorer
+        self.name = name
+        self.metric = getattr(scorer, "__name__", "score")
+        self.scorer = scorer
+        self._dataset = dataset
         own = baselines or {}
         self.baselines = {each: partial(_Baseline, each, own[each]) for each in own}
         try:
@@ -267,7 +265,8 @@ class _Baseline(BaselineSubject):
 
     def __init__(self, name: str, predict: Callable[[Question], str], seed: int) -> None:
         super().__init__(seed)
-        self.name, self._predict = name, predict
+        self.name = name
+        self._predict = predict
 
     def reply(self, request: "_QuestionRequest") -> str:
         """Return the reply to a request; only this one fails with the function."""
@@ -346,7 +345,9 @@ class BoundQuestions:
 
     def __init__(self, suite: QuestionSuite, tasks: Mapping[str, _Task], subject: Subject) -> None:
         """Put the questions of each task into a group for each cluster."""
-        self._suite, self._tasks, self._subject = suite, tasks, subject
+        self._suite = suite
+        self._tasks = tasks
+        self._subject = subject
         configs = {name: task.config for name, task in tasks.items()}
         groups = []
         for name, task in tasks.items():
