@@ -8,8 +8,8 @@ gets `QuestionsPresenter` or `PlainPresenter`), its adapter in `infthor_eval.lm_
 To add a suite: a package with a `Suite` (`infthor_eval/runs/suite.py`), its line here, task files
 with `metadata: {suite: NAME}`, and a presenter in `infthor_eval/report/suites/`.
 
-To add a suite of another package: entry points; `examples/sums/` is a whole package to copy
-(`docs/own-tasks.md`).
+To add a suite of another package: entry points, of a `QuestionSuite` where it asks questions;
+`examples/sums/` is a whole package to copy (`docs/own-tasks.md`).
 """
 
 from collections.abc import Iterable, Mapping

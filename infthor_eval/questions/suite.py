@@ -1,8 +1,4 @@
-"""The smallest suite: questions, and a function that scores their replies.
-
-To add a suite of questions: `QuestionSuite(name, dataset, scorer)` in a package of your own, as in
-`examples/sums/`.
-"""
+"""The smallest suite: a dataset of questions, and a function that scores their replies."""
 
 import inspect
 import pickle
@@ -173,8 +169,10 @@ class QuestionSuite:
         Raises:
             UsageError: a function cannot be found by its name, as a lambda.
         """
-        self.name, self.metric = name, getattr(scorer, "__name__", "")
-        self._dataset, self.scorer = dataset, scorer
+        self.name = name
+        self.metric = getattr(scorer, "__name__", "score")
+        self.scorer = scorer
+        self._dataset = dataset
         own = baselines or {}
         self.baselines = {each: partial(_Baseline, each, own[each]) for each in own}
         try:

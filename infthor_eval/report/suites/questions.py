@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, InfthorError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.questions.suite import (
     Question,
@@ -82,12 +82,15 @@ class QuestionsPresenter(PlainPresenter):
         frames: dict[UnitKey, Sequence[FrameRef]] = {}
         notes: dict[str, None] = {}
         for run in runs:
-            find = self.request_frames(run, data)
-            for record in run.records:
+            pictured = [record for record in run.records if record.payload.n_pictures]
+            for task in dict.fromkeys(record.task for record in pictured):
                 try:
-                    frames.setdefault(record.key, find(record))
+                    questions = _questions(run, task)
                 except DataError as error:
-                    notes[f"{record.task}: no pictures are shown: {error}"] = None
+                    notes[f"{task}: no pictures are shown: {error}"] = None
+                    continue
+                of_task = (record for record in pictured if record.task == task)
+                frames |= {record.key: questions[record.id].frames for record in of_task}
         thumbnails.add_all({str(it.path): it.load for shown in frames.values() for it in shown})
         by_unit = {
             key: Timeline(
@@ -98,17 +101,22 @@ class QuestionsPresenter(PlainPresenter):
                 ),
             )
             for key, shown in frames.items()
-            if shown
         }
         return Timelines(by_unit, list(notes))
 
 
 def _questions(run: Run, task: str) -> dict[str, Question]:
-    """Return the questions of a task as its run asked them, by id; raises DataError if they are
-    others today."""
+    """Return the questions of a task as its run asked them, by id.
+
+    Raises:
+        DataError: they are others today, or there are none.
+    """
     config = run.header.config.tasks[task]
     assert isinstance(run.suite, QuestionSuite)  # nobody else gets this presenter
-    questions = run.suite.questions(config.dataset_kwargs)
+    try:
+        questions = run.suite.questions(config.dataset_kwargs)
+    except InfthorError as error:
+        raise DataError(str(error)) from error
     if digest_of_questions(questions) != config.data:
         raise DataError("the dataset has changed since the run; run it again")
     return {question.id: question for question in questions}
