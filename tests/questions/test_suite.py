@@ -5,13 +5,13 @@ import sys
 import zipfile
 
 import pytest
-from infthor_eval.report.presented import read_report_runs
 from PIL import Image
 
 from infthor_eval.errors import UsageError
 from infthor_eval.questions import Question, QuestionSuite
 from infthor_eval.report.web.build import PageRequest, build_page
 from infthor_eval.report.web.thumbnails import ThumbnailStore
+from infthor_eval.run import open_runs
 from infthor_eval.runs import read_run
 from infthor_eval.suites import find_presenter, find_suite
 from tests.helpers.command_line import option_words
@@ -134,7 +134,7 @@ def test_workers_give_the_same_records(run):
 
 def test_its_page_has_a_chart_by_kind_and_each_question_with_its_picture(run):
     folder = run()[2]
-    page = build_page(read_report_runs([folder]), PageRequest())
+    page = build_page(open_runs([folder]), PageRequest())
     (section,) = [section for section in page.sections if section.key == "colours"]
     (chart,) = section.charts
     assert chart.title == "colours: exact by kind"
@@ -173,7 +173,7 @@ def test_a_dataset_that_changed_gives_no_pictures_and_says_so(package, run):
     folder = run()[2]
     (package / "colours.py").write_text(SUITE.replace("Is the picture", "Was the picture"))
     sys.modules.pop("colours")
-    (run_of_page,) = read_report_runs([folder])
+    (run_of_page,) = open_runs([folder])
     assert build_page([run_of_page], PageRequest()).samples[0].title == "Is the picture white (0)?"
     notes = run_of_page.presenter.timelines([run_of_page], None, ThumbnailStore(10**6)).notes
     assert notes == [
@@ -185,7 +185,7 @@ def test_a_dataset_that_fails_today_is_told_beside_the_run_s_page(package, run):
     folder = run()[2]
     (package / "colours.py").write_text(SUITE.replace("n: int", "m: int"))
     sys.modules.pop("colours")
-    (run_of_page,) = read_report_runs([folder])
+    (run_of_page,) = open_runs([folder])
     (note,) = run_of_page.presenter.timelines([run_of_page], None, ThumbnailStore(10**6)).notes
     assert "colours: no pictures are shown: dataset_kwargs: Object " in note
 
