@@ -39,11 +39,10 @@ def results_document(
 
 
 def _reproducible(summary: Any) -> dict[str, Any]:
-    """Return a summary as it says itself (`document`), else all its fields."""
-    if hasattr(summary, "document"):
-        return dict(summary.document())
-    document: dict[str, Any] = msgspec.to_builtins(summary)
-    return document
+    """Return a summary as it says itself (`document`), or all its fields; without `took`, as times
+    differ from run to run."""
+    document = summary.document() if hasattr(summary, "document") else msgspec.to_builtins(summary)
+    return {name: value for name, value in document.items() if name != "took"}
 
 
 def write_run_files(

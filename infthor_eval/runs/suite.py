@@ -245,7 +245,8 @@ class Suite(Protocol[SuiteUnit, Payload]):
         """Summarise a run: a pure function of its journal, equal for equal records.
 
         What differs between a run and the same run resumed (times) is at most in a field `took`,
-        which results.json leaves out.
+        which results.json leaves out. A summary with a method `document` says itself what is in
+        results.json.
         """
 
     def scores(self, record: UnitRecord[Payload]) -> Mapping[str, float]:

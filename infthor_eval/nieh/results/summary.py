@@ -136,9 +136,8 @@ class NiehSummary(msgspec.Struct, frozen=True, omit_defaults=True):
     repeats: dict[str, RepeatSummary] = {}
 
     def document(self) -> dict[str, Any]:
-        """Return the summary as results.json has it: without times, which differ."""
+        """Return the summary as results.json has it."""
         document: dict[str, Any] = msgspec.to_builtins(self)
-        document.pop("took", None)
         return document | {"tasks": {name: task.document() for name, task in self.tasks.items()}}
 
 
