@@ -30,7 +30,6 @@ from infthor_eval.exports.request import ExportRequest, Written
 from infthor_eval.exports.samples import SampleReader
 from infthor_eval.exports.subjects import UNKNOWN, ModelFacts, model_facts
 from infthor_eval.run import Run
-from infthor_eval.runs.journals.shards import last_change
 from infthor_eval.runs.results import results_document
 from infthor_eval.runs.stored.labels import with_frames
 from infthor_eval.storage.digests import fingerprint
@@ -71,7 +70,7 @@ class _RunExport:
         self._facts = model_facts(run, request.model_id)
         self._measures = list(chain.from_iterable(find_measures(run).values()))
         self.reader = SampleReader(run, request.data)
-        self._ran = last_change(run.folder)
+        self._ran = run.changed
         self._stamp = f"{self._ran.timestamp():.3f}"
         self._collection = f"infthor-{file_name(run.suite.name)}"
 

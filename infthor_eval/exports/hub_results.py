@@ -18,7 +18,6 @@ from infthor_eval.exports.measures import Measure, find_measures
 from infthor_eval.exports.request import ExportRequest, Written
 from infthor_eval.exports.subjects import UNKNOWN, ModelFacts, model_facts
 from infthor_eval.run import Run
-from infthor_eval.runs.journals.shards import last_change
 from infthor_eval.runs.stored.labels import with_frames
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
@@ -78,7 +77,7 @@ def _entry(run: Run, facts: ModelFacts, measure: Measure, request: ExportRequest
         dataset_id=request.dataset,
         task_id=with_frames(measure.task, run.header),
         value=round(factor * measure.estimate.mean, 4),
-        date=last_change(run.folder).isoformat(timespec="seconds"),
+        date=run.changed.isoformat(timespec="seconds"),
         source_url=request.source_url,
         source_name="runs of infthor-eval" if request.source_url else None,
         notes=_notes(run, facts, measure, factor),

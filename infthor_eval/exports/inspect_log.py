@@ -29,7 +29,6 @@ from infthor_eval.exports.samples import SampleReader, TokenCounts
 from infthor_eval.exports.subjects import ModelFacts, model_facts
 from infthor_eval.reasons import count_reasons
 from infthor_eval.run import Run
-from infthor_eval.runs.journals.shards import last_change
 from infthor_eval.runs.stored.labels import with_frames
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
@@ -74,7 +73,7 @@ class _Log:
         self._task = task
         self._measures = measures
         self._reader = reader
-        self._ran = last_change(run.folder)
+        self._ran = run.changed
         self.problems: list[str] = []
 
     def write(self, request: ExportRequest) -> Path:

@@ -7,7 +7,7 @@ from urllib.parse import urlsplit
 
 from infthor_eval.errors import UsageError
 from infthor_eval.run import Run
-from infthor_eval.runs import RunHeader, read_header
+from infthor_eval.runs import RunHeader
 
 UNKNOWN = "unknown"
 _OWN = "infthor-eval"  # developer of baselines
@@ -72,7 +72,7 @@ def model_facts(run: Run, model_id: str | None = None) -> ModelFacts:
     folders of this machine among them. A checkpoint of the hub names its developer and has open
     weights; of a folder and of a server neither is known.
     """
-    header = read_header(run.folder)
+    header = run.own_header
     identity: Mapping[str, Any] = header.config.model
     engine, engine_version = engine_of(identity)
     platform, deployment = _place(identity)

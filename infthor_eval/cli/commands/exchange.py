@@ -59,7 +59,6 @@ def export(runs: tuple[Path, ...], file_format: str, out: Path, **options: Any) 
     from infthor_eval.exports.request import ExportRequest
     from infthor_eval.exports.subjects import require_one_model
     from infthor_eval.run import open_runs
-    from infthor_eval.runs import read_header
     from infthor_eval.storage.files import prepare_folder
     from infthor_eval.terminal import print_line
 
@@ -69,7 +68,7 @@ def export(runs: tuple[Path, ...], file_format: str, out: Path, **options: Any) 
     write = find_writer(file_format, given)
     found = open_runs(runs, print_failure)
     if "model_id" in given:
-        require_one_model([read_header(run.folder) for run in found])
+        require_one_model([run.own_header for run in found])
     written = write(found, ExportRequest(prepare_folder(out), **given))
     for note in written.notes:
         print_note(note, "yellow")

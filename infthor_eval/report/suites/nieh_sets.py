@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
@@ -11,7 +10,6 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import find_set
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
-from infthor_eval.runs.stored.command import read_stored_command
 
 Record = UnitRecord[NiehAnswer]
 
@@ -45,7 +43,7 @@ class RunSets:
 
     def _open(self, run: Run, task: str, data: Path | None) -> None:
         folder = data or run.data
-        options = _options_of(run)
+        options = run.stored_command.options if run.stored_command else {}
         try:
             opened = find_set(
                 str(folder) if folder else None,
@@ -59,8 +57,3 @@ class RunSets:
             self.problems[task] = f"{opened.root} has changed since {run.label} was run"
             return
         self._sets[task] = opened, {question.id: question for question in opened.questions}
-
-
-def _options_of(run: Run) -> Mapping[str, Any]:
-    command = read_stored_command(run.folder)
-    return command.options if command else {}
