@@ -118,17 +118,21 @@ def find_presenter(name: str) -> "Presenter":
     Raises:
         UsageError: that of another package cannot be imported or is incomplete.
     """
-    from infthor_eval.questions import QuestionSuite
-    from infthor_eval.report.plain import PlainPresenter
-    from infthor_eval.report.presenter import Presenter
-
     if name in _PRESENTERS.names:
-        return _PRESENTERS.load(name, Presenter)()
-    if not isinstance(find_suite(name), QuestionSuite):
-        return PlainPresenter()
-    from infthor_eval.report.suites.questions import QuestionsPresenter
+        from infthor_eval.report.presenter import Presenter
 
-    return QuestionsPresenter()
+        return _PRESENTERS.load(name, Presenter)()
+
+    from infthor_eval.questions import QuestionSuite
+
+    if isinstance(find_suite(name), QuestionSuite):
+        from infthor_eval.report.suites.questions import QuestionsPresenter
+
+        return QuestionsPresenter()
+
+    from infthor_eval.report.plain import PlainPresenter
+
+    return PlainPresenter()
 
 
 def find_request_adapter(name: str) -> "RequestAdapter[Any, Any]":

@@ -25,14 +25,14 @@ StandName = Annotated[
     Setting(
         help="Where the agent stands at the start: the expert's place, or that before the "
         "way to it.",
-        choices=tuple(map(str, Stand)),
+        choices=tuple(Stand),
     ),
 ]
 HandName = Annotated[
     str,
     Setting(
         help="Height of the arm at the start of a pick-up.",
-        choices=tuple(map(str, Hand)),
+        choices=tuple(Hand),
     ),
 ]
 ClosingName = Annotated[
@@ -40,7 +40,7 @@ ClosingName = Annotated[
     Setting(
         help="When a policy's hand closes in a pick-up: when it says so, with each step, or "
         "once at the end.",
-        choices=tuple(map(str, Closing)),
+        choices=tuple(Closing),
     ),
 ]
 PutCriterionName = Annotated[
@@ -48,7 +48,7 @@ PutCriterionName = Annotated[
     Setting(
         help="When a put succeeds: once the object is released, wherever, or if it lies "
         "still in or on its receptacle.",
-        choices=tuple(map(str, PutCriterion)),
+        choices=tuple(PutCriterion),
     ),
 ]
 Instruction = Annotated[

@@ -14,7 +14,7 @@ WordsName = Annotated[
     str,
     Setting(
         help="Words of plans and actions: the published ones, or plain English.",
-        choices=tuple(map(str, Words)),
+        choices=tuple(Words),
     ),
 ]
 History = Annotated[

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import msgspec
 
 from infthor_eval.errors import AdapterError, UsageError, in_one_line, wrap_user_code
+from infthor_eval.facets import Facet
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.quantities import Count, Share, require_number
 from infthor_eval.questions.asking import (
@@ -236,10 +237,9 @@ class QuestionSuite:
         tasks = {}
         for task, config in header.config.tasks.items():
             counted = [it for it in records if it.task == task and it.excluded is None]
-            rates = {ALL: _rate(counted)}
-            for kind in config.kinds:
-                rates[kind] = _rate([it for it in counted if it.payload.kind == kind])
-            tasks[task] = {kind: rate for kind, rate in rates.items() if rate is not None}
+            everything = _rate(counted)
+            by_kind = Facet("kind", "kind", _kind_of, config.kinds).means(counted, _rate)
+            tasks[task] = ({} if everything is None else {ALL: everything}) | by_kind
         return QuestionSummary(header.config.metric, tasks)
 
     def scores(self, record: UnitRecord[QuestionAnswer]) -> Mapping[str, float]:
@@ -308,6 +308,11 @@ class _Task:
     generation_kwargs: Mapping[str, Any]
     config: QuestionTaskConfig
 
+    @cached_property
+    def numbers(self) -> dict[str, int]:
+        """Positions of the questions in the run, by id."""
+        return {name: number for number, name in enumerate(self.questions)}
+
     @classmethod
     def of(cls, suite: QuestionSuite, file: TaskFile, request: TaskRequest[Any]) -> "_Task":
         where = f"{file.path}: "
@@ -344,7 +349,7 @@ class QuestionEvaluation:
         task = self._tasks[record.task]
         question = task.questions[record.id]
         return UnitDoc(
-            number=list(task.questions).index(record.id),
+            number=task.numbers[record.id],
             doc={"id": record.id, "question": question.text, "kind": question.kind},
             target=question.answer,
             prompt="<image>" * len(question.pictures) + question.text,
@@ -430,6 +435,10 @@ def _problem_with(question: Any) -> str | None:
     if question.kind == ALL:
         return f"calls the kind of {question.id} {ALL}, as all kinds together; rename it"
     return None
+
+
+def _kind_of(record: UnitRecord[QuestionAnswer]) -> str | None:
+    return record.payload.kind or None
 
 
 def _cluster_of(question: Question) -> str:
