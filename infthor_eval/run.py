@@ -55,24 +55,15 @@ class Run:
         folder: folder of the run.
         listed: first line of the journal; until that is read, its configs are JSON values, so that
             runs are listed without their suites.
-        name: name of the run beside others.
+        name: name of the run beside others; its own until `named`.
     """
 
-    def __init__(
-        self, folder: Path, listed: RunHeader, tell: Tell | None = None, name: str | None = None
-    ) -> None:
-        """Take the place of a run.
-
-        Args:
-            folder: its folder.
-            listed: its header.
-            tell: told of bad lines of the journal, see `read_run`.
-            name: its name beside other runs; None for its own.
-        """
+    def __init__(self, folder: Path, listed: RunHeader, tell: Tell | None = None) -> None:
+        """Take folder and header of a run; `tell` is told of bad lines, see `read_run`."""
         self.folder = folder
         self.listed = listed
         self._tell = tell
-        self.name = listed.name if name is None else name
+        self.name = listed.name
 
     @classmethod
     def open(cls, folder: Path, tell: Tell | None = None) -> Self:
