@@ -15,14 +15,16 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from infthor_eval.cli.results import read_run_results
+from infthor_eval.distances import DISTANCES
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.published import published_tables
 from infthor_eval.nieh.guessing.audit import audit
 from infthor_eval.nieh.results.cells import Cell
 from infthor_eval.nieh.results.evidence_tables import short_name
-from infthor_eval.nieh.results.summary import DISTANCES, SHOWN_CLUES, NiehSummary, TaskSummary
+from infthor_eval.nieh.results.facets import SHOWN_CLUES
+from infthor_eval.nieh.results.summary import NiehSummary, TaskSummary
 from infthor_eval.report.figures.style import LEGEND, add_legend, looks_of, save_figure
+from infthor_eval.run import Run
 
 DOCS = Path(__file__).parents[1] / "docs"
 MODES = {
@@ -41,7 +43,7 @@ def main() -> None:
     options = parser.parse_args()
     tasks: dict[str, TaskSummary] = {}
     for folder in options.runs:
-        summary = read_run_results(folder).summary.summary
+        summary = Run.open(folder).own_summary.summary
         assert isinstance(summary, NiehSummary)
         tasks |= summary.tasks
     tasks = {name: tasks[name] for name in MODES}
@@ -100,7 +102,7 @@ def draw_guessing(data: NiehSet, tasks: Mapping[str, TaskSummary]) -> Figure:
             )
         for name, task in tasks.items():
             at -= 1
-            score = task.by_file[file.name].scores["strict"]
+            score = task.by["file"][file.name].scores["strict"]
             axes.hlines(
                 at,
                 100 * (score.low or 0),
@@ -147,19 +149,19 @@ def draw_evidence(tasks: Mapping[str, TaskSummary]) -> Figure:
     return _by_file(
         hiding,
         SHOWN_CLUES,
-        lambda task, file: task.evidence[file].by_shown_clues,
+        lambda task, file: task.files[file]["shown_clues"],
         "of the clue frames",
     )
 
 
 def draw_distance(tasks: Mapping[str, TaskSummary]) -> Figure:
     """Draw accuracy by the distance of the last clue from the end."""
-    used = set().union(*(task.evidence["total"].by_distance for task in tasks.values()))
+    used = set().union(*(task.by["distance"] for task in tasks.values()))
     names = [name for name in DISTANCES if name in used]
     return _by_file(
         tasks,
         names,
-        lambda task, file: task.evidence[file].by_distance,
+        lambda task, file: task.files[file]["distance"],
         "frames after the last clue",
     )
 
@@ -170,7 +172,7 @@ def _by_file(
     cells_of: Callable[[TaskSummary, str], Mapping[str, Cell]],
     label: str,
 ) -> Figure:
-    files = list(next(iter(tasks.values())).by_file)
+    files = list(next(iter(tasks.values())).by["file"])
     figure = Figure(figsize=(7.4 + LEGEND, 2.8), layout="constrained")
     panels: Sequence[Axes] = figure.subplots(1, len(files), sharey=True)
     for axes, file in zip(panels, files, strict=True):

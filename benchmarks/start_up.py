@@ -41,7 +41,7 @@ _COMMANDS: dict[str, tuple[str, ...]] = {
     "show": ("show",),
 }
 _END = os._exit  # which the command makes an error while it runs
-_ANSWERING = "infthor_eval.nieh.asking.answering"
+_ASKING = "infthor_eval.questions.asking"
 
 
 class _Stopwatch(MetaPathFinder, Loader):
@@ -55,7 +55,7 @@ class _Stopwatch(MetaPathFinder, Loader):
         self, name: str, path: Any, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         """Take over the import of the answerers' module."""
-        if name != _ANSWERING:
+        if name != _ASKING:
             return None
         sys.meta_path.remove(self)
         spec = importlib.util.find_spec(name)
@@ -67,7 +67,7 @@ class _Stopwatch(MetaPathFinder, Loader):
     def exec_module(self, module: ModuleType) -> None:
         """Wrap the answerers once they are defined."""
         self._execute(module)
-        for answerer in (module.OpenModel, module.OpenBaseline):
+        for answerer in (module.ModelReplier, module.BaselineReplier):
             answerer.answer = self._timed(answerer.answer)
 
     def _timed(self, answer: Callable[..., Any]) -> Callable[..., Any]:

@@ -38,7 +38,7 @@ _SECTIONS = {
         "infthor_eval/episodes/",
         "infthor_eval/runs/",
         "infthor_eval/suites.py",
-        "tests/docs/settings_tables.py",
+        "infthor_eval/settings.py",
     ),
     "Plans and manipulation": (
         "infthor_eval/household/",

@@ -25,12 +25,11 @@ from infthor_eval.nieh.scoring import scores
 from infthor_eval.nieh.task import NiehTask, PreparedTask
 from infthor_eval.nieh.units import NiehUnit
 from infthor_eval.runs import Catalog, TaskFile, TaskRequest, UnitKey, UnitRecord
+from infthor_eval.settings import config_values
 
 Record = UnitRecord[NiehAnswer]
 _SUITE = "nieh"
 _MOST_UNITS = 10_000  # that a run may lack nearly all of, which the checks then say
-# Options that a run's config keeps, as it was given them.
-_OPTIONS = ("k_tokens", "tokens_per_frame", "frames", "prompt", "memory", "memory_args", "budget")
 
 
 @dataclass(frozen=True)
@@ -220,8 +219,9 @@ def _settings(file: TaskFile, options: NiehOptions) -> dict[str, Any]:
 
 
 def _options(run: NiehConfig, task: NiehTaskConfig, file: TaskFile) -> NiehOptions:
+    kept = config_values(NiehOptions()).keys() - {"repeats"}
     given: dict[str, Any] = {
-        name: value for name in _OPTIONS if (value := getattr(run, name)) not in (None, "")
+        name: value for name in kept if (value := getattr(run, name)) not in (None, "")
     }
     if file.settings["dataset_kwargs"].get("leaves_open") == "context":
         own = task.dataset_kwargs

@@ -1,15 +1,15 @@
 """The suites by the names in task files, with their presenters and lm-eval adapters.
 
 Each class is imported only when needed, so that `--help` stays quick. Other packages add theirs
-through entry points, as "module:Class" under the suite's name: the suite in `infthor_eval.suites`,
-its presenter in `infthor_eval.presenters` (without one it gets `PlainPresenter`), its adapter in
-`infthor_eval.lm_eval`.
+through entry points, as "module:Class" under the suite's name: the suite in `infthor_eval.suites`
+(or a `QuestionSuite`, as "module:NAME"), its presenter in `infthor_eval.presenters` (without one it
+gets `QuestionsPresenter` or `PlainPresenter`), its adapter in `infthor_eval.lm_eval`.
 
 To add a suite: a package with a `Suite` (`infthor_eval/runs/suite.py`), its line here, task files
 with `metadata: {suite: NAME}`, and a presenter in `infthor_eval/report/suites/`.
 
-To add a suite of another package: entry points; `examples/sums/` is a whole package to copy
-(`docs/own-tasks.md`).
+To add a suite of another package: entry points, of a `QuestionSuite` where it asks questions;
+`examples/sums/` is a whole package to copy (`docs/own-tasks.md`).
 """
 
 from collections.abc import Iterable, Mapping
@@ -104,13 +104,12 @@ def find_suite(name: str) -> "Suite[Any, Any]":
     """
     from infthor_eval.runs import Suite
 
-    suite_class = _SUITES.load(name, Suite)
-    if suite_class.name != name:
+    suite = _SUITES.load(name, Suite)
+    if suite.name != name:
         raise UsageError(
-            f"the suite {name} of another package calls itself {suite_class.name!r}; give it one "
-            "name"
+            f"the suite {name} of another package calls itself {suite.name!r}; give it one name"
         )
-    return suite_class()
+    return suite() if isinstance(suite, type) else suite
 
 
 def find_presenter(name: str) -> "Presenter":
@@ -119,10 +118,21 @@ def find_presenter(name: str) -> "Presenter":
     Raises:
         UsageError: that of another package cannot be imported or is incomplete.
     """
-    from infthor_eval.report.plain import PlainPresenter
-    from infthor_eval.report.presenter import Presenter
+    if name in _PRESENTERS.names:
+        from infthor_eval.report.presenter import Presenter
 
-    return (_PRESENTERS.load(name, Presenter) if name in _PRESENTERS.names else PlainPresenter)()
+        return _PRESENTERS.load(name, Presenter)()
+
+    from infthor_eval.questions import QuestionSuite
+
+    if isinstance(find_suite(name), QuestionSuite):
+        from infthor_eval.report.suites.questions import QuestionsPresenter
+
+        return QuestionsPresenter()
+
+    from infthor_eval.report.plain import PlainPresenter
+
+    return PlainPresenter()
 
 
 def find_request_adapter(name: str) -> "RequestAdapter[Any, Any]":

@@ -15,11 +15,11 @@ import infthor_eval
 from infthor_eval.cli import main
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.nieh.records import RECORDS
-from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.sample_columns import ENVELOPE
 from infthor_eval.report.sample_table import encode_samples, sample_table
 from infthor_eval.report.suites.episode_columns import ARM_COLUMNS, PLAN_COLUMNS
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
+from infthor_eval.run import open_runs
 from infthor_eval.runs import UnitRecord
 from infthor_eval.runs.stored.search import read_results
 from tests.helpers.command_line import option_words
@@ -135,7 +135,7 @@ def test_csv_is_safe_to_open_and_parquet_is_exact(make_run) -> None:
         "naïve ∞",
     ]
     folder = make_run(*(make_record(place, reply, ("Bed",)) for place, reply in enumerate(replies)))
-    table = sample_table(read_report_runs([folder]))
+    table = sample_table(open_runs([folder]))
     exact = pandas.read_parquet(io.BytesIO(encode_samples(table, "parquet")))
     assert sorted(exact["reply"]) == sorted(replies)
     text = encode_samples(table, "csv")

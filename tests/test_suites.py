@@ -17,13 +17,15 @@ from tests.helpers.command_line import option_words
 
 ROOT = Path(__file__).parents[1]
 SUITE = """
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
 from infthor_eval.report.plain import PlainPresenter
+from infthor_eval.settings import Setting
 from tests.helpers.toy_suite import ToySuite
 
 @dataclass(frozen=True)
 class Options:
-    abacus: str = field(default="wood", metadata={"help": "What it is made of."})
+    abacus: Annotated[str, Setting(help="What it is made of.")] = "wood"
 
 class SumsSuite(ToySuite):
     name, options = "sums", Options

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,8 +14,9 @@ if TYPE_CHECKING:
 
 
 def evaluate(options: Mapping[str, Any]) -> DataFrame:
-    """See `infthor_eval.evaluate`."""
+    """See `infthor_eval.evaluate`; the options are taken as those of `--config` are."""
     from infthor_eval.cli.commands.run import command
+    from infthor_eval.cli.options.config import take_options
     from infthor_eval.cli.options.run import RunOptions
     from infthor_eval.cli.progress.runs import execute_runs
     from infthor_eval.exports.lm_eval import export
@@ -23,8 +24,11 @@ def evaluate(options: Mapping[str, Any]) -> DataFrame:
     from infthor_eval.runs import prepare_all
 
     try:
-        context = command.make_context("evaluate", list(_words(options)))
-        requests = RunOptions.from_click(context.params).requests()
+        context = click.Context(command, info_name="evaluate")
+        take_options(context, options, "evaluate")
+        with context.scope(cleanup=False):
+            command.parse_args(context, [])
+            requests = RunOptions.from_click(context.params).requests()
     except click.ClickException as error:
         raise UsageError(error.format_message()) from error
     runs = prepare_all(requests)
@@ -32,21 +36,3 @@ def evaluate(options: Mapping[str, Any]) -> DataFrame:
     if is_stopped:
         raise KeyboardInterrupt
     return load_runs(*(outcome.folder for outcome in outcomes))
-
-
-def _words(options: Mapping[str, Any]) -> Iterator[str]:
-    """Yield options as they are typed: `model_args={"a": 1}` is `--model-args a=1`."""
-    for name, value in options.items():
-        if value is None or value is False:
-            continue
-        yield f"--{name.replace('_', '-')}"
-        if value is not True:
-            yield _typed(value)
-
-
-def _typed(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return ",".join(f"{key}={item}" for key, item in value.items())
-    if isinstance(value, list | tuple):
-        return ",".join(map(str, value))
-    return str(value)

@@ -1,7 +1,6 @@
 """Results of runs on standard output: tables, or a format for another program."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
@@ -15,61 +14,13 @@ from infthor_eval.cli.progress.notes import print_failure
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
+from infthor_eval.run import Run, told_apart
 from infthor_eval.runs import (
-    RunSummary,
-    Suite,
     UnitRecord,
-    Usage,
-    mark_incomplete,
-    read_header,
 )
-from infthor_eval.runs.completeness import count_missing
-from infthor_eval.runs.journals.shards import read_run_log
 from infthor_eval.runs.results import results_document
-from infthor_eval.runs.stored.labels import label_runs
-from infthor_eval.runs.stored.search import read_results
-from infthor_eval.suites import find_suite
 from infthor_eval.tables import Table
 from infthor_eval.terminal import print_line
-
-_SHOWN_BY_TABLES = {"frames"}  # the options that the suites' tables show beside a run's name
-
-
-@dataclass(frozen=True)
-class RunResults:
-    """The results of a run.
-
-    Attributes:
-        folder: folder of the run.
-        suite: suite of the run, which builds its tables.
-        summary: header and summary of the run.
-        usage: requests, tokens and cost.
-        n_missing: units that were not attempted; None where that is not known.
-    """
-
-    folder: Path
-    suite: Suite
-    summary: RunSummary
-    usage: Usage
-    n_missing: int | None
-
-
-def read_run_results(folder: Path) -> tuple[RunResults, Sequence[UnitRecord[Any]]]:
-    """The run in a folder, summed up from its journal, and its records; bad lines are named and
-    left out.
-
-    Raises:
-        DataError: there is no journal, or one of another format.
-        UsageError: its suite is not known here.
-    """
-    suite = find_suite(read_header(folder).suite)
-    header, log = read_run_log(folder, suite.records, print_failure)
-    results = read_results(folder)
-    summary = RunSummary.of(suite, header, log.records)
-    n_missing = count_missing(header, len(log.records))
-    if n_missing is None and results is not None:
-        n_missing = results.n_missing
-    return RunResults(folder, suite, summary, log.usage, n_missing), log.records
 
 
 def print_failures(records: Iterable[UnitRecord[Any]], folder: Path | None = None) -> int:
@@ -91,41 +42,30 @@ def print_failures(records: Iterable[UnitRecord[Any]], folder: Path | None = Non
     return len(failed)
 
 
-def print_results(runs: Sequence[RunResults], options: ShowOptions) -> None:
+def print_results(runs: Sequence[Run], options: ShowOptions) -> None:
     """Print the results of runs, with one set of tables for each suite."""
     if options.format == "json":
         _print_json(runs)
         return
-    labelled = _with_labels(runs)
+    labelled = told_apart(runs)
     if not options.quiet:
         _print_tables(labelled, options)
     if options.format is None:
         _print_folders(labelled, options.quiet)
 
 
-def _print_json(runs: Sequence[RunResults]) -> None:
+def _print_json(runs: Sequence[Run]) -> None:
     documents = [
         {
             "folder": str(run.folder),
-            **results_document(run.summary, run.suite, run.n_missing, run.usage),
+            **results_document(run.own_summary, run.suite, run.n_missing, run.usage),
         }
         for run in runs
     ]
     click.echo(msgspec.json.format(msgspec.json.encode(documents, order="sorted"), indent=2))
 
 
-def _with_labels(runs: Sequence[RunResults]) -> list[RunResults]:
-    """The runs with labels for names, which tell those of one name apart."""
-    labels = label_runs([(run.folder, run.summary.header) for run in runs], _SHOWN_BY_TABLES)
-    labelled = []
-    for run, label in zip(runs, labels, strict=True):
-        name = mark_incomplete(label, run.summary.units, run.n_missing)
-        header = msgspec.structs.replace(run.summary.header, name=name)
-        labelled.append(replace(run, summary=replace(run.summary, header=header)))
-    return labelled
-
-
-def _print_tables(runs: Sequence[RunResults], options: ShowOptions) -> None:
+def _print_tables(runs: Sequence[Run], options: ShowOptions) -> None:
     tables: list[Table] = []
     suite_name = attrgetter("suite.name")
     for _, group in groupby(sorted(runs, key=suite_name), key=suite_name):
@@ -141,7 +81,7 @@ def _print_tables(runs: Sequence[RunResults], options: ShowOptions) -> None:
         print_table(table, console)
 
 
-def _print_folders(runs: Sequence[RunResults], quiet: bool) -> None:
+def _print_folders(runs: Sequence[Run], quiet: bool) -> None:
     for run in runs:
         name = run.summary.header.name
         if not quiet and run.usage.requests:

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.metadata import version
 from itertools import groupby
 from pathlib import Path
@@ -94,6 +95,12 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
     def units(self) -> list[U]:
         """The episodes of all tasks, task by task, in the order of trajectories and time."""
 
+    @cached_property
+    def _numbers(self) -> dict[UnitKey, int]:
+        """Positions of the episodes in their tasks."""
+        by_task = groupby(self.units, key=lambda unit: unit.key.task)
+        return {unit.key: number for _, of_task in by_task for number, unit in enumerate(of_task)}
+
     @property
     def _shared_config(self) -> dict[str, Any]:
         """The fields of `EpisodesConfig`, and those that all runs have."""
@@ -144,10 +151,6 @@ class BoundEpisodes(Generic[U, P]):
         self.workload = workload
         self.seed = evaluation.seed
         self._simulators_to_close = list(simulators)
-        by_task = groupby(evaluation.units, key=lambda unit: unit.key.task)
-        self._numbers = {
-            unit.key: number for _, of_task in by_task for number, unit in enumerate(of_task)
-        }
 
     def close(self) -> None:
         """See `infthor_eval.runs.BoundEvaluation.close`."""

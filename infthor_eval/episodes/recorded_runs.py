@@ -2,12 +2,11 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, ClassVar, Generic, Self, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from infthor_eval.episodes.config import EpisodesConfig
 from infthor_eval.episodes.records import P
-from infthor_eval.runs import RecordTypes, RunHeader, UnitRecord, read_run
+from infthor_eval.runs import RunHeader, UnitRecord
 
 _EMBEDDED = "embedded"  # as the option --simulator names it
 
@@ -23,15 +22,7 @@ class RecordedRun(Generic[P, C]):
     header: RunHeader[C]
     records: Sequence[UnitRecord[P]]
 
-    record_types: ClassVar[RecordTypes[Any]]
     planner: ClassVar[str]  # the upper bound's name; its own module would import the simulator
-
-    @classmethod
-    def read(cls, folder: Path, label: str | None = None) -> Self:
-        """Read the run in a folder, by default labelled by its own name; DataError for a missing or
-        damaged journal."""
-        header, records = read_run(folder, cls.record_types)
-        return cls(label or header.name, header, records)
 
     @property
     def config(self) -> C:

@@ -29,10 +29,9 @@ from infthor_eval.exports.measures import LEVEL, Measure, find_measures, scored
 from infthor_eval.exports.request import ExportRequest, Written
 from infthor_eval.exports.samples import SampleReader
 from infthor_eval.exports.subjects import UNKNOWN, ModelFacts, model_facts
-from infthor_eval.report.presented import PresentedRun
-from infthor_eval.report.runs import with_frames
-from infthor_eval.runs.journals.shards import last_change
+from infthor_eval.run import Run
 from infthor_eval.runs.results import results_document
+from infthor_eval.runs.stored.labels import with_frames
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
@@ -44,7 +43,7 @@ _NO_PLACE = (
 Document = dict[str, Any]
 
 
-def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
+def write(runs: Sequence[Run], request: ExportRequest) -> Written:
     """Write runs; the same run gives files of the same names.
 
     Raises:
@@ -65,13 +64,13 @@ def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
 class _RunExport:
     """The files of a run."""
 
-    def __init__(self, run: PresentedRun, request: ExportRequest) -> None:
+    def __init__(self, run: Run, request: ExportRequest) -> None:
         self._run = run
         self._request = request
         self._facts = model_facts(run, request.model_id)
         self._measures = list(chain.from_iterable(find_measures(run).values()))
         self.reader = SampleReader(run, request.data)
-        self._ran = last_change(run.folder)
+        self._ran = run.changed
         self._stamp = f"{self._ran.timestamp():.3f}"
         self._collection = f"infthor-{file_name(run.suite.name)}"
 
@@ -253,7 +252,7 @@ def _metric_config(measure: Measure, description: str) -> Document:
     }
 
 
-def _generation_config(run: PresentedRun, task: str) -> Document:
+def _generation_config(run: Run, task: str) -> Document:
     config = run.header.config
     document = task_document(run, task)
     decoding = document.get("decoding") or {}

@@ -7,10 +7,10 @@ from typing import Any
 
 from infthor_eval.exports.measures import Measure, Scored, counted
 from infthor_eval.exports.samples import ACT, Sample, SampleReader, describe_result
-from infthor_eval.report.presented import PresentedRun
-from infthor_eval.report.runs import with_frames
 from infthor_eval.report.web.samples import StepRow
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord
+from infthor_eval.runs.stored.labels import with_frames
 
 SCHEMA_VERSION = "0.3.0"
 Row = dict[str, Any]
@@ -22,7 +22,7 @@ def result_id(measure: Measure) -> str:
 
 
 def sample_rows(
-    run: PresentedRun, measures: Sequence[Measure], reader: SampleReader, shared: Row
+    run: Run, measures: Sequence[Measure], reader: SampleReader, shared: Row
 ) -> Iterator[Row]:
     """Yield the lines of a run.
 
@@ -57,7 +57,7 @@ def sample_rows(
 
 
 def _records_by_group(
-    run: PresentedRun,
+    run: Run,
 ) -> Mapping[tuple[str, str], Sequence[UnitRecord[Any]]]:
     groups: dict[tuple[str, str], list[UnitRecord[Any]]] = {}
     for record in sorted(run.records, key=lambda record: record.key):

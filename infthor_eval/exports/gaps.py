@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.reasons import count_reasons
-from infthor_eval.report.presented import PresentedRun
+from infthor_eval.run import Run
 from infthor_eval.runs import TaskConfig
 
 
@@ -40,24 +40,24 @@ class TaskGaps:
         return self.n_missing == 0 and not self.failed
 
 
-def task_config(run: PresentedRun, task: str) -> TaskConfig:
+def task_config(run: Run, task: str) -> TaskConfig:
     """Return the config of a task; an empty one if its suite has configs of another kind."""
     config = run.tasks[task]
     return config if isinstance(config, TaskConfig) else TaskConfig()
 
 
-def task_document(run: PresentedRun, task: str) -> Mapping[str, Any]:
+def task_document(run: Run, task: str) -> Mapping[str, Any]:
     """Return the config of a task as JSON values, whatever its suite."""
     document: Mapping[str, Any] = msgspec.to_builtins(run.tasks[task], str_keys=True)
     return document
 
 
-def dataset_name(run: PresentedRun, task: str) -> str:
+def dataset_name(run: Run, task: str) -> str:
     """Return the name of a task's data set: the bundled one's, else the task's."""
     return str(task_config(run, task).dataset_kwargs.get("bundled", task))
 
 
-def task_gaps(run: PresentedRun, task: str) -> TaskGaps:
+def task_gaps(run: Run, task: str) -> TaskGaps:
     """Return what is left out of a task."""
     records = [record for record in run.records if record.task == task]
     return TaskGaps(
@@ -82,7 +82,7 @@ def describe_gaps(gaps: TaskGaps) -> str:
     return "; ".join(filter(None, parts))
 
 
-def gap_notes(run: PresentedRun) -> list[str]:
+def gap_notes(run: Run) -> list[str]:
     """Return a line for each task of which something is left out."""
     described = {task: describe_gaps(task_gaps(run, task)) for task in run.tasks}
     return [f"{run.label}, {task}: {words}" for task, words in described.items() if words]

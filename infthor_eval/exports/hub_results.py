@@ -17,9 +17,8 @@ from infthor_eval.exports.gaps import describe_gaps, gap_notes, task_gaps
 from infthor_eval.exports.measures import Measure, find_measures
 from infthor_eval.exports.request import ExportRequest, Written
 from infthor_eval.exports.subjects import UNKNOWN, ModelFacts, model_facts
-from infthor_eval.report.presented import PresentedRun
-from infthor_eval.report.runs import with_frames
-from infthor_eval.runs.journals.shards import last_change
+from infthor_eval.run import Run
+from infthor_eval.runs.stored.labels import with_frames
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
 _FOLDER = ".eval_results"
@@ -33,7 +32,7 @@ _DESCRIPTION = (
 )
 
 
-def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
+def write(runs: Sequence[Run], request: ExportRequest) -> Written:
     """Write the results of runs, and the list of their tasks.
 
     Raises:
@@ -58,7 +57,7 @@ def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
     return Written(list(paths), _NO_PLACE, notes)
 
 
-def _write_results(run: PresentedRun, facts: ModelFacts, request: ExportRequest) -> Path:
+def _write_results(run: Run, facts: ModelFacts, request: ExportRequest) -> Path:
     measures = chain.from_iterable(find_measures(run).values())
     owner = file_name(facts.developer)
     name = file_name(facts.short_name.replace("/", "_"))
@@ -68,9 +67,7 @@ def _write_results(run: PresentedRun, facts: ModelFacts, request: ExportRequest)
     return path
 
 
-def _entry(
-    run: PresentedRun, facts: ModelFacts, measure: Measure, request: ExportRequest
-) -> dict[str, Any]:
+def _entry(run: Run, facts: ModelFacts, measure: Measure, request: ExportRequest) -> dict[str, Any]:
     """Return a result in the form of the hub's library, which writes the keys."""
     from huggingface_hub import EvalResultEntry, eval_result_entries_to_yaml
 
@@ -80,7 +77,7 @@ def _entry(
         dataset_id=request.dataset,
         task_id=with_frames(measure.task, run.header),
         value=round(factor * measure.estimate.mean, 4),
-        date=last_change(run.folder).isoformat(timespec="seconds"),
+        date=run.changed.isoformat(timespec="seconds"),
         source_url=request.source_url,
         source_name="runs of infthor-eval" if request.source_url else None,
         notes=_notes(run, facts, measure, factor),
@@ -89,7 +86,7 @@ def _entry(
     return document
 
 
-def _notes(run: PresentedRun, facts: ModelFacts, measure: Measure, factor: int) -> str:
+def _notes(run: Run, facts: ModelFacts, measure: Measure, factor: int) -> str:
     unit = "%" if measure.is_share else "points"
     interval = measure.interval
     spread = ""
@@ -112,7 +109,7 @@ def _notes(run: PresentedRun, facts: ModelFacts, measure: Measure, factor: int) 
     return "; ".join(filter(None, parts))
 
 
-def _write_tasks(runs: Sequence[PresentedRun], request: ExportRequest) -> Path:
+def _write_tasks(runs: Sequence[Run], request: ExportRequest) -> Path:
     assert request.dataset is not None
     owner, _, name = request.dataset.partition("/")
     tasks = dict.fromkeys(with_frames(task, run.header) for run in runs for task in run.tasks)

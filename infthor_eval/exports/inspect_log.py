@@ -28,9 +28,8 @@ from infthor_eval.exports.request import ExportRequest, Written
 from infthor_eval.exports.samples import SampleReader, TokenCounts
 from infthor_eval.exports.subjects import ModelFacts, model_facts
 from infthor_eval.reasons import count_reasons
-from infthor_eval.report.presented import PresentedRun
-from infthor_eval.report.runs import with_frames
-from infthor_eval.runs.journals.shards import last_change
+from infthor_eval.run import Run
+from infthor_eval.runs.stored.labels import with_frames
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
@@ -41,7 +40,7 @@ _NO_PLACE = "excluded samples (their reasons are told), and pairs of twins other
 Document = dict[str, Any]
 
 
-def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
+def write(runs: Sequence[Run], request: ExportRequest) -> Written:
     """Write a log for each task of runs that has a unit that counts; the same run, the same names.
 
     Raises:
@@ -68,13 +67,13 @@ class _Log:
     """
 
     def __init__(
-        self, run: PresentedRun, task: str, measures: Sequence[Measure], reader: SampleReader
+        self, run: Run, task: str, measures: Sequence[Measure], reader: SampleReader
     ) -> None:
         self._run = run
         self._task = task
         self._measures = measures
         self._reader = reader
-        self._ran = last_change(run.folder)
+        self._ran = run.changed
         self.problems: list[str] = []
 
     def write(self, request: ExportRequest) -> Path:

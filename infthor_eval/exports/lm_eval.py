@@ -1,6 +1,6 @@
 """Our runs in lm-eval's files: results and samples as its own command writes them.
 
-A run writes them at its end, when it still has the requests as they were sent.
+A run writes them at its end, when it has its tasks' data at hand, which every row repeats.
 """
 
 import json
@@ -16,7 +16,7 @@ import msgspec
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.exports import LM_EVAL_MODEL
-from infthor_eval.runs import RunOutcome, TaskFile, UnitCounts, UnitRecord, UnitSample
+from infthor_eval.runs import RunOutcome, TaskFile, UnitCounts, UnitDoc, UnitRecord
 from infthor_eval.runs.journals.shards import last_change
 from infthor_eval.statistics import clustered_mean
 from infthor_eval.storage.digests import canonical_json
@@ -135,11 +135,11 @@ def _tasks(outcome: RunOutcome[Any, Any]) -> list[_Scored]:
         file.name: _Scored(file, units.get(file.name, UnitCounts()))
         for file in outcome.run.request.tasks.tasks
     }
-    for record, sample in zip(outcome.records, outcome.samples, strict=True):
+    for record, doc in zip(outcome.records, outcome.docs, strict=True):
         if record.excluded is None:
             tasks[record.task].records.append(record)
             tasks[record.task].scores.append(outcome.run.suite.scores(record))
-            tasks[record.task].rows.append(_row(sample) | _failure(record))
+            tasks[record.task].rows.append(_row(doc) | _failure(record))
     return [task for task in tasks.values() if task.records]
 
 
@@ -171,24 +171,24 @@ def _hash_of_rows(rows: Sequence[Mapping[str, Any]]) -> str:
     return _hash("".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in rows))
 
 
-def _row(sample: UnitSample) -> dict[str, Any]:
+def _row(unit: UnitDoc) -> dict[str, Any]:
     return {
-        "doc_id": sample.number,
-        "doc": dict(sample.doc),
-        "target": sample.target,
+        "doc_id": unit.number,
+        "doc": dict(unit.doc),
+        "target": unit.target,
         "arguments": {
             "gen_args_0": {
-                "arg_0": sample.prompt,
-                "arg_1": dict(sample.settings),
+                "arg_0": unit.prompt,
+                "arg_1": dict(unit.settings),
                 "arg_2": {"visual": []},
             }
         },
-        "resps": [[sample.reply]],
-        "filtered_resps": [sample.reply],
+        "resps": [[unit.reply]],
+        "filtered_resps": [unit.reply],
         "filter": _FILTER,
-        "doc_hash": _hash(json.dumps(sample.doc, indent=2, ensure_ascii=False)),
-        "prompt_hash": _hash(sample.prompt),
-        "target_hash": _hash(sample.target),
+        "doc_hash": _hash(json.dumps(unit.doc, indent=2, ensure_ascii=False)),
+        "prompt_hash": _hash(unit.prompt),
+        "target_hash": _hash(unit.target),
     }
 
 

@@ -9,7 +9,7 @@ from infthor_eval.exports.gaps import gap_notes
 from infthor_eval.exports.lm_eval import FOLDER
 from infthor_eval.exports.request import ExportRequest, Written
 from infthor_eval.formats.reading import lines_of
-from infthor_eval.report.presented import PresentedRun
+from infthor_eval.run import Run
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
 _HINT = "run its command again"
@@ -18,7 +18,7 @@ _NO_PLACE = (
 )
 
 
-def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
+def write(runs: Sequence[Run], request: ExportRequest) -> Written:
     """Copy the files that runs wrote at their ends into `<out>/<model>/`.
 
     Raises:
@@ -39,7 +39,7 @@ def write(runs: Sequence[PresentedRun], request: ExportRequest) -> Written:
     return Written(paths, _NO_PLACE, notes)
 
 
-def _files_of(run: PresentedRun) -> tuple[Path, list[Path]]:
+def _files_of(run: Run) -> tuple[Path, list[Path]]:
     """Return the newest results of a run, and their samples."""
     found = sorted((run.folder / FOLDER).glob("*/results_*.json"), key=lambda path: path.name)
     if not found:

@@ -11,7 +11,7 @@ from statistics import fmean
 from typing import Any, NamedTuple
 
 from infthor_eval.errors import DataError
-from infthor_eval.report.presented import PresentedRun
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord
 from infthor_eval.statistics import MeanEstimate, bootstrap_interval, clustered_mean
 
@@ -86,18 +86,18 @@ class Measure:
         return "Wilson interval on the effective sample size, clustered by trajectory"
 
 
-def counted(run: PresentedRun, task: str) -> list[Record]:
+def counted(run: Run, task: str) -> list[Record]:
     """Return the records of a task that are not excluded, in the order of their keys."""
     records = (it for it in run.records if it.task == task and it.excluded is None)
     return sorted(records, key=lambda record: record.key)
 
 
-def scored(run: PresentedRun, task: str) -> list[Record]:
+def scored(run: Run, task: str) -> list[Record]:
     """Return those of them that did not fail."""
     return [record for record in counted(run, task) if record.failure is None]
 
 
-def find_measures(run: PresentedRun) -> dict[str, list[Measure]]:
+def find_measures(run: Run) -> dict[str, list[Measure]]:
     """Return the metrics of each task with a unit that has a score, the primary one first.
 
     Raises:
@@ -109,7 +109,7 @@ def find_measures(run: PresentedRun) -> dict[str, list[Measure]]:
     return found
 
 
-def _measures_of(run: PresentedRun, task: str) -> list[Measure]:
+def _measures_of(run: Run, task: str) -> list[Measure]:
     records = scored(run, task)
     return [
         *_groups(run, task, records),
@@ -118,7 +118,7 @@ def _measures_of(run: PresentedRun, task: str) -> list[Measure]:
     ]
 
 
-def _groups(run: PresentedRun, task: str, records: Sequence[Record]) -> Iterator[Measure]:
+def _groups(run: Run, task: str, records: Sequence[Record]) -> Iterator[Measure]:
     by_metric: dict[str, list[Scored]] = {}
     for it in run.presenter.group_scores(records):
         by_metric.setdefault(it.metric, []).append(Scored(it.group, it.cluster, it.score))
@@ -129,7 +129,7 @@ def _groups(run: PresentedRun, task: str, records: Sequence[Record]) -> Iterator
         yield _measure(run, task, metric, samples, is_primary=is_primary, resampled=resampled)
 
 
-def _metrics(run: PresentedRun, task: str, records: Sequence[Record]) -> Iterator[Measure]:
+def _metrics(run: Run, task: str, records: Sequence[Record]) -> Iterator[Measure]:
     main = run.presenter.main_metric
     scores = [run.suite.scores(record) for record in records]
     names = list(dict.fromkeys(name for of_record in scores for name in of_record))
@@ -142,7 +142,7 @@ def _metrics(run: PresentedRun, task: str, records: Sequence[Record]) -> Iterato
         yield _measure(run, task, name, samples, is_primary=is_primary)
 
 
-def _further(run: PresentedRun, task: str, records: Sequence[Record]) -> Iterator[Measure]:
+def _further(run: Run, task: str, records: Sequence[Record]) -> Iterator[Measure]:
     """Yield the scores that only some samples have."""
     by_metric: dict[str, list[tuple[Record, float]]] = {}
     for record in records:
@@ -164,7 +164,7 @@ def _by_unit(scored: Sequence[tuple[Record, float]]) -> list[Scored]:
 
 
 def _measure(
-    run: PresentedRun,
+    run: Run,
     task: str,
     metric: str,
     samples: Sequence[Scored],

@@ -14,7 +14,7 @@ from infthor_eval.plugins import import_target
 
 if TYPE_CHECKING:
     from infthor_eval.exports.request import ExportRequest, Written
-    from infthor_eval.report.presented import PresentedRun
+    from infthor_eval.run import Run
 
 _WRITERS = {
     "every-eval-ever": "infthor_eval.exports.every_eval_ever:write",
@@ -41,7 +41,7 @@ _TAKES = {
 
 def find_writer(
     name: str, options: Collection[str]
-) -> Callable[[Sequence[PresentedRun], ExportRequest], Written]:
+) -> Callable[[Sequence[Run], ExportRequest], Written]:
     """Return what writes runs in a format.
 
     Args:
@@ -58,6 +58,6 @@ def find_writer(
                 f"--{option.replace('_', '-')}: has no place in {name}; leave it out (it is for "
                 f"{', '.join(takers)})"
             )
-    writer: Callable[[Sequence[PresentedRun], ExportRequest], Written]
+    writer: Callable[[Sequence[Run], ExportRequest], Written]
     writer = import_target(_WRITERS[name])
     return writer

@@ -10,9 +10,9 @@ import msgspec
 
 from infthor_eval.exports.gaps import task_config
 from infthor_eval.reasons import count_reasons
-from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.presenter import THOUGHT
 from infthor_eval.report.web.samples import Prompt, StepRow
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
 
 ACT = "act"  # the tool that an agent's or an arm's steps are calls of
@@ -82,7 +82,7 @@ class Sample:
 class SampleReader:
     """Puts a run's records into words."""
 
-    def __init__(self, run: PresentedRun, data: Path | None) -> None:
+    def __init__(self, run: Run, data: Path | None) -> None:
         """Make the requests of the run again; `data` is its set, None for the one it names."""
         self._run = run
         self._prompts: Mapping[UnitKey, Prompt] = run.presenter.prompts(run, data)

@@ -6,8 +6,8 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from infthor_eval.errors import UsageError
-from infthor_eval.report.presented import PresentedRun
-from infthor_eval.runs import RunHeader, read_header
+from infthor_eval.run import Run
+from infthor_eval.runs import RunHeader
 
 UNKNOWN = "unknown"
 _OWN = "infthor-eval"  # developer of baselines
@@ -65,14 +65,14 @@ def require_one_model(headers: Sequence[RunHeader[Any]]) -> None:
             )
 
 
-def model_facts(run: PresentedRun, model_id: str | None = None) -> ModelFacts:
+def model_facts(run: Run, model_id: str | None = None) -> ModelFacts:
     """Return what a run says of its model; `model_id` is its name where that is wrong.
 
     The name is the run's own: the one that tells it from other runs beside it has options, and
     folders of this machine among them. A checkpoint of the hub names its developer and has open
     weights; of a folder and of a server neither is known.
     """
-    header = read_header(run.folder)
+    header = run.own_header
     identity: Mapping[str, Any] = header.config.model
     engine, engine_version = engine_of(identity)
     platform, deployment = _place(identity)

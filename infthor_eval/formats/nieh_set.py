@@ -3,10 +3,9 @@
 The folder has the layout of the published data (hub dataset `PEARLS-Lab/infini-thor-nieh`):
 `qa_set*.csv` beside `metadata/<traj_id>/` with `img/` (or `img_768/`), `metadata.json`,
 `expert_log.json` and, in some sets, `<traj_id>_10fps.mp4`. The trajectory files are in a separate
-folder (published data) or inside the set (ours). Twins share pictures (`shared_frames`).
-
-A low-level action has one frame in our sets, and possibly several in others: they are in
-`expert_log.json`, or in the step log of the layout that the branch `dev` reads.
+folder (published data) or inside the set (ours). Twins share pictures (`shared_frames`). An action
+has one frame in our sets, and possibly several in others (`expert_log.json`, or the step log of the
+layout that the branch `dev` reads).
 
 Question files alone, without `metadata/`, are a set too: for whatever needs no frame. So is a
 folder of one's own frames and questions (`own_folder`).

@@ -21,7 +21,7 @@ from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import ArmEnded, ArmRecord, ArmStep
 from infthor_eval.manipulation.task import ManipulationTask
 from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory
-from infthor_eval.runs import Group, Session, TaskRequest, UnitKey, UnitRecord, UnitSample
+from infthor_eval.runs import Group, RunHeader, Session, TaskRequest, UnitDoc, UnitKey, UnitRecord
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.frames import FrameFolder, FrameKeeper, NoFrames
 from infthor_eval.thor.simulator import Simulator
@@ -61,6 +61,21 @@ class ManipulationEvaluation(EpisodeEvaluation[ManipulationOptions, Manipulation
         else:
             raise TypeError(f"{subject} is neither a policy nor a baseline of manipulation")
         return BoundManipulation(self, create_actor, sees=isinstance(subject, Policy))
+
+    def to_doc(
+        self, header: RunHeader[ManipulationConfig], record: UnitRecord[ArmRecord]
+    ) -> UnitDoc:
+        """See `infthor_eval.runs.Evaluation.to_doc`."""
+        payload = record.payload
+        settings = self.tasks[record.task].settings
+        return UnitDoc(
+            number=self._numbers[record.key],
+            doc={"traj_id": record.cluster, "action": payload.index, "kind": payload.kind},
+            target=payload.instruction,
+            prompt=payload.instruction,
+            settings={"max_steps": settings.max_steps},
+            reply=payload.ended,
+        )
 
 
 class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
@@ -134,19 +149,6 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
                 record = runner.record(unit, fingerprints[unit.key], run, session)
                 yield msgspec.structs.replace(record, faults=(*faults, *record.faults))
                 faults = ()  # those of the expert's simulator are recorded once
-
-    def to_sample(self, record: UnitRecord[ArmRecord]) -> UnitSample:
-        """See `infthor_eval.runs.BoundEvaluation.to_sample`."""
-        payload = record.payload
-        settings = self._tasks[record.task].settings
-        return UnitSample(
-            number=self._numbers[record.key],
-            doc={"traj_id": record.cluster, "action": payload.index, "kind": payload.kind},
-            target=payload.instruction,
-            prompt=payload.instruction,
-            settings={"max_steps": settings.max_steps},
-            reply=payload.ended,
-        )
 
 
 def _arm_record(task: ManipulationTask, episode: ArmEpisode) -> ArmRecord:

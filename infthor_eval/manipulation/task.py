@@ -2,9 +2,11 @@
 
 import string
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
-from infthor_eval.episodes.task_settings import task_settings
+from msgspec import Meta
+
+from infthor_eval.episodes.task_settings import task_settings, with_options
 from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.errors import UsageError
 from infthor_eval.household.wording import canonical_type, noun
@@ -19,75 +21,89 @@ from infthor_eval.manipulation.kinds import (
     PutCriterion,
     Stand,
 )
-from infthor_eval.manipulation.options import RADII, ManipulationOptions
+from infthor_eval.manipulation.options import (
+    ClosingName,
+    HandName,
+    Instruction,
+    ManipulationOptions,
+    PutCriterionName,
+    Radius,
+    StandName,
+)
 from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory, read_arm_trajectory
+from infthor_eval.quantities import MOST, Total
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.limiting import limit_items
+from infthor_eval.settings import Setting
 
 _INSTRUCTIONS = {
     ManipulationKind.PICKUP: "pick up the {object}",
     ManipulationKind.PUT: "put the {object} in the {receptacle}",
 }
-_CHOICES = {
-    "kind": tuple(ManipulationKind),
-    "grasps": ("target", "all"),
-    "hold": ("middle", "palm"),
-    "stand": tuple(map(str, Stand)),
-    "hand": tuple(map(str, Hand)),
-    "closing": tuple(map(str, Closing)),
-    "put_criterion": tuple(map(str, PutCriterion)),
-}
-# settings that are options too
-_GIVEN = ("instruction", "stand", "hand", "closing", "put_criterion")
+_Positive = Annotated[float, Meta(gt=0, lt=MOST)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ArmTaskSettings:
-    """`dataset_kwargs` of a task file.
+    """`dataset_kwargs` of a task file."""
 
-    Attributes:
-        kind: "pickup" or "put".
-        bundled: name of a set of trajectories in the package.
-        instruction: instruction of a policy, with {object} and, for puts, {receptacle}; "short" is
-            the kind alone.
-        radius: radius of the hand's sphere, metres; AI2-THOR's own is 0.06, the published one 0.5.
-        max_steps: maximum number of steps of one episode.
-        image_size: width and height of the frames, pixels.
-        field_of_view: field of view of the camera, degrees.
-        grasps: whether the hand takes the "target" alone out of its sphere, or "all" objects in it.
-        hold: where the object to put is held: in the "middle" of the sphere if there is room, or
-            before the "palm".
-        stand: where the agent stands at the start, see `Stand`.
-        hand: height of its arm at the start of a pick-up, see `Hand`.
-        closing: when a policy's hand closes in a pick-up, see `Closing`.
-        put_criterion: when a put succeeds, see `PutCriterion`.
-        gripper_threshold: value of a policy's gripper below which the hand closes; else it opens.
-        translation_scale: see `Conversion`.
-        max_step: see `Conversion`.
-        rotation: see `Conversion`.
-        return_to_start: see `Conversion`.
-        reward: reward of a success.
-    """
-
-    kind: str = ManipulationKind.PICKUP
-    bundled: str | None = None
-    instruction: str | None = None
-    radius: float = 0.5
-    max_steps: int = 60
-    image_size: int = 300
-    field_of_view: float = 60.0
-    grasps: str = "target"
-    hold: str = "middle"
-    stand: str = Stand.EXPERT
-    hand: str = Hand.REST
-    closing: str = Closing.ASKED
-    put_criterion: str = PutCriterion.AT_REST
-    gripper_threshold: float = 0.5
-    translation_scale: float = 1.0
-    max_step: float = 0.1
-    rotation: bool = True
-    return_to_start: bool = True
-    reward: float = 2.0
+    kind: Annotated[str, Setting(help='"pickup" or "put".', choices=tuple(ManipulationKind))] = (
+        ManipulationKind.PICKUP
+    )
+    bundled: Annotated[
+        str | None, Setting(help="Name of a set of trajectories in the package.")
+    ] = None
+    instruction: Instruction | None = None
+    radius: Radius = 0.5
+    max_steps: Annotated[Total, Setting(help="Maximum number of steps of one episode.")] = 60
+    image_size: Annotated[Total, Setting(help="Width and height of the frames, pixels.")] = 300
+    field_of_view: Annotated[
+        Annotated[float, Meta(gt=0, lt=180)],
+        Setting(help="Field of view of the camera, degrees.", of="degrees"),
+    ] = 60.0
+    grasps: Annotated[
+        str,
+        Setting(
+            help='Whether the hand takes the "target" alone out of its sphere, or "all" objects '
+            "in it.",
+            choices=("target", "all"),
+        ),
+    ] = "target"
+    hold: Annotated[
+        str,
+        Setting(
+            help='Where the object to put is held: in the "middle" of the sphere if there is '
+            'room, or before the "palm".',
+            choices=("middle", "palm"),
+        ),
+    ] = "middle"
+    stand: StandName = Stand.EXPERT
+    hand: HandName = Hand.REST
+    closing: ClosingName = Closing.ASKED
+    put_criterion: PutCriterionName = PutCriterion.AT_REST
+    gripper_threshold: Annotated[
+        Annotated[float, Meta(gt=0, le=1)],
+        Setting(
+            help="Value of a policy's gripper below which the hand closes; else it opens (1 is "
+            "fully open)."
+        ),
+    ] = 0.5
+    translation_scale: Annotated[_Positive, Setting(help="Factor of a policy's translations.")] = (
+        1.0
+    )
+    max_step: Annotated[
+        _Positive,
+        Setting(help="Maximum length of a translation, metres; a longer one is shortened."),
+    ] = 0.1
+    rotation: Annotated[bool, Setting(help="Whether the wrist is turned.")] = True
+    return_to_start: Annotated[
+        bool,
+        Setting(
+            help="Whether the arm goes back after a collision (AI2-THOR's default), or stays "
+            "where it collided."
+        ),
+    ] = True
+    reward: Annotated[_Positive, Setting(help="Reward of a success.")] = 2.0
 
     @property
     def conversion(self) -> Conversion:
@@ -127,7 +143,7 @@ class ArmTaskSettings:
 def check_task_file(file: TaskFile) -> None:
     """Check a task file's settings; raises DataError if one is unknown or its value not allowed."""
     file.require("dataset_kwargs")
-    task_settings(file, ArmTaskSettings, {}, _CHOICES)
+    task_settings(file, ArmTaskSettings)
 
 
 class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
@@ -136,14 +152,11 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
     def __init__(self, file: TaskFile, request: TaskRequest[ManipulationOptions]) -> None:
         """Check the file and find its episodes."""
         file.require("dataset_kwargs")
-        overrides = {"radius": request.options.radius_metres}
-        overrides |= {name: getattr(request.options, name) for name in _GIVEN}
-        settings = task_settings(file, ArmTaskSettings, overrides, _CHOICES)
+        settings = with_options(task_settings(file, ArmTaskSettings), request.options)
         self.kind = ManipulationKind(settings.kind)
         self._template = (
             _INSTRUCTIONS[self.kind] if settings.instruction is None else settings.instruction
         )
-        _check_numbers(file.name, settings)
         self._check_instruction(file.name)
         super().__init__(file, request, settings, read_arm_trajectory)
         episodes = [
@@ -198,16 +211,3 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
                 f"{' and may have {receptacle}' if len(known) > 1 else ''}, and nothing else in "
                 f'braces; or be "short" for {KIND_NAMES[self.kind]!r} alone'
             )
-
-
-def _check_numbers(name: str, settings: ArmTaskSettings) -> None:
-    if settings.field_of_view >= 180:
-        raise UsageError(f"{name}: field_of_view {settings.field_of_view} is not below 180 degrees")
-    if settings.gripper_threshold > 1:
-        raise UsageError(
-            f"{name}: gripper_threshold {settings.gripper_threshold} is above 1, fully open"
-        )
-    if not RADII[0] <= settings.radius <= RADII[1]:
-        raise UsageError(
-            f"{name}: radius {settings.radius} is not within {RADII[0]} to {RADII[1]} metres"
-        )

@@ -1,36 +1,52 @@
 """Options of memories on the command line, which the suites share."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
 
 from infthor_eval.memory.budgets import read_budget
+from infthor_eval.settings import Setting
+
+_CAUSE = "the memory"
 
 
 @dataclass(frozen=True, kw_only=True)
 class MemoryOptions:
-    """The options, with their help texts."""
+    """The options."""
 
-    memory: str | None = field(
-        default=None,
-        metadata={
-            "help": "Memories for tasks that need one (nieh_memory, --history memory), a run with "
+    memory: Annotated[
+        str | None,
+        Setting(
+            help="Memories for tasks that need one (nieh_memory, --history memory), a run with "
             "each; `ls memories`, or FILE.py:CLASS.",
-            "metavar": "NAME,...",
-            "each": True,
-        },
-    )
-    memory_args: str | None = field(
-        default=None,
-        metadata={"help": "Options of the memory (see `ls memories`).", "metavar": "K=V,..."},
-    )
-    budget: str | None = field(
-        default=None,
-        metadata={
-            "help": "Most tokens of what a memory recalls, a run with each; default: the memory's "
+            where="memory",
+            in_config=True,
+            cause=_CAUSE,
+            metavar="NAME,...",
+            each=True,
+        ),
+    ] = None
+    memory_args: Annotated[
+        str | None,
+        Setting(
+            help="Options of the memory (see `ls memories`).",
+            where="memory",
+            in_config=True,
+            cause=_CAUSE,
+            metavar="K=V,...",
+        ),
+    ] = None
+    budget: Annotated[
+        str | None,
+        Setting(
+            help="Most tokens of what a memory recalls, a run with each; default: the memory's "
             "own limit.",
-            "metavar": "TOKENS,...",
-            "each": True,
-        },
-    )
+            where="memory",
+            in_config=True,
+            cause=_CAUSE,
+            metavar="TOKENS,...",
+            each=True,
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
         """Raise UsageError for a budget that is none."""

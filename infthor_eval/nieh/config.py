@@ -1,14 +1,16 @@
 """The config of a run of NIEH."""
 
 import re
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
 
 from infthor_eval.memory import read_budget
-from infthor_eval.quantities import MOST, Count, Repetition
+from infthor_eval.nieh.options import NiehOptions, NiehSettings
+from infthor_eval.quantities import MOST, Count
 from infthor_eval.runs import RunConfig, TaskConfig
+from infthor_eval.settings import with_settings
 
 
 class MetricsConfig(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -128,20 +130,24 @@ class RescoredConfig(msgspec.Struct, frozen=True, kw_only=True):
     judge: dict[str, Any] | None
 
 
-class NiehConfig(RunConfig[NiehTaskConfig], frozen=True, kw_only=True, omit_defaults=True):
-    """The config of a run; the fields are those options of `NiehOptions` that can change a number.
+if TYPE_CHECKING:
+
+    class _KeptSettings(RunConfig[NiehTaskConfig], NiehOptions, frozen=True): ...
+
+else:
+    _KeptSettings = with_settings(
+        with_settings(RunConfig[NiehTaskConfig], NiehSettings),  # first, as in runs of before
+        NiehOptions,
+    )
+
+
+class NiehConfig(_KeptSettings, frozen=True, kw_only=True, omit_defaults=True):
+    """The config of a run, with those of `NiehOptions` that are `in_config`.
 
     Attributes:
         rescored: who scored its replies again; None for a run that asked.
     """
 
-    k_tokens: Count | None = None
-    tokens_per_frame: Count | None = None
-    prompt: str | None = None
-    memory: str | None = None
-    memory_args: str | None = None
-    budget: str | None = None
-    repeats: Repetition = 1
     rescored: RescoredConfig | None = None
 
     @property

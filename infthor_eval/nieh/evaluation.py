@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import groupby
-from typing import Any
 
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
@@ -14,7 +13,6 @@ from infthor_eval.nieh.asking.recalling import apply_recall, asks_model
 from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig
 from infthor_eval.nieh.docs import doc_of, doc_target, prompt_of
 from infthor_eval.nieh.options import NiehOptions
-from infthor_eval.nieh.prompts import PUBLISHED_MAIN
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.task import NiehTask, PreparedTask
@@ -22,15 +20,33 @@ from infthor_eval.nieh.units import NiehUnit
 from infthor_eval.runs import (
     Cost,
     Group,
+    RunHeader,
     Session,
     Skipped,
     TaskRequest,
+    UnitDoc,
     UnitKey,
     UnitRecord,
-    UnitSample,
     Workload,
 )
+from infthor_eval.settings import config_values, settings_of
 from model_adapters import Model, Subject, check_decoding
+
+# What the tasks of a run lack where an option has no effect, by `Setting.where`, and what has it.
+_WITHOUT_EFFECT = {
+    "size": ("context of {} has a size in tokens", "nieh_haystack or nieh_truncate_head"),
+    "context": ("task of {} leaves its context open", "nieh_twins"),
+    "memory": ("task of {} leaves its memory open", "nieh_memory"),
+    "prompt": ("task of {} leaves its words open", "nieh_full"),
+    "retriever": (
+        "context of {} retrieves frames",
+        "nieh_clip_retrieval or nieh_memory_frames, or --memory clip",
+    ),
+    "trajectories": (
+        "context of {} tells of the trajectory beside its frames",
+        "nieh_interleaved or nieh_text_state",
+    ),
+}
 
 
 class NiehEvaluation:
@@ -48,6 +64,7 @@ class NiehEvaluation:
         self._tasks = [NiehTask(file, request) for file in request.tasks]
         _refuse_empty([task.task_samples for task in self._tasks], self._tasks)
         self._refuse_unused()
+        self._prepared: dict[int | None, PreparedEvaluation] = {}  # by tokens of a frame
 
     def bind(self, subject: Subject) -> "BoundNieh":
         """See `infthor_eval.runs.Evaluation.bind`."""
@@ -56,7 +73,7 @@ class NiehEvaluation:
         _refuse_incapable(subject, self._options, self._tasks)
         tokens = self._tokens_per_frame(answerer)
         tasks = {task.name: task for task in self._tasks}
-        prepared = {name: task.prepare(tokens) for name, task in tasks.items()}
+        prepared = self._prepare(tokens).tasks
         _refuse_empty([ready.task_samples for ready in prepared.values()], self._tasks)
         answerer.fit({name: ready.task_samples for name, ready in prepared.items()})
         costs = {name: answerer.cost(ready) for name, ready in prepared.items()}
@@ -79,6 +96,17 @@ class NiehEvaluation:
         )
         return BoundNieh(workload, prepared, answerer)
 
+    def to_doc(self, header: RunHeader[NiehConfig], record: UnitRecord[NiehAnswer]) -> UnitDoc:
+        """See `infthor_eval.runs.Evaluation.to_doc`."""
+        return self._prepare(header.config.tokens_per_frame).to_doc(header, record)
+
+    def _prepare(self, tokens_per_frame: int | None) -> "PreparedEvaluation":
+        """Return the tasks for models that need so many tokens for a frame."""
+        if tokens_per_frame not in self._prepared:
+            tasks = {task.name: task.prepare(tokens_per_frame) for task in self._tasks}
+            self._prepared[tokens_per_frame] = PreparedEvaluation(tasks)
+        return self._prepared[tokens_per_frame]
+
     def _tokens_per_frame(self, answerer: Answerer) -> int | None:
         """Return the size of a frame where a context is measured in it: the option's value, or the
         subject's own."""
@@ -88,81 +116,62 @@ class NiehEvaluation:
         return _measure_frame(measured.data, answerer)
 
     def _config(self, tasks: dict[str, NiehTaskConfig], tokens_per_frame: int | None) -> NiehConfig:
-        options = self._options
-        return NiehConfig(
-            tasks=tasks,
-            k_tokens=options.k_tokens,
-            tokens_per_frame=tokens_per_frame,
-            frames=options.frames,
-            prompt=None if options.prompt == PUBLISHED_MAIN else options.prompt,
-            repeats=options.repeats,
-            **self._memory(),
-        )
-
-    def _memory(self) -> dict[str, Any]:
-        """Return the options of the memory, as far as there are any."""
-        names = ("memory", "memory_args", "budget")
-        return {
-            name: value for name in names if (value := getattr(self._options, name)) is not None
-        }
+        measured = {"tokens_per_frame": tokens_per_frame}
+        return NiehConfig(tasks=tasks, **{**config_values(self._options), **measured})
 
     def _refuse_unused(self) -> None:
         """Refuse options without effect: they would only change the run's config, or mislead."""
         names = ", ".join(task.name for task in self._tasks)
-        measured = any(task.needs_size for task in self._tasks)
-        for name in ("k_tokens", "tokens_per_frame"):
-            value = getattr(self._options, name)
-            if value is not None and not measured:
+        for name, declared in settings_of(NiehOptions).items():
+            value, where = getattr(self._options, name), declared.setting.where
+            if (
+                where
+                and value != declared.default
+                and not any(task.takes(where) for task in self._tasks)
+            ):
+                lack, other = _WITHOUT_EFFECT[where]
                 raise UsageError(
-                    f"--{name.replace('_', '-')} {value}: no context of {names} has a size in "
-                    "tokens; leave it out, or ask nieh_haystack or nieh_truncate_head"
+                    f"--{name.replace('_', '-')} {value}: no {lack.format(names)}; leave it out, "
+                    f"or ask {other}"
                 )
-        for name in ("context", "ctx_size"):
-            value = getattr(self._options, name)
-            if value is not None and not any(task.takes_context for task in self._tasks):
-                raise UsageError(
-                    f"--{name.replace('_', '-')} {value}: no task of {names} leaves its context "
-                    "open; leave it out, or ask nieh_twins"
-                )
-        for name, value in self._memory().items():
-            if not any(task.takes_memory for task in self._tasks):
-                raise UsageError(
-                    f"--{name.replace('_', '-')} {value}: no task of {names} leaves its memory "
-                    "open; leave it out, or ask nieh_memory"
-                )
-        if self._options.prompt is not None and not any(task.takes_prompt for task in self._tasks):
-            raise UsageError(
-                f"--prompt {self._options.prompt}: no task of {names} leaves its words open; leave "
-                "it out, or ask nieh_full"
-            )
-        if (self._options.retriever or self._options.retriever_revision) and not self._depends_on(
-            "retriever"
-        ):
-            raise UsageError(
-                f"--retriever: no context of {names} retrieves frames; leave it out, or ask "
-                "nieh_clip_retrieval or nieh_memory_frames, or --memory clip"
-            )
-        if self._options.trajectories and not self._depends_on("trajectories"):
-            raise UsageError(
-                f"--trajectories: no context of {names} tells of the trajectory beside its frames; "
-                "leave it out, or ask nieh_interleaved or nieh_text_state"
-            )
-
-    def _depends_on(self, source: str) -> bool:
-        """Return whether a context of the tasks reads a source beside the set."""
-        return any(source in task.sources for task in self._tasks)
 
 
 class PreparedEvaluation:
     """Samples of known contexts set up for a run of a model; see `infthor_eval.runs.Evaluation`."""
 
-    def __init__(self, prepared: Mapping[str, PreparedTask]) -> None:
+    def __init__(self, tasks: Mapping[str, PreparedTask]) -> None:
         """Take tasks by name."""
-        self._prepared = prepared
+        self.tasks = tasks
 
     def bind(self, subject: Subject) -> "BoundNieh":
         """See `infthor_eval.runs.Evaluation.bind`."""
-        return BoundNieh(Workload(_groups(self._prepared)), self._prepared, answerer_of(subject))
+        return BoundNieh(Workload(_groups(self.tasks)), self.tasks, answerer_of(subject))
+
+    def to_doc(self, header: RunHeader[NiehConfig], record: UnitRecord[NiehAnswer]) -> UnitDoc:
+        """See `infthor_eval.runs.Evaluation.to_doc`."""
+        prepared = self.tasks[record.task]
+        number = self._numbers[record.key.once]
+        sample = prepared.task_samples.samples[number]
+        if record.payload.recall is not None:
+            sample = apply_recall(sample, record.payload.recall)
+        videos = header.config.tasks[record.task].film == "video"
+        return UnitDoc(
+            number=number,
+            doc=doc_of(prepared.task_samples, sample),
+            target=doc_target(sample.question),
+            prompt=prompt_of(prepared.task_samples, sample, videos=videos),
+            settings=prepared.generation_kwargs,
+            reply=record.payload.reply or "",
+        )
+
+    @cached_property
+    def _numbers(self) -> dict[UnitKey, int]:
+        """Positions of the samples in their tasks."""
+        return {
+            UnitKey(name, sample.question.id, sample.variant): number
+            for name, prepared in self.tasks.items()
+            for number, sample in enumerate(prepared.task_samples.samples)
+        }
 
 
 class BoundNieh:
@@ -181,38 +190,18 @@ class BoundNieh:
     ) -> Iterator[UnitRecord[NiehAnswer]]:
         """See `infthor_eval.runs.BoundEvaluation.run`."""
         task = group.units[0].key.task
+        answerer = self._answerer
         yield from answer_units(
-            group.units, self._prepared[task], self._answerer.open(task, session), session
-        )
-
-    def to_sample(self, record: UnitRecord[NiehAnswer]) -> UnitSample:
-        """See `infthor_eval.runs.BoundEvaluation.to_sample`."""
-        prepared = self._prepared[record.task]
-        number = self._numbers[record.key.once]
-        sample = prepared.task_samples.samples[number]
-        if record.payload.recall is not None:
-            sample = apply_recall(sample, record.payload.recall)
-        videos = bool(self._answerer.video_input)
-        return UnitSample(
-            number=number,
-            doc=doc_of(prepared.task_samples, sample),
-            target=doc_target(sample.question),
-            prompt=prompt_of(prepared.task_samples, sample, videos=videos),
-            settings=prepared.generation_kwargs,
-            reply=record.payload.reply or "",
+            group.units,
+            self._prepared[task],
+            answerer.video_input,
+            answerer.open(task),
+            answerer.open_notebook(session),
+            session,
         )
 
     def close(self) -> None:
         """Nothing is held."""
-
-    @cached_property
-    def _numbers(self) -> dict[UnitKey, int]:
-        """Positions of the samples in their tasks."""
-        return {
-            UnitKey(name, sample.question.id, sample.variant): number
-            for name, prepared in self._prepared.items()
-            for number, sample in enumerate(prepared.task_samples.samples)
-        }
 
 
 def _groups(prepared: Mapping[str, PreparedTask], repeats: int = 1) -> list[Group[NiehUnit]]:

@@ -6,34 +6,28 @@ under `process_results`, with its metrics under `metric_list`, as in lm-eval.
 
 import importlib
 import importlib.util
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from infthor_eval.errors import STOPS, DataError, UserCodeError, describe_exception, in_one_line
+from infthor_eval.errors import STOPS, DataError, in_one_line
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import Doc, doc_of
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.scoring import SCORERS, STRICT_RULES, scores
 from infthor_eval.pairs import PAIR_BOUNDS
 from infthor_eval.quantities import require_number
+from infthor_eval.questions.asking import wrap_metric_errors
 from infthor_eval.runs.catalog import TaskFile
-from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.digests import digest_of_file
-from infthor_eval.storage.limits import SCORER_SECONDS
 
 _OURS = (
     "infthor_eval.harness.nieh_task.process_results",
     "infthor_eval.harness.nieh_task.process_pair",
 )
 ProcessResults = Callable[[Doc, list[str]], Mapping[str, Any]]
-
-
-class MetricError(UserCodeError, DataError):
-    """A metrics function from elsewhere raised an exception, or its result lacks a metric."""
 
 
 @dataclass(frozen=True)
@@ -62,26 +56,6 @@ class Metrics:
         with wrap_metric_errors(f"process_results fails on {sample.question.id}"):
             results = self.process(doc_of(task_samples, sample), [reply])
             return {name: require_number(name, results[name]) for name in self.names}
-
-
-@contextmanager
-def wrap_metric_errors(problem: str) -> Iterator[None]:
-    """Turn any exception in a metrics function into a `MetricError` of one line, with its place.
-
-    Args:
-        problem: the function and the question that it fails on.
-
-    Raises:
-        MetricError: the function raises an exception, or takes longer than
-            `limits.SCORER_SECONDS`.
-    """
-    try:
-        with limit_by(SCORER_SECONDS, problem, MetricError):
-            yield
-    except (MetricError, *STOPS):
-        raise
-    except BaseException as error:  # it is anybody's code, and may call `sys.exit`
-        raise MetricError(f"{problem}: {describe_exception(error)}") from error
 
 
 PUBLISHED = Metrics(SCORERS, code={"strict": STRICT_RULES})

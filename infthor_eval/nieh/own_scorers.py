@@ -9,10 +9,10 @@ from typing import Any, Protocol
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.question import Answer
-from infthor_eval.nieh.metrics import MetricError, wrap_metric_errors
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.plugins import PluginTable
 from infthor_eval.quantities import require_number
+from infthor_eval.questions.asking import MetricError, wrap_metric_errors
 from infthor_eval.runs import UnitKey, UnitRecord
 from model_adapters.adapter_identity import package_identity
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file

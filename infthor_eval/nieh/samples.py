@@ -25,6 +25,7 @@ from infthor_eval.nieh.options import NO_CLUE
 from infthor_eval.nieh.prompts import PUBLISHED_MAIN
 from infthor_eval.nieh.published.hub_data import default_folder
 from infthor_eval.runs.limiting import spread
+from infthor_eval.settings import read
 from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.storage.once import once_a_command
 
@@ -153,9 +154,9 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
     """
     name = config.get("context", DEFAULT_CONTEXT)
     context = context_named(name)
-    settings = ContextSettings.read(config)
+    settings = read(ContextSettings, config)
     data = find_set(**config)
-    check_prompt(name, settings.prompt)
+    check_prompt(name, settings.words)
     frame_ablation = FrameAblation(settings.frames, settings.seed)
     frame_ablation.check(data)
     items = [
@@ -167,7 +168,7 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
     skipped = [sample for sample in items if isinstance(sample, SkippedQuestion)]
     sources = context.sources(data, settings)
     return TaskSamples(
-        data, name, context, samples, skipped, sources, frame_ablation, settings.prompt
+        data, name, context, samples, skipped, sources, frame_ablation, settings.words
     )
 
 

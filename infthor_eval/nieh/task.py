@@ -1,8 +1,7 @@
 """A task of NIEH: its file, its samples, and how their replies become records."""
 
-import difflib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -23,11 +22,12 @@ from infthor_eval.nieh.other_homes import without_alike
 from infthor_eval.nieh.samples import TaskSamples, find_samples, find_set
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
+from infthor_eval.settings import check_names, read
 from infthor_eval.storage.folders import packaged_folder
-from model_adapters import Decoding, cut_at_stop
+from model_adapters import Decoding
 
 # Keys of `dataset_kwargs` beside the settings of contexts.
-_OF_SETS = ("context", "leaves_open", "data", "bundled")
+_OF_SETS = ("leaves_open", "data", "bundled")
 _NEEDED = (
     "custom_dataset",
     "dataset_kwargs",
@@ -43,7 +43,7 @@ class PreparedTask:
     """A task with what turns samples into records; `generation_kwargs` in lm-eval's words.
 
     Attributes:
-        stop: strings that end an answer behind thoughts; the decoding's own would end the thoughts.
+        stop: see `infthor_eval.questions.asking.Request`.
     """
 
     task_samples: TaskSamples
@@ -52,21 +52,13 @@ class PreparedTask:
     metrics: Metrics = PUBLISHED
     stop: tuple[str, ...] = ()
 
-    def cut(self, answer: str) -> str:
-        """Return an answer before its first stop string."""
-        before = cut_at_stop(answer, self.stop)
-        return answer if before is None else before
-
 
 class NiehTask:
     """A task file, as far as it can be read before the model is loaded.
 
     Attributes:
         settings: contents of its file; with the run's context, if it leaves that open.
-        takes_context: True if its context is one of the run's options.
         needs_size: True if the samples depend on the model's tokens per frame.
-        takes_memory: True if its memory is one of the run's options.
-        takes_prompt: True if its prompt is.
         task_samples: the samples; None if they depend on the model.
     """
 
@@ -81,8 +73,8 @@ class NiehTask:
         check_task_file(file)
         self.name = file.name
         own = file.settings["dataset_kwargs"]
-        self.takes_context = _leaves_context_open(own)
-        if self.takes_context:
+        leaves_context_open = _leaves_context_open(own)
+        if leaves_context_open:
             own = _context_of(request.options) | own
         self.settings: Mapping[str, Any] = {**file.settings, "dataset_kwargs": own}
         self._limit = request.limit
@@ -96,8 +88,12 @@ class NiehTask:
         self.needs_size = (
             CONTEXTS[self._config["context"]].needs_model or self._config.get("budget") is not None
         )
-        self.takes_memory = self._config["context"] == MEMORY and "memory" not in own
-        self.takes_prompt = "prompt" not in own
+        self._takes = {
+            "context": leaves_context_open,
+            "memory": self._config["context"] == MEMORY and "memory" not in own,
+            "prompt": "prompt" not in own,
+            "size": self.needs_size,
+        }
         self.task_samples: TaskSamples | None = (
             None if self.needs_size else find_samples(self._config, self._limit)
         )
@@ -107,9 +103,13 @@ class NiehTask:
         """Whatever the frames depend on besides the set and the settings (`Context.sources`)."""
         if self.task_samples is not None:
             return self.task_samples.sources
-        return CONTEXTS[self._config["context"]].sources(
-            self.data, ContextSettings.read(self._config)
-        )
+        settings = read(ContextSettings, self._config)
+        return CONTEXTS[self._config["context"]].sources(self.data, settings)
+
+    def takes(self, where: str) -> bool:
+        """Return whether options that apply there (`Setting.where`) have an effect on it."""
+        taken = self._takes.get(where)
+        return where in self.sources if taken is None else taken  # which takes long to find
 
     def prepare(self, tokens_per_frame: int | None) -> PreparedTask:
         """Prepare the task for a model, given a frame's tokens where samples depend on them."""
@@ -168,12 +168,8 @@ def check_task_file(file: TaskFile) -> None:
     file.require("dataset_kwargs")
     location = f"{file.path}: dataset_kwargs"
     raw = file.settings["dataset_kwargs"]
-    known = (*_OF_SETS, *(setting.name for setting in fields(ContextSettings)))
-    for key in raw if isinstance(raw, Mapping) else ():
-        if key not in known:
-            near = difflib.get_close_matches(str(key), known, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(sorted(known))}"
-            raise DataError(f"{location}: {key} is not known; {hint}")
+    if isinstance(raw, Mapping):
+        check_names(ContextSettings, raw, location, _OF_SETS)
     if not isinstance(raw, Mapping) or not (
         isinstance(raw.get("context"), str) or _leaves_context_open(raw)
     ):
@@ -184,7 +180,7 @@ def check_task_file(file: TaskFile) -> None:
     for key in _OF_SETS:
         if not isinstance(raw.get(key, ""), str):
             raise DataError(f"{location}: {key} is {raw[key]!r:.60}; it is a name")
-    settings = ContextSettings.read(raw, location)
+    settings = read(ContextSettings, raw, location)
     if "context" in raw:
         _check_context(raw["context"], settings, location)
     if "bundled" in raw:
@@ -204,7 +200,7 @@ def _check_context(name: str, settings: ContextSettings, location: str) -> None:
     if context is None:
         raise UsageError(f"{location}: context is {name!r:.60}; it is one of {', '.join(CONTEXTS)}")
     try:
-        check_prompt(name, settings.prompt)
+        check_prompt(name, settings.words)
     except UsageError as error:
         raise UsageError(f"{location}: {error}") from error
     if context.needs_model and settings.ctx_size is None:

@@ -18,7 +18,7 @@ from infthor_eval.plans.records import PlanRecord
 from infthor_eval.plans.runner import PlanRunner, plan_record
 from infthor_eval.plans.task import PlansTask
 from infthor_eval.plans.trajectories import PlanTrajectory
-from infthor_eval.runs import Group, Session, TaskRequest, UnitRecord, UnitSample
+from infthor_eval.runs import Group, RunHeader, Session, TaskRequest, UnitDoc, UnitRecord
 from infthor_eval.storage.scratch import ScratchFolder
 from model_adapters import Model, Subject, check_decoding
 
@@ -55,6 +55,24 @@ class PlansEvaluation(EpisodeEvaluation[PlansOptions, PlansTask, PlanUnit]):
         if isinstance(subject, Model):
             _refuse_incapable(subject, self.options, self.tasks.values())
         return BoundPlans(self, actor_factory(subject, self.trajectories))
+
+    def to_doc(self, header: RunHeader[PlansConfig], record: UnitRecord[PlanRecord]) -> UnitDoc:
+        """See `infthor_eval.runs.Evaluation.to_doc`."""
+        payload = record.payload
+        task = self.tasks[record.task]
+        return UnitDoc(
+            number=self._numbers[record.key],
+            doc={
+                "traj_id": record.cluster,
+                "plan": payload.index,
+                "kind": payload.kind,
+                "goal": payload.goal,
+            },
+            target=payload.plan,
+            prompt=f"{payload.goal}\n{payload.plan}",
+            settings=task.file.settings["generation_kwargs"],
+            reply=", ".join(step.action or (step.reply or "") for step in payload.steps),
+        )
 
 
 class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
@@ -141,24 +159,6 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
     ) -> EpisodeResult[PlanRecord]:
         runner.prepare([other.episode for other in group.units])
         return runner.run(unit.episode)
-
-    def to_sample(self, record: UnitRecord[PlanRecord]) -> UnitSample:
-        """See `infthor_eval.runs.BoundEvaluation.to_sample`."""
-        payload = record.payload
-        task = self._tasks[record.task]
-        return UnitSample(
-            number=self._numbers[record.key],
-            doc={
-                "traj_id": record.cluster,
-                "plan": payload.index,
-                "kind": payload.kind,
-                "goal": payload.goal,
-            },
-            target=payload.plan,
-            prompt=f"{payload.goal}\n{payload.plan}",
-            settings=task.file.settings["generation_kwargs"],
-            reply=", ".join(step.action or (step.reply or "") for step in payload.steps),
-        )
 
 
 def _refuse_incapable(model: Model, options: PlansOptions, tasks: Iterable[PlansTask]) -> None:

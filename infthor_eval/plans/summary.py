@@ -16,6 +16,7 @@ from infthor_eval.episodes.summary import (
     success_rate,
     summarise_episodes,
 )
+from infthor_eval.facets import Facet
 from infthor_eval.plans.config import PlansConfig, PlansTaskConfig
 from infthor_eval.plans.plan import PlanKind
 from infthor_eval.plans.published.log import log_rows
@@ -107,9 +108,7 @@ def _summarise_task(
         n_plans=len(counted) + n_missing,
         n_tried=sum(record.payload.attempted for record in answered) if has_steps else None,
         success={name: rate for name, rate in success.items() if rate is not None},
-        by_kind={
-            str(kind): rate for kind in PlanKind if (rate := _success(counted, frozenset({kind})))
-        },
+        by_kind=_BY_KIND.means(counted, success_rate),
         path_weighted=_out_of(
             clustered_rate(
                 [_path_weight(item.payload) for item in acted], [item.cluster for item in acted]
@@ -121,8 +120,8 @@ def _summarise_task(
         max_reward=whole.of_trajectories(lambda _, most: most),
         goals=whole.goals(),
         goal_conditions=whole.goal_conditions(),
-        by_distance=_by_class(acted, _distance, (*DISTANCES, NEVER)),
-        by_tokens=_by_class(acted, _clue_tokens, LENGTHS),
+        by_distance=BY_DISTANCE.means(acted, success_rate),
+        by_tokens=BY_TOKENS.means(acted, success_rate),
         n_actions=sum(len(record.payload.steps) for record in acted) if has_steps else None,
         rules=_rules(config.rewards),
         logged=_logged(whole.trajectories),
@@ -228,24 +227,22 @@ def _out_of(rate: Rate | None, n_all: int) -> Rate | None:
     return None if rate is None else rate.out_of(n_all)
 
 
-def _by_class(
-    records: Sequence[Record], class_of: Callable[[PlanRecord], str | None], names: Sequence[str]
-) -> dict[str, Rate]:
-    """Return the share of plans done in each class that has plans; some plans are in none."""
-    groups: dict[str, list[Record]] = {}
-    for record in records:
-        name = class_of(record.payload)
-        if name is not None:
-            groups.setdefault(name, []).append(record)
-    rates = {name: success_rate(groups[name]) for name in names if name in groups}
-    return {name: rate for name, rate in rates.items() if rate is not None}
-
-
-def _distance(plan: PlanRecord) -> str | None:
+def _distance(record: Record) -> str | None:
+    plan = record.payload
     if not plan.is_final:
         return None
     return NEVER if plan.clue_distance is None else distance_class(plan.clue_distance)
 
 
-def _clue_tokens(plan: PlanRecord) -> str | None:
-    return None if plan.clue_tokens is None else length_class(plan.clue_tokens)
+def _clue_tokens(record: Record) -> str | None:
+    tokens = record.payload.clue_tokens
+    return None if tokens is None else length_class(tokens)
+
+
+_BY_KIND = Facet[Record](
+    "kind", "kind of plan", lambda record: record.payload.kind, tuple(map(str, PlanKind))
+)
+BY_DISTANCE = Facet(
+    "distance", "frames since what they need was in view", _distance, (*DISTANCES, NEVER)
+)
+BY_TOKENS = Facet("tokens", "thousand tokens since then", _clue_tokens, LENGTHS)

@@ -5,7 +5,6 @@ from typing import Any
 
 from msgspec import UNSET
 
-from infthor_eval.distances import DISTANCES, LENGTHS
 from infthor_eval.episodes.tables import (
     NAME_COLUMNS,
     endings_table,
@@ -13,9 +12,15 @@ from infthor_eval.episodes.tables import (
     result_notes,
     run_name,
 )
+from infthor_eval.facets import facet_table
 from infthor_eval.formats.published import PUBLISHED_DATA, published_tables
 from infthor_eval.plans.config import PlansTaskConfig
-from infthor_eval.plans.summary import FINAL_COLUMNS, NEVER, PlanTaskSummary
+from infthor_eval.plans.summary import (
+    BY_DISTANCE,
+    BY_TOKENS,
+    FINAL_COLUMNS,
+    PlanTaskSummary,
+)
 from infthor_eval.plans.twins.tables import NET_PAIRS, format_pairs, twin_tables
 from infthor_eval.rates import Rate, format_number, format_percent
 from infthor_eval.runs import RunSummary
@@ -101,29 +106,17 @@ def _distance_tables(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> list[
     """Return tables of final tasks' plans by the distance of their clues, in frames and tokens."""
     by_frames = [((run, name), task.by_distance) for run, name, task in tasks]
     by_tokens = [((run, name), task.by_tokens) for run, name, task in tasks]
-    title = "frames since what they need was in view"
-    tables = [
-        _distance_table(title, by_frames, (*DISTANCES, NEVER)),
-        _distance_table("thousand tokens since then", by_tokens, LENGTHS),
+    return [
+        table
+        for facet, named in ((BY_DISTANCE, by_frames), (BY_TOKENS, by_tokens))
+        for table in facet_table(
+            f"Final tasks: plans completed, % (plans), by {facet.heading}",
+            [column.name for column in NAME_COLUMNS],
+            facet.in_order(name for _, rates in named for name in rates),
+            [(names, rates) for names, rates in named if rates],
+            _rate_and_n,
+        )
     ]
-    return [table for table in tables if table.rows]
-
-
-def _distance_table(
-    title: str,
-    tasks: Sequence[tuple[tuple[str, str], Mapping[str, Rate]]],
-    order: Sequence[str],
-) -> Table:
-    """Return the table of tasks' rates by distance; without rows if there is no rate."""
-    known = {distance for _, rates in tasks for distance in rates}
-    distances = [distance for distance in order if distance in known]
-    rows = []
-    for names, rates in tasks:
-        if rates:
-            cells = [_rate_and_n(rates.get(distance)) for distance in distances]
-            rows.append(Row((*names, *cells)))
-    columns = (*NAME_COLUMNS, *map(Column, distances))
-    return Table(f"Final tasks: plans completed, % (plans), by {title}", columns, tuple(rows))
 
 
 def _rate_and_n(rate: Rate | None) -> str:

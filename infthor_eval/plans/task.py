@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from typing import Annotated
 
-from infthor_eval.episodes.task_settings import task_settings
+from infthor_eval.episodes.task_settings import task_settings, with_options
 from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.object_ids import Words
@@ -14,60 +15,56 @@ from infthor_eval.plans.environment import MAX_STEPS
 from infthor_eval.plans.history.forms import LastTokens, history_named
 from infthor_eval.plans.history.recalled import MemoryChoice, RecalledHistory
 from infthor_eval.plans.history.retrieved import require_retrieved
-from infthor_eval.plans.options import PlansOptions
+from infthor_eval.plans.options import (
+    AfterFailure,
+    History,
+    PlansOptions,
+    Protocol,
+    Rewards,
+    WordsName,
+)
 from infthor_eval.plans.plan import Plan
 from infthor_eval.plans.published.final_protocol import MAX_STEPS as MAX_FINAL_STEPS
 from infthor_eval.plans.published.final_protocol import FinalForm, chat_form, final_form
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.trajectories import PlanTrajectory, read_plan_trajectory
 from infthor_eval.plans.twins.looking import worlds_together
+from infthor_eval.quantities import Total
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.runs.limiting import limit_items
-
-_CHOICES = {
-    "plans": ("all", "final"),
-    "protocol": ("default", "published"),
-    "after_failure": ("continue", "stop"),
-    "words": tuple(map(str, Words)),
-}
-
-# Settings that are options too.
-_GIVEN = ("rewards", "words", "history", "protocol", "after_failure")
+from infthor_eval.settings import Setting
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlanTaskSettings:
-    """`dataset_kwargs` of a task file.
+    """`dataset_kwargs` of a task file."""
 
-    Attributes:
-        plans: "all" plans, or those of the "final" long-horizon task.
-        bundled: name of a set of trajectories in the package.
-        rewards: name of the reward rules.
-        words: the words of plans and actions, see `Words`.
-        history: how much of the history a model is given.
-        protocol: whether each plan begins in the true state ("default"), or a final task is done in
-            one go as in the "published" scripts (`final_protocol`).
-        after_failure: whether to "continue" from the true state after a failed plan, or to "stop".
-        max_steps: maximum number of steps of one plan.
-        preamble: text before everything else that a model is given.
-    """
-
-    plans: str = "all"
-    bundled: str | None = None
-    rewards: str = "default"
-    words: str = Words.PUBLISHED
-    history: str = "full"
-    protocol: str = "default"
-    after_failure: str = "continue"
-    max_steps: int = MAX_STEPS
-    preamble: str = ""
+    plans: Annotated[
+        str,
+        Setting(
+            help='"all" plans, or those of the "final" long-horizon task.',
+            choices=("all", "final"),
+        ),
+    ] = "all"
+    bundled: Annotated[
+        str | None, Setting(help="Name of a set of trajectories in the package.")
+    ] = None
+    rewards: Rewards = "default"
+    words: WordsName = Words.PUBLISHED
+    history: History = "full"
+    protocol: Protocol = "default"
+    after_failure: AfterFailure = "continue"
+    max_steps: Annotated[Total, Setting(help="Maximum number of steps of one plan.")] = MAX_STEPS
+    preamble: Annotated[str, Setting(help="Text before everything else that a model is given.")] = (
+        ""
+    )
 
 
 def check_task_file(file: TaskFile) -> None:
     """Check a task file's settings; raises DataError if one is unknown or its value not allowed."""
     file.require("dataset_kwargs")
-    task_settings(file, PlanTaskSettings, {}, _CHOICES)
+    task_settings(file, PlanTaskSettings)
 
 
 class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
@@ -91,8 +88,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         """
         file.require("dataset_kwargs", "generation_kwargs")
         self._options = request.options
-        overrides = {name: getattr(self._options, name) for name in _GIVEN}
-        settings = task_settings(file, PlanTaskSettings, overrides, _CHOICES)
+        settings = with_options(task_settings(file, PlanTaskSettings), self._options)
         rules = reward_rules(settings.rewards)
         self.rules = rules.forcing() if self._options.force_action else rules
         self.words = Words(settings.words)

@@ -13,6 +13,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.runs import RunConfig
+from infthor_eval.settings import causes_of
 
 Path = tuple[str, ...]
 _ABSENT = "-"
@@ -110,17 +111,13 @@ _KINDS = (
     _Kind(
         "the words of the question",
         _SENT,
-        ("prompt", f"{_CONTEXT}.prompt", *_each(_FILE, "doc_to_text doc_to_image")),
+        _each(_FILE, "doc_to_text doc_to_image"),
     ),
-    _Kind(
-        "the memory",
-        _SENT,
-        ("memory", "memory_args", "budget", f"{_TASK}.sources.memory", f"{_CONTEXT}.budget"),
-    ),
+    _Kind("the memory", _SENT, (f"{_TASK}.sources.memory",)),
     _Kind(
         "the context or its window",
         _SENT | _CHOSEN,
-        (_CONTEXT, "k_tokens", "tokens_per_frame", *_each(_TASK, "film sources")),
+        (_CONTEXT, *_each(_TASK, "film sources")),
     ),
     _Kind(
         "the model",
@@ -161,7 +158,7 @@ _KINDS = (
         _SCORED,
         ("rescored", f"{_TASK}.metrics", *_each(_FILE, "metric_list process_results")),
     ),
-    _Kind("which questions are asked", _CHOSEN, ("limit", "repeats", f"{_TASK}.skipped")),
+    _Kind("which questions are asked", _CHOSEN, ("limit", f"{_TASK}.skipped")),
     _Kind("the version of infthor-eval", _ANY, ("infthor_eval", "suite_code")),
     _Kind("other settings", _ANY, ("*",)),
 )
@@ -197,11 +194,12 @@ def differing_causes(first: RunConfig[Any], second: RunConfig[Any]) -> list[Caus
     one, other = (dict(_flat(document)) for document in _documents(first, second))
     pairs = {path: (one.get(path, _ABSENT), other.get(path, _ABSENT)) for path in one | other}
     differing = {path: values for path, values in pairs.items() if len(set(values)) > 1}
+    declared = causes_of(type(first))
     found: dict[str, list[Setting]] = {}
     for path, values in differing.items():
         if _TOLD_ELSEWHERE.has(path):
             continue
-        kind = next(kind for kind in _KINDS if kind.has(path))
+        kind = _find_kind(path, declared)
         if _ENGINE_SETTING in differing and _is_of_engine(path, values):
             kind = _ENGINE
         found.setdefault(kind.name, []).append(Setting(".".join(path), *values))
@@ -210,6 +208,15 @@ def differing_causes(first: RunConfig[Any], second: RunConfig[Any]) -> list[Caus
         for kind in _KINDS
         if kind.name in found
     ]
+
+
+def _find_kind(path: Path, declared: Mapping[str, str]) -> _Kind:
+    """Return the cause that a setting is, by its path: the one that is declared with it, where the
+    setting is of the run or of a task file."""
+    name = path[4] if len(path) > 4 and _begins(path, _CONTEXT.split(".")) else path[0]
+    cause = declared.get(name)
+    found = next((kind for kind in _KINDS if kind.name == cause), None)
+    return found or next(kind for kind in _KINDS if kind.has(path))
 
 
 def _is_of_engine(path: Path, values: Sequence[Any]) -> bool:

@@ -12,9 +12,9 @@ from typing import Any
 
 from infthor_eval.errors import DataError
 from infthor_eval.report.causes import Effect
-from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.presenter import THOUGHT, ReplyTokens
 from infthor_eval.report.same_questions import Side, find_sides
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
 
 Record = UnitRecord[Any]
@@ -140,7 +140,7 @@ class _Pair:
     same_decoding: bool
 
 
-def compare_questions(first: PresentedRun, second: PresentedRun) -> Compared:
+def compare_questions(first: Run, second: Run) -> Compared:
     """Compare two runs of one suite question by question.
 
     A task and variant (a depth) is compared with that of its name; a run's only one with the only
@@ -185,7 +185,7 @@ def compare_questions(first: PresentedRun, second: PresentedRun) -> Compared:
     return Compared(len(shared[0]), (fmean(scores[0]), fmean(scores[1])), differences)
 
 
-def _pairs(runs: tuple[PresentedRun, PresentedRun]) -> Iterator[_Pair]:
+def _pairs(runs: tuple[Run, Run]) -> Iterator[_Pair]:
     for first, second in _paired_sides(find_sides(runs)):
         records = [_by_key(side) for side in (first, second)]
         same = first is not None and second is not None and _decode_alike(runs, (first, second))
@@ -208,7 +208,7 @@ def _by_key(side: Side | None) -> dict[UnitKey, Record]:
     return {} if side is None else {record.key: record for record in side.records}
 
 
-def _decode_alike(runs: tuple[PresentedRun, PresentedRun], sides: tuple[Side, Side]) -> bool:
+def _decode_alike(runs: tuple[Run, Run], sides: tuple[Side, Side]) -> bool:
     """Return whether hashes of requests, which have the decoding in them, tell of the rest.
 
     Those of imported replies are of the replies.
@@ -223,7 +223,7 @@ def _decode_alike(runs: tuple[PresentedRun, PresentedRun], sides: tuple[Side, Si
     return bool(decoding[0] == decoding[1])
 
 
-def _answer(run: PresentedRun, record: Record | None) -> Answer:
+def _answer(run: Run, record: Record | None) -> Answer:
     if record is None:
         return Answer("not in the run")
     if record.state != "answered":
@@ -236,7 +236,7 @@ def _answer(run: PresentedRun, record: Record | None) -> Answer:
 
 
 def _effects(
-    runs: tuple[PresentedRun, PresentedRun], pair: _Pair, answers: tuple[Answer, Answer]
+    runs: tuple[Run, Run], pair: _Pair, answers: tuple[Answer, Answer]
 ) -> frozenset[Effect]:
     n_answered = sum(answer.score is not None for answer in answers)
     if n_answered == 0:
@@ -256,7 +256,7 @@ def _effects(
     return frozenset(effects | _request_effects(pair.first, pair.second, pair.same_decoding))
 
 
-def _scores_differ(runs: tuple[PresentedRun, PresentedRun], records: tuple[Record, Record]) -> bool:
+def _scores_differ(runs: tuple[Run, Run], records: tuple[Record, Record]) -> bool:
     first, second = (run.suite.scores(record) for run, record in zip(runs, records, strict=True))
     if any(first[name] != second[name] for name in first.keys() & second.keys()):
         return True

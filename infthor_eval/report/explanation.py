@@ -17,7 +17,7 @@ from infthor_eval.report.differences import (
     QuestionDifference,
     compare_questions,
 )
-from infthor_eval.report.presented import PresentedRun
+from infthor_eval.run import Run
 from infthor_eval.tables import Column, Row, Table
 
 _N_SHOWN = 5  # questions in the table, unless all are wanted
@@ -75,7 +75,7 @@ class Explanation:
             nothing.
     """
 
-    runs: tuple[PresentedRun, PresentedRun]
+    runs: tuple[Run, Run]
     compared: Compared
     findings: Sequence[_Finding]
 
@@ -222,7 +222,7 @@ class Explanation:
         return Row((question, *said, *where, *scores, carries))
 
 
-def explain_runs(first: PresentedRun, second: PresentedRun) -> Explanation:
+def explain_runs(first: Run, second: Run) -> Explanation:
     """Explain why two runs of one suite differ.
 
     Raises:

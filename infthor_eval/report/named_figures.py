@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from infthor_eval.errors import UsageError
-from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.presenter import Figure, FigureRequest, FigureResult
-from infthor_eval.report.runs import ReportRun
+from infthor_eval.run import Run, open_runs
 from infthor_eval.suites import find_presenter, suite_names
 
 if TYPE_CHECKING:
@@ -40,7 +39,7 @@ def build_figure(
         raise UsageError(
             f"--figure {name}: is none that can be drawn; there are {', '.join(abouts)}"
         )
-    runs = read_report_runs(folders, tell)
+    runs = open_runs(folders, tell)
     figure = _require_figure(runs, name, owners)
     if request.panels is not None and not figure.has_panels:
         raise UsageError(f"--panels: figure {name} has panels of its own; leave it out")
@@ -61,7 +60,7 @@ def load_figure(
 
 
 def _require_figure(
-    runs: Sequence[ReportRun], name: str, owners: Mapping[str, Mapping[str, Figure]]
+    runs: Sequence[Run], name: str, owners: Mapping[str, Mapping[str, Figure]]
 ) -> Figure:
     """Return the figure of a name; of different ones of two packages the first run decides."""
     first = runs[0].suite.name

@@ -17,11 +17,11 @@ from infthor_eval.report.presenter import (
     ReplyTokens,
     Timelines,
 )
-from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.sample_columns import SampleColumn
 from infthor_eval.report.web.samples import Prompt, StepRow
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
 
 _LONGEST = 2000  # characters of a field on the page
@@ -82,15 +82,15 @@ class PlainPresenter:
         """See `Presenter.group_scores`: none."""
         return ()
 
-    def opening(self, runs: Sequence[ReportRun]) -> Section | None:
+    def opening(self, runs: Sequence[Run]) -> Section | None:
         """See `Presenter.opening`: none."""
         return None
 
-    def charts(self, runs: Sequence[ReportRun]) -> Sequence[Chart]:
+    def charts(self, runs: Sequence[Run]) -> Sequence[Chart]:
         """See `Presenter.charts`: none."""
         return ()
 
-    def sections(self, runs: Sequence[ReportRun]) -> Iterable[Section]:
+    def sections(self, runs: Sequence[Run]) -> Iterable[Section]:
         """See `Presenter.sections`: none."""
         return ()
 
@@ -122,16 +122,16 @@ class PlainPresenter:
         """See `Presenter.steps`: none."""
         return ()
 
-    def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
+    def prompts(self, run: Run, data: Path | None) -> Mapping[UnitKey, Prompt]:
         """See `Presenter.prompts`: none."""
         return {}
 
-    def request_frames(self, run: ReportRun, data: Path | None) -> FindFrames:
+    def request_frames(self, run: Run, data: Path | None) -> FindFrames:
         """See `Presenter.request_frames`: none."""
         return lambda _: ()
 
     def timelines(
-        self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore
+        self, runs: Sequence[Run], data: Path | None, thumbnails: ThumbnailStore
     ) -> Timelines:
         """See `Presenter.timelines`: none."""
         return Timelines()

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.sample_columns import SampleColumn
 from infthor_eval.report.web.samples import FrameFacts, Prompt, StepRow, Timeline
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.tables import Table
 
@@ -130,7 +130,7 @@ class Figure:
     """
 
     about: str
-    build: Callable[[Sequence[ReportRun], FigureRequest], FigureResult]
+    build: Callable[[Sequence[Run], FigureRequest], FigureResult]
     has_panels: bool = True
 
 
@@ -213,7 +213,7 @@ class Replay(Protocol):
     options: Collection[str]
     sheet_rows: int
 
-    def select(self, run: ReportRun, selection: EpisodeSelection) -> Recording:
+    def select(self, run: Run, selection: EpisodeSelection) -> Recording:
         """Find the selected episodes in a run.
 
         Raises:
@@ -301,14 +301,14 @@ class Presenter(Protocol):
         """Return the scores of the groups in a run's records of a task; runs are compared on
         them."""
 
-    def opening(self, runs: Sequence[ReportRun]) -> Section | None:
+    def opening(self, runs: Sequence[Run]) -> Section | None:
         """Build the section that comes before the suite's own, with charts and tables of its own;
         tables of the suite that it has are not shown again."""
 
-    def charts(self, runs: Sequence[ReportRun]) -> Sequence[Chart]:
+    def charts(self, runs: Sequence[Run]) -> Sequence[Chart]:
         """Draw the charts of the suite's section; its tables are `Suite.tables`."""
 
-    def sections(self, runs: Sequence[ReportRun]) -> Iterable[Section]:
+    def sections(self, runs: Sequence[Run]) -> Iterable[Section]:
         """Build further sections, which follow the suite's own."""
 
     def describe(self, record: Record) -> Description:
@@ -330,14 +330,14 @@ class Presenter(Protocol):
     def steps(self, record: Record) -> Sequence[StepRow]:
         """Return the steps of a recorded episode; empty if it has none."""
 
-    def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
+    def prompts(self, run: Run, data: Path | None) -> Mapping[UnitKey, Prompt]:
         """Return the requests of a run's records, equal ones once; `data` is as for `timelines`."""
 
-    def request_frames(self, run: ReportRun, data: Path | None) -> FindFrames:
+    def request_frames(self, run: Run, data: Path | None) -> FindFrames:
         """Return what finds the frames of a record's request (`prompts`), in their order; it raises
         DataError where they cannot be found."""
 
     def timelines(
-        self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore
+        self, runs: Sequence[Run], data: Path | None, thumbnails: ThumbnailStore
     ) -> Timelines:
         """Find the samples' frames; `data` is the set's folder, None for the one a run names."""

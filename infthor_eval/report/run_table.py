@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator
-from datetime import UTC, datetime
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from infthor_eval.rates import Rate
-from infthor_eval.runs.stored.labels import label_runs
-from infthor_eval.runs.stored.search import StoredRun, find_runs
+from infthor_eval.run import Run, find_runs, told_apart
+from infthor_eval.runs import NOTHING
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -24,12 +23,11 @@ def load_runs(*folders: str | os.PathLike[str]) -> DataFrame:
 
     stored = []
     for run in chain.from_iterable(find_runs(Path(one), warnings.warn) for one in folders):
-        if isinstance(run, StoredRun):
+        if isinstance(run, Run):
             stored.append(run)
         else:
             warnings.warn(f"{run.folder}: cannot be read: {run.reason}", stacklevel=2)
-    labels = label_runs([(run.folder, run.header) for run in stored])
-    rows = [row for label, run in zip(labels, stored, strict=True) for row in _rows(label, run)]
+    rows = [row for run in told_apart(stored, ignore=()) for row in _rows(run)]
     return pandas.DataFrame(rows, columns=_COLUMNS)
 
 
@@ -55,25 +53,25 @@ _COLUMNS = [
 ]
 
 
-def _rows(label: str, run: StoredRun) -> Iterator[dict[str, Any]]:
-    usage = run.usage
-    is_whole = run.n_failed == 0 and run.n_not_asked == 0
+def _rows(run: Run) -> Iterator[dict[str, Any]]:
+    usage = run.results.usage if run.results else NOTHING
+    is_whole = run.states["failed"] == 0 and run.n_not_asked == 0
     of_run = {
-        "run": label,
-        "suite": run.header.suite,
+        "run": run.name,
+        "suite": run.listed.suite,
         "state": "whole" if is_whole else "incomplete",
-        "answered": run.n_answered,
-        "failed": run.n_failed,
+        "answered": run.states["answered"],
+        "failed": run.states["failed"],
         "not_asked": run.n_not_asked,
         "requests": usage.requests,
         "tokens_read": usage.context,
         "tokens_cached": usage.cached,
         "tokens_written": usage.reply,
         "cost": usage.cost,
-        "changed": datetime.fromtimestamp(run.changed, UTC),
+        "changed": run.changed,
         "folder": str(run.folder),
     }
-    for task in run.header.config.tasks:
+    for task in run.listed.config.tasks:
         rate = run.primary_metrics.get(task)
         yield {**of_run, "task": task, **({} if rate is None else _scores(rate))}
 

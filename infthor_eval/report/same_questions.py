@@ -14,7 +14,7 @@ import msgspec
 
 from infthor_eval.errors import DataError
 from infthor_eval.report.comparison import Comparison, compare, p_cell
-from infthor_eval.report.presented import PresentedRun
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
@@ -51,7 +51,7 @@ class ComparedSides:
     comparisons: Sequence[Comparison]
 
 
-def find_sides(runs: Sequence[PresentedRun]) -> list[Side]:
+def find_sides(runs: Sequence[Run]) -> list[Side]:
     """Return the sides of runs of one suite, in the order of runs, tasks and variants."""
     sides = []
     for number, run in enumerate(runs):
@@ -65,7 +65,7 @@ def find_sides(runs: Sequence[PresentedRun]) -> list[Side]:
     return sides
 
 
-def _by_question(run: PresentedRun, record: Record) -> Record:
+def _by_question(run: Run, record: Record) -> Record:
     """Return a record whose key is the question alone."""
     title, target, *_ = run.presenter.describe(record)
     question = msgspec.json.encode((record.id, title, target)).decode()
@@ -73,7 +73,7 @@ def _by_question(run: PresentedRun, record: Record) -> Record:
 
 
 def compare_sides(
-    runs: Sequence[PresentedRun], sides: Sequence[Side], against: int | None = None
+    runs: Sequence[Run], sides: Sequence[Side], against: int | None = None
 ) -> list[ComparedSides]:
     """Compare sides on the questions that both have a result of, the later one less the earlier.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
@@ -13,11 +13,11 @@ from typing import Any
 
 from infthor_eval.errors import DataError, unknown_name
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.report.presented import PresentedRun, read_report_runs
 from infthor_eval.report.presenter import Description
 from infthor_eval.report.runs import choose_evenly
 from infthor_eval.report.web.samples import Prompt, PromptFrames, StepRow
 from infthor_eval.report.web.thumbnails import ThumbnailStore
+from infthor_eval.run import Run, open_runs
 from infthor_eval.runs import UnitRecord
 
 _MOST_FRAMES = 24  # in a cell
@@ -35,7 +35,7 @@ class Sample:
         data: folder of its data set; None for the one that the run names.
     """
 
-    run: PresentedRun
+    run: Run
     record: UnitRecord[Any]
     data: Path | None = None
 
@@ -74,9 +74,9 @@ class Sample:
         return self.run.presenter.request_frames(self._alone, self.data)(self.record)
 
     @property
-    def _alone(self) -> PresentedRun:
+    def _alone(self) -> Run:
         """The run with this sample alone, so that no other request is made again."""
-        return replace(self.run, records=(self.record,))
+        return self.run.with_records((self.record,))
 
     def lines(self) -> Iterator[str]:
         """Yield the sample in words: what was asked, the reply, and why it got its score."""
@@ -147,7 +147,7 @@ class Sample:
         return "".join(parts) + self.description.title
 
 
-def find_samples(runs: Sequence[PresentedRun], name: str, data: Path | None = None) -> list[Sample]:
+def find_samples(runs: Sequence[Run], name: str, data: Path | None = None) -> list[Sample]:
     """Return the samples of a name in runs: an id, or a whole key with variant and repetition.
 
     Raises:
@@ -168,7 +168,7 @@ def load_sample(
     folder: str | os.PathLike[str], name: str, data: str | os.PathLike[str] | None
 ) -> Sample:
     """See `infthor_eval.load_sample`."""
-    runs = read_report_runs([Path(folder)], warnings.warn)
+    runs = open_runs([Path(folder)], warnings.warn)
     return find_samples(runs, name, None if data is None else Path(data))[0]
 
 

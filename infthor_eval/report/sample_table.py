@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from infthor_eval.formats.csv_files import shield
-from infthor_eval.report.presented import PresentedRun, read_report_runs
 from infthor_eval.report.sample_columns import ENVELOPE, SampleColumn
+from infthor_eval.run import Run, open_runs
 from infthor_eval.runs import UnitRecord
 from infthor_eval.terminal import printable
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 FORMS = ("csv", "parquet")
 
 
-def sample_table(runs: Sequence[PresentedRun]) -> Table:
+def sample_table(runs: Sequence[Run]) -> Table:
     """Return a table with a row per sample, in the order of the runs and of their units' keys.
 
     The columns are run, suite, `ENVELOPE`, a `score_...` for each metric, and those of the
@@ -37,7 +37,7 @@ def sample_table(runs: Sequence[PresentedRun]) -> Table:
     return pyarrow.concat_tables([_table_of(run) for run in runs], promote_options="default")
 
 
-def _table_of(run: PresentedRun) -> Table:
+def _table_of(run: Run) -> Table:
     import pyarrow
 
     types = {
@@ -60,21 +60,21 @@ def _table_of(run: PresentedRun) -> Table:
     return pyarrow.table(arrays)
 
 
-def _score_columns(run: PresentedRun) -> list[SampleColumn]:
+def _score_columns(run: Run) -> list[SampleColumn]:
     metrics = dict.fromkeys(metric for record in run.records for metric in run.suite.scores(record))
     return [
         SampleColumn(f"score_{metric}", float, partial(_score, run, metric)) for metric in metrics
     ]
 
 
-def _score(run: PresentedRun, metric: str, record: UnitRecord[Any]) -> float | None:
+def _score(run: Run, metric: str, record: UnitRecord[Any]) -> float | None:
     """Return a score as summaries count it; None for a unit without a result."""
     return run.suite.scores(record).get(metric, 0.0) if record.state == "answered" else None
 
 
 def load_run(folder: str | os.PathLike[str]) -> DataFrame:
     """See `infthor_eval.load_run`."""
-    return sample_table(read_report_runs([Path(folder)], warnings.warn)).to_pandas()
+    return sample_table(open_runs([Path(folder)], warnings.warn)).to_pandas()
 
 
 def encode_samples(table: Table, file_format: str) -> bytes:

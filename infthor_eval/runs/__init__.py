@@ -25,7 +25,7 @@ from infthor_eval.runs.suite import (
     Skipped,
     Suite,
     TaskRequest,
-    UnitSample,
+    UnitDoc,
     Workload,
 )
 from infthor_eval.runs.usage import NOTHING, Usage
@@ -64,9 +64,9 @@ __all__ = [
     "Tokens",
     "Unit",
     "UnitCounts",
+    "UnitDoc",
     "UnitKey",
     "UnitRecord",
-    "UnitSample",
     "Usage",
     "Workload",
     "check_equality",

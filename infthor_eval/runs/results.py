@@ -39,8 +39,9 @@ def results_document(
 
 
 def _reproducible(summary: Any) -> dict[str, Any]:
-    """Return a summary without its field `took`, if it has one: times differ from run to run."""
-    document: dict[str, Any] = msgspec.to_builtins(summary)
+    """Return a summary as it says itself (`document`), or all its fields; without `took`, as times
+    differ from run to run."""
+    document = summary.document() if hasattr(summary, "document") else msgspec.to_builtins(summary)
     return {name: value for name, value in document.items() if name != "took"}
 
 

@@ -9,9 +9,6 @@ and tables. Each further object exists only once all that it needs is known:
 
 `SuiteUnit` is the suite's unit, `Payload` the payload of its records.
 
-To add an option of a suite: a field with its help in the suite's options, as in
-`infthor_eval/nieh/options.py`; `is_place` in its metadata if it may name a file.
-
 To add or change what people see of a suite: its `overview` first, its `tables` with everything; its
 one number, `primary_metrics`.
 """
@@ -149,12 +146,12 @@ class Session(Protocol[Payload]):
 
 
 @dataclass(frozen=True)
-class UnitSample:
-    """A unit and its result, for readers that know no suites (lm-eval's format).
+class UnitDoc:
+    """A unit as lm-eval's files have it, which tell more of it than its record does.
 
     Attributes:
-        number: position among the samples of its task.
-        doc: the sample as JSON values.
+        number: position among the units of its task, repetitions counted once.
+        doc: what is asked, as JSON values, from the data set.
         target: the expected result in words.
         prompt: the request in words, with a placeholder for each frame.
         settings: decoding settings in lm-eval's words.
@@ -187,9 +184,6 @@ class BoundEvaluation(Protocol[SuiteUnit, Payload]):
                 only MemoryError ends the run.
         """
 
-    def to_sample(self, record: UnitRecord[Payload]) -> UnitSample:
-        """Convert a record of this workload for other readers; not after `close`."""
-
     def close(self) -> None:
         """Release what the work needed (simulators); called once, also if it was not finished."""
 
@@ -205,6 +199,9 @@ class Evaluation(Protocol[SuiteUnit, Payload]):
             DataError: the data do not match their format.
             ModelError: the model can take none of the units.
         """
+
+    def to_doc(self, header: RunHeader[Any], record: UnitRecord[Payload]) -> UnitDoc:
+        """Convert a record of a run of this work for lm-eval's files; nothing need be bound."""
 
 
 class Suite(Protocol[SuiteUnit, Payload]):
@@ -248,7 +245,8 @@ class Suite(Protocol[SuiteUnit, Payload]):
         """Summarise a run: a pure function of its journal, equal for equal records.
 
         What differs between a run and the same run resumed (times) is at most in a field `took`,
-        which results.json leaves out.
+        which results.json leaves out. A summary with a method `document` says itself what is in
+        results.json.
         """
 
     def scores(self, record: UnitRecord[Payload]) -> Mapping[str, float]:

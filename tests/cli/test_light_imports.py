@@ -58,13 +58,13 @@ FIRST_QUESTION = """
 import sys
 from infthor_eval.cli import main
 from infthor_eval.cli.own_code import end_process
-from infthor_eval.nieh.asking import answering
+from infthor_eval.questions import asking
 
 def print_modules(*_):
     print(*sorted(sys.modules), file=sys.__stdout__, flush=True)  # not that of a run
     end_process(0)
 
-answering.OpenModel.answer = answering.OpenBaseline.answer = print_modules
+asking.ModelReplier.answer = asking.BaselineReplier.answer = print_modules
 main(sys.argv[1:])
 """
 AFTER_THE_QUESTIONS = {"lm_eval", "scipy.special"}  # for the results

@@ -27,6 +27,16 @@ def test_all_contexts_are_named():
     assert re.findall(r"`(\w+)`", said) == list(CONTEXTS)
 
 
+def test_the_suite_of_the_page_is_the_example(tmp_path):
+    written_files("docs/own-tasks.md", tmp_path)
+    suite = "infthor_sums/__init__.py"
+    assert (tmp_path / suite).read_text() == (ROOT / "examples/sums" / suite).read_text()
+    lines = sum(
+        len(path.read_text().splitlines()) for path in (ROOT / "examples/sums").rglob("*.py")
+    )
+    assert lines <= 60
+
+
 def test_own_tasks_run_with_the_shared_files_of_this_package(tmp_path, run_cli, monkeypatch):
     written_files("docs/own-tasks.md", tmp_path)
     monkeypatch.chdir(tmp_path)

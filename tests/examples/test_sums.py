@@ -2,12 +2,13 @@
 installed it."""
 
 import json
+import re
 
 import pytest
 
 from infthor_eval.cli import main
-from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
+from infthor_eval.run import open_runs
 
 from ..helpers.command_line import option_words
 
@@ -31,7 +32,7 @@ def folders(install, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def page(folders):
-    return build_page(read_report_runs(folders), PageRequest())
+    return build_page(open_runs(folders), PageRequest())
 
 
 def test_its_results_are_shown_and_exported(folders, run_cli):
@@ -47,7 +48,7 @@ def test_its_results_are_shown_and_exported(folders, run_cli):
     (samples,) = folders[0].rglob("samples_sums_small_*.jsonl")
     lines = [json.loads(line) for line in samples.read_text().splitlines()]
     assert all(
-        line["target"] == str(line["doc"]["a"] + line["doc"]["b"]) == line["resps"][0][0]
+        line["target"] == str(sum(map(int, line["doc"]["id"].split("+")))) == line["resps"][0][0]
         for line in lines
     )
     assert "sums_small right % 100.00 0.00 -100.00" in " ".join(
@@ -69,8 +70,8 @@ def test_its_page_has_its_tables_its_chart_and_its_samples(page):
     assert sections["sums"].title == "Sums"
     (chart,) = sections["sums"].charts
     assert (chart.title, chart.description[:18]) == (
-        "sums_small: right sums by kind",
-        "calculator 100.0 %",
+        "sums_small: right by kind",
+        "all (8) calculator",
     )
     (table,) = sections["sums"].tables
     assert [column.name for column in table.columns] == [
@@ -79,12 +80,12 @@ def test_its_page_has_its_tables_its_chart_and_its_samples(page):
         "all",
         "without carry",
         "with carry",
-        "sums",
+        "questions",
     ]
-    assert {row.cells[2] for row in sections["results"].tables[0].rows} == {"right sums"}
+    assert {row.cells[2] for row in sections["results"].tables[0].rows} == {"right"}
     assert len(page.samples) == 8
     for sample in page.samples:
-        a, b = map(int, sample.title.split(" + "))
+        a, b = map(int, re.findall(r"\d+", sample.title))
         right, wrong = sample.results
         assert (sample.target, right.reply, right.outcome, wrong.outcome) == (
             str(a + b),
@@ -103,7 +104,7 @@ def test_its_page_opens_in_a_browser(page, open_page):
     carried = [sample for sample in page.samples if sample.kind == "with carry"]
     assert tab.locator("#count").inner_text() == f"{len(carried)} of 8"
     assert tab.locator("#sample h3").inner_text() == carried[0].title
-    assert tab.locator("#sample .target").inner_text() == f"sum: {carried[0].target}"
+    assert tab.locator("#sample .target").inner_text() == f"gold answer: {carried[0].target}"
     assert tab.locator("#sums figure.chart svg").count() == 1
     assert tab.locator("#disagree").is_hidden()  # it has one scorer
     assert opened.errors == []

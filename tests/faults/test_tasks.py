@@ -30,7 +30,7 @@ FILES = [
     (CLUES + ", depths: [2]}", f"{SETTING} depths is [2]; it is a list of numbers from 0 to 1"),
     (CLUES + ", depths: []}", f"{SETTING} depths is []; it is a list of numbers from 0 to 1"),
     (CLUES + ", top_k: true}", f"{SETTING} top_k is True; it is a whole number from 1"),
-    (CLUES + ", budget: 0}", f"{SETTING} budget is 0; it is a whole number from 1, in tokens"),
+    (CLUES + ", budget: 0}", f"{SETTING} budget is 0; it is a whole number of tokens from 1"),
     (CLUES + ", k_tokens: 1023}", f"{SETTING} k_tokens is 1023; it is 1000 or 1024"),
     (CLUES + ", seed: x}", f"{SETTING} seed is 'x'; it is a whole number"),
     (
@@ -39,7 +39,7 @@ FILES = [
     ),
     (
         CLUES + ", prompt: mine}",
-        f"{SETTING} prompt is 'mine'; it is one of published-main, published-logs",
+        f"{SETTING} prompt is 'mine'; it is published-main or published-logs",
     ),
     (
         HEAD + "dataset_kwargs: {context: video, prompt: published-logs}",

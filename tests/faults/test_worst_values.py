@@ -45,19 +45,19 @@ def spoiling_suite(name: str, spoiled: Spoiled) -> Any:
                 record = msgspec.structs.replace(whole, id=unit.key.id, cluster=unit.cluster)
                 yield session.find_record(unit, "f") or replace_field(record, path, value)
 
-        def to_sample(self, record: Any) -> Any:
-            reply = str(record.payload)
-            return runs.UnitSample(0, {}, "", record.id, {}, reply)
-
         def close(self) -> None:
             """Nothing is held."""
+
+    class Given(Prepared):
+        def to_doc(self, _: Any, record: Any) -> Any:
+            return runs.UnitDoc(0, {}, "", record.id, {}, str(record.payload))
 
     class Spoiling:
         def __getattr__(self, attribute: str) -> Any:
             return getattr(suite, attribute)
 
         def prepare(self, _: Any) -> Any:
-            return Prepared(Bound)
+            return Given(Bound)
 
     return Spoiling()
 

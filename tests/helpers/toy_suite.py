@@ -45,12 +45,6 @@ class Sums:
                 "f", Sum(unit.payload.numbers, sum(unit.payload.numbers))
             )
 
-    def to_sample(self, record):
-        a, b = record.payload.numbers
-        return runs.UnitSample(
-            a * 10 + b, {"numbers": [a, b]}, str(a + b), f"{a}+{b}", {}, str(record.payload.answer)
-        )
-
     def close(self):
         pass
 
@@ -67,6 +61,12 @@ class Prepared:
 
     def bind(self, subject):
         return self.create()
+
+    def to_doc(self, header, record):
+        a, b = record.payload.numbers
+        return runs.UnitDoc(
+            a * 10 + b, {"numbers": [a, b]}, str(a + b), f"{a}+{b}", {}, str(record.payload.answer)
+        )
 
 
 def make_suite(create):

@@ -2,6 +2,7 @@
 
 import pytest
 
+from infthor_eval.cli.options.suites import expand_suite_options
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.manipulation.environment import Grasp
 from infthor_eval.manipulation.kinds import ManipulationKind
@@ -61,36 +62,32 @@ def test_words_of_puts_may_have_a_receptacle_and_must_have_an_object(data):
 
 
 @pytest.mark.parametrize(
-    "radius", ["0.039", "0.51", "0", "-0.1", "nan", "inf", "wide", "", "0,06", "6 cm"]
+    "radius", ["0.039", "0.51", "0", "-0.1", "nan", "inf", "wide", "0,06", "6 cm"]
 )
 def test_a_radius_that_no_hand_has_is_refused(radius):
-    with pytest.raises(
-        UsageError, match=r"--radius .*: is a length of 0\.04 to 0\.5 metres"
-    ) as caught:
-        ManipulationOptions(radius=radius)
+    valid = r"--radius .*: give a number of metres from 0\.04, at most 0\.5"
+    with pytest.raises(UsageError, match=valid) as caught:
+        expand_suite_options("manipulation", {"radius": radius}, ["manipulation"])
     read_one_line(caught)
 
 
 @pytest.mark.parametrize("radius", [0.039, 0.6, 5])
 def test_nor_may_a_task_file_have_it(data, radius):
-    with pytest.raises(
-        UsageError, match=f"a_task: radius {radius} is not within 0.04 to 0.5 metres"
-    ):
+    with pytest.raises(DataError, match=f"radius is {radius}; it is a number of metres from 0.04"):
         task_of(data, radius=radius)
 
 
 def test_the_command_line_goes_before_the_file(data):
     assert task_of(data, radius=0.1).settings.grasp.radius == 0.1
-    for typed, metres in (("0.04", 0.04), ("0.5", 0.5), ("6e-2", 0.06)):
-        assert (
-            task_of(data, ManipulationOptions(radius=typed), radius=0.1).settings.grasp.radius
-            == metres
-        )
+    typed = {"radius": "0.04,0.5,6e-2"}
+    given = expand_suite_options("manipulation", typed, ["manipulation"])
+    radii = [task_of(data, options, radius=0.1).settings.grasp.radius for options in given]
+    assert radii == [0.04, 0.5, 0.06]
 
 
 @pytest.mark.parametrize("frames", ["", "Blank", "black", "shown,blank"])
 def test_frame_ablations_for_frames_that_do_not_exist_are_refused(frames):
-    with pytest.raises(UsageError, match="tasks in a simulator have shown, blank"):
+    with pytest.raises(UsageError, match="give shown or blank"):
         ManipulationOptions(frames=frames)
 
 
@@ -126,22 +123,22 @@ def test_settings_have_defaults_and_all_of_them_act(data):
 
 
 @pytest.mark.parametrize(("settings", "expected"), [
-    ({"kind": "throw"}, "kind is 'throw'; there are pickup, put"),
+    ({"kind": "throw"}, "kind is 'throw'; it is pickup or put"),
     ({"radios": 0.5}, "radios is not known; did you mean radius?"),
-    ({"colour": "red"}, "colour is not known; there are kind, bundled"),
-    ({"grasps": "some"}, "grasps is 'some'; there are target, all"),
-    ({"hold": "tight"}, "hold is 'tight'; there are middle, palm"),
-    ({"max_steps": 0}, "max_steps is 0; it is a whole number above 0"),
-    ({"max_steps": 2.5}, "max_steps is 2.5; it is a whole number above 0"),
+    ({"colour": "red"}, "colour is not known; there are bundled, closing"),
+    ({"grasps": "some"}, "grasps is 'some'; it is target or all"),
+    ({"hold": "tight"}, "hold is 'tight'; it is middle or palm"),
+    ({"max_steps": 0}, "max_steps is 0; it is a whole number from 1"),
+    ({"max_steps": 2.5}, "max_steps is 2.5; it is a whole number from 1"),
     ({"max_step": -0.1}, "max_step is -0.1; it is a number above 0"),
     ({"max_step": float("inf")}, "max_step is inf; it is a number above 0"),
     ({"translation_scale": "big"}, "translation_scale is 'big'; it is a number above 0"),
     ({"rotation": "off"}, "rotation is 'off'; it is true or false"),
     ({"rotation": 0}, "rotation is 0; it is true or false"),
     ({"instruction": 7}, "instruction is 7; it is a text"),
-    ({"radius": True}, "radius is True; it is a number above 0"),
-    ({"field_of_view": 180}, "field_of_view 180 is not below 180 degrees"),
-    ({"gripper_threshold": 1.5}, "gripper_threshold 1.5 is above 1"),
+    ({"radius": True}, "radius is True; it is a number of metres from 0.04, at most 0.5"),
+    ({"field_of_view": 180}, "field_of_view is 180; it is a number of degrees above 0, below 180"),
+    ({"gripper_threshold": 1.5}, "gripper_threshold is 1.5; it is a number above 0, at most 1"),
     ({"bundled": "nothing"}, "the installation lacks its data folder 'sets/nothing'"),
 ])  # fmt: skip
 def test_a_setting_that_would_not_act_is_refused(data, settings, expected):

@@ -58,8 +58,7 @@ def test_the_planner_does_what_the_expert_did(prepare_run, data):
     assert all(record.payload.done and record.payload.reward == 2 for record in outcome.records)
     assert not any(record.failure or record.excluded or record.faults for record in outcome.records)
     numbers = {
-        record.key: sample.number
-        for record, sample in zip(outcome.records, outcome.samples, strict=True)
+        record.key: doc.number for record, doc in zip(outcome.records, outcome.docs, strict=True)
     }
     assert numbers[records[PUT, MUG, 21].key] == 0
     (table, *_) = outcome.run.suite.tables([outcome.summary])
@@ -347,9 +346,9 @@ def test_nothing_to_evaluate_is_refused_in_one_line(prepare_run, tmp_path):
 
 
 @pytest.mark.parametrize(("option", "value", "expected"), [
-    ("radius", "0.7", "--radius 0.7: is a length of 0.04 to 0.5 metres"),
-    ("radius", "wide", "--radius wide: is a length"),
-    ("frames", "black", "--frames black: tasks in a simulator have shown, blank"),
+    ("radius", "0.7", "--radius 0.7: give a number of metres from 0.04, at most 0.5"),
+    ("radius", "wide", "--radius wide: give a number of metres"),
+    ("frames", "black", "--frames black: give shown or blank"),
     ("instruction", "do it", "must have {object}"),
     ("scenes", "/nowhere/at/all", "/nowhere/at/all"),
 ])  # fmt: skip

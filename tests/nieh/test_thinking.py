@@ -80,7 +80,7 @@ def test_thoughts_have_a_budget_of_their_own(make_nieh_set, tmp_path, run_cli):
     assert {limit for limit, _ in LIMITS} == {1050}
     assert "0 evaluated now" not in run_cli(*arguments)[2]  # another run
     code, _, err = run_cli(*arguments, "--max-thinking-tokens", 0)
-    assert code == 2 and "--max-thinking-tokens 0: give 1 or more" in err
+    assert code == 2 and "--max-thinking-tokens 0: give a whole number from 1" in err
 
 
 def test_a_stop_string_ends_the_answer_and_not_the_thoughts(

@@ -4,8 +4,8 @@ waits for it."""
 import pytest
 
 from infthor_eval.nieh import units
-from infthor_eval.nieh.asking.answering import OpenBaseline
 from infthor_eval.nieh.records import BlindGuess
+from infthor_eval.questions.asking import BaselineReplier
 from infthor_eval.runs import Unit, execute
 from infthor_eval.runs.work.binding import bind_run
 
@@ -19,10 +19,10 @@ class _Guesses(dict):
 def events(monkeypatch):
     """What happens, in order: a question is "asked", what `blind` says is "learned"."""
     happened = []
-    answer = OpenBaseline.answer
+    answer = BaselineReplier.answer
     monkeypatch.setattr(units, "find_floor", lambda *_: happened.append("learned") or _Guesses())
     monkeypatch.setattr(
-        OpenBaseline,
+        BaselineReplier,
         "answer",
         lambda *arguments: happened.append("asked") or answer(*arguments),
     )

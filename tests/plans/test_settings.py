@@ -18,15 +18,17 @@ pytestmark = pytest.mark.usefixtures("shared_simulators")
 
 SETTINGS = [
     ("plan: all", "dataset_kwargs: plan is not known; did you mean plans?"),
-    ("colour: red", "dataset_kwargs: colour is not known; there are plans, bundled, rewards"),
-    ("plans: some", "dataset_kwargs: plans is 'some'; there are all, final"),
-    ("after_failure: weep", "dataset_kwargs: after_failure is 'weep'; there are continue, stop"),
-    ("max_steps: 0", "dataset_kwargs: max_steps is 0; it is a whole number above 0"),
-    ("max_steps: true", "dataset_kwargs: max_steps is True; it is a whole number above 0"),
-    ("max_steps: 2.5", "dataset_kwargs: max_steps is 2.5; it is a whole number above 0"),
+    (
+        "colour: red",
+        "dataset_kwargs: colour is not known; there are after_failure, bundled",
+    ),
+    ("plans: some", "dataset_kwargs: plans is 'some'; it is all or final"),
+    ("after_failure: weep", "dataset_kwargs: after_failure is 'weep'; it is continue or stop"),
+    ("max_steps: 0", "dataset_kwargs: max_steps is 0; it is a whole number from 1"),
+    ("max_steps: true", "dataset_kwargs: max_steps is True; it is a whole number from 1"),
+    ("max_steps: 2.5", "dataset_kwargs: max_steps is 2.5; it is a whole number from 1"),
     ("preamble: 7", "dataset_kwargs: preamble is 7; it is a text"),
-    ("bundled:", "dataset_kwargs: bundled is None; it is a text"),
-    ("rewards: generous", "unknown reward rules 'generous'; there are default, published"),
+    ("rewards: generous", "rewards is 'generous'; it is default or published"),
     (
         "history: all",
         "history all: there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, "

@@ -85,7 +85,7 @@ def test_what_is_exported_has_a_sample_for_each_plan(prepare_run):
         (2, "go to the drawer", 1.0),
         (3, "put the Fork in the Drawer", 1.0),
     ]
-    assert list(outcome.samples)[1].prompt == "put a fork in the drawer\npick up the Fork"
+    assert list(outcome.docs)[1].prompt == "put a fork in the drawer\npick up the Fork"
 
 
 def test_the_published_rules_have_the_published_faults(prepare_run):

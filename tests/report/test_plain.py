@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.report.plain import PlainPresenter
-from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.web.build import PageRequest, build_page
-from infthor_eval.runs import NOTHING, RunConfig, RunHeader, UnitRecord
+from infthor_eval.run import Run
+from infthor_eval.runs import RunConfig, RunHeader, RunSummary, UnitRecord
 
 from ..helpers.toy_suite import Sum, ToySuite
 
@@ -28,17 +28,11 @@ def run(name, *records):
     header = RunHeader(
         suite="toy", name=name, config=RunConfig(model={"name": name}, tasks={"sums": {}})
     )
-    return PresentedRun(
-        folder=Path(name),
-        label=name,
-        model=name,
-        suite=ToySuite(),
-        presenter=PlainPresenter(),
-        header=header,
-        records=records,
-        usage=NOTHING,
-        n_missing=0,
-    )
+    suite = ToySuite()
+    summary = RunSummary.of(suite, header, records)
+    held = Run.held(Path(name), suite, summary, records, n_missing=0)
+    held.presenter = PlainPresenter()
+    return held
 
 
 @pytest.fixture(scope="module")
@@ -51,11 +45,14 @@ def page():
 def test_it_has_the_suites_tables_and_primary_metric(page):
     sections = {section.key: section for section in page.sections}
     assert sections["toy"].title == "Toy"
-    assert [row.cells for row in sections["toy"].tables[0].rows] == [("right", "2"), ("wrong", "1")]
+    assert [row.cells for row in sections["toy"].tables[0].rows] == [
+        ("right", "2"),
+        ("wrong (incomplete)", "1"),
+    ]
     rows = [row.cells[:4] for row in sections["results"].tables[0].rows]
     assert rows == [
         ("right", "sums", "primary metric", "100.0"),
-        ("wrong", "sums", "primary metric", "50.0"),
+        ("wrong (incomplete)", "sums", "primary metric", "50.0"),
     ]
     (comparison,) = sections["comparison"].tables
     assert comparison.rows[0].cells[:6] == ("sums", "right", "%", "100.00", "0.00", "-100.00")
@@ -100,7 +97,7 @@ def test_the_browser_shows_the_fields(page, open_page):
     assert [text.split() for text in details] == [
         ["all", "runs", "numbers", "[1,", "3]"],
         ["right", "answer", "4"],
-        ["wrong", "answer", "9"],
+        ["wrong", "(incomplete)", "answer", "9"],
     ]
     opened.tab.fill("#search", "1, 4")
     assert opened.tab.locator("#count").inner_text() == "1 of 2"

@@ -14,10 +14,10 @@ from infthor_eval.exports.lm_eval import convert_run
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.report.live.state import LiveRun
-from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
 from infthor_eval.report.web.page import write_page
-from infthor_eval.runs import RunSummary, TaskFile, UnitSample
+from infthor_eval.run import open_runs
+from infthor_eval.runs import RunSummary, TaskFile, UnitDoc
 
 from ..helpers.journals import write_journal
 from ..helpers.nieh_runs import make_config, make_header, make_record
@@ -110,7 +110,7 @@ def test_a_comparison_is_over_what_both_answered(planted: Path, whole: Path, run
 
 
 def test_the_page_with_its_tables_charts_and_samples(planted: Path, whole: Path, tmp_path) -> None:
-    runs = read_report_runs([planted, whole])
+    runs = open_runs([planted, whole])
     page = build_page(runs, PageRequest())
     charts = [chart for section in page.sections for chart in section.charts]
     assert charts
@@ -144,13 +144,13 @@ def exported(records: list[Any], folder: Path) -> Any:
     task = TaskFile("nieh_gt", "nieh", Path("nieh_gt.yaml"), {})
     tasks = SimpleNamespace(tasks=[task], limit=None, seed=0)
     request = SimpleNamespace(tasks=tasks, model="m", model_options={})
-    samples = [
-        UnitSample(number, {"id": record.id}, "mug", "?", {}, record.payload.reply or "")
+    docs = [
+        UnitDoc(number, {"id": record.id}, "mug", "?", {}, record.payload.reply or "")
         for number, record in enumerate(records)
     ]
     run = SimpleNamespace(request=request, suite=NiehSuite())
     summary = RunSummary.of(NiehSuite(), header_of("m"), records)
-    outcome = {"run": run, "records": records, "samples": samples, "summary": summary}
+    outcome = {"run": run, "records": records, "docs": docs, "summary": summary}
     return convert_run(SimpleNamespace(**outcome, n_missing=2, folder=folder))  # type: ignore[arg-type]
 
 
@@ -175,7 +175,7 @@ def test_a_run_that_failed_on_everything_has_no_score(
     _, out, _ = run_cli("show", nothing, "--json")
     (document,) = json.loads(out)
     assert document["primary_metrics"] == {}
-    page = build_page(read_report_runs([nothing, whole]), PageRequest())
+    page = build_page(open_runs([nothing, whole]), PageRequest())
     cells = [row.cells for row in page.sections[0].tables[0].rows]
     assert ("dead (incomplete)", "none answered") in [(row[0], row[3]) for row in cells]
     assert LiveRun(nothing).state().metrics == {}

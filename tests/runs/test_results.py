@@ -4,12 +4,13 @@ import json
 from types import SimpleNamespace
 from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from infthor_eval.runs import Usage, execute, prepare
-from infthor_eval.runs.results import write_usage
+from infthor_eval.runs import NOTHING, RunConfig, RunHeader, RunSummary, Usage, execute, prepare
+from infthor_eval.runs.results import results_document, write_usage
 from tests.helpers.toy_suite import ToySuite
 from tests.runs.toy_command import request
 
@@ -43,6 +44,26 @@ def test_the_hit_rate_is_a_share_of_what_was_read(counts: list[tuple[int, int]])
 )
 def test_usage_in_words(usage: Usage, description: str) -> None:
     assert usage.description == description
+
+
+class _Timed(msgspec.Struct):
+    right: int
+    took: float
+
+
+class _Worded(_Timed):
+    def document(self) -> dict[str, Any]:
+        return {"of 2": self.right, "took": self.took}
+
+
+@pytest.mark.parametrize(
+    ("summary", "document"), [(_Timed(1, 0.5), {"right": 1}), (_Worded(1, 0.5), {"of 2": 1})]
+)
+def test_results_leave_out_what_a_summary_took(summary: Any, document: dict[str, Any]) -> None:
+    header = RunHeader(suite="toy", name="a", config=RunConfig(tasks={"sums": {}}))
+    suite: Any = SimpleNamespace(primary_metrics=lambda _: {})
+    run = RunSummary(header, summary)
+    assert results_document(run, suite, 0, NOTHING)["summary"] == document
 
 
 def test_what_was_taken_is_written_as_it_is(tmp_path: Any) -> None:

@@ -75,11 +75,12 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
 
 
 def _read_summary(folder: Path) -> "RunSummary":
-    from infthor_eval.cli.results import read_run_results
+    from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.errors import UsageError
     from infthor_eval.nieh.results.summary import NiehSummary
+    from infthor_eval.run import Run
 
-    run = read_run_results(folder)[0].summary
+    run = Run.open(folder, print_failure).own_summary
     if not isinstance(run.summary, NiehSummary):
         raise UsageError(
             f"{folder}: a run of {run.header.suite}; only runs of nieh can stand beside blind"

@@ -13,7 +13,7 @@ from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
 
 if TYPE_CHECKING:
-    from infthor_eval.report.presented import PresentedRun
+    from infthor_eval.run import Run
 
 
 @click.command(
@@ -41,7 +41,7 @@ def command(folders: tuple[Path, ...], same_questions: bool, against: Path | Non
     """
     from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.errors import UsageError
-    from infthor_eval.report.presented import read_report_runs
+    from infthor_eval.run import open_runs
 
     if against is not None and against.resolve() not in {folder.resolve() for folder in folders}:
         folders = (against, *folders)
@@ -49,7 +49,7 @@ def command(folders: tuple[Path, ...], same_questions: bool, against: Path | Non
         raise UsageError(
             f"{folders[0]}: one run; give another, or --same-questions to compare its tasks"
         )
-    runs = read_report_runs(folders, print_failure, twice=True)
+    runs = open_runs(folders, print_failure, twice=True)
     other = next((run for run in runs if run.suite.name != runs[0].suite.name), None)
     if other is not None:
         raise UsageError(
@@ -65,7 +65,7 @@ def command(folders: tuple[Path, ...], same_questions: bool, against: Path | Non
         _print_pairs(runs, base)
 
 
-def _print_pairs(runs: Sequence[PresentedRun], base: int | None) -> None:
+def _print_pairs(runs: Sequence[Run], base: int | None) -> None:
     from infthor_eval.report.comparison import compare, comparison_table
     from infthor_eval.report.terminal import print_table, table_console
 
@@ -75,16 +75,14 @@ def _print_pairs(runs: Sequence[PresentedRun], base: int | None) -> None:
         print_table(comparison_table(rows, first.label, second.label), console)
 
 
-def _pairs(
-    runs: Sequence[PresentedRun], base: int | None
-) -> Iterator[tuple[PresentedRun, PresentedRun]]:
+def _pairs(runs: Sequence[Run], base: int | None) -> Iterator[tuple[Run, Run]]:
     if base is None:
         yield from combinations(runs, 2)
     else:
         yield from ((runs[base], run) for number, run in enumerate(runs) if number != base)
 
 
-def _print_same_questions(runs: Sequence[PresentedRun], base: int | None) -> None:
+def _print_same_questions(runs: Sequence[Run], base: int | None) -> None:
     from infthor_eval.report.same_questions import compare_sides, find_sides, sides_table
     from infthor_eval.report.terminal import print_table, table_console
 

@@ -12,7 +12,7 @@ from infthor_eval.cli.options.values import PATH, output_option
 from infthor_eval.exports.registry import FORMATS
 
 if TYPE_CHECKING:
-    from infthor_eval.cli.results import RunResults
+    from infthor_eval.run import Run
 
 _RELATIONSHIPS = ("first_party", "third_party", "collaborative", "other")
 
@@ -58,8 +58,7 @@ def export(runs: tuple[Path, ...], file_format: str, out: Path, **options: Any) 
     from infthor_eval.exports.registry import find_writer
     from infthor_eval.exports.request import ExportRequest
     from infthor_eval.exports.subjects import require_one_model
-    from infthor_eval.report.presented import read_report_runs
-    from infthor_eval.runs import read_header
+    from infthor_eval.run import open_runs
     from infthor_eval.storage.files import prepare_folder
     from infthor_eval.terminal import print_line
 
@@ -67,9 +66,9 @@ def export(runs: tuple[Path, ...], file_format: str, out: Path, **options: Any) 
         _check_hub_name(f"--{name.replace('_', '-')}", options[name])
     given = {name: value for name, value in options.items() if value}
     write = find_writer(file_format, given)
-    found = read_report_runs(runs, print_failure)
+    found = open_runs(runs, print_failure)
     if "model_id" in given:
-        require_one_model([read_header(run.folder) for run in found])
+        require_one_model([run.own_header for run in found])
     written = write(found, ExportRequest(prepare_folder(out), **given))
     for note in written.notes:
         print_note(note, "yellow")
@@ -132,13 +131,13 @@ def import_replies(
 
 def _import_replies(
     logs: Sequence[Path], data: Path, model: str | None, output: Path
-) -> Iterator[tuple["RunResults", int]]:
+) -> Iterator[tuple["Run", int]]:
     """Yield the results of runs of logs of replies, and the number of rows not imported."""
     from infthor_eval.cli.progress.notes import print_left_out, print_note, print_refused
-    from infthor_eval.cli.results import RunResults
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.published.imported_replies import import_logs
     from infthor_eval.nieh.suite import NiehSuite
+    from infthor_eval.run import Run
     from infthor_eval.runs.stored.writing import store_run
 
     questions = NiehSet(data)
@@ -158,19 +157,21 @@ def _import_replies(
         problems = {"not imported": run.refused, "scored otherwise than logged": run.rescored}
         for what, rows in problems.items():
             print_refused(name, what, [(row.log, row.line, row.reason) for row in rows])
-        results = RunResults(stored.folder, suite, stored.summary, stored.usage, run.n_missing)
-        yield results, len(run.refused)
+        held = Run.held(
+            stored.folder, suite, stored.summary, usage=stored.usage, n_missing=run.n_missing
+        )
+        yield held, len(run.refused)
 
 
 def _import_plans(
     logs: Sequence[Path], model: str | None, output: Path
-) -> Iterator[tuple["RunResults", int]]:
+) -> Iterator[tuple["Run", int]]:
     """Yield the results of runs of logs of plans, and the number of rows not imported."""
     from infthor_eval.cli.progress.notes import print_note, print_refused
-    from infthor_eval.cli.results import RunResults
     from infthor_eval.formats.plan_logs import read_plan_log
     from infthor_eval.plans.published.imported_counts import import_counts
     from infthor_eval.plans.suite import PlansSuite
+    from infthor_eval.run import Run
     from infthor_eval.runs.stored.writing import store_run
 
     suite = PlansSuite()
@@ -184,4 +185,5 @@ def _import_plans(
             f"set-up of {run.n_failed_set_ups} more failed"
         )
         print_refused(name, "not imported", [(path, row.line, row.reason) for row in run.refused])
-        yield RunResults(stored.folder, suite, stored.summary, stored.usage, 0), len(run.refused)
+        held = Run.held(stored.folder, suite, stored.summary, usage=stored.usage, n_missing=0)
+        yield held, len(run.refused)

@@ -26,11 +26,11 @@ def command(context: click.Context, first: Path, second: Path, every: bool) -> N
     from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.errors import UsageError
     from infthor_eval.report.explanation import explain_runs
-    from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.terminal import print_table, table_console
+    from infthor_eval.run import open_runs
     from infthor_eval.terminal import print_line
 
-    runs = read_report_runs((first, second), print_failure, twice=True)
+    runs = open_runs((first, second), print_failure, twice=True)
     if runs[0].suite.name != runs[1].suite.name:
         raise UsageError(
             f"{first} is a run of {runs[0].suite.name}, {second} of {runs[1].suite.name}; give "

@@ -18,10 +18,9 @@ from infthor_eval.memory import MEMORIES, accepted_options, memory_class
 from infthor_eval.rates import Rate
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
+from infthor_eval.run import BrokenRun, Run, find_runs, told_apart
 from infthor_eval.runs.catalog import Catalog, TaskFile
 from infthor_eval.runs.completeness import mark_incomplete
-from infthor_eval.runs.stored.labels import label_runs
-from infthor_eval.runs.stored.search import BrokenRun, StoredRun, find_runs
 from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.suites import baseline_suites, find_suite, split_by_suite
 from infthor_eval.tables import Column, Row, Table, answered_cell
@@ -224,14 +223,13 @@ def _scenes(data: Path | None) -> None:
 def _runs(folder: Path, output_format: str | None) -> None:
     """Runs below DIR (default: results): units by state; primary metrics of tasks."""
     runs = list(find_runs(folder, print_failure))
-    stored = [run for run in runs if isinstance(run, StoredRun)]
+    stored = told_apart([run for run in runs if isinstance(run, Run)], ignore=())
     if not runs:
         print_line(f"no runs in {folder}; `infthor-eval --model MODEL --tasks TASKS` starts one")
     if stored:
         columns = (Column("run", False), Column("suite", False), *map(Column, _COUNTS))
         more = (Column("tasks, %", False), Column("age"), Column("folder", False))
-        labels = label_runs([(run.folder, run.header) for run in stored])
-        rows = tuple(_row(label, run) for label, run in zip(labels, stored, strict=True))
+        rows = tuple(map(_row, stored))
         table = Table("", (*columns, *more), rows)
         if output_format is None:
             print_table(table, table_console())
@@ -242,17 +240,17 @@ def _runs(folder: Path, output_format: str | None) -> None:
             print_note(f"{run.folder}: cannot be read: {run.reason}", "red")
 
 
-def _row(label: str, run: StoredRun) -> Row:
+def _row(run: Run) -> Row:
     n_not_asked = "?" if run.n_not_asked is None else str(run.n_not_asked)
-    counts = (str(run.n_answered), str(run.n_failed), n_not_asked)
-    label = mark_incomplete(label, {}, run.n_failed + (run.n_not_asked or 0))
-    age = _age(time.time() - run.changed)
-    return Row((label, run.header.suite, *counts, _numbers(run), age, str(run.folder)))
+    counts = (str(run.states["answered"]), str(run.states["failed"]), n_not_asked)
+    label = mark_incomplete(run.name, {}, run.states["failed"] + (run.n_not_asked or 0))
+    age = _age(time.time() - run.changed.timestamp())
+    return Row((label, run.listed.suite, *counts, _numbers(run), age, str(run.folder)))
 
 
-def _numbers(run: StoredRun) -> str:
+def _numbers(run: Run) -> str:
     """The tasks with their primary metrics, as many as fit into a row."""
-    tasks = list(run.header.config.tasks)
+    tasks = list(run.listed.config.tasks)
     numbers = []
     for task in tasks[:_MAX_TASKS]:
         metric = run.primary_metrics.get(task)

@@ -134,13 +134,13 @@ def _export_table(folders: Sequence[Path], form: str | None, spreadsheet: Path |
     from infthor_eval.report.exporting import export_tables
     from infthor_eval.report.headline.results import task_results
     from infthor_eval.report.headline.tables import results_table
-    from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.spreadsheet import prepare_spreadsheet, write_spreadsheet
+    from infthor_eval.run import open_runs
     from infthor_eval.terminal import print_line
 
     if spreadsheet is not None:
         prepare_spreadsheet(spreadsheet)
-    runs = read_report_runs(folders, print_failure)
+    runs = open_runs(folders, print_failure)
     table = results_table([result for run in runs for result in task_results(run)])
     if form is not None:
         click.echo(export_tables([table], form), nl=False)
@@ -164,16 +164,16 @@ def _write_index(folders: Sequence[Path], request: PageRequest, out: Path) -> No
 def _write_page(folders: Sequence[Path], request: PageRequest, out: Path) -> None:
     from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.errors import UsageError
-    from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.web.build import build_page
     from infthor_eval.report.web.page import write_page
+    from infthor_eval.run import open_runs
     from infthor_eval.storage.files import prepare_file
     from infthor_eval.terminal import error_console, print_line, progress_bar
 
     if out.suffix.lower() not in (".html", ".htm"):
         raise UsageError(f"--out {out}: the page is an .html file; name one")
     path = prepare_file(out)
-    runs = read_report_runs(folders, print_failure)
+    runs = open_runs(folders, print_failure)
     with progress_bar(error_console()) as progress:
         page = build_page(runs, request, _PageBars(progress))
     size = write_page(page, path)

@@ -153,10 +153,11 @@ def _store(rescoring: Rescoring, output: Path) -> Rescored:
 
 def _print(rescoring: Rescoring, rescored: Rescored) -> None:
     from infthor_eval.cli.options.show import ShowOptions
-    from infthor_eval.cli.results import RunResults, print_results
+    from infthor_eval.cli.results import print_results
     from infthor_eval.nieh.rescoring.report import agreement_table, change_table, sources_of
     from infthor_eval.nieh.suite import NiehSuite
     from infthor_eval.report.terminal import print_table, table_console
+    from infthor_eval.run import Run
 
     report = rescored.report
     run = rescored.run
@@ -165,10 +166,10 @@ def _print(rescoring: Rescoring, rescored: Rescored) -> None:
     print_table(change_table(report, sources_of(rescoring.header.config)), console)
     if report.judge is not None and rescoring.judge is not None:
         print_table(agreement_table(report.judge, rescoring.judge.name), console)
-    print_results(
-        [RunResults(run.folder, NiehSuite(), run.summary, run.usage, report.n_missing)],
-        ShowOptions(),
+    held = Run.held(
+        run.folder, NiehSuite(), run.summary, usage=run.usage, n_missing=report.n_missing
     )
+    print_results([held], ShowOptions())
 
 
 def _print_counts(report: RescoringReport) -> None:

@@ -24,9 +24,10 @@ from infthor_eval.cli.progress.notes import (
     quiet_notes,
 )
 from infthor_eval.cli.progress.runs import check_others, execute_runs
-from infthor_eval.cli.results import RunResults, print_failures, print_results
+from infthor_eval.cli.results import print_failures, print_results
 from infthor_eval.errors import DataError
 from infthor_eval.reasons import count_reasons
+from infthor_eval.run import Run
 from infthor_eval.runs import (
     Equality,
     RunOutcome,
@@ -136,8 +137,13 @@ def evaluate(
                 print_note(f"{model}: {note}", "yellow")
         outcomes, is_stopped = execute_runs(runs, finish=export)
     results = [
-        RunResults(
-            outcome.folder, outcome.run.suite, outcome.summary, outcome.usage, outcome.n_missing
+        Run.held(
+            outcome.folder,
+            outcome.run.suite,
+            outcome.summary,
+            outcome.records,
+            outcome.usage,
+            outcome.n_missing,
         )
         for outcome in outcomes
     ]

@@ -13,9 +13,10 @@ from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.show import ShowOptions, sample_options
 from infthor_eval.cli.options.values import PATH
 from infthor_eval.cli.progress.notes import print_failure
-from infthor_eval.cli.results import print_failures, print_results, read_run_results
+from infthor_eval.cli.results import print_failures, print_results
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import is_trajectory_file
+from infthor_eval.run import Run, open_runs
 from infthor_eval.terminal import print_line
 
 
@@ -59,10 +60,10 @@ def command(paths: tuple[Path, ...], per_sample: bool, question: str | None, **p
 
 def _print_runs(folders: Sequence[Path], options: ShowOptions) -> None:
     """Print the results of runs, and why units have none."""
-    runs, records = zip(*map(read_run_results, folders), strict=True)
+    runs = [Run.open(folder, print_failure).read() for folder in folders]
     print_results(runs, options)
-    for run, of_run in zip(runs, records, strict=True):
-        print_failures(of_run, run.folder if len(runs) > 1 else None)
+    for run in runs:
+        print_failures(run.records, run.folder if len(runs) > 1 else None)
 
 
 def _print_trajectories(paths: tuple[Path, ...], options: ShowOptions) -> None:
@@ -85,16 +86,14 @@ def _print_trajectories(paths: tuple[Path, ...], options: ShowOptions) -> None:
 
 
 def _print_question(folders: tuple[Path, ...], name: str) -> None:
-    from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.sample import find_samples
 
-    for sample in find_samples(read_report_runs(folders, print_failure), name):
+    for sample in find_samples(open_runs(folders, print_failure), name):
         for line in sample.lines():
             print_line(line)
 
 
 def _print_samples(folders: tuple[Path, ...], options: ShowOptions) -> None:
-    from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.sample_table import FORMS, encode_samples, sample_table
 
     if options.format not in FORMS or options.full:
@@ -106,5 +105,5 @@ def _print_samples(folders: tuple[Path, ...], options: ShowOptions) -> None:
         raise UsageError(
             "--format parquet: is not for a terminal; write it into a file, `> samples.parquet`"
         )
-    table = sample_table(read_report_runs(folders, print_failure))
+    table = sample_table(open_runs(folders, print_failure))
     sys.stdout.buffer.write(encode_samples(table, options.format))

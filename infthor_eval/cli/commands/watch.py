@@ -14,8 +14,8 @@ from infthor_eval.cli.options.values import PATH, FiniteFloat
 if TYPE_CHECKING:
     from PIL import Image
 
-    from infthor_eval.report.presented import PresentedRun
     from infthor_eval.report.presenter import Recording, Replay
+    from infthor_eval.run import Run
     from infthor_eval.terminal import PlainConsole
 
 _FOLDER = Path("results/recordings")
@@ -83,15 +83,15 @@ def command(
     from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.errors import UsageError
     from infthor_eval.formats.pictures.animations import require_animation_name
-    from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.presenter import EpisodeSelection
+    from infthor_eval.run import open_runs
     from infthor_eval.storage.files import prepare_file
 
     if out is not None:
         require_animation_name(out)
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise UsageError(f"--sheet {sheet}: a sheet is a PNG; give a file whose name ends in .png")
-    (recorded,) = read_report_runs([run], print_failure)
+    (recorded,) = open_runs([run], print_failure)
     replay = _require_replay(recorded)
     _refuse_options(recorded, replay, {"--plans": plans, "--episode": episode, "--sheet": sheet})
     if sheet is not None and out is not None:
@@ -105,7 +105,7 @@ def command(
     _write(recorded, recording, path, data=data, scenes=scenes, fps=rate)
 
 
-def _require_replay(run: PresentedRun) -> Replay:
+def _require_replay(run: Run) -> Replay:
     from infthor_eval.errors import UsageError
     from infthor_eval.suites import find_presenter, suite_names
 
@@ -119,7 +119,7 @@ def _require_replay(run: PresentedRun) -> Replay:
     return run.presenter.replay
 
 
-def _refuse_options(run: PresentedRun, replay: Replay, options: Mapping[str, object]) -> None:
+def _refuse_options(run: Run, replay: Replay, options: Mapping[str, object]) -> None:
     """Refuse options that are given and that the suite of a run does not have."""
     from infthor_eval.errors import UsageError
 
@@ -139,7 +139,7 @@ def _default_file(parts: Sequence[str]) -> Path:
 
 
 def _write(
-    run: PresentedRun,
+    run: Run,
     recording: Recording,
     path: Path,
     *,

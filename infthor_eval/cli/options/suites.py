@@ -1,10 +1,8 @@
-"""Options of suites on the command line, built from their dataclasses."""
+"""Options of suites on the command line, built from their settings."""
 
-import typing
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import Field, fields
+from dataclasses import MISSING
 from itertools import product
-from types import NoneType
 from typing import Any
 
 import click
@@ -13,8 +11,8 @@ import msgspec
 from infthor_eval.cli.help import SuiteOption
 from infthor_eval.cli.options.values import WholeNumber, split_names
 from infthor_eval.errors import UsageError
+from infthor_eval.settings import Declared, Shorthand, settings_of
 from infthor_eval.suites import options_class, suite_names
-from model_adapters.options.parsing import is_required
 
 
 def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -22,21 +20,20 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     Suites with an option of one name share it; its help has the text of each.
     """
-    for name, by_suite in _shorthands().items():
-        _, help_text = next(iter(by_suite.values())).metadata["shorthands"][name]
+    for name, flags in _shorthands().items():
         command = click.option(
             f"--{name}",
             cls=SuiteOption,
-            suites=tuple(by_suite),
+            suites=tuple(flags),
             is_flag=True,
             default=None,
-            help=help_text,
+            help=next(iter(flags.values())).help,
         )(command)
     for name, by_suite in reversed(_options_by_name().items()):
-        first, option = next(iter(by_suite.items()))
-        kind = _value_type(typing.get_type_hints(options_class(first))[name])
-        choices = option.metadata.get("choices")
-        types = {bool: None, int: WholeNumber()}
+        option = next(iter(by_suite.values()))
+        kind, setting = option.kind, option.setting
+        choices = () if setting.each else tuple(map(str, setting.choices))
+        types = {bool: None, int: WholeNumber()} if not setting.each else {kind: str}
         command = click.option(
             f"--{name.replace('_', '-')}",
             cls=SuiteOption,
@@ -44,7 +41,7 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
             type=click.Choice(choices) if choices else types.get(kind, kind),
             is_flag=kind is bool,
             default=None,
-            metavar=option.metadata.get("metavar"),
+            metavar=setting.metavar,
             help=_help(by_suite),
         )(command)
     return command
@@ -60,8 +57,8 @@ def suite_values(params: Mapping[str, Any]) -> dict[str, Any]:
 def expand_suite_options(suite: str, params: Mapping[str, Any], used: Collection[str]) -> list[Any]:
     """Return the options of a suite for each of its runs.
 
-    An option with `each` in its metadata takes several values with commas, and there is a run for
-    each of them. A flag in its `shorthands` stands for such values.
+    An option with `each` takes several values with commas, and there is a run for each of them. A
+    flag in its `shorthands` stands for such values.
 
     Args:
         suite: name of the suite.
@@ -73,26 +70,28 @@ def expand_suite_options(suite: str, params: Mapping[str, Any], used: Collection
             a flag stands for one that is given as well.
     """
     _refuse_unused(params, used)
-    kinds = typing.get_type_hints(options_class(suite))
     values: dict[str, list[Any]] = {}
-    for option in fields(options_class(suite)):
-        value = _value(option, params)
+    for name, option in settings_of(options_class(suite)).items():
+        value = _value(name, option, params)
         if value is not None:
-            typed = [value]
-            if option.metadata.get("each"):
-                typed = list(split_names(value, f"--{option.name}"))
-            values[option.name] = [
-                msgspec.convert(value, kinds[option.name], strict=False) for value in typed
-            ]
-        elif is_required(option):
+            typed = split_names(value, f"--{name}") if option.setting.each else (value,)
+            values[name] = [_convert(name, option, value) for value in typed]
+        elif option.default is MISSING:
             raise UsageError(
-                f"--{option.name.replace('_', '-')}: {suite} needs it, as its field has no "
+                f"--{name.replace('_', '-')}: {suite} needs it, as its field has no "
                 "default; give it"
             )
     return [
         options_class(suite)(**dict(zip(values, chosen, strict=True)))
         for chosen in product(*values.values())
     ]
+
+
+def _convert(name: str, option: Declared, text: Any) -> Any:
+    try:
+        return msgspec.convert(text, option.kind, strict=False)
+    except msgspec.ValidationError as error:
+        raise UsageError(f"--{name.replace('_', '-')} {text}: give {option.valid}") from error
 
 
 def refuse_duplicate_options(command: Callable[..., Any]) -> None:
@@ -113,41 +112,42 @@ def refuse_duplicate_options(command: Callable[..., Any]) -> None:
         )
 
 
-def _value(option: Field[Any], params: Mapping[str, Any]) -> Any:
+def _value(name: str, option: Declared, params: Mapping[str, Any]) -> Any:
     """Return what is given for an option, by itself or by a flag that stands for its values."""
-    value = params.get(option.name)
-    for name, (meant, _) in option.metadata.get("shorthands", {}).items():
-        if params.get(name):
+    value = params.get(name)
+    for flag in option.setting.shorthands:
+        if params.get(flag.name):
             if value is not None:
                 raise UsageError(
-                    f"--{name} and --{option.name}: the first is --{option.name} {meant}; give one "
-                    "of them"
+                    f"--{flag.name} and --{name}: the first is --{name} {flag.values}; give one of "
+                    "them"
                 )
-            return meant
+            return flag.values
     return value
 
 
-def _options_by_name() -> dict[str, dict[str, Field[Any]]]:
+def _options_by_name() -> dict[str, dict[str, Declared]]:
     """The options of all suites by name, then by suite."""
-    options: dict[str, dict[str, Field[Any]]] = {}
+    options: dict[str, dict[str, Declared]] = {}
     for suite in suite_names():
-        for option in fields(options_class(suite)):
-            options.setdefault(option.name, {})[suite] = option
+        for name, option in settings_of(options_class(suite)).items():
+            options.setdefault(name, {})[suite] = option
     return options
 
 
-def _shorthands() -> dict[str, dict[str, Field[Any]]]:
-    """The options that have a flag for several of their values: by the flag, then by suite."""
-    flags: dict[str, dict[str, Field[Any]]] = {}
+def _shorthands() -> dict[str, dict[str, Shorthand]]:
+    """The flags for several values of an option: by name, then by suite."""
+    flags: dict[str, dict[str, Shorthand]] = {}
     for by_suite in _options_by_name().values():
         for suite, option in by_suite.items():
-            for flag in option.metadata.get("shorthands", {}):
-                flags.setdefault(flag, {})[suite] = option
+            for flag in option.setting.shorthands:
+                flags.setdefault(flag.name, {})[suite] = flag
     return flags
 
 
 def _refuse_unused(params: Mapping[str, Any], used: Collection[str]) -> None:
-    for name, by_suite in (_options_by_name() | _shorthands()).items():
+    every: dict[str, Mapping[str, Any]] = {**_options_by_name(), **_shorthands()}
+    for name, by_suite in every.items():
         if params.get(name) is not None and not set(by_suite) & set(used):
             raise UsageError(
                 f"--{name.replace('_', '-')} is for tasks of {' and '.join(by_suite)}; --tasks "
@@ -155,16 +155,11 @@ def _refuse_unused(params: Mapping[str, Any], used: Collection[str]) -> None:
             )
 
 
-def _help(by_suite: Mapping[str, Field[Any]]) -> str:
+def _help(by_suite: Mapping[str, Declared]) -> str:
     """The text of all suites, or those of each with its name."""
     suites: dict[str, list[str]] = {}
     for suite, option in by_suite.items():
-        suites.setdefault(option.metadata.get("help", ""), []).append(suite)
+        suites.setdefault(option.setting.help, []).append(suite)
     if len(suites) == 1:
         return next(iter(suites))
     return " ".join(f"{text} [{', '.join(names)}]" for text, names in suites.items())
-
-
-def _value_type(hint: Any) -> type:
-    """The type behind `int | None`."""
-    return next(kept for kept in (typing.get_args(hint) or (hint,)) if kept is not NoneType)

@@ -14,7 +14,7 @@ from infthor_eval.episodes.shared_units import (
 from infthor_eval.errors import UsageError
 from infthor_eval.manipulation.config import ArmTaskConfig, ManipulationConfig
 from infthor_eval.manipulation.kinds import ManipulationKind
-from infthor_eval.manipulation.records import RECORDS, ArmRecord
+from infthor_eval.manipulation.records import ArmRecord
 
 _COMPARED_ELSEWHERE = {"reward", "radius"}  # settings that have an error and a note of their own
 
@@ -22,7 +22,6 @@ _COMPARED_ELSEWHERE = {"reward", "radius"}  # settings that have an error and a 
 class ArmRun(RecordedRun[ArmRecord, ManipulationConfig]):
     """The journal of a run of manipulation."""
 
-    record_types = RECORDS
     planner = "planner-arm"
 
 

@@ -5,12 +5,15 @@ from typing import Protocol
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.nieh.asking.answering import OpenAnswerer, OpenBaseline, OpenModel
+from infthor_eval.memory import Write
+from infthor_eval.nieh.asking.answering import NiehRequest
 from infthor_eval.nieh.asking.baselines import Baseline, Blind, Predict
 from infthor_eval.nieh.asking.budget import budget_of
+from infthor_eval.nieh.asking.notebook import Notebook
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.task import PreparedTask
+from infthor_eval.questions.asking import BaselineReplier, ModelReplier, Replier
 from infthor_eval.runs import Session
 from model_adapters import Model, Subject
 
@@ -42,8 +45,11 @@ class Answerer(Protocol):
     def fit(self, tasks: Mapping[str, TaskSamples]) -> None:
         """Fit the subject to the answer key of each task's set; models need no key."""
 
-    def open(self, task: str, session: Session[NiehAnswer]) -> OpenAnswerer:
+    def open(self, task: str) -> Replier:
         """Return what answers the questions of a task on one trajectory."""
+
+    def open_notebook(self, session: Session[NiehAnswer]) -> Write | None:
+        """Return what asks the model for texts for its memory; None for who reads no context."""
 
 
 class _ModelAnswerer:
@@ -77,8 +83,11 @@ class _ModelAnswerer:
     def fit(self, tasks: Mapping[str, TaskSamples]) -> None:
         pass
 
-    def open(self, task: str, session: Session[NiehAnswer]) -> OpenAnswerer:
-        return OpenModel(self._model, session)
+    def open(self, task: str) -> Replier:
+        return ModelReplier(self._model)
+
+    def open_notebook(self, session: Session[NiehAnswer]) -> Write | None:
+        return Notebook(self._model, session).write
 
 
 class _BaselineAnswerer:
@@ -106,8 +115,16 @@ class _BaselineAnswerer:
         for name, samples in tasks.items():
             self._predictions[name] = self._baseline.fit(samples.data, samples.context_name)
 
-    def open(self, task: str, session: Session[NiehAnswer]) -> OpenAnswerer:
-        return OpenBaseline(self._predictions[task])
+    def open(self, task: str) -> Replier:
+        predict = self._predictions[task]
+
+        def reply(request: NiehRequest) -> str:
+            return predict(request.unit.sample, request.context)
+
+        return BaselineReplier(reply)
+
+    def open_notebook(self, session: Session[NiehAnswer]) -> Write | None:
+        return None
 
 
 def answerer_of(subject: Subject) -> Answerer:

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, get_type_hints
+from typing import Annotated, Any
 
-import msgspec
+from msgspec import Meta
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
@@ -12,49 +12,14 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.pictures.video import FILM_FPS, Video
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.memory import MemoryOptions
-from infthor_eval.nieh.options import FRAMES
-from infthor_eval.nieh.prompts import PROMPTS, PUBLISHED_MAIN, question_text
+from infthor_eval.nieh.options import NiehSettings
+from infthor_eval.nieh.prompts import PUBLISHED_MAIN, question_text
+from infthor_eval.quantities import Share, Total
+from infthor_eval.settings import Setting
 from infthor_eval.storage.digests import digest_of_file, fingerprint
 
-_LARGEST = 1e9  # kilo-tokens; more is a typing error
-_COUNT = "a whole number from 1"
 ContextPart = str | FrameRef | Video
-
-
-def _is_positive(value: Any) -> bool:
-    return bool(value >= 1)
-
-
-def _is_plain(value: Any) -> bool:
-    return isinstance(value, str | int | float)
-
-
-# The check of each setting beyond its type, and the words for its valid values.
-_VALUES: dict[str, tuple[Callable[[Any], bool] | None, str]] = {
-    "ctx_size": (lambda value: 0 < value < _LARGEST, "a number of kilo-tokens above 0"),
-    "k_tokens": (lambda value: value in (1000, 1024), "1000 or 1024"),
-    "depths": (
-        lambda value: value and all(0 <= depth <= 1 for depth in value),
-        "a list of numbers from 0 to 1",
-    ),
-    "tokens_per_frame": (_is_positive, _COUNT),
-    "top_k": (_is_positive, _COUNT),
-    "memory": (None, "the name of a memory"),
-    "memory_args": (
-        lambda value: all(map(_is_plain, value.values())),
-        "a mapping of options to texts and numbers",
-    ),
-    "budget": (_is_positive, f"{_COUNT}, in tokens"),
-    "fps": (
-        lambda value: 0 < value <= FILM_FPS,
-        f"a number of frames per second above 0, at most {FILM_FPS}",
-    ),
-    "seed": (None, "a whole number"),
-    "retriever": (None, "a text"),
-    "retriever_revision": (None, "a text"),
-    "frames": (lambda value: value in FRAMES, f"one of {', '.join(FRAMES)}"),
-    "prompt": (lambda value: value in PROMPTS, f"one of {', '.join(PROMPTS)}"),
-}
+_Fps = Annotated[float, Meta(gt=0, le=FILM_FPS)]
 
 
 @dataclass(frozen=True)
@@ -111,61 +76,47 @@ class Sample:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ContextSettings:
-    """Settings of contexts, from `dataset_kwargs` of a task file or lm-eval's metadata.
+class ContextSettings(NiehSettings):
+    """Settings of contexts, from `dataset_kwargs` of a task file or lm-eval's metadata."""
 
-    Attributes:
-        ctx_size: size of the context in kilo-tokens.
-        k_tokens: tokens of a kilo-token, 1000 or 1024; None for the published value of the context.
-        tokens_per_frame: tokens of one frame, from the model's own processor.
-        depths: positions of the needle in the window, 0 at its start.
-        top_k: number of retrieved frames.
-        retriever: CLIP model that retrieves them, a hub id or a folder.
-        retriever_revision: branch, tag or commit on the hub; None for the default branch.
-        memory: memory that recalls what is shown, a name or FILE.py:CLASS.
-        memory_args: options of the memory.
-        budget: most tokens of what is recalled; None for the memory's own limit.
-        fps: frames per second that are sampled from a trajectory's film.
-        seed: seed of everything sampled.
-        frames: the frames that are shown (`infthor_eval.nieh.frame_ablations`).
-        prompt: the words of the question, `published-main` or `published-logs`.
-    """
-
-    ctx_size: float | None = None
-    k_tokens: int | None = None
-    tokens_per_frame: int | None = None
-    depths: tuple[float, ...] = (0.0, 0.2, 0.4, 0.6, 0.8)
-    top_k: int = 10
-    retriever: str = "openai/clip-vit-large-patch14"
-    retriever_revision: str | None = None
-    memory: str | None = None
-    memory_args: dict[str, Any] = field(default_factory=dict)
-    budget: int | None = None
-    fps: float = 1.0
-    seed: int = 0
-    frames: str = "shown"
-    prompt: str = PUBLISHED_MAIN
-
-    @classmethod
-    def read(cls, raw: Mapping[str, Any], location: str = "dataset_kwargs") -> "ContextSettings":
-        """Return the settings in a mapping at a location (for messages); other keys are ignored.
-
-        Raises:
-            UsageError: a value is not valid; the message has location, setting and valid values.
-        """
-        values = {}
-        for name, kind in get_type_hints(cls).items():
-            if raw.get(name) is None:
-                continue
-            check, expected = _VALUES[name]
-            try:
-                values[name] = msgspec.convert(raw[name], kind)
-                is_valid = check is None or check(values[name])
-            except msgspec.ValidationError:
-                is_valid = False
-            if not is_valid:
-                raise UsageError(f"{location}: {name} is {raw[name]!r:.60}; it is {expected}")
-        return cls(**values)
+    depths: Annotated[
+        tuple[Share, ...],
+        Meta(min_length=1),
+        Setting(
+            help="Positions of the needle in the window, 0 at its start.",
+            is_a="a list of numbers from 0 to 1",
+        ),
+    ] = (0.0, 0.2, 0.4, 0.6, 0.8)
+    top_k: Annotated[Total, Setting(help="Number of retrieved frames.")] = 10
+    memory: Annotated[
+        str | None,
+        Setting(
+            help="Memory that recalls what is shown, a name or FILE.py:CLASS.",
+            is_a="the name of a memory",
+        ),
+    ] = None
+    memory_args: Annotated[
+        dict[str, str | int | float | bool],
+        Setting(
+            help="Options of the memory.",
+            is_a="a mapping of options to texts and numbers",
+        ),
+    ] = field(default_factory=dict)
+    budget: Annotated[
+        Total | None,
+        Setting(
+            help="Most tokens of what is recalled; default: the memory's own limit.",
+            of="tokens",
+        ),
+    ] = None
+    fps: Annotated[
+        _Fps,
+        Setting(
+            help="Frames per second that are sampled from a trajectory's film.",
+            of="frames per second",
+        ),
+    ] = 1.0
+    seed: Annotated[int, Setting(help="Seed of everything sampled.")] = 0
 
     def n_frames(self, k_tokens: int) -> int:
         """Return how many frames fill the context, given the published tokens of its kilo-token.

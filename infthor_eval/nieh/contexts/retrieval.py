@@ -40,4 +40,4 @@ def retriever_identity(_data: NiehSet, settings: ContextSettings) -> dict[str, A
 def _retriever(settings: ContextSettings) -> "Retriever":
     from model_adapters.hf.retrieval import open_retriever
 
-    return open_retriever(settings.retriever, settings.retriever_revision)
+    return open_retriever(settings.clip_model, settings.retriever_revision)

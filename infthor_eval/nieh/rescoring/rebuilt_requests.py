@@ -11,19 +11,19 @@ from typing import Any, NamedTuple
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.asking.answering import request_fingerprint
 from infthor_eval.nieh.asking.recalling import apply_recall
 from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.contexts import MEMORY, ContextPart, ContextSettings, Sample, context_named
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.frame_ablations import FrameAblation
+from infthor_eval.nieh.options import NiehSettings
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import TaskSamples
+from infthor_eval.questions.asking import request_fingerprint
 from infthor_eval.runs import RunHeader, UnitRecord
+from infthor_eval.settings import config_values, read
 
 _RETRIEVED = "clip_retrieval"
-# Settings of contexts that a run gives to all its tasks.
-_RUN_SETTINGS = ("k_tokens", "tokens_per_frame", "frames", "prompt", "seed")
 
 
 class RebuiltRequest(NamedTuple):
@@ -52,12 +52,13 @@ class RequestRebuilder:
             UsageError: a setting of the task is not valid.
         """
         config = header.config.tasks[task]
-        of_run = {name: getattr(header.config, name) for name in _RUN_SETTINGS}
-        self._settings = ContextSettings.read(of_run | dict(config.dataset_kwargs))
+        kept = config_values(NiehSettings()).keys() | {"seed"}
+        of_run = {name: getattr(header.config, name) for name in kept}
+        self._settings = read(ContextSettings, of_run | dict(config.dataset_kwargs), task)
         self._context = context_named(config.context)
         ablation = FrameAblation(self._settings.frames, self._settings.seed)
         self._samples = TaskSamples(
-            data, config.context, self._context, (), (), {}, ablation, self._settings.prompt
+            data, config.context, self._context, (), (), {}, ablation, self._settings.words
         )
         self._decoding: Mapping[str, Any] = config.decoding
         self._shows_images = config.film == "images"

@@ -21,13 +21,13 @@ from infthor_eval.nieh.config import (
     RescoredConfig,
     SourceRun,
 )
-from infthor_eval.nieh.metrics import MetricError
 from infthor_eval.nieh.own_scorers import OwnScorer, OwnScores
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.nieh.rescoring.judging import JUDGED, Judge, Judgement, Track, judge_replies
 from infthor_eval.nieh.rescoring.report import RescoringReport, find_changes
 from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.nieh.suite import NiehSuite
+from infthor_eval.questions.asking import MetricError
 from infthor_eval.runs import NOTHING, RunHeader, Session, Unit, UnitRecord, read_header, read_run
 from infthor_eval.runs.journals.shards import Tell
 from infthor_eval.runs.results import write_document

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from infthor_eval.distances import LENGTHS
+from infthor_eval.nieh.results.facets import LENGTH
 from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.summary import NiehSummary, TaskSummary
 from infthor_eval.runs import RunSummary
@@ -145,11 +145,10 @@ def _points(sized: tuple[float, TaskSummary], scorer: str) -> Iterator[_Point]:
     if size:
         yield _point(f"{size:g}", task, scorer)
         return
-    for name in LENGTHS:
-        if name in task.by_length:
-            at = task.by_length[name]
-            score = at.cell.scores.get(scorer)
-            yield _Point(name, score.mean if score else None, at.above_blind.get(scorer))
+    for name, cell in task.by[LENGTH.name].items():
+        score = cell.scores.get(scorer)
+        above = task.above_blind_by_length[name].get(scorer)
+        yield _Point(name, score.mean if score else None, above)
 
 
 def _point(length: str, task: TaskSummary, scorer: str) -> _Point:

@@ -1,47 +1,58 @@
-"""Tables on the evidence: how much was shown, how far from the end, and scores above blind."""
+"""Tables by facet of questions, and scores above blind as cells."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from infthor_eval.distances import DISTANCES
+from infthor_eval.facets import facet_table
 from infthor_eval.nieh.results.above_blind import SOLVED, AboveBlind
 from infthor_eval.nieh.results.cells import Cell, mean_cell, score_interval
+from infthor_eval.nieh.results.facets import FACETS, QuestionFacet
 from infthor_eval.nieh.results.gains import name_of
-from infthor_eval.nieh.results.summary import (
-    SHOWN_CLUES,
-    EvidenceCells,
-    NiehSummary,
-    TaskSummary,
-)
+from infthor_eval.nieh.results.summary import NiehSummary, TaskSummary
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table, TableCell
+from infthor_eval.tables import Table, TableCell
 
 _ALONE = "above blind: not given, as beside one trajectory there is no other to learn from."
 _WITH_INTERVAL = "In brackets: 95 % interval, clustered by trajectory; in parentheses: questions."
 
 
-def evidence_tables(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return the tables by share of the clue frames shown and last clue's distance, where known.
+def question_facet_tables(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return the table of each facet that tells anything of a task."""
+    return [table for facet in FACETS if facet.in_tables for table in _table(facet, runs)]
 
-    A task that shows all evidence of all samples is not in the first, which would say nothing of
-    it.
-    """
-    distances = _used(runs)
-    rows = list(_rows(runs, lambda cells: cells.by_shown_clues, SHOWN_CLUES, _hides_evidence))
-    far = list(
-        _rows(
-            runs, lambda cells: cells.by_distance, distances, lambda task: task.context != "clues"
-        )
+
+def _table(facet: QuestionFacet, runs: Sequence[RunSummary]) -> list[Table]:
+    used = {name for *_, task in _tasks(runs) for name in task.by[facet.name]}
+    return facet_table(
+        f"Accuracy, % by {facet.title or facet.heading} (questions)",
+        ("model", "task", *(("file",) if facet.of_files else ()), "scorer"),
+        facet.shown(used),
+        list(_rows(facet, runs)),
+        lambda scores: _cell(*(scores or (None, ""))),
+        (_WITH_INTERVAL,),
     )
-    tables = []
-    if rows:
-        title = "Accuracy, % by how many of the clue frames were shown (questions)"
-        tables.append(_table(title, SHOWN_CLUES, rows))
-    if far:
-        title = (
-            "Accuracy, % by frames between the last clue and the end of the trajectory (questions)"
-        )
-        tables.append(_table(title, distances, far))
-    return tables
+
+
+def _rows(
+    facet: QuestionFacet, runs: Sequence[RunSummary]
+) -> Iterator[tuple[tuple[str, ...], dict[str, tuple[Cell, str]]]]:
+    """Yield the names and the cells of a row per task, metric, and file if the facet has those."""
+    for run, name, task in _tasks(runs):
+        if not facet.is_worth(task.context, task.by[facet.name]):
+            continue
+        for file, cells in facet_cells(facet, task).items():
+            of_file = (short_name(file),) if facet.of_files else ()
+            for metric in task.metrics:
+                by_class = {key: (cell, metric) for key, cell in cells.items()}
+                yield (run, name, *of_file, metric), by_class
+
+
+def facet_cells(facet: QuestionFacet, task: TaskSummary) -> dict[str, Mapping[str, Cell]]:
+    """Return a facet's cells of all questions ("total"), and of each file if it has those."""
+    files = task.files if facet.of_files else {}
+    return {
+        "total": task.by[facet.name],
+        **{name: cells[facet.name] for name, cells in files.items()},
+    }
 
 
 def short_name(file: str) -> str:
@@ -84,39 +95,6 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
         yield from ((name_of(run), name, task) for name, task in run.summary.tasks.items())
 
 
-def _hides_evidence(task: TaskSummary) -> bool:
-    return bool(task.evidence["total"].by_shown_clues.keys() - {"all"})
-
-
-def _used(runs: Sequence[RunSummary]) -> list[str]:
-    used = {name for _, _, task in _tasks(runs) for name in task.evidence["total"].by_distance}
-    return [name for name in DISTANCES if name in used]
-
-
-def _rows(
-    runs: Sequence[RunSummary],
-    cells_of: Callable[[EvidenceCells], Mapping[str, Cell]],
-    names: Sequence[str],
-    is_worth: Callable[[TaskSummary], bool],
-) -> Iterator[Row]:
-    """Yield a row per task, file and metric, of tasks that have such cells and are worth it."""
-    for run, name, task in _tasks(runs):
-        if not cells_of(task.evidence["total"]) or not is_worth(task):
-            continue
-        for file, evidence in task.evidence.items():
-            cells = cells_of(evidence)
-            for metric in task.metrics:
-                yield Row(
-                    (
-                        run,
-                        name,
-                        file.removeprefix("qa_set_"),
-                        metric,
-                        *(_cell(cells.get(column), metric) for column in names),
-                    )
-                )
-
-
 def _cell(cell: Cell | None, metric: str) -> TableCell:
     """Return a mean with its interval and its questions."""
     if cell is None:
@@ -137,8 +115,3 @@ def _score_cell(mean: float | None, low: float | None, high: float | None) -> Ta
     interval = f" [{ends[0]}, {ends[1]}]" if all(ends) else ""
     numbers = {"": f"{100 * mean:.1f}", "low": ends[0], "high": ends[1]}
     return TableCell(f"{numbers['']}{interval}", numbers)
-
-
-def _table(title: str, names: Sequence[str], rows: Sequence[Row]) -> Table:
-    heads = [Column(name, False) for name in ("model", "task", "file", "scorer")]
-    return Table(title, (*heads, *map(Column, names)), tuple(rows), (_WITH_INTERVAL,))

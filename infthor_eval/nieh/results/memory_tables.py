@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.results.cells import mean_cell, score_interval
+from infthor_eval.nieh.results.facets import SHOWN_CLUES
 from infthor_eval.nieh.results.gains import (
     Gain,
     difference_cell,
@@ -16,7 +17,7 @@ from infthor_eval.nieh.results.gains import (
     paired_gain,
 )
 from infthor_eval.nieh.results.memory_summary import subject_of
-from infthor_eval.nieh.results.summary import SHOWN_CLUES, NiehSummary, TaskSummary, main_metric
+from infthor_eval.nieh.results.summary import NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, TableCell
 
@@ -176,7 +177,7 @@ def _cells(
 
 
 def _recalled(task: TaskSummary, share: str, metric: str) -> TableCell:
-    cells = task.evidence["total"].by_shown_clues
+    cells = task.by["shown_clues"]
     n_all = sum(cell.n for cell in cells.values())
     if share not in cells:
         return TableCell("-", {"": "", "questions": "0"})

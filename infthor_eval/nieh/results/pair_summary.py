@@ -13,6 +13,7 @@ from typing import NamedTuple
 import msgspec
 
 from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
+from infthor_eval.facets import Facet
 from infthor_eval.nieh.records import NiehAnswer, TwinSide
 from infthor_eval.nieh.scoring import SCORERS, compared_form, scores
 from infthor_eval.pairs import PAIR_BOUNDS, PairShares, net_pairs
@@ -48,15 +49,7 @@ class PairSummary(msgspec.Struct, frozen=True):
         one_right: exactly one of both is right.
         one_is_commoner: of these pairs, the right one has the commoner gold answer of its form
             (a half where both are as common): prior knowledge, not memory; None if there are none.
-        by_kind: net pairs by kind of edit.
-        by_question_type: net pairs by type of question.
-        by_distance: net pairs by frames between the last clue and the end of the trajectory.
-        by_tokens: net pairs by thousand tokens of the frames shown after the last clue, where the
-            model counts tokens.
-        by_shown: net pairs by the number of frames shown.
-        by_difference: net pairs by whether a frame that differs was shown in both worlds.
-        by_age: net pairs by frames since the agent last changed what is asked about; "never" where
-            it is as at the start.
+        by: net pairs by facet and class (`PAIR_FACETS`): `by_FACET` in results.json.
         scores: net score of each pair, by the trajectory that its worlds were made of.
     """
 
@@ -73,13 +66,7 @@ class PairSummary(msgspec.Struct, frozen=True):
     right_when_flipped: Rate | None
     one_right: Rate
     one_is_commoner: Rate | None
-    by_kind: dict[str, Rate]
-    by_question_type: dict[str, Rate]
-    by_distance: dict[str, Rate]
-    by_tokens: dict[str, Rate]
-    by_shown: dict[str, Rate]
-    by_difference: dict[str, Rate]
-    by_age: dict[str, Rate]
+    by: dict[str, dict[str, Rate]]
     scores: dict[str, dict[str, float]]
 
 
@@ -222,13 +209,7 @@ class _Pairs:
             right_when_flipped=self._right(flipped) if flipped else None,
             one_right=_mean(self.pairs, lambda pair: sum(pair.rights(self.metric)) == 1),
             one_is_commoner=self._commoner(one_right) if one_right else None,
-            by_kind=self._by(lambda pair: pair.sides[0].twin.kind),
-            by_question_type=self._by(lambda pair: pair.sides[0].record.payload.question_type),
-            by_distance=self._by(_distance, DISTANCES),
-            by_tokens=self._by(_tokens, LENGTHS),
-            by_shown=self._by(_shown, N_SHOWN),
-            by_difference=self._by(_difference, SHOWN_DIFFERENCE),
-            by_age=self._by(_age, (*DISTANCES, NEVER_CHANGED)),
+            by={facet.name: facet.means(self.pairs, self._net_pairs) for facet in PAIR_FACETS},
             scores=_by_trajectory(scores),
         )
 
@@ -241,22 +222,8 @@ class _Pairs:
         clusters = [pair.cluster for pair in self.pairs for _ in pair.sides]
         return _certain(clustered_rate(values, clusters))
 
-    def _by(
-        self, name_of: Callable[[TwinRecords], str | None], order: Sequence[str] = ()
-    ) -> dict[str, Rate]:
-        """Return the net pairs of groups of pairs, in this order, else by name."""
-        groups: dict[str, list[TwinRecords]] = {}
-        for pair in self.pairs:
-            name = name_of(pair)
-            if name is not None:
-                groups.setdefault(name, []).append(pair)
-        return {
-            name: _certain(
-                net_pairs([it.shares(self.metric) for it in same], [it.cluster for it in same])
-            )
-            for name, same in ((name, groups.get(name)) for name in order or sorted(groups))
-            if same
-        }
+    def _net_pairs(self, pairs: Sequence[TwinRecords]) -> Rate | None:
+        return net_pairs([it.shares(self.metric) for it in pairs], [it.cluster for it in pairs])
 
     def _commoner(self, pairs: Sequence[TwinRecords]) -> Rate:
         """Return how often the answer that was got right is the commoner one of its form."""
@@ -374,3 +341,39 @@ def _age(pair: TwinRecords) -> str:
     ages = [side.twin.n_since_change for side in pair.sides]
     known = [age for age in ages if age is not None]
     return distance_class(min(known)) if known else NEVER_CHANGED
+
+
+# Those by which a chart has curves of memory, in the tables' order.
+_DISTANCE = Facet(
+    "distance",
+    "frames between the last clue and the end of the trajectory",
+    _distance,
+    DISTANCES,
+)
+_SHOWN = Facet("shown", "number of frames shown", _shown, N_SHOWN)
+_AGE = Facet(
+    "age",
+    "frames since the agent last changed what is asked about",
+    _age,
+    (*DISTANCES, NEVER_CHANGED),
+)
+MEMORY_FACETS = (_DISTANCE, _SHOWN, _AGE)
+PAIR_FACETS: tuple[Facet[TwinRecords], ...] = (
+    Facet("kind", "kind of edit", lambda pair: pair.sides[0].twin.kind),
+    Facet(
+        "question_type",
+        "type of question",
+        lambda pair: pair.sides[0].record.payload.question_type,
+    ),
+    _DISTANCE,
+    # Of models that count tokens.
+    Facet("tokens", "thousand tokens of frames shown after the last clue", _tokens, LENGTHS),
+    _SHOWN,
+    Facet(
+        "difference",
+        "whether both worlds were shown a frame that differs",
+        _difference,
+        SHOWN_DIFFERENCE,
+    ),
+    _AGE,
+)

@@ -1,16 +1,10 @@
 """Tables of pairs of twins: net pairs, what the replies to twins were, and the memory curves."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
 
-from infthor_eval.distances import DISTANCES, LENGTHS
+from infthor_eval.facets import Facet, facet_table
 from infthor_eval.nieh.results.gains import name_of
-from infthor_eval.nieh.results.pair_summary import (
-    N_SHOWN,
-    NEVER_CHANGED,
-    SHOWN_DIFFERENCE,
-    PairSummary,
-)
+from infthor_eval.nieh.results.pair_summary import PAIR_FACETS, PairSummary, TwinRecords
 from infthor_eval.nieh.results.summary import NiehSummary
 from infthor_eval.rates import Rate, format_percent
 from infthor_eval.runs import RunSummary
@@ -29,50 +23,6 @@ _NOTES = (
     "trajectories that the worlds were made of.",
 )
 
-
-class PairCurve(NamedTuple):
-    """Net pairs over classes.
-
-    Attributes:
-        title: what the classes are of, in words.
-        rates: returns the net pairs by class.
-        classes: all classes in their order; none for that of their names.
-    """
-
-    title: str
-    rates: Callable[[PairSummary], Mapping[str, Rate]]
-    classes: tuple[str, ...] = ()
-
-
-_BY_DISTANCE = PairCurve(
-    "frames between the last clue and the end of the trajectory",
-    lambda pairs: pairs.by_distance,
-    DISTANCES,
-)
-_BY_TOKENS = PairCurve(
-    "thousand tokens of frames shown after the last clue", lambda pairs: pairs.by_tokens, LENGTHS
-)
-_BY_SHOWN = PairCurve("number of frames shown", lambda pairs: pairs.by_shown, N_SHOWN)
-_BY_DIFFERENCE = PairCurve(
-    "whether both worlds were shown a frame that differs",
-    lambda pairs: pairs.by_difference,
-    SHOWN_DIFFERENCE,
-)
-_BY_AGE = PairCurve(
-    "frames since the agent last changed what is asked about",
-    lambda pairs: pairs.by_age,
-    (*DISTANCES, NEVER_CHANGED),
-)
-MEMORY_CURVES = (_BY_DISTANCE, _BY_SHOWN, _BY_AGE)
-_GROUPINGS = (
-    PairCurve("kind of edit", lambda pairs: pairs.by_kind),
-    PairCurve("type of question", lambda pairs: pairs.by_question_type),
-    _BY_DISTANCE,
-    _BY_TOKENS,
-    _BY_SHOWN,
-    _BY_DIFFERENCE,
-    _BY_AGE,
-)
 
 _Found = tuple[str, str, str, PairSummary]  # model, task, context, pairs
 
@@ -95,7 +45,8 @@ def pair_tables(runs: Sequence[RunSummary]) -> list[Table]:
     found = list(_find(runs))
     if not found:
         return []
-    return [*pair_overview(runs), *(_grouped(curve, found) for curve in _GROUPINGS)]
+    by_facet = [table for facet in PAIR_FACETS for table in _grouped(facet, found)]
+    return [*pair_overview(runs), *by_facet]
 
 
 def _find(runs: Sequence[RunSummary]) -> Iterator[_Found]:
@@ -127,16 +78,15 @@ def _mean_cell(rate: Rate | None) -> TableCell:
     return TableCell(cell.numbers[""] or "-", cell.numbers)
 
 
-def _grouped(curve: PairCurve, found: Sequence[_Found]) -> Table:
-    used = {name for *_, pairs in found for name in curve.rates(pairs)}
-    names = [name for name in curve.classes or sorted(used) if name in used]
-    rows = []
-    for run, task, context, pairs in found:
-        rates = curve.rates(pairs)
-        rows.append(Row((run, task, context, *(_grouped_cell(rates.get(name)) for name in names))))
-    note = "In brackets: 95 % bootstrap interval over trajectories; in parentheses: pairs."
-    title = f"Twins: net pairs, % by {curve.title} (pairs)"
-    return Table(title, (*_HEADS, *map(Column, names)), tuple(rows), (note,))
+def _grouped(facet: Facet[TwinRecords], found: Sequence[_Found]) -> list[Table]:
+    return facet_table(
+        f"Twins: net pairs, % by {facet.heading} (pairs)",
+        [column.name for column in _HEADS],
+        facet.in_order(name for *_, pairs in found for name in pairs.by[facet.name]),
+        [(names, pairs.by[facet.name]) for *names, pairs in found],
+        _grouped_cell,
+        ("In brackets: 95 % bootstrap interval over trajectories; in parentheses: pairs.",),
+    )
 
 
 def _grouped_cell(rate: Rate | None) -> TableCell:

@@ -6,17 +6,19 @@ a field of its own, `took`, which results.json leaves out.
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
 
 import msgspec
 
-from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig, SkippedSample
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.results.above_blind import AboveBlind, above_blind
 from infthor_eval.nieh.results.answer_form import YesNo, format_failures, yes_no
 from infthor_eval.nieh.results.cells import Cell, make_cell, score_of, with_missing
+from infthor_eval.nieh.results.facets import FACETS, FILE, LENGTH
 from infthor_eval.nieh.results.memory_summary import (
     MemorySummary,
     MemoryTimes,
@@ -37,29 +39,7 @@ from infthor_eval.runs import UnitRecord
 CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
 OPEN_ENDED = "open-ended"  # column of questions whose answer is neither yes, no nor a number
 
-SHOWN_CLUES = ("all", "some", "none")
-
 Record = UnitRecord[NiehAnswer]
-
-
-class EvidenceCells(msgspec.Struct, frozen=True):
-    """Scores by what was shown of the evidence; samples where that is unknown are in no cell.
-
-    Attributes:
-        by_shown_clues: cells of the samples with all, some and none of their clue frames shown.
-        by_distance: cells by the number of frames between the last clue and the end of the
-            trajectory ("50-99").
-    """
-
-    by_shown_clues: dict[str, Cell]
-    by_distance: dict[str, Cell]
-
-
-class LengthCell(msgspec.Struct, frozen=True):
-    """Scores of samples with contexts of about one length, and those above blind by scorer."""
-
-    cell: Cell
-    above_blind: dict[str, float | None]
 
 
 class SkippedSummary(msgspec.Struct, frozen=True):
@@ -85,10 +65,9 @@ class TaskSummary(msgspec.Struct, frozen=True):
         simulator: simulator that rendered the frames; None if the set does not say.
         by_clues: cells of the columns of Table 4; of absence questions, which are in the total too;
             and of open-ended questions, which are in the other columns too.
-        by_file: cells by question file, in a set of several.
-        evidence: cells by what was shown of the evidence: of all samples ("total"), and of each
-            file.
-        by_length: cells by thousand tokens of the context ("32-64").
+        by: cells by facet and class (`FACETS`): `by_FACET` in results.json.
+        files: the same of the samples of each question file, by the facets that have it.
+        above_blind_by_length: scores above blind by length of the context and scorer.
         above_blind: the share of what `blind` has not that the replies got, by scorer.
         format_failures: number of replies that are not of the form asked for, by reason.
         n_thought: number of replies behind thoughts.
@@ -105,11 +84,9 @@ class TaskSummary(msgspec.Struct, frozen=True):
     simulator: str | None
     metrics: list[str]
     by_clues: dict[str, Cell]
-    by_question_type: dict[str, Cell]
-    by_variant: dict[str, Cell]
-    by_file: dict[str, Cell]
-    evidence: dict[str, EvidenceCells]
-    by_length: dict[str, LengthCell]
+    by: dict[str, dict[str, Cell]]
+    files: dict[str, dict[str, dict[str, Cell]]]
+    above_blind_by_length: dict[str, dict[str, float | None]]
     above_blind: dict[str, AboveBlind]
     skipped: SkippedSummary
     yes_no: YesNo
@@ -127,6 +104,22 @@ class TaskSummary(msgspec.Struct, frozen=True):
         """Scores of all samples."""
         return self.by_clues["total"]
 
+    def document(self) -> dict[str, Any]:
+        """Return the task as results.json has it."""
+        document: dict[str, Any] = msgspec.to_builtins(self)
+        by, files = document.pop("by"), document.pop("files")
+        total = {facet.name: by.pop(facet.name) for facet in FACETS if facet.of_files}
+        above = document.pop("above_blind_by_length")
+        by[LENGTH.name] = {
+            name: {"cell": cell, "above_blind": above[name]}
+            for name, cell in by[LENGTH.name].items()
+        }
+        evidence = {name: _fields(of_file) for name, of_file in {"total": total, **files}.items()}
+        pairs = document["pairs"]
+        if pairs is not None:
+            pairs |= _fields(pairs.pop("by"))
+        return document | _fields(by) | {"evidence": evidence}
+
 
 class NiehSummary(msgspec.Struct, frozen=True, omit_defaults=True):
     """The summary of a run by task.
@@ -141,6 +134,15 @@ class NiehSummary(msgspec.Struct, frozen=True, omit_defaults=True):
     tasks: dict[str, TaskSummary]
     took: dict[str, MemoryTimes] = {}
     repeats: dict[str, RepeatSummary] = {}
+
+    def document(self) -> dict[str, Any]:
+        """Return the summary as results.json has it."""
+        document: dict[str, Any] = msgspec.to_builtins(self)
+        return document | {"tasks": {name: task.document() for name, task in self.tasks.items()}}
+
+
+def _fields(by: dict[str, Any]) -> dict[str, Any]:
+    return {f"by_{name}": cells for name, cells in by.items()}
 
 
 def summarise(config: NiehConfig, records: Sequence[Record]) -> NiehSummary:
@@ -188,21 +190,25 @@ def _task(replies: Sequence[Record], task: NiehTaskConfig, config: NiehConfig) -
     metrics = list(task.metrics.names)
     records = [mean_record(same) for same in by_question(replies)]
     n_missing = max(0, task.n_samples - len(records))
-    answered = [record for record in records if record.state == "answered"]
-    files = _by_file(records)
+    answered = _answered(records)
+    cells = partial(make_cell, metrics=metrics)
     return TaskSummary(
         n=len(records) + n_missing,
         context=task.context,
         simulator=task.simulator,
         metrics=metrics,
         by_clues=_by_clues(records, metrics, n_missing),
-        by_question_type=_group(records, metrics, _question_type),
-        by_variant=_group(records, metrics, lambda record: record.variant or "-"),
-        by_file={name: make_cell(chosen, metrics) for name, chosen in files.items()},
-        evidence={
-            name: _evidence(chosen, metrics) for name, chosen in {"total": records, **files}.items()
+        by={facet.name: facet.means(records, cells) for facet in FACETS},
+        files={
+            name: {facet.name: facet.means(same, cells) for facet in FACETS if facet.of_files}
+            for name, same in FILE.split(records).items()
         },
-        by_length=_by_length(records, metrics),
+        above_blind_by_length={
+            length: {
+                name: share.mean for name, share in _above_blind(_answered(same), metrics).items()
+            }
+            for length, same in LENGTH.split(records).items()
+        },
         above_blind=_above_blind(answered, metrics),
         skipped=_summarise_skipped(records, n_missing, metrics, task.skipped),
         yes_no=yes_no(replies),
@@ -217,17 +223,8 @@ def _task(replies: Sequence[Record], task: NiehTaskConfig, config: NiehConfig) -
     )
 
 
-def _by_file(records: Sequence[Record]) -> dict[str, list[Record]]:
-    """Return the records by question file, in the order of the files' names."""
-    files: dict[str, list[Record]] = {}
-    for record in records:
-        if record.payload.file:
-            files.setdefault(record.payload.file, []).append(record)
-    return dict(sorted(files.items()))
-
-
-def _question_type(record: Record) -> str:
-    return record.payload.question_type or "untyped"
+def _answered(records: Sequence[Record]) -> list[Record]:
+    return [record for record in records if record.state == "answered"]
 
 
 def _below_full_marks(records: Sequence[Record], metric: str) -> list[str]:
@@ -275,67 +272,8 @@ def is_open_ended(record: Record) -> bool:
     return isinstance(first, str) and first.strip().lower() not in ("yes", "no")
 
 
-def _group(
-    records: Sequence[Record], metrics: Sequence[str], name_of: Callable[[Record], str]
-) -> dict[str, Cell]:
-    groups: dict[str, list[Record]] = {}
-    for record in records:
-        groups.setdefault(name_of(record), []).append(record)
-    return {name: make_cell(chosen, metrics) for name, chosen in sorted(groups.items())}
-
-
-def _evidence(records: Sequence[Record], metrics: Sequence[str]) -> EvidenceCells:
-    return EvidenceCells(
-        by_shown_clues=_in_order(records, metrics, _share_shown, SHOWN_CLUES),
-        by_distance=_in_order(records, metrics, _distance, DISTANCES),
-    )
-
-
-def _in_order(
-    records: Sequence[Record],
-    metrics: Sequence[str],
-    name_of: Callable[[Record], str | None],
-    names: Sequence[str],
-) -> dict[str, Cell]:
-    """Return the cells of groups with samples, in their names' order; some samples are in none."""
-    cells = {}
-    for name in names:
-        chosen = [record for record in records if name_of(record) == name]
-        if chosen:
-            cells[name] = make_cell(chosen, metrics)
-    return cells
-
-
-def _by_length(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, LengthCell]:
-    cells = {}
-    for name, cell in _in_order(records, metrics, _length, LENGTHS).items():
-        chosen = [
-            record for record in records if _length(record) == name and record.state == "answered"
-        ]
-        shares = _above_blind(chosen, metrics)
-        cells[name] = LengthCell(cell, {metric: share.mean for metric, share in shares.items()})
-    return cells
-
-
 def _above_blind(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, AboveBlind]:
     return {name: above_blind(records, name) for name in metrics if name in SCORERS}
-
-
-def _share_shown(record: Record) -> str | None:
-    clues = record.payload.shown_clues
-    if clues is None:
-        return None
-    return SHOWN_CLUES[0 if clues.n_shown == clues.n_clues else 1 if clues.n_shown else 2]
-
-
-def _distance(record: Record) -> str | None:
-    clues = record.payload.shown_clues
-    return None if clues is None or clues.n_after is None else distance_class(clues.n_after)
-
-
-def _length(record: Record) -> str | None:
-    tokens = record.tokens.context
-    return None if tokens is None else length_class(tokens)
 
 
 def _summarise_skipped(

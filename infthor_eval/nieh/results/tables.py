@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from infthor_eval.facets import facet_table
 from infthor_eval.formats.published import (
     PUBLISHED_DATA,
     PublishedRow,
@@ -18,9 +19,10 @@ from infthor_eval.nieh.results.effective_length import effective_lengths
 from infthor_eval.nieh.results.evidence_tables import (
     above_blind_cell,
     above_blind_notes,
-    evidence_tables,
+    question_facet_tables,
     short_name,
 )
+from infthor_eval.nieh.results.facets import DEPTH, FILE
 from infthor_eval.nieh.results.gains import Gain, find_gains, frames_of, name_of
 from infthor_eval.nieh.results.memory_tables import memory_tables
 from infthor_eval.nieh.results.pair_tables import pair_overview, pair_tables
@@ -85,7 +87,7 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
         *others,
         clues_table(runs),
         *_gains_table(runs),
-        *evidence_tables(runs),
+        *question_facet_tables(runs),
         *effective_lengths(runs),
         *memory_tables(runs),
         *repeat_tables(runs),
@@ -312,8 +314,8 @@ def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
     ]
     for run, name, task in _tasks([run for run in runs if frames_of(run) == SHOWN]):
         if task.context == table.context and table.metric in task.metrics:
-            by_file = {short_name(file): cell for file, cell in task.by_file.items()}
-            cells = task.by_clues | task.by_question_type | task.by_variant | by_file
+            by_file = {short_name(file): cell for file, cell in task.by[FILE.name].items()}
+            cells = task.by_clues | task.by["question_type"] | task.by["variant"] | by_file
             if not cells.keys() & set(table.columns):
                 continue
             means = [mean_cell(cells.get(column), table.metric) for column in table.columns]
@@ -371,19 +373,25 @@ def _points(gain: float | None) -> str:
 
 def _depth_table(runs: Sequence[RunSummary]) -> list[Table]:
     """Return a table if a task has depths."""
-    variants = {variant for _, _, task in _tasks(runs) for variant in task.by_variant}
-    depths = sorted(variant for variant in variants if variant.startswith("depth="))
-    if not depths:
-        return []
-    rows = []
-    for run, name, task in _tasks(runs):
-        if not set(depths) & set(task.by_variant):
-            continue
-        for metric in task.metrics:
-            means = [_mean_of(task.by_variant.get(depth), metric) for depth in depths]
-            rows.append(Row((run, name, metric, *means)))
-    columns = (*_NAMES, _METRIC, *map(Column, depths))
-    return [Table("Accuracy, % by depth of the needle (questions)", columns, tuple(rows))]
+    rows = [
+        ((run, name, metric), {depth: (cell, metric) for depth, cell in by_depth(task).items()})
+        for run, name, task in _tasks(runs)
+        if by_depth(task)
+        for metric in task.metrics
+    ]
+    return facet_table(
+        "Accuracy, % by depth of the needle (questions)",
+        ("model", "task", "scorer"),
+        sorted({depth for _, cells in rows for depth in cells}),
+        rows,
+        lambda scores: _mean_of(*(scores or (None, ""))),
+    )
+
+
+def by_depth(task: TaskSummary) -> dict[str, Cell]:
+    """Return the cells of a task's variants that are depths of the needle."""
+    variants = task.by["variant"].items()
+    return {name: cell for name, cell in variants if name.startswith(DEPTH)}
 
 
 # -- form of the replies

@@ -11,13 +11,12 @@ from infthor_eval.episodes.shared_units import (
 )
 from infthor_eval.errors import UsageError
 from infthor_eval.plans.config import PlansConfig
-from infthor_eval.plans.records import RECORDS, PlanRecord
+from infthor_eval.plans.records import PlanRecord
 
 
 class PlansRun(RecordedRun[PlanRecord, PlansConfig]):
     """The journal of a run of plans."""
 
-    record_types = RECORDS
     planner = "planner"
 
     @property

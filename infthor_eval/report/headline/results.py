@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from statistics import fmean
 
 from infthor_eval.rates import Rate
-from infthor_eval.report.presented import PresentedRun
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitCounts, Usage
 
 
@@ -48,7 +48,7 @@ class TaskResult:
         return self.units.answered + self.units.failed + self.units.not_asked
 
 
-def task_results(run: PresentedRun, link: str = "") -> Iterator[TaskResult]:
+def task_results(run: Run, link: str = "") -> Iterator[TaskResult]:
     """Yield what a run scored in each of its tasks."""
     summary = run.summary.summary
     rates = run.suite.primary_metrics(summary)

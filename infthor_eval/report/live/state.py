@@ -12,12 +12,12 @@ import msgspec
 from infthor_eval.errors import InfthorError, wrap_errors
 from infthor_eval.pages.server import file_route
 from infthor_eval.rates import Rate
-from infthor_eval.report.presented import PresentedRun
-from infthor_eval.runs import NOTHING, UnitRecord, Usage
+from infthor_eval.run import Run
+from infthor_eval.runs import NOTHING, RunSummary, UnitRecord, Usage
 from infthor_eval.runs.journals.following import FollowedJournal, is_written
 from infthor_eval.runs.journals.shards import FOLDER
 from infthor_eval.runs.stored.search import Results, read_results, run_folders
-from infthor_eval.suites import find_presenter, find_suite
+from infthor_eval.suites import find_suite
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -36,7 +36,7 @@ class LiveSample(msgspec.Struct, frozen=True):
     """A sample: texts as they are in the journal, cut if they are very long; times in seconds.
 
     Attributes:
-        outcome: see `PresentedRun.outcome`.
+        outcome: see `Run.outcome`.
         reason: why it failed or does not count.
         tokens: of the contexts and of the replies; None if they are not counted.
     """
@@ -151,18 +151,7 @@ class LiveRun:
         suite = self._journal.suite
         if header is None or suite is None:
             return LiveState(status="waiting", folder=str(self._run))
-        presenter = find_presenter(header.suite)
-        run = PresentedRun(
-            folder=self._run,
-            label=header.name,
-            model=header.name,
-            suite=suite,
-            presenter=presenter,
-            header=header,
-            records=(),
-            usage=NOTHING,
-            n_missing=None,
-        )
+        run = Run.held(self._run, suite, RunSummary(header, None))
         if has_grown:
             self._sum_up(run, self._journal)
         self._update_metrics(run, self._journal)
@@ -178,14 +167,14 @@ class LiveRun:
             if header.n_units is not None
             else _n_units(results, self._totals.n_done),
             totals=self._totals,
-            measure=self._measure or presenter.measure,
-            target_label=presenter.target_label,
+            measure=self._measure or run.presenter.measure,
+            target_label=run.presenter.target_label,
             metrics=self._metrics,
             failures=self._failures,
             newest=tuple(_sample(run, record) for record in reversed(self._journal.newest)),
         )
 
-    def _sum_up(self, run: PresentedRun, journal: FollowedJournal) -> None:
+    def _sum_up(self, run: Run, journal: FollowedJournal) -> None:
         records = list(journal.log.units.values())
         states = Counter(record.state for record in records)
         failed = [record for record in records if record.failure is not None]
@@ -202,7 +191,7 @@ class LiveRun:
         self._failures = tuple(_sample(run, record) for record in reversed(failed[-_N_FAILURES:]))
         self._has_new_metrics = True
 
-    def _update_metrics(self, run: PresentedRun, journal: FollowedJournal) -> None:
+    def _update_metrics(self, run: Run, journal: FollowedJournal) -> None:
         """Work the primary metrics out as `show` does, unless that was done a moment ago."""
         started = time.monotonic()
         if not self._has_new_metrics or started < self._metrics_due:
@@ -240,7 +229,7 @@ def _n_units(results: Results | None, n_done: int) -> int | None:
     return None if results is None else results.n_missing + n_done
 
 
-def _sample(run: PresentedRun, record: UnitRecord[Any]) -> LiveSample:
+def _sample(run: Run, record: UnitRecord[Any]) -> LiveSample:
     description = run.presenter.describe(record)
     return LiveSample(
         task=record.task,

@@ -25,10 +25,11 @@ from infthor_eval.report.presenter import (
 from infthor_eval.report.recordings.arm_pictures import arm_pictures
 from infthor_eval.report.recordings.episode_sheet import MOST_ROWS, draw_sheet, sheet_rows
 from infthor_eval.report.recordings.reach_view import draw_reach
-from infthor_eval.report.runs import ReportRun, choose_evenly
+from infthor_eval.report.runs import choose_evenly
 from infthor_eval.report.suites.episode_columns import ARM_COLUMNS
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Section
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ class ArmEpisodesReplay:
     options: Collection[str] = ("--episode", "--sheet")
     sheet_rows = MOST_ROWS
 
-    def select(self, run: ReportRun, selection: EpisodeSelection) -> Recording:
+    def select(self, run: Run, selection: EpisodeSelection) -> Recording:
         """See `Replay.select`."""
         from infthor_eval.manipulation.recorded.replaying import recorded_episodes, replay_episodes
 
@@ -87,16 +88,16 @@ def _select_episodes(recorded: "RecordedEpisodes", selection: EpisodeSelection) 
     return chosen
 
 
-def _arm_run(run: ReportRun) -> ArmRun:
+def _arm_run(run: Run) -> ArmRun:
     return ArmRun(run.label, run.header, run.records)
 
 
-def _model_runs(runs: Sequence[ReportRun]) -> list[ArmRun]:
+def _model_runs(runs: Sequence[Run]) -> list[ArmRun]:
     """Runs named after their models: those of one model with several radii become one line."""
     return [replace(_arm_run(run), label=run.model) for run in runs]
 
 
-def _runs_by_radius(runs: Sequence[ReportRun]) -> list[ArmRun]:
+def _runs_by_radius(runs: Sequence[Run]) -> list[ArmRun]:
     """Runs named after models and radii, or by all options that differ if that is ambiguous."""
     named = label_by_radius(_model_runs(runs))
     return (
@@ -106,13 +107,13 @@ def _runs_by_radius(runs: Sequence[ReportRun]) -> list[ArmRun]:
     )
 
 
-def _build_figure_6(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+def _build_figure_6(runs: Sequence[Run], request: FigureRequest) -> FigureResult:
     from infthor_eval.report.suites.reward_curves import curves_result
 
     return curves_result(arm_curves(_runs_by_radius(runs), request.task), request.panels)
 
 
-def _build_radius_figure(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+def _build_radius_figure(runs: Sequence[Run], request: FigureRequest) -> FigureResult:
     from infthor_eval.report.figures.radius import radii_figure, radii_table
 
     by_radius = success_by_radius(_model_runs(runs), request.task)
@@ -145,7 +146,7 @@ class ManipulationPresenter(PlainPresenter):
         """See `Presenter.bounds`: a reward has none."""
         return (0.0, 1.0) if metric == self.main_metric else (-math.inf, math.inf)
 
-    def sections(self, runs: Sequence[ReportRun]) -> Iterator[Section]:
+    def sections(self, runs: Sequence[Run]) -> Iterator[Section]:
         """See `Presenter.sections`: reward along trajectories, and success by radius where there
         are several radii."""
         from infthor_eval.report.figures.radius import radii_chart, radii_table

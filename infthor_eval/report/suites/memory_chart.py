@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Sequence
 
 from infthor_eval.nieh.results.summary import main_metric
-from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.svg.dots import dot_of
 from infthor_eval.report.svg.points import Point, PointsChart, points_chart
 from infthor_eval.report.web.sections import Chart
+from infthor_eval.run import Run
 
 
-def memory_charts(runs: Sequence[ReportRun]) -> Iterator[Chart]:
+def memory_charts(runs: Sequence[Run]) -> Iterator[Chart]:
     """Yield a chart for each task with memories whose models count their tokens."""
     tasks = dict.fromkeys(
         name
@@ -23,7 +23,7 @@ def memory_charts(runs: Sequence[ReportRun]) -> Iterator[Chart]:
             yield _chart(task, curves)
 
 
-def _curves(runs: Sequence[ReportRun], task: str) -> dict[str, list[Point]]:
+def _curves(runs: Sequence[Run], task: str) -> dict[str, list[Point]]:
     """Return the points of each memory, of each subject if there are several, by tokens."""
     by_memory: dict[tuple[str, str], list[Point]] = {}
     for run in runs:

@@ -8,6 +8,7 @@ from statistics import fmean
 from infthor_eval.nieh.records import BlindGuess, NiehAnswer
 from infthor_eval.nieh.rescoring.judging import JUDGED
 from infthor_eval.nieh.results.above_blind import score_above_blind, score_range
+from infthor_eval.nieh.results.facets import FACETS
 from infthor_eval.nieh.results.pair_summary import score_pairs
 from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.nieh.scoring import SCORERS
@@ -26,11 +27,11 @@ from infthor_eval.report.presenter import (
     ReplyTokens,
     Timelines,
 )
-from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
 from infthor_eval.report.web.samples import Prompt
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
 
 Record = UnitRecord[NiehAnswer]
@@ -43,7 +44,7 @@ _BOUNDS = {
 }
 
 
-def _build_pairs_figure(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+def _build_pairs_figure(runs: Sequence[Run], request: FigureRequest) -> FigureResult:
     from infthor_eval.report.suites.pair_charts import build_pairs_figure
 
     return build_pairs_figure(runs, request)
@@ -137,13 +138,13 @@ class NiehPresenter(PlainPresenter):
             for name, score in pair.shares.by_metric.items():
                 yield GroupScore(name, group, pair.cluster, score)
 
-    def opening(self, runs: Sequence[ReportRun]) -> Section | None:
+    def opening(self, runs: Sequence[Run]) -> Section | None:
         """See `Presenter.opening`: pairs of twins, if there are any."""
         from infthor_eval.report.suites.pair_charts import pairs_section
 
         return pairs_section(runs)
 
-    def charts(self, runs: Sequence[ReportRun]) -> list[Chart]:
+    def charts(self, runs: Sequence[Run]) -> list[Chart]:
         """See `Presenter.charts`."""
         from infthor_eval.report.suites.nieh_charts import nieh_charts
 
@@ -179,6 +180,9 @@ class NiehPresenter(PlainPresenter):
             details |= {
                 name: f"{score:+.2f}" for name, score in self.further_scores(record).items()
             }
+        for facet in FACETS:
+            told = None if facet.is_told else facet.class_of(record)
+            details |= {} if told is None else {facet.heading: told}
         if payload.thinking is not None:
             details[THOUGHT] = payload.thinking
         return details
@@ -188,20 +192,20 @@ class NiehPresenter(PlainPresenter):
         recall = record.payload.recall
         return () if recall is None else recall.recalled
 
-    def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
+    def prompts(self, run: Run, data: Path | None) -> Mapping[UnitKey, Prompt]:
         """See `Presenter.prompts`."""
         from infthor_eval.report.suites.nieh_prompts import find_prompts
 
         return find_prompts(run, data)
 
-    def request_frames(self, run: ReportRun, data: Path | None) -> FindFrames:
+    def request_frames(self, run: Run, data: Path | None) -> FindFrames:
         """See `Presenter.request_frames`."""
         from infthor_eval.report.suites.nieh_prompts import RequestFrames
 
         return RequestFrames(run, data)
 
     def timelines(
-        self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore
+        self, runs: Sequence[Run], data: Path | None, thumbnails: ThumbnailStore
     ) -> Timelines:
         """See `Presenter.timelines`."""
         from infthor_eval.report.suites.nieh_frames import find_timelines

@@ -1,32 +1,31 @@
 """Charts of NIEH: accuracy by clues, type, evidence and depth, and gains."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import NamedTuple
 
-from infthor_eval.distances import DISTANCES, LENGTHS
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.results.above_blind import AboveBlind, FormScore
 from infthor_eval.nieh.results.cells import Cell, mean_cell
-from infthor_eval.nieh.results.evidence_tables import short_name
+from infthor_eval.nieh.results.evidence_tables import facet_cells, short_name
+from infthor_eval.nieh.results.facets import DEPTH, FACETS, QuestionFacet
 from infthor_eval.nieh.results.gains import find_gains, name_of
 from infthor_eval.nieh.results.summary import (
     CLUE_COLUMNS,
-    SHOWN_CLUES,
     TaskSummary,
     main_metric,
 )
-from infthor_eval.report.runs import ReportRun
+from infthor_eval.nieh.results.tables import by_depth
 from infthor_eval.report.suites.memory_chart import memory_charts
 from infthor_eval.report.svg.dots import Dot, DotRow, DotsChart, class_row, dot_of, dots_chart
 from infthor_eval.report.svg.drawing import Series
 from infthor_eval.report.web.sections import Chart
+from infthor_eval.run import Run
 from infthor_eval.statistics import MeanEstimate
 from infthor_eval.tables import Column, Row, Table
 
 _COLUMNS = (*CLUE_COLUMNS, ABSENCE)
-_DEPTH = "depth="
 
 
 class _Line(NamedTuple):
@@ -40,7 +39,7 @@ class _Line(NamedTuple):
         return main_metric(self.task)
 
 
-def nieh_charts(runs: Sequence[ReportRun]) -> list[Chart]:
+def nieh_charts(runs: Sequence[Run]) -> list[Chart]:
     """Draw all charts that the runs have numbers for."""
     charts: list[Chart] = []
     for task in dict.fromkeys(name for run in runs for name in run.summary.summary.tasks):
@@ -59,82 +58,58 @@ def nieh_charts(runs: Sequence[ReportRun]) -> list[Chart]:
 
 def _charts_of_task(task: str, lines: Sequence[_Line]) -> Iterator[Chart]:
     clues = [name for name in _COLUMNS if any(line.task.by_clues[name].n for line in lines)]
-    yield _by_class(
-        _Classes(task, "number of clues", clues, lambda line: line.task.by_clues), lines
-    )
-    types = sorted({name for line in lines for name in line.task.by_question_type})
-    if len(types) > 1:
-        yield _by_class(
-            _Classes(task, "type of question", types, lambda line: line.task.by_question_type),
-            lines,
-        )
+    by_clues = [line.task.by_clues for line in lines]
+    yield _by_class(task, "number of clues", clues, by_clues, lines)
+    facets = {facet.name: facet for facet in FACETS if facet.in_charts}
+    yield from _by_facet(task, facets.pop("question_type"), lines)
     if any(len(_forms(line)) > 1 for line in lines):
         yield _by_form(task, lines)
-    variants = sorted({name for line in lines for name in line.task.by_variant})
-    depths = [name for name in variants if name.startswith(_DEPTH)]
+    by_depths = [by_depth(line.task) for line in lines]
+    depths = sorted(set().union(*by_depths))
     if len(depths) > 1:
-        yield _by_class(
-            _Classes(task, "depth of the needle", depths, lambda line: line.task.by_variant), lines
-        )
-    known_lengths = set().union(*(line.task.by_length for line in lines))
-    lengths = [name for name in LENGTHS if name in known_lengths]
-    if len(lengths) > 1:
-        classes = _Classes(task, "length of the context, thousand tokens", lengths, _by_length)
-        yield _by_class(classes, lines)
-    yield from _by_evidence(task, lines)
+        yield _by_class(task, "depth of the needle", depths, by_depths, lines)
+    for facet in facets.values():
+        if not facet.of_files:
+            yield from _by_facet(task, facet, lines)
+    files = ["total", *lines[0].task.files]
+    for file, facet in product(files, facets.values()):
+        if facet.of_files:
+            name = f"{task}, {short_name(file)}" if len(files) > 1 else task
+            yield from _by_facet(name, facet, lines, file)
 
 
-@dataclass(frozen=True)
-class _Classes:
-    """Classes of a task's questions: what they are by, their names, and their cells of a run."""
-
-    task: str
-    by: str
-    names: Sequence[str]
-    cells_of: Callable[[_Line], Mapping[str, Cell]]
-
-
-def _by_length(line: _Line) -> Mapping[str, Cell]:
-    return {name: length.cell for name, length in line.task.by_length.items()}
+def _by_facet(
+    title: str, facet: QuestionFacet, lines: Sequence[_Line], file: str = "total"
+) -> Iterator[Chart]:
+    """Draw the classes of a facet, if they tell anything of some run."""
+    cells = [facet_cells(facet, line.task).get(file, {}) for line in lines]
+    names = facet.shown(set().union(*cells))
+    both = zip(lines, cells, strict=True)
+    if len(names) > 1 and any(facet.is_worth(line.task.context, of) for line, of in both):
+        yield _by_class(title, facet.heading, names, cells, lines)
 
 
-def _by_evidence(task: str, lines: Sequence[_Line]) -> Iterator[Chart]:
-    """Draw accuracy by share of the clues shown and by distance of the last clue; by file."""
-    for file in lines[0].task.evidence:
-        of_file = f"{task}, {short_name(file)}" if len(lines[0].task.evidence) > 1 else task
-
-        def cells_by_share(line: _Line, file: str = file) -> Mapping[str, Cell]:
-            return line.task.evidence[file].by_shown_clues if file in line.task.evidence else {}
-
-        def far(line: _Line, file: str = file) -> Mapping[str, Cell]:
-            return line.task.evidence[file].by_distance if file in line.task.evidence else {}
-
-        if any(cells_by_share(line).keys() - {"all"} for line in lines):
-            by = "clue frames shown"
-            yield _by_class(_Classes(of_file, by, SHOWN_CLUES, cells_by_share), lines)
-        known = set().union(*map(far, lines))
-        distances = [name for name in DISTANCES if name in known]
-        if len(distances) > 1 and any(line.task.context != "clues" for line in lines):
-            by = "frames between the last clue and the end"
-            yield _by_class(_Classes(of_file, by, distances, far), lines)
-
-
-def _by_class(classes: _Classes, lines: Sequence[_Line]) -> Chart:
-    """Draw a row per class with the dots of all lines."""
-    cells = [classes.cells_of(line) for line in lines]
+def _by_class(
+    task: str,
+    by: str,
+    names: Sequence[str],
+    cells: Sequence[Mapping[str, Cell]],
+    lines: Sequence[_Line],
+) -> Chart:
+    """Draw a row per class with the dots of all lines, whose cells are by class."""
     rows = []
-    for name in classes.names:
+    for name in names:
         dots = [_dot(of_line.get(name), line) for of_line, line in zip(cells, lines, strict=True)]
-        rows.append(class_row(name.removeprefix(_DEPTH), dots))
+        rows.append(class_row(name.removeprefix(DEPTH), dots))
     return dots_chart(
         DotsChart(
-            title=f"{classes.task}: accuracy by {classes.by}",
+            title=f"{task}: accuracy by {by}",
             caption=(
                 "A row is a class of questions, with their number in parentheses; a dot is a run, "
                 "its line the 95 % interval over trajectories."
             ),
             axis=f"{lines[0].metric} (%)",
-            label=classes.by,
+            label=by,
             series=[line.series for line in lines],
             rows=rows,
             description=_describe(lines),
@@ -184,7 +159,7 @@ def _describe(lines: Sequence[_Line]) -> str:
     return "; ".join(f"{label} {mean} %" for label, mean in totals)
 
 
-def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
+def _gains_chart(runs: Sequence[Run]) -> Chart | None:
     """Draw each run's gain over blank frames, a row per task; None without a run on blank ones."""
     summaries = [run.summary for run in runs]
     rows = []
@@ -196,7 +171,7 @@ def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
     return _by_rows("Gain over blank frames", caption, rows, "gain, in points")
 
 
-def _above_blind_chart(runs: Sequence[ReportRun]) -> Chart | None:
+def _above_blind_chart(runs: Sequence[Run]) -> Chart | None:
     """Draw the score above blind of each run, a row per task; None if no floor is known."""
     rows = [
         (f"{run.label}, {name}", above)
@@ -233,7 +208,7 @@ def _by_rows(
     )
 
 
-def _heat_map(run: ReportRun) -> Chart | None:
+def _heat_map(run: Run) -> Chart | None:
     """Draw accuracy by depth of the needle and context size; None if no task has depths."""
     from matplotlib.figure import Figure
 
@@ -241,18 +216,16 @@ def _heat_map(run: ReportRun) -> Chart | None:
 
     tasks: dict[int, TaskSummary] = {}
     for name, task in run.summary.summary.tasks.items():
-        if any(variant.startswith(_DEPTH) for variant in task.by_variant):
+        if by_depth(task):
             tasks[int(run.tasks[name].dataset_kwargs.get("ctx_size") or 0)] = task
     if not tasks:
         return None
     sizes = sorted(tasks)
     metric = main_metric(next(iter(tasks.values())))
-    depths = sorted(
-        {depth for task in tasks.values() for depth in task.by_variant if depth.startswith(_DEPTH)}
-    )
+    depths = sorted(set().union(*map(by_depth, tasks.values())))
     means = []
     for depth in depths:
-        means.append([_percent(tasks[size].by_variant.get(depth), metric) for size in sizes])
+        means.append([_percent(by_depth(tasks[size]).get(depth), metric) for size in sizes])
 
     def draw() -> Figure:
         figure = Figure(
@@ -268,7 +241,7 @@ def _heat_map(run: ReportRun) -> Chart | None:
                 text = "-" if math.isnan(value) else f"{value:.0f}"
                 axes.text(column, row, text, ha="center", va="center", color=ink)
         axes.set_xticks(range(len(sizes)), list(map(_size, sizes)))
-        axes.set_yticks(range(len(depths)), [depth.removeprefix(_DEPTH) for depth in depths])
+        axes.set_yticks(range(len(depths)), [depth.removeprefix(DEPTH) for depth in depths])
         axes.set_xlabel("context (thousand tokens)")
         axes.set_ylabel("depth of the needle")
         figure.colorbar(picture, ax=axes, label=f"{metric} (%)")
@@ -290,7 +263,7 @@ def _heat_table(
     rows = []
     for depth, values in zip(depths, means, strict=True):
         cells = ("-" if math.isnan(value) else f"{value:.2f}" for value in values)
-        rows.append(Row((depth.removeprefix(_DEPTH), *cells)))
+        rows.append(Row((depth.removeprefix(DEPTH), *cells)))
     return Table("", columns, tuple(rows))
 
 

@@ -4,6 +4,7 @@ from functools import partial
 
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.results.above_blind import score_above_blind
+from infthor_eval.nieh.results.facets import FACETS
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.sample_columns import SampleColumn, payload_column
 from infthor_eval.runs import UnitRecord
@@ -55,4 +56,5 @@ NIEH_COLUMNS = (
     SampleColumn("n_recalled", int, _n_recalled),
     SampleColumn("build_seconds", float, partial(_recall, "build_s")),
     SampleColumn("recall_seconds", float, partial(_recall, "recall_s")),
+    *(SampleColumn(facet.name, str, facet.class_of) for facet in FACETS if not facet.is_told),
 )

@@ -18,19 +18,18 @@ from infthor_eval.formats.step_log import LoggedPose, Step, read_steps
 from infthor_eval.formats.twins import TwinPair
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.report.presenter import Timelines
-from infthor_eval.report.runs import ReportRun, choose_evenly, records_by_unit
+from infthor_eval.report.runs import choose_evenly, records_by_unit
 from infthor_eval.report.suites.nieh_sets import RunSets
 from infthor_eval.report.web.samples import FrameFacts, Numbered, Timeline, TimelineFrame
 from infthor_eval.report.web.thumbnails import ThumbnailStore
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
 
 _OVERVIEW = 5  # frames of a trajectory that are shown for a question without clues
 _DIFFERING = 6  # frames beside the clues that are shown of those that differ from the twin's
 
 
-def find_timelines(
-    runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore
-) -> Timelines:
+def find_timelines(runs: Sequence[Run], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
     """See `Presenter.timelines`; a set that is missing or has changed since the run has a note.
 
     Clues of all questions get their pictures before any neighbour does, as there is a limit on the

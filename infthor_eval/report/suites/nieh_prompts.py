@@ -13,9 +13,9 @@ from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.rescoring.rebuilt_requests import RebuiltRequest, RequestRebuilder
-from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.nieh_sets import RunSets
 from infthor_eval.report.web.samples import Prompt, PromptFrames
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
 
 Record = UnitRecord[NiehAnswer]
@@ -23,7 +23,7 @@ _Positions = dict[FrameRef, list[int]]  # of each picture in the trajectory; som
 _OF_BASELINES = "a baseline is not sent it: it answers from the questions alone"
 
 
-def find_prompts(run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
+def find_prompts(run: Run, data: Path | None) -> Mapping[UnitKey, Prompt]:
     """See `Presenter.prompts`."""
     sets = RunSets([run], data)
     rebuilders: dict[str, RequestRebuilder | str] = {
@@ -44,7 +44,7 @@ def find_prompts(run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
 class RequestFrames:
     """Finds the frames of a run's requests; see `Presenter.request_frames`."""
 
-    def __init__(self, run: ReportRun, data: Path | None) -> None:
+    def __init__(self, run: Run, data: Path | None) -> None:
         sets = RunSets([run], data)
         self._rebuilders = {task: _rebuilder(run, task, sets) for task in run.tasks}
 
@@ -61,7 +61,7 @@ class RequestFrames:
         return [part for part in parts if isinstance(part, FrameRef)]
 
 
-def _rebuilder(run: ReportRun, task: str, sets: RunSets) -> RequestRebuilder | str:
+def _rebuilder(run: Run, task: str, sets: RunSets) -> RequestRebuilder | str:
     """Return what makes the requests of a task again, or why nothing can."""
     opened = sets.find_set(task)
     if opened is None:

@@ -2,16 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import find_set
-from infthor_eval.report.runs import ReportRun
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
-from infthor_eval.runs.stored.command import read_stored_command
 
 Record = UnitRecord[NiehAnswer]
 
@@ -23,7 +21,7 @@ class RunSets:
         problems: reason why a task has no set, by its name.
     """
 
-    def __init__(self, runs: Sequence[ReportRun], data: Path | None) -> None:
+    def __init__(self, runs: Sequence[Run], data: Path | None) -> None:
         """Open the sets; `data` is the folder of all, None for the one that each run names."""
         self.problems: dict[str, str] = {}
         self._sets: dict[str, tuple[NiehSet, Mapping[str, Question]]] = {}
@@ -43,9 +41,9 @@ class RunSets:
             question if question is not None and question.text == record.payload.question else None
         )
 
-    def _open(self, run: ReportRun, task: str, data: Path | None) -> None:
+    def _open(self, run: Run, task: str, data: Path | None) -> None:
         folder = data or run.data
-        options = _options_of(run)
+        options = run.stored_command.options if run.stored_command else {}
         try:
             opened = find_set(
                 str(folder) if folder else None,
@@ -59,8 +57,3 @@ class RunSets:
             self.problems[task] = f"{opened.root} has changed since {run.label} was run"
             return
         self._sets[task] = opened, {question.id: question for question in opened.questions}
-
-
-def _options_of(run: ReportRun) -> Mapping[str, Any]:
-    command = read_stored_command(run.folder)
-    return command.options if command else {}

@@ -7,8 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from infthor_eval.errors import UsageError
-from infthor_eval.nieh.results.pair_summary import PairSummary
-from infthor_eval.nieh.results.pair_tables import MEMORY_CURVES, PairCurve, pair_tables
+from infthor_eval.facets import Facet
+from infthor_eval.nieh.results.pair_summary import MEMORY_FACETS, PairSummary, TwinRecords
+from infthor_eval.nieh.results.pair_tables import pair_tables
 from infthor_eval.rates import Rate, format_percent
 from infthor_eval.report.figures.style import (
     LEGEND,
@@ -18,10 +19,10 @@ from infthor_eval.report.figures.style import (
     looks_of,
 )
 from infthor_eval.report.presenter import FigureRequest, FigureResult
-from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.svg.dots import DotsChart, class_row, dot_of, dots_chart, number_range
 from infthor_eval.report.svg.drawing import Series
 from infthor_eval.report.web.sections import Chart, Section
+from infthor_eval.run import Run
 from infthor_eval.tables import Column, Row, Table
 
 # inches
@@ -43,7 +44,7 @@ class _Line(NamedTuple):
         return Series(self.label, self.place)
 
 
-def pairs_section(runs: Sequence[ReportRun]) -> Section | None:
+def pairs_section(runs: Sequence[Run]) -> Section | None:
     """Return the section of the page on pairs; None if the runs have none."""
     tables = pair_tables([run.summary for run in runs])
     if not tables:
@@ -51,17 +52,17 @@ def pairs_section(runs: Sequence[ReportRun]) -> Section | None:
     return Section("pairs", "Pairs of twins", tuple(_charts(runs)), tuple(tables))
 
 
-def _charts(runs: Sequence[ReportRun]) -> Iterator[Chart]:
+def _charts(runs: Sequence[Run]) -> Iterator[Chart]:
     """Yield a chart per task and memory curve that has several classes."""
     for task in _tasks(runs):
         lines = _lines(runs, task)
-        for curve in MEMORY_CURVES:
+        for curve in MEMORY_FACETS:
             names = _classes(curve, lines)
             if len(names) > 1:
                 yield _chart(task, curve, names, lines)
 
 
-def build_pairs_figure(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+def build_pairs_figure(runs: Sequence[Run], request: FigureRequest) -> FigureResult:
     """Return the memory curves of a task as one figure, a panel each.
 
     Raises:
@@ -80,13 +81,13 @@ def build_pairs_figure(runs: Sequence[ReportRun], request: FigureRequest) -> Fig
     return FigureResult(_table(task, lines), lambda: _pairs_figure(task, lines))
 
 
-def _tasks(runs: Sequence[ReportRun]) -> list[str]:
+def _tasks(runs: Sequence[Run]) -> list[str]:
     """Return the tasks with pairs."""
     by_name = ((name, task) for run in runs for name, task in run.summary.summary.tasks.items())
     return list(dict.fromkeys(name for name, task in by_name if task.pairs is not None))
 
 
-def _lines(runs: Sequence[ReportRun], task: str) -> list[_Line]:
+def _lines(runs: Sequence[Run], task: str) -> list[_Line]:
     looks = looks_of(run.label for run in runs)
     summaries = [(run.label, run.summary.summary.tasks.get(task)) for run in runs]
     return [
@@ -96,14 +97,15 @@ def _lines(runs: Sequence[ReportRun], task: str) -> list[_Line]:
     ]
 
 
-def _classes(curve: PairCurve, lines: Sequence[_Line]) -> list[str]:
+def _classes(curve: Facet[TwinRecords], lines: Sequence[_Line]) -> list[str]:
     """Return the curve's classes that a run has pairs in."""
-    used = {name for line in lines for name in curve.rates(line.pairs)}
-    return [name for name in curve.classes if name in used]
+    return curve.in_order(name for line in lines for name in line.pairs.by[curve.name])
 
 
-def _chart(task: str, curve: PairCurve, names: Sequence[str], lines: Sequence[_Line]) -> Chart:
-    rates = [curve.rates(line.pairs) for line in lines]
+def _chart(
+    task: str, curve: Facet[TwinRecords], names: Sequence[str], lines: Sequence[_Line]
+) -> Chart:
+    rates = [line.pairs.by[curve.name] for line in lines]
     described = []
     for line, of_line in zip(lines, rates, strict=True):
         texts = [f"{100 * of_line[name].mean:.1f} % at {name}" for name in names if name in of_line]
@@ -115,13 +117,13 @@ def _chart(task: str, curve: PairCurve, names: Sequence[str], lines: Sequence[_L
         rows.append(class_row(name, dots))
     return dots_chart(
         DotsChart(
-            title=f"{task}: net pairs of twins, by {curve.title}",
+            title=f"{task}: net pairs of twins, by {curve.heading}",
             caption=(
                 "A row is a class of pairs, with their number in parentheses; a dot is a run, its "
                 "line the 95 % interval; who does not know which world is which has 0 on average."
             ),
             axis="net pairs (%)",
-            label=curve.title,
+            label=curve.heading,
             series=[line.series for line in lines],
             rows=rows,
             description="; ".join(described),
@@ -129,9 +131,11 @@ def _chart(task: str, curve: PairCurve, names: Sequence[str], lines: Sequence[_L
     )
 
 
-def _draw(axes: Axes, curve: PairCurve, names: Sequence[str], lines: Sequence[_Line]) -> None:
+def _draw(
+    axes: Axes, curve: Facet[TwinRecords], names: Sequence[str], lines: Sequence[_Line]
+) -> None:
     """Draw a curve of each run over the classes, with intervals, and the counts of pairs."""
-    rates = [curve.rates(line.pairs) for line in lines]
+    rates = [line.pairs.by[curve.name] for line in lines]
     for number, (line, of_line) in enumerate(zip(lines, rates, strict=True)):
         offset = _SPREAD * (number / max(len(lines) - 1, 1) - 0.5) if len(lines) > 1 else 0.0
         _draw_line(axes, of_line, names, line.look, offset)
@@ -141,7 +145,7 @@ def _draw(axes: Axes, curve: PairCurve, names: Sequence[str], lines: Sequence[_L
     )
     axes.set_ylim(min(-3.0, axes.get_ylim()[0]), 103)
     axes.set_ylabel("net pairs (%)")
-    axes.set_xlabel(f"{curve.title} (pairs)")
+    axes.set_xlabel(f"{curve.heading} (pairs)")
     axes.grid(axis="x", visible=False)
 
 
@@ -163,10 +167,10 @@ def _draw_line(
 
 def _pairs_figure(task: str, lines: Sequence[_Line]) -> Figure:
     """Return a figure with a panel per curve."""
-    width = len(MEMORY_CURVES) * _PANEL[0] + LEGEND
+    width = len(MEMORY_FACETS) * _PANEL[0] + LEGEND
     figure = Figure(figsize=(width, _PANEL[1] + _MARGIN), layout="constrained")
-    panels = figure.subplots(1, len(MEMORY_CURVES), squeeze=False)[0]
-    for axes, curve in zip(panels, MEMORY_CURVES, strict=True):
+    panels = figure.subplots(1, len(MEMORY_FACETS), squeeze=False)[0]
+    for axes, curve in zip(panels, MEMORY_FACETS, strict=True):
         _draw(axes, curve, _classes(curve, lines), lines)
     add_legend(panels[-1], [(line.label, line.look) for line in lines])
     first = lines[0].pairs
@@ -182,9 +186,9 @@ def _table(task: str, lines: Sequence[_Line]) -> Table:
     """Return the numbers of the figure, a row per run, curve and class."""
     rows = []
     for line in lines:
-        for curve in MEMORY_CURVES:
-            for name, rate in curve.rates(line.pairs).items():
-                cells = (line.label, curve.title, name, format_percent(rate), str(rate.n))
+        for curve in MEMORY_FACETS:
+            for name, rate in line.pairs.by[curve.name].items():
+                cells = (line.label, curve.heading, name, format_percent(rate), str(rate.n))
                 rows.append(Row(cells))
     names = (Column("run", False), Column("by", False), Column("class", False))
     columns = (*names, Column("net pairs, %"), Column("pairs"))

@@ -30,10 +30,10 @@ from infthor_eval.report.presenter import (
 )
 from infthor_eval.report.recordings.plan_pictures import plan_pictures
 from infthor_eval.report.recordings.room_map import draw_map
-from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.episode_columns import PLAN_COLUMNS
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Section
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class PlansReplay:
     options: Collection[str] = ("--plans",)
     sheet_rows = 0
 
-    def select(self, run: ReportRun, selection: EpisodeSelection) -> Recording:
+    def select(self, run: Run, selection: EpisodeSelection) -> Recording:
         """See `Replay.select`."""
         from infthor_eval.plans.recorded.replaying import recorded_plans, replay_plans
 
@@ -87,11 +87,11 @@ def _select_plans(recorded: "RecordedPlans", plans: str | None) -> Sequence[Reco
     return recorded.between(int(numbers[1]), int(numbers[2] or numbers[1]))
 
 
-def _plans_run(run: ReportRun) -> PlansRun:
+def _plans_run(run: Run) -> PlansRun:
     return PlansRun(run.label, run.header, run.records)
 
 
-def _build_figure_7(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+def _build_figure_7(runs: Sequence[Run], request: FigureRequest) -> FigureResult:
     from infthor_eval.report.suites.reward_curves import curves_result
 
     return curves_result(
@@ -136,7 +136,7 @@ class PlansPresenter(PlainPresenter):
             for name, score in pair.shares.by_metric.items():
                 yield GroupScore(name, pair.pair, pair.base, score)
 
-    def sections(self, runs: Sequence[ReportRun]) -> Iterator[Section]:
+    def sections(self, runs: Sequence[Run]) -> Iterator[Section]:
         """See `Presenter.sections`: curves of reward for each task that all runs have."""
         from infthor_eval.report.suites.reward_curves import (
             DrawnFigure,

@@ -12,7 +12,6 @@ from infthor_eval.report.comparison import compare, comparison_table
 from infthor_eval.report.headline.results import TaskResult, task_results
 from infthor_eval.report.headline.sentence import headline
 from infthor_eval.report.headline.tables import cost_chart, results_chart, results_table
-from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.web.page import About, Page, SuiteLabels, embedded_remark
 from infthor_eval.report.web.progress import PageProgress, Silent
 from infthor_eval.report.web.replays import EpisodeReplays
@@ -21,6 +20,7 @@ from infthor_eval.report.web.sample_list import SharedTexts, build_samples
 from infthor_eval.report.web.samples import PageSample
 from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
+from infthor_eval.run import Run
 
 _SUMMARIES = "runs summarised"
 _FEW = 4  # runs of which each is compared with each
@@ -47,7 +47,7 @@ class PageRequest:
 
 
 def build_page(
-    runs: Sequence[PresentedRun], request: PageRequest, progress: PageProgress | None = None
+    runs: Sequence[Run], request: PageRequest, progress: PageProgress | None = None
 ) -> Page:
     """Build the page of some runs, of one suite or of several; `progress` observes what takes long.
 
@@ -55,7 +55,7 @@ def build_page(
         DataError: a run's header is not one of its suite.
     """
     progress = progress or Silent()
-    by_suite: dict[str, list[PresentedRun]] = {}
+    by_suite: dict[str, list[Run]] = {}
     progress.begin(_SUMMARIES, len(runs))
     for run in runs:
         by_suite.setdefault(run.suite.name, []).append(run)
@@ -122,12 +122,12 @@ def results_section(results: Sequence[TaskResult]) -> Section:
     )
 
 
-def _title(runs: Sequence[PresentedRun]) -> str:
+def _title(runs: Sequence[Run]) -> str:
     names = ", ".join(run.label for run in runs)
     return names if len(names) <= 60 else f"{len(runs)} runs"
 
 
-def _remark(runs: Sequence[PresentedRun]) -> str:
+def _remark(runs: Sequence[Run]) -> str:
     """Return the remark on the runs of the page in the embedded simulator; empty without any."""
     embedded = [run.label for run in runs if "embedded" in run.header.config.simulators]
     if not embedded:
@@ -136,7 +136,7 @@ def _remark(runs: Sequence[PresentedRun]) -> str:
     return embedded_remark(which)
 
 
-def _suite_sections(runs: Sequence[PresentedRun]) -> Iterator[Section]:
+def _suite_sections(runs: Sequence[Run]) -> Iterator[Section]:
     suite = runs[0].suite
     presenter = runs[0].presenter
     title = presenter.title or suite.name.replace("_", " ").capitalize()
@@ -150,7 +150,7 @@ def _suite_sections(runs: Sequence[PresentedRun]) -> Iterator[Section]:
         yield replace(section, is_linked=False)
 
 
-def _comparisons(suites: Iterable[Sequence[PresentedRun]]) -> Iterator[Section]:
+def _comparisons(suites: Iterable[Sequence[Run]]) -> Iterator[Section]:
     """Each run against each before it, of its suite; if there are many, each against the first."""
     tables = []
     notes = []
@@ -171,7 +171,7 @@ def _comparisons(suites: Iterable[Sequence[PresentedRun]]) -> Iterator[Section]:
         yield Section("comparison", "Comparison", (), tuple(tables), tuple(notes))
 
 
-def _labels(runs: Sequence[PresentedRun], same: Sequence[PresentedRun]) -> SuiteLabels:
+def _labels(runs: Sequence[Run], same: Sequence[Run]) -> SuiteLabels:
     presenter = same[0].presenter
     run_indices = tuple(runs.index(run) for run in same)
     return SuiteLabels(
@@ -183,7 +183,7 @@ def _labels(runs: Sequence[PresentedRun], same: Sequence[PresentedRun]) -> Suite
     )
 
 
-def _metrics(runs: Sequence[PresentedRun], samples: Sequence[PageSample]) -> list[str]:
+def _metrics(runs: Sequence[Run], samples: Sequence[PageSample]) -> list[str]:
     """Names of all metrics; those that decide the outcome first."""
     main = {run.presenter.main_metric for run in runs}
     names = dict.fromkeys(
@@ -197,7 +197,7 @@ def _metrics(runs: Sequence[PresentedRun], samples: Sequence[PageSample]) -> lis
     return sorted(names, key=lambda name: name not in main)
 
 
-def _state(run: PresentedRun) -> str:
+def _state(run: Run) -> str:
     """Return how many samples have a result, and what became of the others; empty for a whole
     run."""
     units = list(run.summary.units.values())
@@ -209,7 +209,7 @@ def _state(run: PresentedRun) -> str:
     return f"{answered:,} answered, {failed:,} failed, {not_asked:,} not asked"
 
 
-def _about(run: PresentedRun) -> About:
+def _about(run: Run) -> About:
     config = run.header.config
     facts = {
         "suite": run.suite.name,

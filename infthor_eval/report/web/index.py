@@ -11,14 +11,12 @@ import infthor_eval
 from infthor_eval.errors import InfthorError
 from infthor_eval.process_settings import safe_path
 from infthor_eval.report.headline.results import TaskResult, task_results
-from infthor_eval.report.presented import read_report_run
-from infthor_eval.report.runs import distinct_names
 from infthor_eval.report.web.build import PageRequest, build_page, results_section
 from infthor_eval.report.web.page import Page, embedded_remark, write_page
 from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import n_processors
-from infthor_eval.runs import RunHeader, read_header
+from infthor_eval.run import Run, told_apart
 from infthor_eval.storage.files import file_name, prepare_folder
 from infthor_eval.tables import Column, Row, Table
 
@@ -50,7 +48,6 @@ class _Job:
     """A run whose page is to be made: its name beside the others, and the place of the page."""
 
     folder: Path
-    suite: str
     name: str
     page: Path
 
@@ -111,19 +108,17 @@ def write_index(
 
 def _plan(folders: Sequence[Path], pages: Path) -> tuple[list[_Job], list[tuple[str, str]]]:
     """Return the runs with their names and pages, and those whose header cannot be read."""
-    headers: list[tuple[Path, RunHeader]] = []
+    runs: list[Run] = []
     unread = []
     for folder in folders:
         try:
-            headers.append((folder, read_header(folder)))
+            runs.append(Run.open(folder))
         except InfthorError as error:
             unread.append((str(folder), str(error)))
-    known = [folder for folder, _ in headers]
-    names = distinct_names(known, [header for _, header in headers])
     jobs = []
-    for number, ((folder, header), name) in enumerate(zip(headers, names, strict=True)):
-        page = pages / f"{number:04}-{file_name(header.name)}.html"
-        jobs.append(_Job(folder, header.suite, name, page))
+    for number, run in enumerate(told_apart(runs, by_task=True)):
+        page = pages / f"{number:04}-{file_name(run.listed.name)}.html"
+        jobs.append(_Job(run.folder, run.name, page))
     return jobs, unread
 
 
@@ -152,7 +147,7 @@ def _make(job: _Job, request: PageRequest) -> _Made:
     """Write the page of a run, and return what the index says of it."""
     problems: list[str] = []
     try:
-        run = read_report_run(job.folder, job.suite, job.name, problems.append)
+        run = Run.open(job.folder, problems.append).named(job.name).read()
         page = build_page([run], request)
     except InfthorError as error:
         return _Made(problems=problems, failure=str(error))

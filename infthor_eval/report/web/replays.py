@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 from PIL import Image
 
 from infthor_eval.errors import InfthorError
-from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.presenter import EpisodeSelection, OpenReplay, Replay
 from infthor_eval.report.runs import choose_evenly
 from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.thumbnails import ThumbnailStore
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
 
 Record = UnitRecord[Any]
@@ -43,7 +43,7 @@ class EpisodeReplays:
 
     def __init__(
         self,
-        runs: Sequence[PresentedRun],
+        runs: Sequence[Run],
         most: int,
         folders: tuple[Path | None, Path | None],
         thumbnails: ThumbnailStore,
@@ -68,7 +68,7 @@ class EpisodeReplays:
         if n_episodes:
             progress.begin(_WORK, n_episodes)
 
-    def replay(self, run: PresentedRun) -> tuple[Mapping[UnitKey, EpisodePictures], list[str]]:
+    def replay(self, run: Run) -> tuple[Mapping[UnitKey, EpisodePictures], list[str]]:
         """Replay chosen episodes; return their pictures, and why a trajectory was not replayed."""
         pictures: dict[UnitKey, EpisodePictures] = {}
         notes: list[str] = []
@@ -96,11 +96,11 @@ class EpisodeReplays:
                     self._count(run, trajectory)
         return pictures, notes
 
-    def _count(self, run: PresentedRun, trajectory: str) -> None:
+    def _count(self, run: Run, trajectory: str) -> None:
         self._progress.advance(_WORK, f"{run.label}, {trajectory}")
 
     def _draw(
-        self, replay: Replay, session: OpenReplay, run: PresentedRun, record: Record
+        self, replay: Replay, session: OpenReplay, run: Run, record: Record
     ) -> EpisodePictures:
         frames = list(session.frames([record]))
         seen = [frame.observation for frame in frames if frame.observation is not None]
@@ -119,7 +119,7 @@ class EpisodeReplays:
         )
 
 
-def _choose(run: PresentedRun, most: int) -> list[Record]:
+def _choose(run: Run, most: int) -> list[Record]:
     """Two thirds of the room for episodes that went wrong, the rest for successes."""
     acted = [record for record in run.records if run.presenter.steps(record)]
     wrong = [record for record in acted if run.main_score(record) < 1]

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from infthor_eval.reasons import count_reasons
-from infthor_eval.report.presented import PresentedRun
+from infthor_eval.run import Run
 from infthor_eval.runs import TaskConfig
 from infthor_eval.tables import Column, Row, Table
 
@@ -11,7 +11,7 @@ _NAMES = (Column("run", False), Column("task", False))
 _MEASURABLE_S = 0.05  # less is the clock's noise: baselines take microseconds
 
 
-def costs_table(runs: Sequence[PresentedRun]) -> Table:
+def costs_table(runs: Sequence[Run]) -> Table:
     """Return speed and cost, with a row per run."""
     tokens = ("tokens read", "of them cached, %", "tokens written")
     columns = ("samples", "seconds", "samples / s", "requests", *tokens, "cost")
@@ -24,7 +24,7 @@ def costs_table(runs: Sequence[PresentedRun]) -> Table:
     )
 
 
-def _cost_row(run: PresentedRun) -> Row:
+def _cost_row(run: Run) -> Row:
     seconds = sum(record.seconds for record in run.records)
     rate = f"{len(run.records) / seconds:,.2f}" if seconds >= _MEASURABLE_S else "-"
     usage = run.usage
@@ -36,7 +36,7 @@ def _cost_row(run: PresentedRun) -> Row:
     return Row((run.label, str(len(run.records)), f"{seconds:.1f}", rate, requests, *tokens, cost))
 
 
-def left_out_table(runs: Sequence[PresentedRun]) -> Table | None:
+def left_out_table(runs: Sequence[Run]) -> Table | None:
     """Return counts of failed, excluded, retried, skipped and missing units by reason, or None."""
     rows = [
         Row((run.label, task, what, str(n), reason))
@@ -53,7 +53,7 @@ def left_out_table(runs: Sequence[PresentedRun]) -> Table | None:
     return Table("", columns, tuple(rows))
 
 
-def _left_out(run: PresentedRun) -> Iterator[tuple[tuple[str, str], str]]:
+def _left_out(run: Run) -> Iterator[tuple[tuple[str, str], str]]:
     for record in run.records:
         if record.failure is not None:
             yield (record.task, record.state), record.failure

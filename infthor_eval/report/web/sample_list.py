@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.runs import records_by_unit
 from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.replays import EpisodePictures, EpisodeReplays
@@ -22,6 +21,7 @@ from infthor_eval.report.web.samples import (
     Timeline,
 )
 from infthor_eval.report.web.thumbnails import ThumbnailStore
+from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.runs.journals.shards import FOLDER
 from infthor_eval.runs.journals.tracebacks import StoredTracebacks
@@ -54,7 +54,7 @@ class SharedTexts:
 
 
 def build_samples(
-    runs: Sequence[PresentedRun],
+    runs: Sequence[Run],
     data: Path | None,
     replays: EpisodeReplays,
     thumbnails: ThumbnailStore,
@@ -101,7 +101,7 @@ def build_samples(
 class _Source:
     """A run with what is known of its records beside them."""
 
-    run: PresentedRun
+    run: Run
     prompts: Mapping[UnitKey, Prompt]
     tracebacks: StoredTracebacks
     texts: SharedTexts

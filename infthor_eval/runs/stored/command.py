@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import yaml
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.runs.request import RunRequest
+from infthor_eval.settings import settings_of
 from infthor_eval.storage.files import write_atomically, writing_hint
 
 _FILE = "run.yaml"
@@ -124,11 +125,10 @@ def _non_default(options: Any) -> dict[str, Any]:
     """Return the fields of a dataclass that differ from their defaults."""
     if not is_dataclass(options):  # a suite without options
         return {}
-    values = [(option, getattr(options, option.name)) for option in fields(options)]
     return {
-        option.name: _absolute(value) if option.metadata.get("is_place") else value
-        for option, value in values
-        if value != option.default
+        name: _absolute(value) if declared.setting.is_place else value
+        for name, declared in settings_of(type(options)).items()
+        if (value := getattr(options, name)) != declared.default
     }
 
 

@@ -17,9 +17,12 @@ _NOT_SHOWN = {
     "name",
     "tasks",
 }
+_LONGEST_TASKS = 60  # characters of the tasks in a label
 
 
-def label_runs(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str] = ()) -> list[str]:
+def label_runs(
+    runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str] = (), *, by_task: bool = False
+) -> list[str]:
     """Return a label for each run.
 
     Runs of one suite and name are told apart by the options that differ: `qwen2.5-vl
@@ -29,10 +32,38 @@ def label_runs(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str] =
     Args:
         runs: folder and header of each run.
         ignore: options that the tables show anyway.
+        by_task: whether runs of other tasks have other labels, too; frames are no part of these.
 
     Raises:
         DataError: the `run.yaml` of a run is not valid.
     """
+    labels = _label_by_options(runs, ignore)
+    return _label_by_task(labels, runs) if by_task else labels
+
+
+def with_frames(name: str, header: RunHeader) -> str:
+    """Return the name of a run, with its frame ablation if there is one."""
+    frames = header.config.frames
+    return name if frames in ("", "shown") else f"{name}, {frames} frames"
+
+
+def _label_by_task(labels: Sequence[str], runs: Sequence[tuple[Path, RunHeader]]) -> list[str]:
+    """Return the labels; those of runs of one label and frames with their tasks or folders."""
+    tasks = ["+".join(sorted(header.config.tasks))[:_LONGEST_TASKS] for _, header in runs]
+    keys = [
+        (label, header.suite, header.config.frames)
+        for label, (_, header) in zip(labels, runs, strict=True)
+    ]
+    with_tasks = list(zip(keys, tasks, strict=True))
+    told = list(labels)
+    for position, (folder, _) in enumerate(runs):
+        if keys.count(keys[position]) > 1:
+            is_told_by_tasks = with_tasks.count(with_tasks[position]) == 1
+            told[position] += f" ({tasks[position] if is_told_by_tasks else folder.name})"
+    return told
+
+
+def _label_by_options(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str]) -> list[str]:
     same_name = defaultdict(list)
     for position, (_, header) in enumerate(runs):
         same_name[header.suite, header.name].append(position)

@@ -25,6 +25,7 @@ _NEEDED: dict[Need, tuple[type, str]] = {
 class BoundRun(Generic[SuiteUnit, Payload]):
     """A run whose subject is loaded, and the header of its journal."""
 
+    prepared: PreparedRun[SuiteUnit, Payload]
     subject: Subject
     evaluation: BoundEvaluation[SuiteUnit, Payload]
     header: RunHeader
@@ -66,7 +67,7 @@ def bind_run(
         require_independent(subject, evaluation.workload, run.request.worker_settings)
         header = _header(run, subject, evaluation.workload)
         stack.pop_all()
-    return BoundRun(subject, evaluation, header, owns_subject=loaded is None)
+    return BoundRun(run, subject, evaluation, header, owns_subject=loaded is None)
 
 
 def check_runs(runs: Iterable[PreparedRun[Any, Any]]) -> None:

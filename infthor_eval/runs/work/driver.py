@@ -1,13 +1,10 @@
-"""One run of any suite: its journal, the order of its work, its samples for other readers."""
+"""One run of any suite: its journal, the order of its work, its results."""
 
-import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, Protocol
-
-import msgspec
 
 from infthor_eval.errors import UserCodeError
 from infthor_eval.runs.journals import journal as journals
@@ -16,7 +13,7 @@ from infthor_eval.runs.journals.records import Payload, SuiteUnit, Unit, UnitRec
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.results import write_run_files
 from infthor_eval.runs.stored.command import write_command
-from infthor_eval.runs.suite import RunSummary, UnitSample, Workload
+from infthor_eval.runs.suite import RunSummary, UnitDoc, Workload
 from infthor_eval.runs.usage import Usage
 from infthor_eval.runs.work.executor import Executor, LocalExecutor
 from infthor_eval.runs.work.worker_executor import WorkerPoolExecutor
@@ -56,7 +53,6 @@ class RunOutcome(Generic[SuiteUnit, Payload]):
         records: records of all units that were attempted.
         n_missing: number of units that were not attempted, as the run was stopped.
         usage: usage of all requests, those for cached artifacts included.
-        samples: the records in their order, converted for other readers.
         close_failure: why the subject or the suite could not be closed; None if it was.
     """
 
@@ -66,8 +62,13 @@ class RunOutcome(Generic[SuiteUnit, Payload]):
     records: list[UnitRecord[Payload]]
     n_missing: int
     usage: Usage
-    samples: Iterable[UnitSample]
     close_failure: str | None = None
+
+    @property
+    def docs(self) -> Iterator[UnitDoc]:
+        """The records in their order, as lm-eval's files have them, each made when it is read."""
+        for record in self.records:
+            yield self.run.evaluation.to_doc(self.summary.header, record)
 
 
 def execute(
@@ -133,10 +134,7 @@ def _evaluate(
             _write_results(run, folder, workload, journal)
             raise
         summary, records, usage = _write_results(run, folder, workload, journal)
-    samples = StoredSamples(executor.samples(records))
-    return RunOutcome(
-        folder, run, summary, records, workload.n_units - len(records), usage, samples
-    )
+    return RunOutcome(folder, run, summary, records, workload.n_units - len(records), usage)
 
 
 def _start_executor(
@@ -165,21 +163,3 @@ def _write_results(
     )
     write_run_files(folder, summary, run.suite, records, n_missing, usage)
     return summary, records, usage
-
-
-class StoredSamples:
-    """Samples in a temporary file, read as often as needed.
-
-    The evaluation that converts records to samples is closed with its run, but readers come later.
-    In memory the prompts of long trajectories would take gigabytes.
-    """
-
-    def __init__(self, samples: Iterable[UnitSample]) -> None:
-        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed with its owner
-        for sample in samples:
-            self._file.write(msgspec.json.encode(sample) + b"\n")
-
-    def __iter__(self) -> Iterator[UnitSample]:
-        self._file.seek(0)
-        for line in self._file:
-            yield msgspec.json.decode(line, type=UnitSample)

@@ -117,7 +117,7 @@ def _each_reply(
     for group in evaluation.workload.groups[::step]:
         ordered = replace(group, units=group.units[::step])
         for record in group_records(evaluation, ordered, session, gate):
-            reply = evaluation.to_sample(record).reply
+            reply = bound.prepared.evaluation.to_doc(bound.header, record).reply
             yield record.key, reply if record.failure is None else f"failed: {record.failure}"
 
 

@@ -1,6 +1,6 @@
 """Who does a run's work: this process, or several workers; either way the same records."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import Any, Generic, Protocol
@@ -18,7 +18,7 @@ from infthor_eval.runs.journals.records import (
 )
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.suite import UnitSample, Workload
+from infthor_eval.runs.suite import Workload
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.runs.work.binding import bind_run
 from infthor_eval.runs.work.deferring import fetch_replies
@@ -45,9 +45,6 @@ class Executor(Protocol[Payload]):
         self, folder: Path, journal: Journal[Payload], should_stop: Callable[[], bool]
     ) -> Iterator[tuple[UnitRecord[Payload], bool]]:
         """Do all groups, or stop after the units in hand; yield each record once it is on disk."""
-
-    def samples(self, records: Sequence[UnitRecord[Payload]]) -> Iterator[UnitSample]:
-        """Convert records for other readers, in their order; not after `close`."""
 
     def close(self) -> None:
         """Release everything, in whatever state it is."""
@@ -101,10 +98,6 @@ class LocalExecutor(Generic[SuiteUnit, Payload]):
         for number in range(1, n_units + 1):
             subject.tell_position(number, n_units)
             yield from islice(records, 1)
-
-    def samples(self, records: Sequence[UnitRecord[Payload]]) -> Iterator[UnitSample]:
-        """See `Executor`."""
-        return map(self._bound.evaluation.to_sample, records)
 
     def close(self) -> None:
         """See `Executor`."""

@@ -24,7 +24,7 @@ from infthor_eval.runs.journals.records import (
 )
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.suite import Group, UnitSample, Workload
+from infthor_eval.runs.suite import Group, Workload
 from infthor_eval.runs.work.binding import bind_run
 from infthor_eval.runs.work.group_records import group_records
 from infthor_eval.terminal import print_error
@@ -34,7 +34,6 @@ from infthor_eval.workers import (
     JobResult,
     Pool,
     WorkerLost,
-    WorkerLostError,
     WorkerWithdrawn,
 )
 
@@ -43,7 +42,6 @@ _SHARD_WAIT_S = 20.0
 # many losses in a row the group is split, and each of its units gets so many tries alone.
 _GROUP_TRIES = 3
 _UNIT_TRIES = 2
-_BATCH = 256  # records that a worker converts at a time
 
 
 @dataclass(frozen=True)
@@ -73,13 +71,6 @@ class _GroupJob(Generic[Payload]):
     portion: _Portion
     folder: Path
     earlier: tuple[UnitRecord[Payload], ...]
-
-
-@dataclass(frozen=True)
-class _SampleJob(Generic[Payload]):
-    """Records for a worker to convert to samples."""
-
-    records: tuple[UnitRecord[Payload], ...]
 
 
 @dataclass(frozen=True)
@@ -118,13 +109,8 @@ class _Evaluator(Generic[SuiteUnit, Payload]):
         parts = (workload.skipped, workload.config, workload.costs, workload.warnings)
         return _Greeting(self._bound.header, Workload(groups, *parts))
 
-    def do(
-        self, job: _GroupJob[Payload] | _SampleJob[Payload]
-    ) -> Iterator[tuple[UnitRecord[Payload], bool] | UnitSample]:
+    def do(self, job: _GroupJob[Payload]) -> Iterator[tuple[UnitRecord[Payload], bool]]:
         evaluation = self._bound.evaluation
-        if isinstance(job, _SampleJob):
-            yield from map(evaluation.to_sample, job.records)
-            return
         session = self._open_session(job.folder)
         for record in job.earlier:
             session.journal.add(record)
@@ -241,29 +227,6 @@ class WorkerPoolExecutor(Generic[SuiteUnit, Payload]):
             if isinstance(event, JobFailed):
                 given_up[portions[event.job]] = event.reason
         return given_up
-
-    def samples(self, records: Sequence[UnitRecord[Payload]]) -> Iterator[UnitSample]:
-        """See `Executor`.
-
-        Raises:
-            WorkerLostError: worker after worker was lost.
-        """
-        # In batches, as a worker is sent all records of a job at once.
-        jobs = [
-            _SampleJob(tuple(records[at : at + _BATCH])) for at in range(0, len(records), _BATCH)
-        ]
-        for job in jobs:
-            converted: list[UnitSample] = []
-            for event in self._pool.run(1, lambda _, job=job: job):  # type: ignore[misc]
-                if isinstance(event, JobResult):
-                    converted.append(event.result)
-                elif isinstance(event, WorkerLost):
-                    converted.clear()  # another worker begins the job again
-                elif isinstance(event, JobFailed):
-                    raise WorkerLostError(
-                        f"worker after worker was lost at it ({event.reason}); run it again"
-                    )
-            yield from converted
 
     def close(self) -> None:
         """See `Executor`."""

@@ -102,7 +102,7 @@ BAD = {
         {"model_args": "a"},
         "typed.yaml: model_args: --model-args: 'a' is not of the form key=value",
     ),
-    "frames": ({"frames": "none"}, "--frames none: there are shown, blank"),
+    "frames": ({"frames": "none"}, "--frames none: give one of shown, blank"),
     "unknown model option": (
         {"model": "qwen2.5-vl-tiny", "model_args": {"dtpe": "x"}},
         "did you mean dtype?",

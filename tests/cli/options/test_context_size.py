@@ -187,11 +187,11 @@ BAD = [
     ),
     (
         ["--model", "oracle", "--tokens-per-frame", "0"],
-        "--tokens-per-frame 0: a frame has one token at least",
+        "--tokens-per-frame 0: give a whole number from 1",
     ),
     (
         ["--model", "oracle", "--tokens-per-frame", "-3"],
-        "--tokens-per-frame -3: a frame has one token at least",
+        "--tokens-per-frame -3: give a whole number from 1",
     ),
     (["--model", "oracle", "--tokens-per-frame", "few"], "'few' is not a valid integer"),
     (["--model", "oracle", "--k-tokens", "1001"], "'1001' is not one of '1000', '1024'"),

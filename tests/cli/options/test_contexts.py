@@ -100,7 +100,7 @@ def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run
         "--trajectories)" in err
     )
     for tasks, trajectories, expected in (
-        ("nieh_gt", folder, "--trajectories: no context of nieh_gt tells of the trajectory"),
+        ("nieh_gt", folder, "no context of nieh_gt tells of the trajectory"),
         (
             "nieh_interleaved",
             tmp_path / "no",

@@ -43,7 +43,7 @@ def test_unknown_frame_ablations_are_one_line(make_nieh_set, tmp_path, run_cli):
         model="oracle", tasks="nieh_gt", data=make_nieh_set(size=8), out=tmp_path / "o"
     )
     for names, expected in (
-        ("none", "--frames none: there are shown, blank"),
+        ("none", "--frames none: give one of shown, blank"),
         (",", "--frames is empty; give a name"),
     ):
         assert_refused(run_cli(*arguments, "--frames", names), expected)

@@ -12,12 +12,11 @@ from types import SimpleNamespace
 import yaml
 
 from infthor_eval.cli import main
-from infthor_eval.cli.results import read_run_results
+from infthor_eval.cli.progress.notes import print_failure
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.nieh.rescoring.rescore import read_source
 from infthor_eval.report.live.state import LiveRun
-from infthor_eval.report.presented import read_report_runs
-from infthor_eval.runs.stored.search import StoredRun, find_runs
+from infthor_eval.run import Run, find_runs, open_runs
 
 from ...helpers.arm_runs import make_arm_run, make_episode_record
 from ...helpers.command_line import option_words
@@ -97,17 +96,17 @@ def _watch(folder: Path) -> None:
 
 def _find(folder: Path) -> None:
     runs = list(find_runs(folder))
-    assert any(isinstance(run, StoredRun) and run.folder.name == "sound" for run in runs), (
+    assert any(isinstance(run, Run) and run.folder.name == "sound" for run in runs), (
         "the good run is not listed"
     )
 
 
 def _show(folder: Path) -> None:
-    read_run_results(folder / "damaged")
+    Run.open(folder / "damaged", print_failure).read()
 
 
 def _report(folder: Path) -> None:
-    runs = read_report_runs([folder / "damaged", folder / "sound"])
+    runs = open_runs([folder / "damaged", folder / "sound"])
     presenter = runs[0].presenter
     list(presenter.sections(runs))
     list(presenter.charts(runs))

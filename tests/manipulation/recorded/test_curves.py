@@ -5,8 +5,9 @@ import pytest
 from infthor_eval.episodes.curves import AT_MOST
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.manipulation.recorded.curves import ALL, arm_curves
-from infthor_eval.manipulation.recorded.runs import ArmRun, label_by_radius
+from infthor_eval.manipulation.recorded.runs import label_by_radius
 from infthor_eval.manipulation.records import RECORDS
+from infthor_eval.run import Run
 from infthor_eval.runs.journals.journal import Journal
 
 from ...helpers.arm_runs import make_arm_planner_run, make_arm_run, make_episode_record
@@ -181,4 +182,4 @@ def test_a_journal_of_another_form_is_refused(tmp_path):
         pass
     spoil_config(tmp_path)
     with pytest.raises(DataError, match="line 1: not the config of a run of manipulation"):
-        ArmRun.read(tmp_path)
+        Run.open(tmp_path).read()

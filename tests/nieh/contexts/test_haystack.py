@@ -8,11 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import SkippedQuestion
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings, Sample
 from infthor_eval.nieh.contexts.haystack import sampling_pool
+from infthor_eval.settings import read
 
 from ...helpers.questions import make_question
 
@@ -227,8 +228,8 @@ def test_a_kilo_token_is_the_published_one_unless_told_otherwise():
 
     assert n_frames("truncate_head") == 8 * 1024 // 121
     assert n_frames("truncate_head", k_tokens=1000) == 8000 // 121
-    with pytest.raises(UsageError, match="k_tokens is 1023"):
-        ContextSettings.read({"k_tokens": 1023})
+    with pytest.raises(DataError, match="k_tokens is 1023"):
+        read(ContextSettings, {"k_tokens": 1023})
     with pytest.raises(UsageError, match="needs tokens_per_frame"):
         windows(10, [1], ctx_size=8)
     with pytest.raises(UsageError, match="needs its size"):

@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.pictures.video import Video
 from infthor_eval.formats.question import Question
@@ -62,7 +62,7 @@ def test_the_rate_is_a_setting(root, write_video):
     assert n_frames == [8, 16]
     for wrong in (0, 11, "x"):
         with pytest.raises(
-            UsageError, match=r"fps is .*; it is a number of frames per second above 0, at most 10"
+            DataError, match=r"fps is .*; it is a number of frames per second above 0, at most 10"
         ):
             samples_of(root, fps=wrong)
 

@@ -226,7 +226,10 @@ def test_published_replies_at_32k_by_shown_clues():
     )
     (run,) = import_logs(logs, data)
     ((_, task),) = summarise(run.header(data).config, run.records).tasks.items()
-    cells = {name: evidence.by_shown_clues for name, evidence in task.evidence.items()}
+    cells = {
+        "total": task.by["shown_clues"],
+        **{name: by["shown_clues"] for name, by in task.files.items()},
+    }
     scores = {
         name: {
             share: (cell.n, round(100 * cell.scores["reference"].mean, 1))

@@ -108,9 +108,9 @@ def test_whole_trajectories_run_where_they_fit_and_are_refused_where_they_do_not
 
 
 def first_prompt(prepare_run, **options):
-    """The prompt of the first request as samples tell it, and the run."""
+    """The prompt of the first request as lm-eval's files tell it, and the run."""
     outcome = execute(prepare_run(**options))
-    return next(iter(outcome.samples)).prompt.rpartition("<image>")[2], outcome
+    return next(outcome.docs).prompt.rpartition("<image>")[2], outcome
 
 
 def test_the_option_sets_the_words_and_the_runs_identity(prepare_run, data):

@@ -7,7 +7,7 @@ from infthor_eval.nieh.results.above_blind import above_blind
 from infthor_eval.nieh.results.evidence_tables import (
     above_blind_cell,
     above_blind_notes,
-    evidence_tables,
+    question_facet_tables,
     short_name,
 )
 
@@ -32,7 +32,7 @@ def test_by_shown_clues_and_by_distance():
         make_evidence_record(2, "mug", 0, 120),
         make_evidence_record(4, "cup", 0, 130),
     ]
-    by_clues, by_distance = evidence_tables(
+    by_clues, by_distance = question_facet_tables(
         [make_run(make_config(context="truncate_head", ctx_size=32), records)]
     )
     assert [column.name for column in by_clues.columns] == [
@@ -60,7 +60,7 @@ def test_files_have_their_rows_under_short_names():
         make_evidence_record(0, "mug", 1, file=SINGLE),
         make_evidence_record(1, "cup", 2, file=MULTI),
     ]
-    (table,) = evidence_tables([make_run(make_config(context="trajectory"), records)])
+    (table,) = question_facet_tables([make_run(make_config(context="trajectory"), records)])
     assert [(row[2], *row[4:]) for row in strict(table)] == [
         ("total", "0.0 (1)", "100.0 (1)", "-"),
         ("nieh_single_clue", "-", "100.0 (1)", "-"),
@@ -71,11 +71,13 @@ def test_files_have_their_rows_under_short_names():
 
 def test_what_says_nothing_is_left_out():
     everything = [make_evidence_record(0, "mug", 2, 10)]
-    (far,) = evidence_tables([make_run(make_config(context="trajectory"), everything)])
+    (far,) = question_facet_tables([make_run(make_config(context="trajectory"), everything)])
     assert "end of the trajectory" in far.title
-    assert evidence_tables([make_run(make_config(context="clues"), everything)]) == []
+    assert question_facet_tables([make_run(make_config(context="clues"), everything)]) == []
     assert (
-        evidence_tables([make_run(make_config(context="trajectory"), [make_record(0, "mug")])])
+        question_facet_tables(
+            [make_run(make_config(context="trajectory"), [make_record(0, "mug")])]
+        )
         == []
     )
 

@@ -102,7 +102,7 @@ def test_pairs_whose_answers_are_exchanged_are_taken_off():
     assert found.pairs_exchanged.mean == 2 / 4
     assert found.net_pairs.mean == -1 / 4
     assert found.net_pairs.low == -1.0  # all drawn bases are u: the interval is of a difference
-    assert found.by_kind["swap"].mean == -1 / 4
+    assert found.by["kind"]["swap"].mean == -1 / 4
     assert found.scores == {"t": {"a/1": 1.0}, "u": {"b/1": -1.0, "c/1": -1.0}, "v": {"d/1": 0.0}}
 
 
@@ -201,11 +201,14 @@ def test_groups_of_pairs_have_their_names_in_order():
             *pair("bowl", "bowl", "b/1", kind="move", n_frames=60, n_after=3, n_differing=0),
         ]
     )
-    assert {name: rate.mean for name, rate in found.by_kind.items()} == {"move": 0.0, "swap": 1.0}
-    assert list(found.by_shown) == ["<=1", "<=64"]
-    assert list(found.by_distance) == ["0-49", "100-199"]
-    assert list(found.by_difference) == ["yes", "no"]
-    assert list(found.by_age) == ["50-99", NEVER_CHANGED]
+    assert {name: rate.mean for name, rate in found.by["kind"].items()} == {
+        "move": 0.0,
+        "swap": 1.0,
+    }
+    assert list(found.by["shown"]) == ["<=1", "<=64"]
+    assert list(found.by["distance"]) == ["0-49", "100-199"]
+    assert list(found.by["difference"]) == ["yes", "no"]
+    assert list(found.by["age"]) == ["50-99", NEVER_CHANGED]
 
 
 def test_questions_without_twins_have_no_summary_of_pairs():

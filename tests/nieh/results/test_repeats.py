@@ -88,10 +88,10 @@ def test_a_baseline_says_the_same_every_time(make_nieh_set, tmp_path, run_cli):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--repeats", 0], "--repeats 0: a question is asked once at least"),
+        (["--repeats", 0], "--repeats 0: give a whole number from 1, at most 10,000"),
         (
             ["--repeats", 2, "--temperature", 0],
-            "--temperature 0.0: replies are drawn at a temperature above 0",
+            "--temperature 0.0: give a number above 0",
         ),
         (["--temperature", "nan"], "above 0"),
     ],

@@ -105,11 +105,11 @@ def test_types_and_variants_are_apart():
         make_record(1, "cup", variant="depth=0.2"),
     ]
     result = summarise(make_config(), records).tasks["nieh_gt"]
-    assert {name: cell.n for name, cell in result.by_question_type.items()} == {
+    assert {name: cell.n for name, cell in result.by["question_type"].items()} == {
         "put_action": 1,
         "untyped": 1,
     }
-    assert {name: cell.scores["strict"].mean for name, cell in result.by_variant.items()} == {
+    assert {name: cell.scores["strict"].mean for name, cell in result.by["variant"].items()} == {
         "depth=0": 1.0,
         "depth=0.2": 0.0,
     }
@@ -171,9 +171,9 @@ def test_files_are_apart_in_a_set_of_several():
         make_record(1, "cup", file="b"),
         make_record(2, "mug", file="a"),
     ]
-    assert list(means(task_of(records).by_file).items()) == [("a", (1, 1.0)), ("b", (2, 0.5))]
+    assert list(means(task_of(records).by["file"]).items()) == [("a", (1, 1.0)), ("b", (2, 0.5))]
     alone = task_of([make_record(0, "mug")])
-    assert (alone.by_file, list(alone.evidence)) == ({}, ["total"])
+    assert (alone.by["file"], alone.files) == ({}, {})
 
 
 def test_samples_are_apart_by_the_share_of_their_clues_that_was_shown():
@@ -182,17 +182,14 @@ def test_samples_are_apart_by_the_share_of_their_clues_that_was_shown():
         make_record(i, "mug" if i else "cup", file=file, shown_clues=make_shown_clues(n))
         for i, (n, file) in enumerate(states)
     ]
-    evidence = task_of(
-        [*records, make_record(9, "mug", file="a")]
-    ).evidence  # of the last it is not known
-    assert {
-        name: list(means(cells.by_shown_clues).items()) for name, cells in evidence.items()
-    } == {
+    task = task_of([*records, make_record(9, "mug", file="a")])  # of the last it is not known
+    evidence = {"total": task.by, **task.files}
+    assert {name: list(means(by["shown_clues"]).items()) for name, by in evidence.items()} == {
         "total": [("all", (1, 1.0)), ("some", (2, 1.0)), ("none", (2, 0.5))],
         "a": [("all", (1, 1.0)), ("some", (1, 1.0)), ("none", (1, 0.0))],
         "b": [("some", (1, 1.0)), ("none", (1, 1.0))],
     }
-    assert all(cells.by_distance == {} for cells in evidence.values())
+    assert all(by["distance"] == {} for by in evidence.values())
 
 
 @pytest.mark.parametrize(
@@ -207,13 +204,13 @@ def test_samples_are_apart_by_the_share_of_their_clues_that_was_shown():
     ],
 )
 def test_samples_are_apart_by_the_distance_of_their_last_clue(n_after, name):
-    evidence = task_of(
+    task = task_of(
         [
             make_record(0, "mug", shown_clues=make_shown_clues(2, n_after=n_after)),
             make_record(1, "cup"),
         ]
-    ).evidence["total"]
-    assert means(evidence.by_distance) == {name: (1, 1.0)}
+    )
+    assert means(task.by["distance"]) == {name: (1, 1.0)}
 
 
 @pytest.mark.parametrize(
@@ -230,8 +227,8 @@ def test_samples_are_apart_by_the_distance_of_their_last_clue(n_after, name):
 def test_samples_are_apart_by_the_length_of_their_context(tokens, name):
     by_length = task_of(
         [make_record(0, "mug", tokens=Tokens(context=tokens)), make_record(1, "cup")]
-    ).by_length
-    assert means({length: at.cell for length, at in by_length.items()}) == {name: (1, 1.0)}
+    ).by["length"]
+    assert means(by_length) == {name: (1, 1.0)}
 
 
 def test_lengths_have_their_own_scores_above_blind():
@@ -242,12 +239,12 @@ def test_lengths_have_their_own_scores_above_blind():
         for i, (reply, n) in enumerate(lengths[:3])
     ]
     summary = task_of([*records, make_record(3, "mug", tokens=Tokens(context=3000))])
-    assert {name: at.above_blind["strict"] for name, at in summary.by_length.items()} == {
+    assert {name: at["strict"] for name, at in summary.above_blind_by_length.items()} == {
         "0-1": 0.0,
         "2-4": None,  # its guess is not known
         "64-128": 1.0,
     }
-    assert list(summary.by_length) == ["0-1", "2-4", "64-128"]
+    assert list(summary.by["length"]) == ["0-1", "2-4", "64-128"]
     assert summary.above_blind["strict"].mean == pytest.approx(1 / 3)
     assert summary.above_blind["strict"].n_unknown == 1
 

@@ -112,7 +112,7 @@ def test_replies_that_are_no_action_here_are_counted_by_their_fault(run_scripted
         assert (step.reply, step.action, step.call, step.reward) == (reply, "", None, 0)
         assert step.message.endswith(message)
         assert len(model.requests) == 1
-        assert [sample.reply for sample in outcome.samples] == [reply]
+        assert [doc.reply for doc in outcome.docs] == [reply]
 
 
 def test_a_reply_with_white_space_around_it_is_the_action_and_goes_into_the_history_without(

@@ -7,8 +7,8 @@ from infthor_eval.episodes.curves import AT_MOST, StepFunction
 from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.plans.recorded.curves import Axis, plan_curves
-from infthor_eval.plans.recorded.runs import PlansRun
 from infthor_eval.plans.records import RECORDS
+from infthor_eval.run import Run
 
 from ...helpers.journals import spoil_config, write_journal
 from ...helpers.plan_runs import TASK, make_plan_record, make_planner_run, make_plans_run
@@ -259,4 +259,4 @@ def test_a_journal_of_another_form_is_refused(tmp_path):
     folder = write_journal(tmp_path / "run", run.header, run.records, RECORDS)
     spoil_config(folder)
     with pytest.raises(DataError, match="line 1: not the config of a run of plans"):
-        PlansRun.read(folder)
+        Run.open(folder).read()

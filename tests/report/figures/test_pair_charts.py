@@ -8,24 +8,17 @@ from infthor_eval.errors import UsageError
 from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.report.figures.style import save_figure
 from infthor_eval.report.presenter import FigureRequest
-from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.nieh import NiehPresenter
-from infthor_eval.runs import NOTHING
+from infthor_eval.run import Run
+from infthor_eval.runs import RunSummary
 
 from ...helpers.nieh_runs import make_config, make_header, make_record, make_twins
 
 
 def make_run(label, records):
-    return ReportRun(
-        folder=Path(label),
-        label=label,
-        model=label,
-        suite=NiehSuite(),
-        header=make_header(make_config(), label),
-        records=tuple(records),
-        usage=NOTHING,
-        n_missing=None,
-    )
+    header = make_header(make_config(), label)
+    suite = NiehSuite()
+    return Run.held(Path(label), suite, RunSummary.of(suite, header, records), records)
 
 
 @pytest.fixture(scope="module")

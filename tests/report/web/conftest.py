@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from infthor_eval.cli import main
-from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
 from infthor_eval.report.web.page import Page
+from infthor_eval.run import open_runs
 from infthor_eval.storage.folders import packaged_folder
 
 HOSTILE = '</script><img src=x onerror="window.hacked=1">"\'&{{ 7*7 }}<!--\u2028'
@@ -32,6 +32,6 @@ def make_page() -> Callable[..., Page]:
     """The page of runs in some folders."""
 
     def make(*folders: Path, **options: Any) -> Page:
-        return build_page(read_report_runs(folders), PageRequest(**options))
+        return build_page(open_runs(folders), PageRequest(**options))
 
     return make

@@ -1,17 +1,17 @@
 """What stands on the page of real runs."""
 
-import dataclasses
 import json
 import shutil
 from collections import Counter
+from copy import copy
 from itertools import pairwise
 
 import msgspec
 import pytest
 
 from infthor_eval.nieh.samples import open_set
-from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
+from infthor_eval.run import open_runs
 from infthor_eval.storage.folders import packaged_folder
 
 from ...helpers.command_line import option_words
@@ -29,7 +29,9 @@ def replace_simulator(runs, simulator):
         }
         config = msgspec.structs.replace(run.header.config, tasks=tasks)
         header = msgspec.structs.replace(run.header, config=config)
-        replaced.append(dataclasses.replace(run, header=header))
+        other = copy(run)
+        other.own_header = other.header = header
+        replaced.append(other)
     return replaced
 
 
@@ -157,9 +159,9 @@ def test_a_run_that_was_stopped_and_has_failures_says_so(make_page, nieh_runs, t
 
 
 def test_the_footer_names_the_embedded_simulator_only_where_it_was_used(page, make_page, nieh_runs):
-    embedded = [run for run in read_report_runs(nieh_runs) if "embedded" in run.simulator]
+    embedded = [run for run in open_runs(nieh_runs) if "embedded" in run.simulator]
     assert bool(embedded) == bool(page.remark)
-    elsewhere = replace_simulator(read_report_runs(nieh_runs)[:1], None)
+    elsewhere = replace_simulator(open_runs(nieh_runs)[:1], None)
     assert build_page(elsewhere, PageRequest(pictures=0)).remark == ""
 
 
@@ -194,7 +196,7 @@ def test_what_takes_long_is_counted_to_its_end(nieh_runs, scripted_run, scripted
         def advance(self, what, detail=""):
             counted[what] += 1
 
-    runs = read_report_runs([*nieh_runs, scripted_run])
+    runs = open_runs([*nieh_runs, scripted_run])
     build_page(runs, PageRequest(episodes=1), Watching())
     assert set(begun) == {
         "runs summarised",

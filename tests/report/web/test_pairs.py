@@ -4,9 +4,9 @@ import pytest
 
 from infthor_eval.cli import main
 from infthor_eval.report.live.state import LiveRun
-from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.web.sample_groups import GroupKey, group_samples
 from infthor_eval.report.web.samples import PageSample, SampleResult
+from infthor_eval.run import open_runs
 
 from ...helpers.twin_sets import CLUES, DIFFERING, STILL, write_twin_set
 
@@ -257,7 +257,7 @@ def test_the_page_on_a_run_as_it_goes_says_that_pairs_count(twin_runs):
 
 
 def test_rows_of_samples_name_their_pair(twin_runs):
-    (run,) = read_report_runs(twin_runs[:1])
+    (run,) = open_runs(twin_runs[:1])
     cells = {column.name: list(map(column.value, run.records)) for column in run.presenter.columns}
     assert sorted(cells["pair"]) == sorted(2 * ["swap-1/1", "swap-1/2", "swap-2/1", "swap-2/2"])
     assert set(cells["fact"]) == {"swap-1/mug", "swap-2/mug"}

@@ -1,8 +1,9 @@
 """How a run was asked for, in a file of its folder that repeats it."""
 
 import shlex
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import pytest
 import yaml
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 from infthor_eval.runs import StoredCommand, TaskRequest, execute, prepare, read_stored_command
 from infthor_eval.runs.stored.command import write_command
+from infthor_eval.settings import Setting
 from infthor_eval.workers import WorkerSettings
 from tests.helpers.refusals import assert_raises_one_line
 from tests.helpers.toy_suite import ToySuite
@@ -19,7 +21,7 @@ from tests.runs.toy_command import request
 
 @dataclass(frozen=True)
 class Options:
-    scenes: str | None = field(default=None, metadata={"is_place": True})
+    scenes: Annotated[str | None, Setting(is_place=True)] = None
     greedy: bool = False
     history: str = "full"
 

@@ -54,9 +54,9 @@ def test_a_group_that_fails_takes_no_other_with_it_and_its_units_are_named(tmp_p
     assert [record.payload.answer for record in outcome.records] == [4, 5, None, None]
     assert read_run(outcome.folder, ToySuite.records) == (outcome.summary.header, outcome.records)
     assert len(closed) == 1
-    assert [sample.reply for sample in outcome.samples] == ["4", "5", "None", "None"]
+    assert [doc.reply for doc in outcome.docs] == ["4", "5", "None", "None"]
     # They can be read again.
-    assert [sample.number for sample in outcome.samples] == [13, 14, 23, 24]
+    assert [doc.number for doc in outcome.docs] == [13, 14, 23, 24]
 
 
 def broken_by(error, answered=0):

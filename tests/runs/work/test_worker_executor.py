@@ -119,8 +119,8 @@ def test_several_workers_find_what_one_process_finds_and_each_writes_a_shard(tmp
         for path in sorted((shared.folder / "journal").glob("*.jsonl"))
     ]
     assert (len(shards), shards[0], sum(shards)) == (3, 1, 3 + 24)
-    assert list(shared.samples) == list(alone.samples)
-    assert len(list(shared.samples)) == 24
+    assert list(shared.docs) == list(alone.docs)
+    assert len(list(shared.docs)) == 24
     assert all(resumed for _, resumed in run(request(tmp_path / "2"), suite)[1].seen)
     assert all(
         resumed for _, resumed in run(request(tmp_path / "1", worker_settings=TWO), suite)[1].seen

@@ -1,0 +1,146 @@
+"""Presenter of every suite that is a `QuestionSuite` and brings none of its own."""
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+
+from infthor_eval.errors import DataError, InfthorError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.questions.suite import (
+    Question,
+    QuestionAnswer,
+    QuestionSuite,
+    QuestionSummary,
+    digest_of_questions,
+)
+from infthor_eval.report.plain import PlainPresenter
+from infthor_eval.report.presenter import THOUGHT, Description, FindFrames, Timelines
+from infthor_eval.report.svg.dots import Dot, DotRow, DotsChart, class_row, dot_of, dots_chart
+from infthor_eval.report.svg.drawing import Series
+from infthor_eval.report.web.samples import Prompt, PromptFrames, Timeline, TimelineFrame
+from infthor_eval.report.web.sections import Chart
+from infthor_eval.report.web.thumbnails import ThumbnailStore
+from infthor_eval.run import Run
+from infthor_eval.runs import UnitKey, UnitRecord
+
+Record = UnitRecord[QuestionAnswer]
+
+
+class QuestionsPresenter(PlainPresenter):
+    """See `Presenter`: each question in words, and a chart of the scores by kind."""
+
+    target_label = "gold answer"
+
+    def measure_of(self, task: str, summary: QuestionSummary) -> str:
+        """See `Presenter.measure_of`: the scorer's name."""
+        return summary.metric
+
+    def bounds(self, metric: str) -> tuple[float, float]:
+        """See `Presenter.bounds`."""
+        return 0.0, 1.0
+
+    def describe(self, record: Record) -> Description:
+        """See `Presenter.describe`."""
+        return Description(record.payload.question, record.payload.answer, record.payload.kind)
+
+    def reply(self, record: Record) -> str:
+        """See `Presenter.reply`."""
+        return record.payload.reply or ""
+
+    def details(self, record: Record) -> Mapping[str, str]:
+        """See `Presenter.details`: the thoughts, the description has all else."""
+        thinking = record.payload.thinking
+        return {} if thinking is None else {THOUGHT: thinking}
+
+    def charts(self, runs: Sequence[Run]) -> list[Chart]:
+        """See `Presenter.charts`: scores by kind, a chart for each task."""
+        tasks = dict.fromkeys(task for run in runs for task in run.summary.summary.tasks)
+        return [
+            _chart(task, [run for run in runs if task in run.summary.summary.tasks])
+            for task in tasks
+        ]
+
+    def prompts(self, run: Run, data: Path | None) -> Mapping[UnitKey, Prompt]:
+        """See `Presenter.prompts`."""
+        counts = {record.key: record.payload.n_pictures for record in run.records}
+        return {
+            key: Prompt((PromptFrames("pictures", (), n),) if n else ())
+            for key, n in counts.items()
+        }
+
+    def request_frames(self, run: Run, data: Path | None) -> FindFrames:
+        """See `Presenter.request_frames`."""
+        questions = cache(lambda task: _questions(run, task))
+        return lambda record: (
+            questions(record.task)[record.id].frames if record.payload.n_pictures else ()
+        )
+
+    def timelines(
+        self, runs: Sequence[Run], data: Path | None, thumbnails: ThumbnailStore
+    ) -> Timelines:
+        """See `Presenter.timelines`: the pictures of each question."""
+        frames: dict[UnitKey, Sequence[FrameRef]] = {}
+        notes: dict[str, None] = {}
+        for run in runs:
+            pictured = [record for record in run.records if record.payload.n_pictures]
+            for task in dict.fromkeys(record.task for record in pictured):
+                try:
+                    questions = _questions(run, task)
+                except DataError as error:
+                    notes[f"{task}: no pictures are shown: {error}"] = None
+                    continue
+                of_task = (record for record in pictured if record.task == task)
+                frames |= {record.key: questions[record.id].frames for record in of_task}
+        thumbnails.add_all({str(it.path): it.load for shown in frames.values() for it in shown})
+        by_unit = {
+            key: Timeline(
+                len(shown),
+                tuple(
+                    TimelineFrame(place, thumbnails.number(str(frame.path)))
+                    for place, frame in enumerate(shown)
+                ),
+            )
+            for key, shown in frames.items()
+        }
+        return Timelines(by_unit, list(notes))
+
+
+def _questions(run: Run, task: str) -> dict[str, Question]:
+    """Return the questions of a task as its run asked them, by id.
+
+    Raises:
+        DataError: they are others today, or there are none.
+    """
+    config = run.header.config.tasks[task]
+    assert isinstance(run.suite, QuestionSuite)  # nobody else gets this presenter
+    try:
+        questions = run.suite.questions(config.dataset_kwargs)
+    except InfthorError as error:
+        raise DataError(str(error)) from error
+    if digest_of_questions(questions) != config.data:
+        raise DataError("the dataset has changed since the run; run it again")
+    return {question.id: question for question in questions}
+
+
+def _chart(task: str, runs: Sequence[Run]) -> Chart:
+    summaries: list[QuestionSummary] = [run.summary.summary for run in runs]
+    rates = [summary.tasks[task] for summary in summaries]
+
+    def row(kind: str) -> DotRow:
+        dots: list[Dot | None] = [
+            dot_of(of_run[kind], of_run[kind].n) if kind in of_run else None for of_run in rates
+        ]
+        return class_row(kind, dots)
+
+    kinds = dict.fromkeys(kind for of_run in rates for kind in of_run)
+    metric = ", ".join(dict.fromkeys(summary.metric for summary in summaries))
+    return dots_chart(
+        DotsChart(
+            title=f"{task}: {metric} by kind",
+            caption="Higher is better: a dot is a mean score with its 95 % interval.",
+            axis=f"{metric} (%)",
+            label="kind",
+            series=[Series(run.label, place) for place, run in enumerate(runs)],
+            rows=[row(kind) for kind in kinds],
+        )
+    )

@@ -1,0 +1,322 @@
+"""A run as its folder holds it, for all who show, compare, explain or export it.
+
+A journal that still grows is followed (`runs/journals/following.py`), and one that a stranger sends
+is read bit by bit (`infthor_board/reading.py`); all others read a run here.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import msgspec
+
+from infthor_eval.errors import DataError, InfthorError, UsageError
+from infthor_eval.runs.completeness import (
+    UnitCounts,
+    count_missing,
+    count_units,
+    mark_incomplete,
+)
+from infthor_eval.runs.journals.records import RunHeader, State, UnitRecord
+from infthor_eval.runs.journals.shards import (
+    RunLog,
+    Tell,
+    last_change,
+    read_header,
+    read_run_log,
+    read_states,
+)
+from infthor_eval.runs.stored.command import StoredCommand, read_stored_command
+from infthor_eval.runs.stored.labels import label_runs, with_frames
+from infthor_eval.runs.stored.search import Results, read_results, run_folders
+from infthor_eval.runs.suite import RunSummary
+from infthor_eval.runs.usage import NOTHING, Usage
+from infthor_eval.suites import find_presenter, find_suite
+
+if TYPE_CHECKING:
+    from infthor_eval.rates import Rate
+    from infthor_eval.report.presenter import Presenter
+    from infthor_eval.runs.suite import Suite
+
+_SHOWN_BY_TABLES = {"frames"}  # the options that tables show beside a run's name
+
+
+class Run:
+    """A run. What is not asked for is not read.
+
+    Attributes:
+        folder: folder of the run.
+        listed: first line of the journal; until that is read, its configs are JSON values, so that
+            runs are listed without their suites.
+        name: name of the run beside others; its own until `named`.
+    """
+
+    def __init__(self, folder: Path, listed: RunHeader, tell: Tell | None = None) -> None:
+        """Take folder and header of a run; `tell` is told of bad lines, see `read_run`."""
+        self.folder = folder
+        self.listed = listed
+        self._tell = tell
+        self.name = listed.name
+
+    @classmethod
+    def open(cls, folder: Path, tell: Tell | None = None) -> Self:
+        """Open the run in a folder.
+
+        Raises:
+            DataError: there is no journal, or one of another format. What is read later may raise
+                it, too, and UsageError where the suite of the run is not known here.
+        """
+        return cls(folder, read_header(folder), tell)
+
+    @classmethod
+    def held(
+        cls,
+        folder: Path,
+        suite: Suite[Any, Any],
+        summary: RunSummary,
+        records: Sequence[UnitRecord[Any]] = (),
+        usage: Usage = NOTHING,
+        n_missing: int | None = None,
+    ) -> Self:
+        """Return a run of which this process has everything, so that nothing is read."""
+        run = cls(folder, summary.header)
+        run.suite = suite
+        run.records = tuple(records)
+        run.units = summary.units
+        run.usage = usage
+        run.n_missing = n_missing
+        run.own_header = summary.header
+        run._summed_up = summary.summary
+        return run
+
+    def named(self, name: str) -> Self:
+        """Return the run by a name that it has beside others."""
+        other = copy(self)
+        other.name = name
+        other.__dict__.pop("header", None)
+        return other
+
+    def with_records(self, records: Sequence[UnitRecord[Any]]) -> Self:
+        """Return the run, by the name and the marks that it has, with some of its records alone."""
+        other = copy(self.read())
+        other.records = tuple(records)
+        return other
+
+    def read(self) -> Self:
+        """Read the records now, so that what cannot be read is refused before any work."""
+        _ = self.header  # which tells whether all units have a record
+        return self
+
+    @cached_property
+    def suite(self) -> Suite[Any, Any]:
+        """Its suite."""
+        return find_suite(self.listed.suite)
+
+    @cached_property
+    def presenter(self) -> Presenter:
+        """The presenter of its suite."""
+        return find_presenter(self.listed.suite)
+
+    @cached_property
+    def _log(self) -> tuple[RunHeader, RunLog[Any]]:
+        return read_run_log(self.folder, self.suite.records, self._tell)
+
+    @cached_property
+    def own_header(self) -> RunHeader:
+        """First line of the journal as it is, the configs of tasks in the suite's types."""
+        self.listed = self._log[0]
+        return self.listed
+
+    @cached_property
+    def header(self) -> RunHeader:
+        """First line of the journal; its name is the one beside other runs, with a mark if the run
+        is not whole."""
+        return msgspec.structs.replace(self.own_header, name=self._marked(self.name))
+
+    @cached_property
+    def records(self) -> tuple[UnitRecord[Any], ...]:
+        """The latest record of each unit."""
+        return tuple(self._log[1].records)
+
+    @cached_property
+    def usage(self) -> Usage:
+        """Tokens and requests of the whole run."""
+        return self._log[1].usage
+
+    @cached_property
+    def results(self) -> Results | None:
+        """What `results.json` has; None before there is one."""
+        return read_results(self.folder)
+
+    @cached_property
+    def n_missing(self) -> int | None:
+        """Number of units that were not attempted; None if unknown."""
+        return self._missing_beside(len(self.records))
+
+    def _missing_beside(self, n_recorded: int) -> int | None:
+        n_missing = count_missing(self.listed, n_recorded)
+        if n_missing is None and self.results is not None:
+            return self.results.n_missing
+        return n_missing
+
+    @cached_property
+    def units(self) -> Mapping[str, UnitCounts]:
+        """Numbers of units of each task by state."""
+        return count_units(self.listed, self.records)
+
+    @cached_property
+    def _summed_up(self) -> Any:
+        return self.suite.summarise(self.header, self.records)
+
+    @property
+    def summary(self) -> RunSummary:
+        """Summary of the records."""
+        return RunSummary(self.header, self._summed_up, self.units)
+
+    @property
+    def own_summary(self) -> RunSummary:
+        """Summary of the records, by the run's own name."""
+        return RunSummary(self.own_header, self._summed_up, self.units)
+
+    @cached_property
+    def states(self) -> Counter[State]:
+        """Number of units by state, read without the suite."""
+        return Counter(read_states(self.folder, self._tell).values())
+
+    @property
+    def n_not_asked(self) -> int | None:
+        """Number of units that were not attempted, or that a cap left out, by `states`; None if
+        neither header nor results tell."""
+        n_missing = self._missing_beside(self.states.total())
+        return None if n_missing is None else n_missing + self.states["not asked"]
+
+    @property
+    def primary_metrics(self) -> Mapping[str, Rate]:
+        """Primary metric of each task as `results.json` has it; empty before there is one."""
+        return self.results.primary_metrics if self.results else {}
+
+    @property
+    def changed(self) -> datetime:
+        """Time of the last change to the journal."""
+        return last_change(self.folder)
+
+    @cached_property
+    def stored_command(self) -> StoredCommand | None:
+        """The command that made the run; None if unknown."""
+        return read_stored_command(self.folder)
+
+    @property
+    def command(self) -> str:
+        """Command that repeats the run; empty if unknown."""
+        return self.stored_command.line if self.stored_command else ""
+
+    @property
+    def data(self) -> Path | None:
+        """Folder of the data set, if the command named one."""
+        return self.stored_command.data if self.stored_command else None
+
+    @property
+    def label(self) -> str:
+        """Name of the run beside the others, with what replaces the frames, and a mark if the run
+        is not whole."""
+        return with_frames(self._marked(self.name), self.listed)
+
+    @property
+    def model(self) -> str:
+        """Name of the model, the same for runs that differ in other settings; with what replaces
+        the frames, and the mark."""
+        return with_frames(self._marked(self.listed.name), self.listed)
+
+    def _marked(self, name: str) -> str:
+        return mark_incomplete(name, self.units, self.n_missing)
+
+    @property
+    def tasks(self) -> Mapping[str, Any]:
+        """Configs of the tasks by name, of the suite's type (`RecordTypes.config`)."""
+        tasks: Mapping[str, Any] = self.own_header.config.tasks
+        return tasks
+
+    @property
+    def simulator(self) -> str:
+        """Names of the frames' simulators, separated by commas; empty if not known."""
+        return ", ".join(self.own_header.config.simulators)
+
+    def main_score(self, record: UnitRecord[Any]) -> float:
+        """Return the score that decides whether a unit is right, 1 being right."""
+        scores = self.suite.scores(record)
+        main = self.presenter.main_metric
+        if main is None:
+            return next(iter(scores.values()), 0.0)
+        return scores.get(main, max(scores.values(), default=0.0))
+
+    def outcome(self, record: UnitRecord[Any]) -> str:
+        """Return how a unit ended: "right", "partly", "wrong", "failed", "not asked" or
+        "excluded"."""
+        if record.state != "answered":
+            return record.state
+        score = self.main_score(record)
+        return "right" if score >= 1 else "partly" if score > 0 else "wrong"
+
+
+@dataclass(frozen=True)
+class BrokenRun:
+    """The folder of a run that cannot be read, and why."""
+
+    folder: Path
+    reason: str
+
+
+def open_runs(
+    folders: Sequence[Path], tell: Tell | None = None, *, twice: bool = False
+) -> list[Run]:
+    """Open runs by names that tell them apart, at least one.
+
+    Args:
+        folders: their folders.
+        tell: told of bad lines of journals, see `read_run`.
+        twice: whether a folder may be given twice.
+
+    Raises:
+        UsageError: a folder is given twice, or the suite of a run is not known here.
+        DataError: a folder has no journal, or it cannot be read.
+    """
+    if not twice and len({folder.resolve() for folder in folders}) < len(folders):
+        raise UsageError("one run is given twice; give each once")
+    runs = told_apart([Run.open(folder, tell) for folder in folders], by_task=True)
+    return [run.read() for run in runs]
+
+
+def told_apart(
+    runs: Sequence[Run], *, by_task: bool = False, ignore: Collection[str] = _SHOWN_BY_TABLES
+) -> list[Run]:
+    """Return runs by names that tell them apart; see `label_runs`."""
+    places = [(run.folder, run.listed) for run in runs]
+    names = label_runs(places, ignore, by_task=by_task)
+    return [run.named(name) for run, name in zip(runs, names, strict=True)]
+
+
+def find_runs(folder: Path, tell: Tell | None = None) -> Iterator[Run | BrokenRun]:
+    """Yield the runs below a folder, in the order of their paths, with their states and results.
+
+    Raises:
+        DataError: there is no such folder, or it cannot be searched.
+    """
+    if not folder.is_dir():
+        raise DataError(
+            f"{folder}: no such folder; give the results folder of a run (`--out`, else results)"
+        )
+    for path in run_folders(folder):
+        try:
+            run = Run.open(path, tell)
+            _ = run.states, run.results
+        except InfthorError as error:
+            yield BrokenRun(path, str(error))
+        else:
+            yield run
