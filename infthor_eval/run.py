@@ -25,6 +25,7 @@ from infthor_eval.runs.completeness import (
     mark_incomplete,
 )
 from infthor_eval.runs.journals.records import RunHeader, State, UnitRecord
+from infthor_eval.runs.journals.requests import StoredRequest
 from infthor_eval.runs.journals.shards import (
     RunLog,
     Tell,
@@ -144,6 +145,10 @@ class Run:
     def records(self) -> tuple[UnitRecord[Any], ...]:
         """The latest record of each unit."""
         return tuple(self._log[1].records)
+
+    def request(self, record: UnitRecord[Any]) -> StoredRequest | None:
+        """Return the request of a record; None where the journal does not have it."""
+        return self._log[1].find_artifact(record.request, StoredRequest)
 
     @cached_property
     def usage(self) -> Usage:

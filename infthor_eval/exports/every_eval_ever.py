@@ -27,7 +27,7 @@ from infthor_eval.exports.gaps import (
 )
 from infthor_eval.exports.measures import LEVEL, Measure, find_measures, scored
 from infthor_eval.exports.request import ExportRequest, Written
-from infthor_eval.exports.samples import SampleReader
+from infthor_eval.exports.samples import unknown_requests
 from infthor_eval.exports.subjects import UNKNOWN, ModelFacts, model_facts
 from infthor_eval.run import Run
 from infthor_eval.runs.results import results_document
@@ -57,7 +57,7 @@ def write(runs: Sequence[Run], request: ExportRequest) -> Written:
         if written[0] in paths:
             raise DataError(f"{run.folder}: has the config of another of the runs; leave one out")
         paths += written
-        notes += [*gap_notes(run), *export.reader.problems, *export.unknown]
+        notes += [*gap_notes(run), *unknown_requests(run), *export.unknown]
     return Written(paths, _NO_PLACE, notes)
 
 
@@ -69,7 +69,6 @@ class _RunExport:
         self._request = request
         self._facts = model_facts(run, request.model_id)
         self._measures = list(chain.from_iterable(find_measures(run).values()))
-        self.reader = SampleReader(run, request.data)
         self._ran = run.changed
         self._stamp = f"{self._ran.timestamp():.3f}"
         self._collection = f"infthor-{file_name(run.suite.name)}"
@@ -93,7 +92,7 @@ class _RunExport:
         shared = {"evaluation_id": self._evaluation_id, "model_id": self._facts.id}
         with wrap_errors(f"{folder}: cannot be written", writing_hint("")):
             folder.mkdir(parents=True, exist_ok=True)
-            rows = sample_rows(self._run, self._measures, self.reader, shared)
+            rows = sample_rows(self._run, self._measures, shared)
             n_rows, checksum = _write_lines(samples, rows)
             document = self._document(
                 {

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from infthor_eval.exports.measures import Measure, Scored, counted
-from infthor_eval.exports.samples import ACT, Sample, SampleReader, describe_result
+from infthor_eval.exports.samples import ACT, describe_result, facts_of, payload_of
+from infthor_eval.report.sample import Sample
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord
@@ -14,6 +15,7 @@ from infthor_eval.runs.stored.labels import with_frames
 
 SCHEMA_VERSION = "0.3.0"
 Row = dict[str, Any]
+_FRAME = "<image>"  # stands for a frame in a text, as in lm-eval's files
 
 
 def result_id(measure: Measure) -> str:
@@ -21,15 +23,12 @@ def result_id(measure: Measure) -> str:
     return f"{measure.task}/{measure.metric}"
 
 
-def sample_rows(
-    run: Run, measures: Sequence[Measure], reader: SampleReader, shared: Row
-) -> Iterator[Row]:
+def sample_rows(run: Run, measures: Sequence[Measure], shared: Row) -> Iterator[Row]:
     """Yield the lines of a run.
 
     Args:
         run: the run.
         measures: the metrics of all its tasks.
-        reader: puts its records into words.
         shared: what all lines have.
     """
     groups = _records_by_group(run)
@@ -41,19 +40,19 @@ def sample_rows(
         }
         for scored in measure.samples:
             if not scored.repetitions:
-                members = [reader.read(it) for it in groups.get((measure.task, scored.name), ())]
+                members = [Sample(run, it) for it in groups.get((measure.task, scored.name), ())]
                 yield of_metric | _group_row(scored, members)
                 continue
             for record, score in scored.repetitions:
                 name = f"{record.task} {record.key}"
                 # The journal's own record of it once: it is as long as all else.
-                yield of_metric | _row(reader.read(record), score, is_first=name not in told)
+                yield of_metric | _row(Sample(run, record), score, is_first=name not in told)
                 told.add(name)
         if measure.is_primary:
             # A line has to have a score; the metric's own leaves these out.
             failed = (it for it in counted(run, measure.task) if it.failure is not None)
             for record in failed:
-                yield of_metric | _row(reader.read(record), 0.0, is_first=True)
+                yield of_metric | _row(Sample(run, record), 0.0, is_first=True)
 
 
 def _records_by_group(
@@ -69,9 +68,9 @@ def _records_by_group(
 
 def _row(sample: Sample, score: float, *, is_first: bool) -> Row:
     record = sample.record
-    about = dict(sample.about)
+    about = facts_of(sample)
     if is_first:
-        about["payload"] = sample.payload
+        about["payload"] = payload_of(sample)
     return {
         "schema_version": SCHEMA_VERSION,
         "sample_id": str(record.key),
@@ -79,7 +78,7 @@ def _row(sample: Sample, score: float, *, is_first: bool) -> Row:
         "interaction_type": "agentic" if sample.is_episode else "single_turn",
         "input": {
             "raw": sample.question,
-            "formatted": sample.request,
+            "formatted": sample.request_text(lambda frames: _FRAME * frames.n),
             "reference": [sample.target] if sample.target else [],
         },
         **(_messages(sample) if sample.is_episode else _output(sample)),

@@ -25,9 +25,10 @@ from infthor_eval.exports.gaps import (
 from infthor_eval.exports.inspect_samples import SampleWriter, model_usage, sample_summary
 from infthor_eval.exports.measures import Measure, counted, find_measures
 from infthor_eval.exports.request import ExportRequest, Written
-from infthor_eval.exports.samples import SampleReader, TokenCounts
+from infthor_eval.exports.samples import unknown_requests
 from infthor_eval.exports.subjects import ModelFacts, model_facts
 from infthor_eval.reasons import count_reasons
+from infthor_eval.report.sample import Sample, TokenCounts
 from infthor_eval.run import Run
 from infthor_eval.runs.stored.labels import with_frames
 from infthor_eval.storage.digests import fingerprint
@@ -49,12 +50,11 @@ def write(runs: Sequence[Run], request: ExportRequest) -> Written:
     paths: list[Path] = []
     notes: list[str] = []
     for run in runs:
-        reader = SampleReader(run, request.data)
         for task, measures in find_measures(run).items():
-            log = _Log(run, task, measures, reader)
+            log = _Log(run, task, measures)
             paths.append(log.write(request))
             notes += log.problems
-        notes += [*gap_notes(run), *reader.problems]
+        notes += [*gap_notes(run), *unknown_requests(run)]
     frames = "" if request.frames else "; it has one for frames, which --frames attaches"
     return Written(paths, f"{_NO_PLACE}{frames}", notes)
 
@@ -66,13 +66,10 @@ class _Log:
         problems: why frames are missing, a line each.
     """
 
-    def __init__(
-        self, run: Run, task: str, measures: Sequence[Measure], reader: SampleReader
-    ) -> None:
+    def __init__(self, run: Run, task: str, measures: Sequence[Measure]) -> None:
         self._run = run
         self._task = task
         self._measures = measures
-        self._reader = reader
         self._ran = run.changed
         self.problems: list[str] = []
 
@@ -94,7 +91,7 @@ class _Log:
         ):
             _add(archive, "_journal/start.json", start)
             for record in counted(self._run, self._task):
-                sample = self._reader.read(record)
+                sample = Sample(self._run, record, request.data)
                 document = writer.write(sample)
                 _add(archive, f"samples/{document['id']}_epoch_{document['epoch']}.json", document)
                 summaries.append(sample_summary(document))

@@ -14,9 +14,10 @@ import msgspec
 
 from infthor_eval.errors import DataError
 from infthor_eval.exports.measures import Measure
-from infthor_eval.exports.samples import ACT, Sample, TokenCounts, describe_result
+from infthor_eval.exports.samples import ACT, describe_result, facts_of, payload_of
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.report.web.samples import PromptFrames
+from infthor_eval.report.sample import Sample, TokenCounts
+from infthor_eval.runs import StoredFrames
 
 Document = dict[str, Any]
 FindFrames = Callable[[Any], Sequence[FrameRef]]
@@ -63,7 +64,7 @@ class SampleWriter:
                 metric: self._score(sample, score)
                 for metric, score in self._scores.get((name, record.repeat), {}).items()
             },
-            "metadata": {**sample.about, "payload": msgspec.json.decode(sample.payload)},
+            "metadata": {**facts_of(sample), "payload": msgspec.json.decode(payload_of(sample))},
             "model_usage": {self._model: usage} if usage else {},
             "total_time": record.seconds,
             "working_time": record.seconds,
@@ -74,19 +75,18 @@ class SampleWriter:
         return document
 
     def _asked(self, sample: Sample, attachments: dict[str, str]) -> Document:
-        prompt = sample.prompt
-        if prompt is None or prompt.problem:
-            target = f"{sample.target}\n" if sample.is_episode else ""
-            return {"role": "user", "content": f"{target}{sample.question}", "source": "input"}
+        question = sample.question
+        if sample.request is None:
+            goal = f"{sample.target}\n" if sample.is_episode else ""
+            return {"role": "user", "content": f"{goal}{question}", "source": "input"}
         frames = iter(self._frames(sample))
         content: list[Document] = []
-        for part in prompt.parts:
-            if isinstance(part, str):
-                content.append(_text(part))
+        for part in sample.request.parts:
+            if not isinstance(part, StoredFrames):
+                content.append(_text(question if part is None else part))
                 continue
             images = [_attach(next(frames), attachments) for _ in range(part.n)]
             content += images if all(images) else [_text(_words(part))]
-        content.append(_text(sample.question))
         return {"role": "user", "content": _joined(content), "source": "input"}
 
     def _frames(self, sample: Sample) -> Iterator[FrameRef | None]:
@@ -193,7 +193,7 @@ def _text(text: str) -> Document:
     return {"type": "text", "text": text}
 
 
-def _words(frames: PromptFrames) -> str:
+def _words(frames: StoredFrames) -> str:
     places = ", ".join(
         str(first) if first == last else f"{first} to {last}" for first, last in frames.places
     )

@@ -103,6 +103,7 @@ class NiehSet:
         # One tuple per trajectory, shared by all its questions: a copy each would be thousands of
         # references.
         self._all_frames: dict[str, tuple[FrameRef, ...] | DataError] = {}
+        self._places: dict[str, dict[FrameRef, list[int]] | DataError] = {}
         self._videos: dict[tuple[str, float], Video | DataError] = {}
         self._outlines: dict[str, Outline | DataError] = {}
         self._action_frames: dict[str, dict[int, tuple[int, ...]]] = {}
@@ -203,6 +204,27 @@ class NiehSet:
         return _read_once(
             self._all_frames, traj_id, lambda: tuple(self._trajectory(traj_id).values())
         )
+
+    def find_places(self, traj_id: str, frames: Sequence[FrameRef]) -> list[int]:
+        """Return where in a trajectory's time order frames in time order are; none where one of
+        them is no frame of it."""
+
+        def read() -> dict[FrameRef, list[int]]:
+            by_frame: dict[FrameRef, list[int]] = {}
+            for place, frame in enumerate(self.frames(traj_id)):
+                by_frame.setdefault(frame, []).append(place)  # some pictures are there twice
+            return by_frame
+
+        by_frame = _read_once(self._places, traj_id, read)
+        found: list[int] = []
+        for frame in frames:
+            places = by_frame.get(frame)
+            if places is None:
+                return []
+            # Of equal pictures the next one: requests are in time order.
+            later = (place for place in places if not found or place > found[-1])
+            found.append(next(later, places[0]))
+        return found
 
     def clue_frames(self, question: Question) -> tuple[FrameRef, ...]:
         """Return the frames with a question's evidence, in the order of its clues."""

@@ -21,9 +21,10 @@ from infthor_eval.nieh.contexts import (
     context_named,
 )
 from infthor_eval.nieh.frame_ablations import FrameAblation
-from infthor_eval.nieh.options import NO_CLUE
+from infthor_eval.nieh.options import NO_CLUE, SHOWN
 from infthor_eval.nieh.prompts import PUBLISHED_MAIN
 from infthor_eval.nieh.published.hub_data import default_folder
+from infthor_eval.runs import StoredRequest
 from infthor_eval.runs.limiting import spread
 from infthor_eval.settings import read
 from infthor_eval.storage.folders import packaged_folder
@@ -102,6 +103,21 @@ class TaskSamples:
         """Return the request of a sample: the context, and the text with the question after it."""
         parts, text = self.context.request(self.data, sample, self.prompt)
         return self.frame_ablation.apply(parts, self.data, self.context, sample), text
+
+    def stored_request(
+        self, sample: Sample, context: Sequence[ContextPart], text: str
+    ) -> StoredRequest:
+        """Return the request of a sample (`request`) as a journal has it."""
+        traj_id = sample.question.traj_id
+        ablation = self.frame_ablation.frames
+        return StoredRequest.of(
+            context,
+            text,
+            sample.question.text,
+            lambda frames: self.data.find_places(traj_id, frames),
+            "frames" if ablation == SHOWN else f"frames ({ablation})",
+            self.positions(sample),
+        )
 
 
 @once_a_command

@@ -23,7 +23,17 @@ from infthor_eval.errors import (
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.pictures.video import Video
 from infthor_eval.formats.question import Answer
-from infthor_eval.runs import NOTHING, ReadHashes, Session, Tokens, Unit, UnitRecord, Usage
+from infthor_eval.runs import (
+    NOTHING,
+    ReadHashes,
+    Session,
+    StoredRequest,
+    Tokens,
+    Unit,
+    UnitRecord,
+    Usage,
+    keep_request,
+)
 from infthor_eval.runs.journals.records import Payload
 from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.digests import fingerprint
@@ -101,6 +111,11 @@ class Request(Generic[Payload]):
         """
         raise NotImplementedError
 
+    @property
+    def stored(self) -> StoredRequest:
+        """The request as the journal has it."""
+        raise NotImplementedError
+
     @cached_property
     def fingerprint(self) -> str:
         """See `request_fingerprint`."""
@@ -138,6 +153,7 @@ class Request(Generic[Payload]):
             tokens=Tokens(reply.n_context_tokens, reply.n_cached_tokens, reply.n_reply_tokens),
             usage=usage,
             read=ReadHashes(reply.context_hash, reply.frames_hash),
+            request=keep_request(self.stored, session),
         )
 
 
@@ -331,6 +347,7 @@ def _answer(
                 request.fingerprint,
                 asked=is_asked(error),
                 faults=faults,
+                request=keep_request(request.stored, session),
             )
             return
         for request in requests:  # one of them may be to blame; the others are answered

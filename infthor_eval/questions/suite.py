@@ -32,6 +32,7 @@ from infthor_eval.runs import (
     RunHeader,
     RunSummary,
     Session,
+    StoredRequest,
     TaskConfig,
     TaskFile,
     TaskRequest,
@@ -286,6 +287,11 @@ class _QuestionRequest(Request[QuestionAnswer]):
     @cached_property
     def names(self) -> list[str]:
         return list(map(str, self.question.pictures))  # with folders: files have names alike
+
+    @property
+    def stored(self) -> StoredRequest:
+        """See `Request`."""
+        return StoredRequest.of(self.context, self.text, self.question.text, what="pictures")
 
     def replied(self, reply: Reply, answer: str, thinking: str | None) -> QuestionAnswer:
         return msgspec.structs.replace(self.unit.payload, reply=answer, thinking=thinking)

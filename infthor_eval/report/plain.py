@@ -18,11 +18,11 @@ from infthor_eval.report.presenter import (
     Timelines,
 )
 from infthor_eval.report.sample_columns import SampleColumn
-from infthor_eval.report.web.samples import Prompt, StepRow
+from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
-from infthor_eval.runs import UnitKey, UnitRecord
+from infthor_eval.runs import UnitRecord
 
 _LONGEST = 2000  # characters of a field on the page
 
@@ -121,10 +121,6 @@ class PlainPresenter:
     def steps(self, record: UnitRecord[Any]) -> Sequence[StepRow]:
         """See `Presenter.steps`: none."""
         return ()
-
-    def prompts(self, run: Run, data: Path | None) -> Mapping[UnitKey, Prompt]:
-        """See `Presenter.prompts`: none."""
-        return {}
 
     def request_frames(self, run: Run, data: Path | None) -> FindFrames:
         """See `Presenter.request_frames`: none."""

@@ -14,7 +14,7 @@ from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.report.sample_columns import SampleColumn
-from infthor_eval.report.web.samples import FrameFacts, Prompt, StepRow, Timeline
+from infthor_eval.report.web.samples import FrameFacts, StepRow, Timeline
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
@@ -329,9 +329,6 @@ class Presenter(Protocol):
 
     def steps(self, record: Record) -> Sequence[StepRow]:
         """Return the steps of a recorded episode; empty if it has none."""
-
-    def prompts(self, run: Run, data: Path | None) -> Mapping[UnitKey, Prompt]:
-        """Return the requests of a run's records, equal ones once; `data` is as for `timelines`."""
 
     def request_frames(self, run: Run, data: Path | None) -> FindFrames:
         """Return what finds the frames of a record's request (`prompts`), in their order; it raises

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
@@ -13,12 +13,12 @@ from typing import Any
 
 from infthor_eval.errors import DataError, unknown_name
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.report.presenter import Description
+from infthor_eval.report.presenter import THOUGHT, Description
 from infthor_eval.report.runs import choose_evenly
-from infthor_eval.report.web.samples import Prompt, PromptFrames, StepRow
+from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run, open_runs
-from infthor_eval.runs import UnitRecord
+from infthor_eval.runs import StoredFrames, StoredRequest, UnitRecord
 
 _MOST_FRAMES = 24  # in a cell
 _SIDE = 150  # pixels of a frame's longer side
@@ -26,8 +26,19 @@ _ROOM = 10**7  # bytes of all frames: more than they can have
 
 
 @dataclass(frozen=True)
+class TokenCounts:
+    """Tokens of a sample's requests, of those not encoded again, and of its replies."""
+
+    context: int
+    cached: int
+    reply: int
+
+
+@dataclass(frozen=True)
 class Sample:
-    """A sample of a run. A notebook shows it as the last value of a cell.
+    """A sample of a run, as every reader of runs has it: pages, exports, `show`, notebooks.
+
+    A notebook shows it as the last value of a cell.
 
     Attributes:
         run: the run.
@@ -39,15 +50,35 @@ class Sample:
     record: UnitRecord[Any]
     data: Path | None = None
 
-    @property
+    @cached_property
     def description(self) -> Description:
         """What was asked, in words."""
         return self.run.presenter.describe(self.record)
 
     @property
+    def question(self) -> str:
+        """The question, the plan or the instruction."""
+        return self.description.title
+
+    @property
+    def target(self) -> str:
+        """The gold answers, or the goal."""
+        return self.description.target
+
+    @property
     def reply(self) -> str:
-        """The reply; empty if there is none."""
+        """The reply, or how an episode ended; empty if there is none."""
         return self.run.presenter.reply(self.record)
+
+    @property
+    def thinking(self) -> str | None:
+        """What the model thought before its reply; None if it did not."""
+        return self.details.get(THOUGHT)
+
+    @cached_property
+    def details(self) -> Mapping[str, str]:
+        """Further facts by name."""
+        return self.run.presenter.details(self.record)
 
     @property
     def scores(self) -> Mapping[str, float]:
@@ -55,14 +86,60 @@ class Sample:
         return self.run.suite.scores(self.record) if self.record.state == "answered" else {}
 
     @property
+    def outcome(self) -> str:
+        """See `Run.outcome`."""
+        return self.run.outcome(self.record)
+
+    @property
+    def reason(self) -> str:
+        """Why it failed or is excluded; empty if it has a result."""
+        return self.record.failure or self.record.excluded or ""
+
+    @property
+    def is_baseline(self) -> bool:
+        """Whether a baseline replied, and no model."""
+        return "baseline" in self.run.header.config.model
+
+    @property
+    def is_episode(self) -> bool:
+        """Whether it is an episode, and no reply to a request."""
+        return self.run.presenter.replay is not None
+
+    @cached_property
     def steps(self) -> Sequence[StepRow]:
         """The steps of an episode; empty for other samples."""
         return self.run.presenter.steps(self.record)
 
     @cached_property
-    def prompt(self) -> Prompt | None:
-        """The request as it was sent; None if its suite does not tell it."""
-        return self.run.presenter.prompts(self._alone, self.data).get(self.record.key)
+    def request(self) -> StoredRequest | None:
+        """The request as it was sent, of an episode the one before its first step; None if it is
+        not known."""
+        return self.run.request(self.record)
+
+    @property
+    def request_problem(self) -> str:
+        """Why the request is not known; empty if it is."""
+        if self.request is not None:
+            return ""
+        if self.is_baseline:
+            return "a baseline is sent none"
+        if self.record.request:
+            return "it is not in the journal; its line there is missing or bad"
+        return f"none was made: {self.reason}" if self.reason else "the run's journal has none"
+
+    def request_text(self, words: Callable[[StoredFrames], str]) -> str | None:
+        """Return the request as one text, `words` for frames; None if it is not known."""
+        return None if self.request is None else self.request.text(self.question, words)
+
+    @property
+    def tokens(self) -> TokenCounts | None:
+        """Tokens of its requests and replies; None if they were not counted."""
+        tokens, usage = self.record.tokens, self.record.usage
+        if tokens.context is not None and tokens.reply is not None:
+            return TokenCounts(tokens.context, tokens.cached or 0, tokens.reply)
+        if usage.context or usage.reply:
+            return TokenCounts(usage.context, usage.cached, usage.reply)
+        return None
 
     @cached_property
     def frames(self) -> Sequence[FrameRef]:
@@ -71,29 +148,24 @@ class Sample:
         Raises:
             DataError: they cannot be found.
         """
-        return self.run.presenter.request_frames(self._alone, self.data)(self.record)
-
-    @property
-    def _alone(self) -> Run:
-        """The run with this sample alone, so that no other request is made again."""
-        return self.run.with_records((self.record,))
+        return self.run.presenter.request_frames(self.run, self.data)(self.record)
 
     def lines(self) -> Iterator[str]:
         """Yield the sample in words: what was asked, the reply, and why it got its score."""
         presenter = self.run.presenter
         yield f"{self.run.label}, {self.record.task}, {self.record.key}"
-        yield f"  {self.description.title}"
-        yield f"  {presenter.target_label}: {self.description.target}"
+        yield f"  {self.question}"
+        yield f"  {presenter.target_label}: {self.target}"
         if self.record.state != "answered":
-            why = self.record.failure or self.record.excluded
-            yield f"  {self.record.state}, in no score: {why}"
+            yield f"  {self.record.state}, in no score: {self.reason}"
             return
         yield f"  {presenter.reply_label}: {self.reply or '(empty)'}"
         yield f"  scores: {self._scores_in_words()}"
         for line in presenter.explain(self.record):
             yield f"    {line}"
-        for name, value in presenter.details(self.record).items():
+        for name, value in self.details.items():
             yield f"  {name}: {value}"
+        yield f"  request: {self._request_in_words()}"
         for number, step in enumerate(self.steps, 1):
             yield f"  {number:4d}. {_in_words(step)}"
 
@@ -136,15 +208,7 @@ class Sample:
         return [store.encoded[number] for number in numbers if number is not None], note
 
     def _request_in_words(self) -> str:
-        if self.prompt is None:
-            return ""
-        if self.prompt.problem:
-            return f"cannot be shown: {self.prompt.problem}"
-        parts = (
-            f"[{part.n} {part.what}]\n" if isinstance(part, PromptFrames) else part
-            for part in self.prompt.parts
-        )
-        return "".join(parts) + self.description.title
+        return self.request_text(_frames_in_words) or f"not known: {self.request_problem}"
 
 
 def find_samples(runs: Sequence[Run], name: str, data: Path | None = None) -> list[Sample]:
@@ -170,6 +234,13 @@ def load_sample(
     """See `infthor_eval.load_sample`."""
     runs = open_runs([Path(folder)], warnings.warn)
     return find_samples(runs, name, None if data is None else Path(data))[0]
+
+
+def _frames_in_words(frames: StoredFrames) -> str:
+    places = ", ".join(
+        str(first) if first == last else f"{first} to {last}" for first, last in frames.places
+    )
+    return f"[{frames.n} {frames.what}{f': {places}' if places else ''}]\n"
 
 
 def _in_words(step: StepRow) -> str:

@@ -12,6 +12,7 @@ from infthor_eval.runs.journals.records import (
     UnitKey,
     UnitRecord,
 )
+from infthor_eval.runs.journals.requests import StoredFrames, StoredRequest
 from infthor_eval.runs.journals.shards import read_header, read_run
 from infthor_eval.runs.request import PreparedRun, RunRequest, prepare, prepare_all
 from infthor_eval.runs.stored.command import StoredCommand, read_stored_command
@@ -27,6 +28,7 @@ from infthor_eval.runs.suite import (
     TaskRequest,
     UnitDoc,
     Workload,
+    keep_request,
 )
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.runs.work.binding import check_runs
@@ -56,6 +58,8 @@ __all__ = [
     "Silent",
     "Skipped",
     "StoredCommand",
+    "StoredFrames",
+    "StoredRequest",
     "Suite",
     "TaskConfig",
     "TaskEstimate",
@@ -74,6 +78,7 @@ __all__ = [
     "count_units",
     "estimate_run",
     "execute",
+    "keep_request",
     "mark_incomplete",
     "prepare",
     "prepare_all",

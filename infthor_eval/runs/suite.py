@@ -35,6 +35,7 @@ from infthor_eval.runs.journals.records import (
     UnitKey,
     UnitRecord,
 )
+from infthor_eval.runs.journals.requests import StoredRequest
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.tables import Table
 from model_adapters import Capabilities, Subject
@@ -143,6 +144,14 @@ class Session(Protocol[Payload]):
 
     def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
         """Cache an artifact for when the run is resumed, with what its requests took."""
+
+
+def keep_request(request: StoredRequest, session: Session[Any]) -> str:
+    """Put a request into the journal unless it is there; return the name that records have."""
+    name = request.fingerprint
+    if session.find_artifact(name, StoredRequest) is None:
+        session.cache_artifact(name, request)
+    return name
 
 
 @dataclass(frozen=True)

@@ -115,10 +115,13 @@ def test_frames_that_are_gone_are_named(questions_run, run_cli, tmp_path):
     words = ("--format", "inspect", "--frames", "--out", tmp_path, "--data", tmp_path)
     code, _, err = run_cli("export", questions_run, *words)
     assert code == 0
-    assert "request(s) left out: " in err
+    assert "16 sample(s) without frames: " in err
     (log,) = documents(tmp_path).values()
     sample = log["summaries.json"][0]
     assert sample["input"] == "Where is the mug?"
+    first, *_ = (content for name, content in log.items() if name.startswith("samples/"))
+    (said,) = first["messages"][0]["content"]
+    assert said["text"].startswith("[frames: ")  # the texts that were sent are known all the same
 
 
 def test_a_failed_sample_has_its_error_and_an_excluded_one_is_none(arm_run, export):

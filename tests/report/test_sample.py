@@ -37,7 +37,7 @@ def test_texts_of_a_reply_are_no_markup(folder: Path) -> None:
     assert HOSTILE not in page
     assert "&lt;script&gt;" in page
     assert "no frames:" in page  # and why, as the set is not there
-    assert "cannot be shown:" in page
+    assert "not known: the run&#39;s journal has none" in page
 
 
 def test_a_failed_sample_has_its_reason_and_no_score(folder: Path) -> None:
@@ -72,4 +72,4 @@ def test_an_episode_has_its_steps(tmp_path: Path, run_cli) -> None:
     listed = [line for line in sample.lines() if re.match(r" +\d+\. ", line)]
     assert len(listed) == len(sample.steps) > 0
     assert all(step.action in line for step, line in zip(sample.steps, listed, strict=True))
-    assert sample.prompt is None
+    assert sample.request is None

@@ -18,7 +18,7 @@ from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.nieh.twins import first_world, twin_side
 from infthor_eval.nieh.units import NiehUnit, shown_clues
 from infthor_eval.questions.asking import Replier, Request, answer_requests, is_asked
-from infthor_eval.runs import Session, UnitRecord
+from infthor_eval.runs import Session, StoredRequest, UnitRecord
 from model_adapters import Reply
 
 _MARGIN_DIGITS = 3  # after the point, of margins in nats
@@ -50,6 +50,11 @@ class NiehRequest(Request[NiehAnswer]):
     def words(self) -> tuple[str, ...]:
         """See `Request`: those of the set."""
         return self.prepared.task_samples.words
+
+    @property
+    def stored(self) -> StoredRequest:
+        """See `Request`."""
+        return self.prepared.task_samples.stored_request(self.unit.sample, self.context, self.text)
 
     def replied(self, reply: Reply, answer: str, thinking: str | None) -> NiehAnswer:
         """See `Request`."""

@@ -33,7 +33,7 @@ def with_key(source: Source, key: AnswerKey) -> Source:
     config = replace(source.header.config, tasks=keyed)
     contexts = {name: task.context for name, task in tasks.items()}
     records = [_keyed(record, key, contexts[record.task]) for record in source.records]
-    return Source(replace(source.header, config=config), records)
+    return Source(replace(source.header, config=config), records, source.requests)
 
 
 def _keyed(record: UnitRecord[NiehAnswer], key: AnswerKey, context: str) -> UnitRecord[NiehAnswer]:

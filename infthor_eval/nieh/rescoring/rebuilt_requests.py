@@ -4,7 +4,7 @@ A journal has the hash of each request, not the request. A request that was made
 only if it has that hash, so what is shown is what was sent.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -33,13 +33,11 @@ class RebuiltRequest(NamedTuple):
         traj_id: name of the question's trajectory.
         context: what the model saw, frames as references.
         text: the text after it, which ends with the question.
-        positions: where in the trajectory's time order the shown frames are, from 0 on.
     """
 
     traj_id: str
     context: tuple[ContextPart, ...]
     text: str
-    positions: Sequence[int]
 
 
 class RequestRebuilder:
@@ -78,8 +76,7 @@ class RequestRebuilder:
             != record.fingerprint
         ):
             raise DataError("made again, it is another request than the one that was sent")
-        positions = self._samples.positions(sample)
-        return RebuiltRequest(sample.question.traj_id, context, text, positions)
+        return RebuiltRequest(sample.question.traj_id, context, text)
 
     def _find_sample(self, record: UnitRecord[NiehAnswer]) -> Sample:
         question = self._questions.get(record.id)

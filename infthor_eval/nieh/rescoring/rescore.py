@@ -4,8 +4,8 @@ The journal alone is needed: its records have the gold answers. So runs can be s
 model or set is no longer there, and runs of imported replies.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -28,8 +28,17 @@ from infthor_eval.nieh.rescoring.report import RescoringReport, find_changes
 from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.questions.asking import MetricError
-from infthor_eval.runs import NOTHING, RunHeader, Session, Unit, UnitRecord, read_header, read_run
-from infthor_eval.runs.journals.shards import Tell
+from infthor_eval.runs import (
+    NOTHING,
+    RunHeader,
+    Session,
+    StoredRequest,
+    Unit,
+    UnitRecord,
+    keep_request,
+    read_header,
+)
+from infthor_eval.runs.journals.shards import Tell, read_run_log
 from infthor_eval.runs.results import write_document
 from infthor_eval.runs.stored.writing import Stored, store_run
 
@@ -42,10 +51,16 @@ Record = UnitRecord[NiehAnswer]
 
 @dataclass(frozen=True)
 class Source:
-    """A run whose replies are scored again: its header, and the latest record of each unit."""
+    """A run whose replies are scored again.
+
+    Attributes:
+        records: the latest record of each unit.
+        requests: the stored requests by the names that records have for them.
+    """
 
     header: RunHeader[NiehConfig]
     records: Sequence[Record]
+    requests: Mapping[str, StoredRequest] = field(default_factory=dict)
 
     @property
     def n_missing(self) -> int:
@@ -139,6 +154,8 @@ class Rescoring:
 
         def make_records(session: Session[NiehAnswer]) -> list[Record]:
             records.extend(self._score(record, session) for record in self.source.records)
+            for request in self.source.requests.values():
+                keep_request(request, session)
             if self.judge is not None:
                 judgements.append(judge_replies(records, self.judge, session, track))
                 records[:] = [_with_verdict(record, judgements[0]) for record in records]
@@ -204,7 +221,8 @@ def read_source(folder: Path, tell: Tell | None = None) -> Source:
             f"{folder}: is a run of {header.suite}; give a run of {NiehSuite.name}, which has "
             "replies"
         )
-    return Source(*read_run(folder, RECORDS, tell))
+    header, log = read_run_log(folder, RECORDS, tell)
+    return Source(header, log.records, log.requests)
 
 
 def score_again(

@@ -12,6 +12,7 @@ import msgspec
 from infthor_eval.errors import InfthorError, wrap_errors
 from infthor_eval.pages.server import file_route
 from infthor_eval.rates import Rate
+from infthor_eval.report.sample import Sample
 from infthor_eval.run import Run
 from infthor_eval.runs import NOTHING, RunSummary, UnitRecord, Usage
 from infthor_eval.runs.journals.following import FollowedJournal, is_written
@@ -230,15 +231,15 @@ def _n_units(results: Results | None, n_done: int) -> int | None:
 
 
 def _sample(run: Run, record: UnitRecord[Any]) -> LiveSample:
-    description = run.presenter.describe(record)
+    sample = Sample(run, record)
     return LiveSample(
         task=record.task,
         id=_cut(str(record.key)),
-        title=_cut(description.title),
-        target=_cut(description.target),
-        reply=_cut(run.presenter.reply(record)),
-        outcome=run.outcome(record),
-        reason=_cut(record.failure or record.excluded or ""),
+        title=_cut(sample.question),
+        target=_cut(sample.target),
+        reply=_cut(sample.reply),
+        outcome=sample.outcome,
+        reason=_cut(sample.reason),
         scores=run.suite.scores(record),
         seconds=round(record.seconds, 4),
         tokens=(record.tokens.context, record.tokens.reply),

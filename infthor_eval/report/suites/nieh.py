@@ -28,11 +28,10 @@ from infthor_eval.report.presenter import (
     Timelines,
 )
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
-from infthor_eval.report.web.samples import Prompt
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
-from infthor_eval.runs import UnitKey, UnitRecord
+from infthor_eval.runs import UnitRecord
 
 Record = UnitRecord[NiehAnswer]
 _ABOVE_BLIND = ", above blind"
@@ -191,12 +190,6 @@ class NiehPresenter(PlainPresenter):
         """See `Presenter.recalled`."""
         recall = record.payload.recall
         return () if recall is None else recall.recalled
-
-    def prompts(self, run: Run, data: Path | None) -> Mapping[UnitKey, Prompt]:
-        """See `Presenter.prompts`."""
-        from infthor_eval.report.suites.nieh_prompts import find_prompts
-
-        return find_prompts(run, data)
 
     def request_frames(self, run: Run, data: Path | None) -> FindFrames:
         """See `Presenter.request_frames`."""

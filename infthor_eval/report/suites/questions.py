@@ -17,7 +17,7 @@ from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import THOUGHT, Description, FindFrames, Timelines
 from infthor_eval.report.svg.dots import Dot, DotRow, DotsChart, class_row, dot_of, dots_chart
 from infthor_eval.report.svg.drawing import Series
-from infthor_eval.report.web.samples import Prompt, PromptFrames, Timeline, TimelineFrame
+from infthor_eval.report.web.samples import Timeline, TimelineFrame
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
@@ -59,14 +59,6 @@ class QuestionsPresenter(PlainPresenter):
             _chart(task, [run for run in runs if task in run.summary.summary.tasks])
             for task in tasks
         ]
-
-    def prompts(self, run: Run, data: Path | None) -> Mapping[UnitKey, Prompt]:
-        """See `Presenter.prompts`."""
-        counts = {record.key: record.payload.n_pictures for record in run.records}
-        return {
-            key: Prompt((PromptFrames("pictures", (), n),) if n else ())
-            for key, n in counts.items()
-        }
 
     def request_frames(self, run: Run, data: Path | None) -> FindFrames:
         """See `Presenter.request_frames`."""

@@ -83,7 +83,7 @@ def build_page(
     notes: list[str] = []
     texts = SharedTexts()
     for same in by_suite.values():
-        of_suite = build_samples(same, request.data, replays, thumbnails, texts, progress)
+        of_suite = build_samples(same, request.data, replays, thumbnails, texts)
         run_indices = [runs.index(run) for run in same]
         samples += [sample.spread_over(len(runs), run_indices) for sample in of_suite.samples]
         notes += of_suite.notes

@@ -4,7 +4,7 @@ const promptOf = result => (result?.prompt === undefined ? undefined : prompts[r
 const isKnown = result => promptOf(result) !== undefined && !promptOf(result).problem;
 
 const stretchesOf = places => places.map(([first, last]) => first === last ? `${first}` : `${first}–${last}`).join(", ");
-const framesPart = ({ what, places, n }) => make("span", { class: "frames-part" },
+const framesPart = ({ what = "frames", places = [], n }) => make("span", { class: "frames-part" },
   `⟦${n} × ${what}${places.length ? `: ${stretchesOf(places)}` : ""}⟧`);
 
 // Labels of the runs by the value that their results have, in the order of the runs.
@@ -20,9 +20,9 @@ const runsByValue = (sample, valueOf) => {
 const promptsOf = (sample, name) => runsByValue(sample, result => result.prompt).map(([number, labels]) => {
   const { parts = [], problem, note } = prompts[number];
   const body = problem
-    ? [make("p", { class: "note" }, `It is not known exactly: ${problem}.`)]
-    : [make("pre", {}, ...parts.map(part => typeof part === "string" ? part : framesPart(part)), sample.title),
-      make("p", { class: "note" }, "Made again from the run's settings and its set; by its hash it is what was asked. Each model has its own chat template around it.")];
+    ? [make("p", { class: "note" }, `It is not known: ${problem}.`)]
+    : [make("pre", {}, ...parts.map(part => part === null ? sample.title : typeof part === "string" ? part : framesPart(part))),
+      make("p", { class: "note" }, "As the run's journal has it. Each model has its own chat template around it.")];
   return make("details", { class: "prompt" }, make("summary", {}, "The whole prompt, ", make("b", {}, withName(labels.join(", "), name))),
     note ? make("p", { class: "note" }, note) : null, ...body);
 });

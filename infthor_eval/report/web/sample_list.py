@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from infthor_eval.report.runs import records_by_unit
-from infthor_eval.report.web.progress import PageProgress
+from infthor_eval.report.sample import Sample
 from infthor_eval.report.web.replays import EpisodePictures, EpisodeReplays
 from infthor_eval.report.web.sample_groups import GroupKey, group_samples
 from infthor_eval.report.web.samples import (
@@ -22,12 +22,12 @@ from infthor_eval.report.web.samples import (
 )
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
-from infthor_eval.runs import UnitKey, UnitRecord
+from infthor_eval.runs import StoredRequest, UnitKey, UnitRecord
 from infthor_eval.runs.journals.shards import FOLDER
 from infthor_eval.runs.journals.tracebacks import StoredTracebacks
 
 Record = UnitRecord[Any]
-_PROMPTS = "runs with their prompts"
+_OF_BASELINES = "a baseline is not sent it: it answers from the questions alone"
 
 
 class SuiteSamples(NamedTuple):
@@ -59,7 +59,6 @@ def build_samples(
     replays: EpisodeReplays,
     thumbnails: ThumbnailStore,
     texts: SharedTexts,
-    progress: PageProgress,
 ) -> SuiteSamples:
     """Build the samples of runs.
 
@@ -69,7 +68,6 @@ def build_samples(
         replays: replays some of the episodes.
         thumbnails: collects the pictures.
         texts: collects prompts, tracebacks, and what is known of frames.
-        progress: observes what takes long.
     """
     presenter = runs[0].presenter
     timelines = presenter.timelines(runs, data, thumbnails)
@@ -78,15 +76,7 @@ def build_samples(
         key: timeline.renumbered(fact_numbers) for key, timeline in timelines.by_unit.items()
     }
     replayed = [replays.replay(run) for run in runs]
-    progress.begin(_PROMPTS, len(runs))
-    sources = []
-    for run in runs:
-        sources.append(
-            _Source(
-                run, run.presenter.prompts(run, data), StoredTracebacks(run.folder / FOLDER), texts
-            )
-        )
-        progress.advance(_PROMPTS, run.label)
+    sources = [_Source(run, StoredTracebacks(run.folder / FOLDER), texts) for run in runs]
     samples = []
     for key, records in records_by_unit(runs).items():
         pictures = [of_run.get(key) for of_run, _ in replayed]
@@ -99,16 +89,19 @@ def build_samples(
 
 @dataclass(frozen=True)
 class _Source:
-    """A run with what is known of its records beside them."""
+    """A run with the texts of its samples that are there once."""
 
     run: Run
-    prompts: Mapping[UnitKey, Prompt]
     tracebacks: StoredTracebacks
     texts: SharedTexts
 
-    def prompt(self, record: Record) -> int | None:
-        prompt = self.prompts.get(record.key)
-        return None if prompt is None else self.texts.prompts.number(prompt)
+    def prompt(self, sample: Sample) -> int | None:
+        if sample.request is None and sample.is_baseline:
+            return None
+        note = _OF_BASELINES if sample.is_baseline else ""
+        request = sample.request or StoredRequest()
+        prompt = Prompt(request.parts, request.shown, sample.request_problem, note)
+        return self.texts.prompts.number(prompt)
 
     def traceback(self, record: Record) -> int | None:
         text = "" if record.failure is None else self.tracebacks.find(record.key, record.attempt)
@@ -147,26 +140,25 @@ def _sample(
 
 
 def _result(source: _Source, record: Record, pictures: EpisodePictures) -> SampleResult:
-    run = source.run
+    sample = Sample(source.run, record)
     tokens = record.tokens
-    presenter = run.presenter
     return SampleResult(
-        outcome=run.outcome(record),
-        reply=presenter.reply(record),
-        scores=run.suite.scores(record),
-        reason=record.failure or record.excluded or "",
+        outcome=sample.outcome,
+        reply=sample.reply,
+        scores=source.run.suite.scores(record),
+        reason=sample.reason,
         faults=record.faults,
         seconds=round(record.seconds, 4),
         tokens=(tokens.context, tokens.cached, tokens.reply),
-        details=presenter.details(record),
-        steps=_with_pictures(presenter.steps(record), pictures.frames),
+        details=sample.details,
+        steps=_with_pictures(sample.steps, pictures.frames),
         start=pictures.frames[0] if pictures.frames else None,
         map=pictures.map,
         note=pictures.note,
-        prompt=source.prompt(record),
+        prompt=source.prompt(sample),
         traceback=source.traceback(record),
         why=source.explanation(record),
-        recalled=tuple(presenter.recalled(record)),
+        recalled=tuple(source.run.presenter.recalled(record)),
     )
 
 

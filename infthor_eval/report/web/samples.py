@@ -5,6 +5,8 @@ from typing import Generic, TypeVar
 
 import msgspec
 
+from infthor_eval.runs import StoredFrames
+
 T = TypeVar("T", bound=Hashable)
 
 
@@ -94,32 +96,17 @@ class Timeline(msgspec.Struct, frozen=True, omit_defaults=True):
         )
 
 
-class PromptFrames(msgspec.Struct, frozen=True):
-    """Frames in a prompt.
-
-    Attributes:
-        what: what they are, in words ("frames", "blank frames", "video of 1 frames per second").
-        places: first and last place in the trajectory of each stretch of neighbours, in the order
-            shown; empty where they are no frames of it.
-        n: number of frames.
-    """
-
-    what: str
-    places: tuple[tuple[int, int], ...]
-    n: int
-
-
 class Prompt(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The request of a sample as it was sent, which ends with the sample's title.
+    """The request of a sample as it was sent, as far as it is known.
 
     Attributes:
-        parts: texts, and frames in their places.
-        shown: first and last place in the trajectory of each stretch of frames that it shows.
-        problem: why it cannot be shown; empty if it is.
+        parts: see `StoredRequest`; None stands for the sample's title.
+        shown: see `StoredRequest`.
+        problem: why it is not known; empty if it is.
         note: a remark.
     """
 
-    parts: tuple[str | PromptFrames, ...] = ()
+    parts: tuple[str | StoredFrames | None, ...] = ()
     shown: tuple[tuple[int, int], ...] = ()
     problem: str = ""
     note: str = ""

@@ -27,6 +27,7 @@ from infthor_eval.errors import DataError, UsageError, in_one_line, wrap_errors
 from infthor_eval.formats.reading import NOT_JSON, require_file
 from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.records import (
+    Artifact,
     ArtifactRecord,
     Payload,
     RecordTypes,
@@ -34,6 +35,7 @@ from infthor_eval.runs.journals.records import (
     UnitKey,
     UnitRecord,
 )
+from infthor_eval.runs.journals.requests import StoredRequest
 from infthor_eval.runs.journals.shards import (
     FOLDER,
     Decoder,
@@ -131,13 +133,22 @@ class Journal(Generic[Payload]):
         """Add a record that is in another shard to what this process knows."""
         self._log.add(record)
 
-    def add_from(self, worker: int, record: UnitRecord[Payload]) -> None:
+    def add_from(
+        self, worker: int, record: UnitRecord[Payload], request: StoredRequest | None
+    ) -> None:
         """Add a worker's record; where its shard is not visible here, write it into this one.
+
+        Args:
+            worker: number of the worker.
+            record: the record.
+            request: the request that it names, if no record before it did.
 
         Raises:
             DataError: it cannot be written.
         """
         if not (self._path.parent / _SHARD.format(worker)).exists():
+            if request is not None:
+                self.cache_artifact(record.request, request)
             self._write(record)
         self.add(record)
 
@@ -166,10 +177,9 @@ class Journal(Generic[Payload]):
         self._log.add(record)
         return record
 
-    def find_artifact(self, fingerprint: str) -> Any | None:
+    def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
         """Return the cached artifact of these inputs, or None."""
-        record = self._log.artifacts.get(fingerprint)
-        return None if record is None else record.payload
+        return self._log.find_artifact(fingerprint, kind)
 
     @property
     def artifacts(self) -> list[ArtifactRecord[Any]]:

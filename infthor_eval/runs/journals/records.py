@@ -13,6 +13,7 @@ import msgspec
 from infthor_eval.errors import InfthorError, describe_exception
 from infthor_eval.quantities import Amount, Count, Repetition, Total
 from infthor_eval.runs.config import Config, RunConfig
+from infthor_eval.runs.journals.requests import StoredRequest
 from infthor_eval.runs.usage import NOTHING, Usage
 
 FORMAT = 3
@@ -119,6 +120,7 @@ class UnitRecord(
         tokens: tokens of the unit.
         usage: usage of all its requests.
         read: hashes of what the model read.
+        request: name of the stored request (`StoredRequest.fingerprint`); empty if none was made.
     """
 
     task: _Name
@@ -137,6 +139,7 @@ class UnitRecord(
     tokens: Tokens = Tokens()
     usage: Usage = NOTHING
     read: ReadHashes = ReadHashes()
+    request: str = ""
 
     @property
     def key(self) -> UnitKey:
@@ -177,8 +180,8 @@ class RecordTypes(Generic[Payload_co]):
 
     Attributes:
         unit: payload of its units.
-        artifact: payload of its cached artifacts, a union if there are several kinds; None where it
-            caches none.
+        artifact: payload of its cached artifacts besides requests, a union if there are several
+            kinds; None where it caches none.
         config: config of its runs.
     """
 
@@ -190,7 +193,8 @@ class RecordTypes(Generic[Payload_co]):
         """Return the decoder of a journal's lines."""
         header: Any = RunHeader[self.config]  # type: ignore[name-defined]
         record: Any = UnitRecord[self.unit]  # type: ignore[name-defined]
-        artifact: Any = ArtifactRecord[self.artifact]  # type: ignore[name-defined]
+        cached = StoredRequest if self.artifact is None else StoredRequest | self.artifact
+        artifact: Any = ArtifactRecord[cached]  # type: ignore[valid-type]
         return msgspec.json.Decoder(header | record | artifact)
 
     def header_decoder(self) -> msgspec.json.Decoder[RunHeader[Any]]:

@@ -31,8 +31,7 @@ class JournalSession(Generic[Payload]):
 
     def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
         """See `Session`."""
-        artifact = self.journal.find_artifact(fingerprint)
-        return artifact if isinstance(artifact, kind) else None
+        return self.journal.find_artifact(fingerprint, kind)
 
     def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
         """See `Session`."""

@@ -14,6 +14,7 @@ from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import NOT_JSON, read_bytes, require_file
 from infthor_eval.runs.journals.records import (
     FORMAT,
+    Artifact,
     ArtifactRecord,
     Payload,
     RecordTypes,
@@ -23,6 +24,7 @@ from infthor_eval.runs.journals.records import (
     UnitRecord,
     state_of,
 )
+from infthor_eval.runs.journals.requests import StoredRequest
 from infthor_eval.runs.usage import Usage
 
 FOLDER = "journal"  # within the run's folder
@@ -56,6 +58,17 @@ class RunLog(Generic[Payload]):
     def records(self) -> list[UnitRecord[Payload]]:
         """The latest record of each unit, in the order of the units' keys."""
         return [self.units[key] for key in sorted(self.units)]
+
+    def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
+        """Return the cached artifact of these inputs, or None."""
+        record = self.artifacts.get(fingerprint)
+        return record.payload if record is not None and isinstance(record.payload, kind) else None
+
+    @property
+    def requests(self) -> dict[str, StoredRequest]:
+        """The stored requests by the names that records have for them."""
+        payloads = {name: record.payload for name, record in self.artifacts.items()}
+        return {name: it for name, it in payloads.items() if isinstance(it, StoredRequest)}
 
     @property
     def usage(self) -> Usage:

@@ -22,6 +22,7 @@ from infthor_eval.runs.journals.records import (
     UnitKey,
     UnitRecord,
 )
+from infthor_eval.runs.journals.requests import StoredRequest
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Group, Workload
@@ -101,6 +102,7 @@ class _Evaluator(Generic[SuiteUnit, Payload]):
         self._number = number
         self._bound = bind_run(run)
         self._session: JournalSession[Payload] | None = None
+        self._named: set[str] = set()  # the requests that the driver knows
 
     @property
     def greeting(self) -> _Greeting:
@@ -109,15 +111,21 @@ class _Evaluator(Generic[SuiteUnit, Payload]):
         parts = (workload.skipped, workload.config, workload.costs, workload.warnings)
         return _Greeting(self._bound.header, Workload(groups, *parts))
 
-    def do(self, job: _GroupJob[Payload]) -> Iterator[tuple[UnitRecord[Payload], bool]]:
+    def do(
+        self, job: _GroupJob[Payload]
+    ) -> Iterator[tuple[UnitRecord[Payload], bool, StoredRequest | None]]:
+        """Yield records, whether they were there, and their requests when they are first named."""
         evaluation = self._bound.evaluation
         session = self._open_session(job.folder)
         for record in job.earlier:
             session.journal.add(record)
-        for record in group_records(
-            evaluation, job.portion.select(evaluation.workload.groups), session, self._gate
-        ):
-            yield session.append_new(record)
+        group = job.portion.select(evaluation.workload.groups)
+        for made in group_records(evaluation, group, session, self._gate):
+            record, resumed = session.append_new(made)
+            is_new = not resumed and record.request not in self._named
+            self._named.add(record.request)
+            request = session.find_artifact(record.request, StoredRequest) if is_new else None
+            yield record, resumed, request
 
     def close(self) -> None:
         try:
@@ -199,7 +207,7 @@ class WorkerPoolExecutor(Generic[SuiteUnit, Payload]):
             )
             yield journal.append(unit.record_failure(failure)), False
         for worker in range(1, self._n_workers + 1):
-            journal.reread(worker)  # for cached artifacts, which workers do not send
+            journal.reread(worker)  # for cached artifacts, of which workers send requests alone
 
     def _do_portions(
         self, portions: Sequence[_Portion], progress: _Progress[Payload], max_losses: int
@@ -215,9 +223,9 @@ class WorkerPoolExecutor(Generic[SuiteUnit, Payload]):
         for event in self._pool.run(len(portions), job, progress.should_stop, max_losses):
             self._report_loss(event)
             if isinstance(event, JobResult):
-                record, resumed = event.result
+                record, resumed, request = event.result
                 if not resumed:
-                    journal.add_from(event.worker, record)
+                    journal.add_from(event.worker, record, request)
                 if record.key not in progress.done:
                     progress.done.add(record.key)
                     yield record, resumed

@@ -5,10 +5,11 @@ import msgspec
 import pytest
 
 from infthor_eval.errors import DataError
+from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.nieh.rescoring.rebuilt_requests import RequestRebuilder
 from infthor_eval.nieh.samples import open_set
-from infthor_eval.runs import read_run
+from infthor_eval.runs.journals.shards import read_run_log
 from infthor_eval.storage.folders import packaged_folder
 
 from ...helpers.command_line import option_words
@@ -22,7 +23,7 @@ TOLD = (
 
 @pytest.fixture
 def ask(run_cli, tmp_path):
-    """Runs the answer key on some tasks and returns the run's header and records."""
+    """Runs the answer key on some tasks and returns the run's header and log."""
 
     def ask(tasks, *options, model="oracle"):
         words = (
@@ -31,7 +32,7 @@ def ask(run_cli, tmp_path):
         )
         assert run_cli(*words)[0] == 0
         (folder,) = (tmp_path / model).iterdir()
-        return read_run(folder, RECORDS)
+        return read_run_log(folder, RECORDS)
 
     return ask
 
@@ -55,39 +56,46 @@ def rebuilt(header, records):
     ],
 )
 def test_every_context_comes_out_as_it_was_sent(ask, tasks, options):
-    header, records = ask(tasks, *options)
-    for record, request in rebuilt(header, records):
+    header, log = ask(tasks, *options)
+    requests = log.requests
+    for record, request in rebuilt(header, log.records):
         assert request.text.endswith(f"Question: {record.payload.question}")
         assert request.context
         shown_clues = record.payload.shown_clues
+        stored = requests[record.request]
+        assert stored.text(record.payload.question, lambda frames: "<image>" * frames.n) == "".join(
+            part if isinstance(part, str) else "<image>"
+            for part in (*as_images(request.context), request.text)
+        )
         if shown_clues is not None:
             question = next(it for it in open_set(str(DATA)).questions if it.id == record.id)
-            assert len(set(question.clues) & set(request.positions)) == shown_clues.n_shown
+            shown = {at for first, last in stored.shown for at in range(first, last + 1)}
+            assert len(set(question.clues) & shown) == shown_clues.n_shown
 
 
 def test_what_a_memory_recalled_is_taken_from_the_record(ask):
-    header, records = ask("nieh_mini_memory", "--memory", "uniform", model="qwen2.5-vl-nano")
-    for record, request in rebuilt(header, records):
+    header, log = ask("nieh_mini_memory", "--memory", "uniform", model="qwen2.5-vl-nano")
+    for record, request in rebuilt(header, log.records):
         assert record.payload.recall is not None
         assert len(request.context) == len(record.payload.recall.recalled) + 1
 
 
 def test_another_request_than_the_one_sent_is_refused(ask):
-    header, records = ask("nieh_mini_gt")
+    header, log = ask("nieh_mini_gt")
     rebuilder = RequestRebuilder(header, "nieh_mini_gt", open_set(str(DATA)))
     for change in ({"fingerprint": "0" * 32}, {"repeat": 2}):
         with pytest.raises(DataError, match="another request than the one that was sent"):
-            rebuilder.rebuild(msgspec.structs.replace(records[0], **change))
+            rebuilder.rebuild(msgspec.structs.replace(log.records[0], **change))
     for change, why in (
         ({"id": "nobody/1"}, "not in the set"),
         ({"fingerprint": ""}, "could not be read"),
     ):
         with pytest.raises(DataError, match=why):
-            rebuilder.rebuild(msgspec.structs.replace(records[0], **change))
+            rebuilder.rebuild(msgspec.structs.replace(log.records[0], **change))
 
 
 def test_frames_that_a_model_retrieved_are_not_guessed(ask):
-    header, records = ask("nieh_mini_gt")
+    header, log = ask("nieh_mini_gt")
     header.config.tasks["nieh_mini_gt"].settings["dataset_kwargs"]["context"] = "clip_retrieval"
     with pytest.raises(DataError, match="the journal does not have them"):
-        RequestRebuilder(header, "nieh_mini_gt", open_set(str(DATA))).rebuild(records[0])
+        RequestRebuilder(header, "nieh_mini_gt", open_set(str(DATA))).rebuild(log.records[0])

@@ -7,6 +7,7 @@ import msgspec
 import pytest
 
 from infthor_eval.runs import UnitKey
+from infthor_eval.runs.journals.shards import find_shards
 from infthor_eval.runs.journals.tracebacks import TracebackFile
 from infthor_eval.storage.folders import packaged_folder
 
@@ -29,14 +30,30 @@ def test_equal_prompts_are_there_once_and_none_is_guessed(page):
         assert len({result.prompt for result in sample.results}) == 1
 
 
-def test_without_the_set_the_page_says_that_the_prompt_is_not_known(
-    make_page, nieh_runs, make_nieh_set, open_page
-):
+def test_the_prompt_is_known_without_the_set(make_page, nieh_runs, make_nieh_set, open_page):
     page = make_page(nieh_runs[0], data=make_nieh_set())
     tab = open_page(page).tab
     tab.select_option("#task", "nieh_haystack_8k")
     tab.click("details.prompt summary")
-    assert "It is not known exactly: " in tab.locator("details.prompt").inner_text()
+    assert "Question: " in tab.locator("details.prompt pre").inner_text()
+
+
+def test_a_run_without_requests_says_that_they_are_not_known(
+    make_page, nieh_runs, open_page, tmp_path
+):
+    """As runs of earlier versions are."""
+    run = tmp_path / "run"
+    shutil.copytree(nieh_runs[0], run)
+    for shard in find_shards(run):
+        lines = map(json.loads, shard.read_text().splitlines())
+        kept = [line for line in lines if line["type"] != "artifact"]
+        for line in kept:
+            line.pop("request", None)
+            line.get("config", {}).get("model", {}).pop("baseline", None)
+        shard.write_text("".join(f"{json.dumps(line)}\n" for line in kept))
+    tab = open_page(make_page(run, data=DATA)).tab
+    tab.click("details.prompt summary")
+    assert "It is not known: the run's journal has none" in tab.inner_text("details.prompt")
     assert tab.locator("details.prompt pre").count() == 0
 
 

@@ -62,8 +62,8 @@ def test_what_was_recorded_is_there_when_the_run_goes_on(tmp_path):
         assert journal.find_record(KEY, "f") == record()
         assert journal.find_record(KEY, "other inputs") is None
         assert journal.find_record(UnitKey("other task", "q1"), "f") is None
-        assert journal.find_artifact("inputs") == Note("a mug")
-        assert journal.find_artifact("others") is None
+        assert journal.find_artifact("inputs", Note) == Note("a mug")
+        assert journal.find_artifact("others", Note) is None
     assert read_run(tmp_path, TYPES) == (HEADER, [record()])
     assert read_header(tmp_path) == HEADER
 
@@ -159,7 +159,7 @@ def test_a_bad_line_is_named_with_its_number_and_a_way_on_and_costs_its_own_unit
     assert recover(tmp_path, HEADER, TYPES) == 1
     with opened(tmp_path) as journal:
         assert journal.records == [record("q2")]
-        assert journal.find_artifact("inputs") == Note("a mug")
+        assert journal.find_artifact("inputs", Note) == Note("a mug")
     assert (tmp_path / "journal" / "bad_lines.txt").read_bytes() == line + b"\n"
     assert recover(tmp_path, HEADER, TYPES) == 0
 
@@ -274,18 +274,18 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path):
 def test_an_artifact_is_known_as_soon_as_it_is_cached(tmp_path):
     with opened(tmp_path) as journal:
         journal.cache_artifact("inputs", Note("a mug"))
-        assert journal.find_artifact("inputs") == Note("a mug")
+        assert journal.find_artifact("inputs", Note) == Note("a mug")
         assert [artifact.payload for artifact in journal.artifacts] == [Note("a mug")]
 
 
 def test_a_worker_s_record_is_written_here_only_where_its_shard_cannot_be_seen(tmp_path):
     with opened(tmp_path) as driver:
         before = shard(tmp_path).read_bytes()
-        driver.add_from(7, record("unseen"))
+        driver.add_from(7, record("unseen"), None)
         assert shard(tmp_path).read_bytes().count(b"\n") == before.count(b"\n") + 1
         with opened(tmp_path, worker=1) as worker:
             worker.append(record("seen"))
-        driver.add_from(1, record("seen"))
+        driver.add_from(1, record("seen"), None)
         assert shard(tmp_path).read_bytes().count(b"\n") == before.count(b"\n") + 1
         assert {known.id for known in driver.records} == {"unseen", "seen"}
     assert len(read_run(tmp_path, TYPES)[1]) == 2

@@ -295,7 +295,7 @@ def test_records_whose_shard_is_on_another_disk_are_put_into_the_drivers(tmp_pat
     outcome, _ = run(request(tmp_path), ToySuite())
     (tmp_path / "other").mkdir()
     with Journal(tmp_path / "other", outcome.summary.header, ToySuite.records) as journal:
-        journal.add_from(7, outcome.records[0])
+        journal.add_from(7, outcome.records[0], None)
     assert read_run(tmp_path / "other", ToySuite.records)[1] == outcome.records[:1]
 
 
