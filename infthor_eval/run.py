@@ -146,9 +146,10 @@ class Run:
         """The latest record of each unit."""
         return tuple(self._log[1].records)
 
-    def request(self, record: UnitRecord[Any]) -> StoredRequest | None:
-        """Return the request of a record; None where the journal does not have it."""
-        return self._log[1].find_artifact(record.request, StoredRequest)
+    def requests(self, record: UnitRecord[Any]) -> Sequence[StoredRequest]:
+        """Return the request of a record, behind those that it continues; none where the journal
+        does not have them all."""
+        return self._log[1].requests_before(record.request) or ()
 
     @cached_property
     def usage(self) -> Usage:

@@ -8,7 +8,16 @@ from typing import Generic, TypeVar
 from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.episodes.retries import with_retries
 from infthor_eval.errors import InfthorError, NotAskedError, SceneError
-from infthor_eval.runs import NOTHING, Session, Tokens, Unit, UnitRecord, Usage
+from infthor_eval.runs import (
+    NOTHING,
+    Session,
+    StoredRequest,
+    Tokens,
+    Unit,
+    UnitRecord,
+    Usage,
+    keep_request,
+)
 from infthor_eval.thor.simulator import Simulator
 
 P = TypeVar("P")
@@ -36,10 +45,12 @@ class EpisodeRunner(Generic[E, P]):
         begun: payload of the present episode once it has begun, without steps; recorded if the
             subject fails.
         usage: usage of all requests for the present episode, with those of tries that were retried.
+        request: the request before the first step of the present episode; None if there is none.
     """
 
     begun: P | None
     usage: Usage
+    request: StoredRequest | None
 
     def __init__(self, simulator: Simulator, build: Callable[[], E]) -> None:
         """Take a trajectory's simulator, and what builds its environment and restores the scene."""
@@ -64,25 +75,33 @@ class EpisodeRunner(Generic[E, P]):
         """Run an episode, again if the simulator fails for good, and record it or its error."""
         self.begun = None
         self.usage = NOTHING
+        self.request = None
         start = time.perf_counter()
+        outcome: tuple[EpisodeResult[P], tuple[str, ...]] | InfthorError
         try:
-            result, faults = with_retries(self._simulator, run, self._drop_environment)
-        except (InfeasibleError, SceneError) as error:
-            return unit.record_exclusion(str(error), fingerprint)
+            outcome = with_retries(self._simulator, run, self._drop_environment)
         except InfthorError as error:
+            outcome = error
+        request = "" if self.request is None else keep_request(self.request, session)
+        if isinstance(outcome, (InfeasibleError, SceneError)):
+            return unit.record_exclusion(str(outcome), fingerprint)
+        if isinstance(outcome, InfthorError):
             begun = unit if self.begun is None else replace(unit, payload=self.begun)
             return begun.record_failure(
-                session.describe_failure(unit, error),
+                session.describe_failure(unit, outcome),
                 fingerprint,
-                asked=not isinstance(error, NotAskedError),
+                asked=not isinstance(outcome, NotAskedError),
                 usage=self.usage,
+                request=request,
             )
+        result, faults = outcome
         return unit.record(
             fingerprint,
             result.payload,
             faults=(*faults, *result.faults),
             seconds=round(time.perf_counter() - start, 4),
             usage=self.usage,
+            request=request,
             **({} if result.tokens is None else {"tokens": result.tokens}),
         )
 

@@ -10,12 +10,11 @@ from infthor_eval.exports.samples import ACT, describe_result, facts_of, payload
 from infthor_eval.report.sample import Sample
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.run import Run
-from infthor_eval.runs import UnitRecord
+from infthor_eval.runs import StoredFrames, UnitRecord
 from infthor_eval.runs.stored.labels import with_frames
 
 SCHEMA_VERSION = "0.3.0"
 Row = dict[str, Any]
-_FRAME = "<image>"  # stands for a frame in a text, as in lm-eval's files
 
 
 def result_id(measure: Measure) -> str:
@@ -78,7 +77,7 @@ def _row(sample: Sample, score: float, *, is_first: bool) -> Row:
         "interaction_type": "agentic" if sample.is_episode else "single_turn",
         "input": {
             "raw": sample.question,
-            "formatted": sample.request_text(lambda frames: _FRAME * frames.n),
+            "formatted": None if sample.is_episode else sample.request_text(_images),
             "reference": [sample.target] if sample.target else [],
         },
         **(_messages(sample) if sample.is_episode else _output(sample)),
@@ -153,6 +152,10 @@ def _group_row(scored: Scored, members: Sequence[Sample]) -> Row:
             "members": json.dumps([str(sample.record.key) for sample in members]),
         },
     }
+
+
+def _images(frames: StoredFrames) -> str:
+    return "<image>" * frames.n  # as in lm-eval's files
 
 
 def _tokens(sample: Sample) -> Row | None:

@@ -76,7 +76,7 @@ class SampleWriter:
 
     def _asked(self, sample: Sample, attachments: dict[str, str]) -> Document:
         question = sample.question
-        if sample.request is None:
+        if sample.request is None or sample.is_episode:  # of an episode all of the history
             goal = f"{sample.target}\n" if sample.is_episode else ""
             return {"role": "user", "content": f"{goal}{question}", "source": "input"}
         frames = iter(self._frames(sample))

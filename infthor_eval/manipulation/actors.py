@@ -15,6 +15,7 @@ from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.planner.reaching import plan_steps
+from infthor_eval.runs import StoredRequest
 from infthor_eval.runs.suite import BaselineSubject
 from model_adapters import ArmDelta, Capabilities, Policy, Subject
 from model_adapters.refusals import check_chunk
@@ -73,9 +74,19 @@ class PolicyActor:
     def act(self, frame: FrameRef | None) -> Sequence[Step]:
         """See `ArmActor`."""
         assert frame is not None  # frames are kept for policies
-        chunk = self._policy.act(blank_like(frame) if self._blank else frame, self._instruction)
+        chunk = self._policy.act(self._seen(frame), self._instruction)
         check_chunk(self._policy.name, chunk)
         return chunk
+
+    def request(self, frame: FrameRef) -> StoredRequest:
+        """Return the request before the first step, as the journal has it."""
+        what = "frames (blank)" if self._blank else "frames"
+        return StoredRequest.of(
+            (self._seen(frame),), self._instruction, self._instruction, what=what
+        )
+
+    def _seen(self, frame: FrameRef) -> FrameRef:
+        return blank_like(frame) if self._blank else frame
 
 
 class _ArmBaseline(BaselineSubject):

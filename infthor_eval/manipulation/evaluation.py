@@ -209,6 +209,8 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
             self._actor.begin(
                 ArmSituation(environment, self.begun.instruction, seed, task.settings.max_step)
             )
+            if isinstance(self._actor, PolicyActor) and outcome.frame is not None:
+                self.request = self._actor.request(outcome.frame)
             steps, ended = self._act(environment, outcome, task.settings.max_steps)
         closest = min([outcome.distance, *(step.distance for step in steps)])
         record = msgspec.structs.replace(

@@ -9,7 +9,12 @@ import msgspec
 from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
 from infthor_eval.plans.actors.factory import ActorFactory
-from infthor_eval.plans.actors.protocols import Act, CountingActor, EndedActor, PlanSituation
+from infthor_eval.plans.actors.protocols import (
+    Act,
+    AskingActor,
+    EndedActor,
+    PlanSituation,
+)
 from infthor_eval.plans.environment import PlanEnvironment, StepOutcome
 from infthor_eval.plans.expert import ExpertRefusedError
 from infthor_eval.plans.plan import Plan
@@ -107,6 +112,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         )
         seed = f"{self._seed}/{plan.index}"
         self._actor.begin(PlanSituation(environment, plan, seed, observation, goes_on))
+        self.request = self._actor.request if isinstance(self._actor, AskingActor) else None
         self.begun = self._with_clue_tokens(self.begun, plan)
         acts: list[tuple[Act, StepOutcome]] = []
         while not acts or not (acts[-1][1].terminated or acts[-1][1].truncated):
@@ -131,7 +137,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
     def _with_clue_tokens(self, begun: PlanRecord, plan: Plan) -> PlanRecord:
         """Return the record with the distance of a final plan's clue, in tokens of the history."""
         clue = self._trajectory.clue(plan) if plan.is_final else None
-        if clue is None or not isinstance(self._actor, CountingActor):
+        if clue is None or not isinstance(self._actor, AskingActor):
             return begun
         tokens = self._actor.tokens_between(clue, self._trajectory.first_frame(plan))
         return msgspec.structs.replace(begun, clue_tokens=tokens)

@@ -114,7 +114,9 @@ class Sample:
     def request(self) -> StoredRequest | None:
         """The request as it was sent, of an episode the one before its first step; None if it is
         not known."""
-        return self.run.request(self.record)
+        requests = self.run.requests(self.record)
+        parts = tuple(part for request in requests for part in request.parts)
+        return StoredRequest(parts, requests[-1].shown) if requests else None
 
     @property
     def request_problem(self) -> str:

@@ -22,6 +22,7 @@ from infthor_eval.plans.published.final_protocol import (
     present_parts,
     with_recorded_state,
 )
+from infthor_eval.runs import StoredRequest
 from infthor_eval.storage.digests import seed_of
 from infthor_eval.thor.actions import applicable_actions
 from model_adapters import Decoding, Model, answer_of, wrap_request_errors
@@ -65,6 +66,8 @@ class ModelActor:
         if config.form is not None:
             self._conversation.append(config.form.system, role="system")
         self._start = self._conversation.mark()
+        self._recalled: Sequence[Part] = ()
+        self.request: StoredRequest | None = None
 
     def begin(self, situation: PlanSituation) -> None:
         """See `PlanActor`."""
@@ -80,8 +83,23 @@ class ModelActor:
             past = with_recorded_state(past, environment.trajectory, situation.plan.low[0])
         self._past = past
         with wrap_request_errors(self._model.name):
-            self._recalled = self._config.history.recall(past, self._count)
+            before, self._recalled = self._recalled, self._config.history.recall(past, self._count)
             self._restart(self._recalled)
+        self.request = self._stored_request(before)
+
+    def _stored_request(self, before: Sequence[Part]) -> StoredRequest:
+        """Return what was recalled, as the journal has it; `before` is what the plan before had."""
+        places = {step.frame: step.number for step in self._past.observations()}
+        form = self._config.form
+        opening = ("" if form is None else form.system, self._config.preamble)
+        n_before = len(before) if self.request is not None else 0
+        goes_on = n_before > 0 and list(self._recalled[:n_before]) == list(before)
+        return StoredRequest.of(
+            self._recalled[n_before:] if goes_on else (*opening, *self._recalled),
+            places_of=lambda frames: [places[frame] for frame in frames if frame in places],
+            what="frames (blank)" if self._config.blank else "frames",
+            after=self.request.fingerprint if goes_on and self.request is not None else "",
+        )
 
     def act(self) -> Act:
         """See `PlanActor`."""
@@ -107,7 +125,7 @@ class ModelActor:
         self._conversation.append(f"{outcome.info.action}{ACT}", *self._visible_parts([frame]), ACT)
 
     def tokens_between(self, first: int, last: int) -> int | None:
-        """See `CountingActor`."""
+        """See `AskingActor`."""
         parts: list[Part] = []
         # Of the parts up to each frame; a task's first frame is there again behind its goal.
         ends: list[int] = []

@@ -8,6 +8,7 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.plans.environment import Observation, PlanEnvironment, StepOutcome
 from infthor_eval.plans.plan import Plan
+from infthor_eval.runs import StoredRequest
 from model_adapters import Reply, Subject
 
 
@@ -61,8 +62,13 @@ class PlanActor(Protocol):
 
 
 @runtime_checkable
-class CountingActor(PlanActor, Protocol):
-    """An actor with a model that may count tokens."""
+class AskingActor(PlanActor, Protocol):
+    """An actor that asks a model, which may count tokens."""
+
+    @property
+    def request(self) -> StoredRequest | None:
+        """What the model was given before the first action of the plan that has begun; each further
+        request has the actions and frames since then."""
 
     def tokens_between(self, first: int, last: int) -> int | None:
         """Return the tokens of the history from one frame to another; None if not counted.

@@ -22,7 +22,7 @@ from infthor_eval.report.web.samples import (
 )
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
-from infthor_eval.runs import StoredRequest, UnitKey, UnitRecord
+from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.runs.journals.shards import FOLDER
 from infthor_eval.runs.journals.tracebacks import StoredTracebacks
 
@@ -96,12 +96,16 @@ class _Source:
     texts: SharedTexts
 
     def prompt(self, sample: Sample) -> int | None:
-        if sample.request is None and sample.is_baseline:
-            return None
-        note = _OF_BASELINES if sample.is_baseline else ""
-        request = sample.request or StoredRequest()
-        prompt = Prompt(request.parts, request.shown, sample.request_problem, note)
-        return self.texts.prompts.number(prompt)
+        requests = self.run.requests(sample.record)
+        if not requests:
+            prompt = Prompt(problem=sample.request_problem)
+            return None if sample.is_baseline else self.texts.prompts.number(prompt)
+        number = None
+        for request in requests:
+            note = _OF_BASELINES if sample.is_baseline else ""
+            prompt = Prompt(request.parts, request.shown, number, note=note)
+            number = self.texts.prompts.number(prompt)
+        return number
 
     def traceback(self, record: Record) -> int | None:
         text = "" if record.failure is None else self.tracebacks.find(record.key, record.attempt)

@@ -102,12 +102,14 @@ class Prompt(msgspec.Struct, frozen=True, omit_defaults=True):
     Attributes:
         parts: see `StoredRequest`; None stands for the sample's title.
         shown: see `StoredRequest`.
+        after: number of the prompt that it continues; None if it begins anew.
         problem: why it is not known; empty if it is.
         note: a remark.
     """
 
     parts: tuple[str | StoredFrames | None, ...] = ()
     shown: tuple[tuple[int, int], ...] = ()
+    after: int | None = None
     problem: str = ""
     note: str = ""
 

@@ -23,26 +23,14 @@ class StoredFrames(msgspec.Struct, frozen=True, omit_defaults=True):
 
     Attributes:
         n: number of frames.
-        digest: hash of the digests of their contents, in the order shown.
         places: where in the trajectory they are, in the order shown; empty where they are no frames
             of it.
         what: what they are, in words ("blank frames", "video of 1 frames per second").
     """
 
     n: Count
-    digest: str
     places: tuple[Stretch, ...] = ()
     what: str = "frames"
-
-    @classmethod
-    def of(cls, frames: Sequence[FrameRef], places_of: Places, what: str) -> "StoredFrames":
-        """Return frames as they are stored.
-
-        Raises:
-            DataError: a frame cannot be read.
-        """
-        contents = digest("".join(frame.digest for frame in frames), 8)
-        return cls(len(frames), contents, stretches(places_of(frames)), what)
 
 
 class StoredRequest(
@@ -55,39 +43,51 @@ class StoredRequest(
             record.
         shown: where in the trajectory the frames are that it shows, in time order; those that stand
             for others have the places of these.
+        after: name of the request that it continues, whose parts come before its own; empty if it
+            begins anew. So an agent's growing history is stored once.
+        pixels: hash of the digests of all frames in `parts`, in their order; empty without frames.
     """
 
     parts: tuple[str | StoredFrames | None, ...] = ()
     shown: tuple[Stretch, ...] = ()
+    after: str = ""
+    pixels: str = ""
 
     @classmethod
     def of(
         cls,
         context: Sequence[str | FrameRef | Video],
-        text: str,
-        question: str,
+        text: str = "",
+        question: str = "",
         places_of: Places = lambda _: (),
         what: str = "frames",
         shown: Sequence[int] = (),
+        after: str = "",
     ) -> "StoredRequest":
         """Return a request as it is stored.
 
         Args:
             context: texts, frames and films before the text.
             text: the text, with the question in it.
-            question: the question, as its record has it.
+            question: the question, as its record has it; empty for none.
             places_of: returns the places of frames in their trajectory; none if they are no frames
                 of it.
             what: what the frames are, in words.
             shown: places of all shown frames, in any order.
+            after: see `StoredRequest`.
 
         Raises:
             DataError: a frame cannot be read.
         """
-        before, found, after = text.rpartition(question)
-        asked = (before, None, after) if found else (text,)
-        parts = [*_parts(context, places_of, what), *(part for part in asked if part != "")]
-        return cls(tuple(_joined(parts)), stretches(sorted(set(shown))))
+        asked: tuple[str | None, ...] = (text,)
+        if question and question in text:
+            begin, _, end = text.rpartition(question)
+            asked = (begin, None, end)
+        parts = (*_parts(context, places_of, what), *asked)
+        joined = _joined([part for part in parts if part != ""])
+        frames = [frame for part in context for frame in _frames_in(part)]
+        pixels = digest("".join(frame.digest for frame in frames), 8) if frames else ""
+        return cls(tuple(joined), stretches(sorted(set(shown))), after, pixels)
 
     @property
     def fingerprint(self) -> str:
@@ -123,16 +123,23 @@ def _parts(
 ) -> Iterator[str | StoredFrames]:
     """Yield texts, frames and films; neighbouring frames are one part."""
     for kind, group in groupby(context, type):
+        parts = list(group)
         if kind is FrameRef:
-            frames = [part for part in group if isinstance(part, FrameRef)]
-            yield StoredFrames.of(frames, places_of, what)
+            frames = [frame for part in parts for frame in _frames_in(part)]
+            yield StoredFrames(len(frames), stretches(places_of(frames)), what)
             continue
-        for part in group:
+        for part in parts:
             if isinstance(part, Video):
                 film = what.replace("frames", f"video of {part.fps:g} frames per second", 1)
-                yield StoredFrames.of(part.frames, places_of, film)
+                yield StoredFrames(len(part.frames), stretches(places_of(part.frames)), film)
             elif isinstance(part, str):
                 yield part
+
+
+def _frames_in(part: str | FrameRef | Video) -> Sequence[FrameRef]:
+    if isinstance(part, Video):
+        return part.frames
+    return (part,) if isinstance(part, FrameRef) else ()
 
 
 def _joined(

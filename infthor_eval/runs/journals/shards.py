@@ -70,6 +70,20 @@ class RunLog(Generic[Payload]):
         payloads = {name: record.payload for name, record in self.artifacts.items()}
         return {name: it for name, it in payloads.items() if isinstance(it, StoredRequest)}
 
+    def requests_before(self, name: str) -> list[StoredRequest] | None:
+        """Return the requests that one continues, the first one first, and itself; None where one
+        of them is missing."""
+        chain: list[StoredRequest] = []
+        names = {""}
+        while name not in names:  # what a stranger wrote may lead in a circle
+            names.add(name)
+            request = self.find_artifact(name, StoredRequest)
+            if request is None:
+                return None
+            chain.insert(0, request)
+            name = request.after
+        return chain or None
+
     @property
     def usage(self) -> Usage:
         """Usage of all requests, those for cached artifacts included."""

@@ -8,6 +8,9 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.plans.actors.habits import expert_texts
 from infthor_eval.plans.plan import plans_of
+from infthor_eval.report.sample import Sample
+from infthor_eval.run import Run
+from infthor_eval.runs import StoredFrames
 
 from ...helpers.prompts import join_parts
 from ...helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
@@ -85,6 +88,18 @@ def test_the_history_is_the_true_one_whatever_the_model_did(run_scripted, data, 
 
     assert len(seen(right)) == 4
     assert seen(wrong) == seen(right)
+
+
+def test_the_journal_has_what_was_asked_before_each_plan_once(run_scripted, data):
+    outcome, model = run_scripted(as_expert(data))
+    beginnings = [parts for parts, _ in model.requests if not actions_in_prompt(parts)]
+    run = Run.open(outcome.folder)
+    requests = [Sample(run, record).request_text(lambda _: "<image>") for record in run.records]
+    assert [f"{request}<|act|>" for request in requests] == list(map(join_parts, beginnings))
+    stored = [run.requests(record)[-1] for record in run.records]
+    frames = [part.places for it in stored for part in it.parts if isinstance(part, StoredFrames)]
+    assert frames == [((place, place),) for place in range(len(frames))]
+    assert [bool(request.after) for request in stored] == [False, True, True, True]
 
 
 FAULTS = [
@@ -192,7 +207,8 @@ def test_a_preamble_is_told_before_everything_else(run_scripted, task_files, dat
 
 def test_grey_frames_take_the_places_of_all(run_scripted, data):
     _, plain = run_scripted(as_expert(data))
-    _, blank = run_scripted(as_expert(data), frames="blank")
+    outcome, blank = run_scripted(as_expert(data), frames="blank")
+    run = Run.open(outcome.folder)
     assert [join_parts(parts) for parts, _ in blank.requests] == [
         join_parts(parts) for parts, _ in plain.requests
     ]
@@ -200,3 +216,5 @@ def test_grey_frames_take_the_places_of_all(run_scripted, data):
         len({frame.digest for parts, _ in blank.requests for frame in frames_in_prompt(parts)}) == 1
     )
     assert frames_in_prompt(blank.requests[0][0])[0].load().size == (300, 300)
+    told = [Sample(run, record).request_text(repr) for record in run.records]
+    assert all("frames (blank)" in text for text in told)

@@ -201,7 +201,6 @@ def test_what_takes_long_is_counted_to_its_end(nieh_runs, scripted_run, scripted
     assert set(begun) == {
         "runs summarised",
         "frames read",
-        "runs with their prompts",
         "episodes replayed",
     }
     assert counted == begun
