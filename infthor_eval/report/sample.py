@@ -136,7 +136,8 @@ class Sample:
     @property
     def tokens(self) -> TokenCounts | None:
         """Tokens of its requests and replies; None if they were not counted."""
-        tokens, usage = self.record.tokens, self.record.usage
+        tokens = self.record.tokens
+        usage = self.record.usage
         if tokens.context is not None and tokens.reply is not None:
             return TokenCounts(tokens.context, tokens.cached or 0, tokens.reply)
         if usage.context or usage.reply:

@@ -30,12 +30,10 @@ class RebuiltRequest(NamedTuple):
     """A request as it was sent.
 
     Attributes:
-        traj_id: name of the question's trajectory.
         context: what the model saw, frames as references.
         text: the text after it, which ends with the question.
     """
 
-    traj_id: str
     context: tuple[ContextPart, ...]
     text: str
 
@@ -76,7 +74,7 @@ class RequestRebuilder:
             != record.fingerprint
         ):
             raise DataError("made again, it is another request than the one that was sent")
-        return RebuiltRequest(sample.question.traj_id, context, text)
+        return RebuiltRequest(context, text)
 
     def _find_sample(self, record: UnitRecord[NiehAnswer]) -> Sample:
         question = self._questions.get(record.id)

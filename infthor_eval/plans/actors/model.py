@@ -83,19 +83,20 @@ class ModelActor:
             past = with_recorded_state(past, environment.trajectory, situation.plan.low[0])
         self._past = past
         with wrap_request_errors(self._model.name):
-            before, self._recalled = self._recalled, self._config.history.recall(past, self._count)
+            recalled = self._config.history.recall(past, self._count)
+            self.request = self._stored_request(recalled)
+            self._recalled = recalled
             self._restart(self._recalled)
-        self.request = self._stored_request(before)
 
-    def _stored_request(self, before: Sequence[Part]) -> StoredRequest:
-        """Return what was recalled, as the journal has it; `before` is what the plan before had."""
+    def _stored_request(self, recalled: Sequence[Part]) -> StoredRequest:
+        """Return what is recalled, as the journal has it: behind what the plan before was given."""
         places = {step.frame: step.number for step in self._past.observations()}
         form = self._config.form
         opening = ("" if form is None else form.system, self._config.preamble)
-        n_before = len(before) if self.request is not None else 0
-        goes_on = n_before > 0 and list(self._recalled[:n_before]) == list(before)
+        n_before = len(self._recalled) if self.request is not None else 0
+        goes_on = n_before > 0 and list(recalled[:n_before]) == list(self._recalled)
         return StoredRequest.of(
-            self._recalled[n_before:] if goes_on else (*opening, *self._recalled),
+            recalled[n_before:] if goes_on else (*opening, *recalled),
             places_of=lambda frames: [places[frame] for frame in frames if frame in places],
             what="frames (blank)" if self._config.blank else "frames",
             after=self.request.fingerprint if goes_on and self.request is not None else "",

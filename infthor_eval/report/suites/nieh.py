@@ -193,7 +193,7 @@ class NiehPresenter(PlainPresenter):
 
     def request_frames(self, run: Run, data: Path | None) -> FindFrames:
         """See `Presenter.request_frames`."""
-        from infthor_eval.report.suites.nieh_prompts import RequestFrames
+        from infthor_eval.report.suites.nieh_frames import RequestFrames
 
         return RequestFrames(run, data)
 

@@ -1,6 +1,8 @@
-"""Frames of questions: the clues with their neighbours, or some of all, and what logs say.
+"""Frames of questions: the clues with their neighbours, or some of all, and what logs say; and the
+frames of requests.
 
-Of twins: the clues, and frames that differ between both worlds; the same ones of either.
+Of twins: the clues, and frames that differ between both worlds; the same ones of either. All are
+read from the sets, as far as these are there and unchanged.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,21 +12,24 @@ from pathlib import Path
 
 import msgspec
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, InfthorError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import LoggedPose, Step, read_steps
 from infthor_eval.formats.twins import TwinPair
+from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.rescoring.rebuilt_requests import RequestRebuilder
+from infthor_eval.nieh.samples import find_set
 from infthor_eval.report.presenter import Timelines
 from infthor_eval.report.runs import choose_evenly, records_by_unit
-from infthor_eval.report.suites.nieh_sets import RunSets
 from infthor_eval.report.web.samples import FrameFacts, Numbered, Timeline, TimelineFrame
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
 
+Record = UnitRecord[NiehAnswer]
 _OVERVIEW = 5  # frames of a trajectory that are shown for a question without clues
 _DIFFERING = 6  # frames beside the clues that are shown of those that differ from the twin's
 
@@ -194,3 +199,79 @@ def _pose(pose: LoggedPose) -> str:
         f"x {pose.x:.2f} m, z {pose.z:.2f} m; turned {pose.rotation:.0f}°, camera "
         f"{pose.horizon:.0f}° down"
     )
+
+
+class RunSets:
+    """The sets of the tasks of some runs.
+
+    Attributes:
+        problems: reason why a task has no set, by its name.
+    """
+
+    def __init__(self, runs: Sequence[Run], data: Path | None) -> None:
+        """Open the sets; `data` is the folder of all, None for the one that each run names."""
+        self.problems: dict[str, str] = {}
+        self._sets: dict[str, tuple[NiehSet, Mapping[str, Question]]] = {}
+        for run in runs:
+            for task in run.tasks:
+                if task not in self._sets and task not in self.problems:
+                    self._open(run, task, data)
+
+    def find_set(self, task: str) -> NiehSet | None:
+        """Return the set of a task; None if it is missing or has changed."""
+        return self._sets[task][0] if task in self._sets else None
+
+    def find_question(self, key: UnitKey, record: Record) -> Question | None:
+        """Return the question of a record; None if its set is missing or has another one there."""
+        question = self._sets[key.task][1].get(key.id) if key.task in self._sets else None
+        return (
+            question if question is not None and question.text == record.payload.question else None
+        )
+
+    def _open(self, run: Run, task: str, data: Path | None) -> None:
+        folder = data or run.data
+        options = run.stored_command.options if run.stored_command else {}
+        try:
+            opened = find_set(
+                str(folder) if folder else None,
+                run.tasks[task].dataset_kwargs.get("bundled"),
+                options.get("trajectories"),
+            )
+        except (UsageError, DataError) as error:
+            self.problems[task] = f"{error}; give the set's folder with --data"
+            return
+        if opened.fingerprint != run.tasks[task].data:
+            self.problems[task] = f"{opened.root} has changed since {run.label} was run"
+            return
+        self._sets[task] = opened, {question.id: question for question in opened.questions}
+
+
+class RequestFrames:
+    """Finds the frames of a run's requests; see `Presenter.request_frames`."""
+
+    def __init__(self, run: Run, data: Path | None) -> None:
+        sets = RunSets([run], data)
+        self._rebuilders = {task: _rebuilder(run, task, sets) for task in run.tasks}
+
+    def __call__(self, record: Record) -> list[FrameRef]:
+        """Return the frames of a record's request, those of films too.
+
+        Raises:
+            DataError: the request cannot be made again, or not exactly.
+        """
+        rebuilder = self._rebuilders[record.task]
+        if isinstance(rebuilder, str):
+            raise DataError(rebuilder)
+        parts = as_images(rebuilder.rebuild(record).context)
+        return [part for part in parts if isinstance(part, FrameRef)]
+
+
+def _rebuilder(run: Run, task: str, sets: RunSets) -> RequestRebuilder | str:
+    """Return what makes the requests of a task again, or why nothing can."""
+    opened = sets.find_set(task)
+    if opened is None:
+        return sets.problems[task]
+    try:
+        return RequestRebuilder(run.header, task, opened)
+    except InfthorError as error:
+        return str(error)
