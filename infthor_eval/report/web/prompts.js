@@ -18,13 +18,13 @@ const runsByValue = (sample, valueOf) => {
 };
 
 // The parts of a prompt, behind those of the prompts that it continues.
-const partsOf = ({ parts = [], after }) => [...(after === undefined ? [] : partsOf(prompts[after])), ...parts];
+const promptParts = ({ parts = [], after }) => [...(after === undefined ? [] : promptParts(prompts[after])), ...parts];
 
 const promptsOf = (sample, name) => runsByValue(sample, result => result.prompt).map(([number, labels]) => {
   const { problem, note } = prompts[number];
   const body = problem
     ? [make("p", { class: "note" }, `It is not known: ${problem}.`)]
-    : [make("pre", {}, ...partsOf(prompts[number]).map(part => part === null ? sample.title : typeof part === "string" ? part : framesPart(part))),
+    : [make("pre", {}, ...promptParts(prompts[number]).map(part => part === null ? sample.title : typeof part === "string" ? part : framesPart(part))),
       make("p", { class: "note" }, "As the run's journal has it. Each model has its own chat template around it.")];
   return make("details", { class: "prompt" }, make("summary", {}, "The whole prompt, ", make("b", {}, withName(labels.join(", "), name))),
     note ? make("p", { class: "note" }, note) : null, ...body);
