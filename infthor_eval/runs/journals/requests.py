@@ -83,10 +83,16 @@ class StoredRequest(
         if question and question in text:
             begin, _, end = text.rpartition(question)
             asked = (begin, None, end)
-        parts = (*_parts(context, places_of, what), *asked)
-        joined = _joined([part for part in parts if part != ""])
-        frames = [frame for part in context for frame in _frames_in(part)]
-        pixels = digest("".join(frame.digest for frame in frames), 8) if frames else ""
+        parts: list[str | StoredFrames | None] = []
+        digests: list[str] = []
+        for described, same in _in_sequence(context, what):
+            if isinstance(same, str):
+                parts.append(same)
+                continue
+            parts.append(StoredFrames(len(same), stretches(places_of(same)), described))
+            digests += [frame.digest for frame in same]
+        joined = _joined([part for part in (*parts, *asked) if part != ""])
+        pixels = digest("".join(digests), 8) if digests else ""
         return cls(tuple(joined), stretches(sorted(set(shown))), after, pixels)
 
     @property
@@ -109,37 +115,25 @@ class StoredRequest(
 
 def stretches(places: Sequence[int]) -> tuple[Stretch, ...]:
     """Return first and last of each stretch of ascending neighbours."""
-    found: list[Stretch] = []
-    for place in places:
-        if found and place == found[-1][1] + 1:
-            found[-1] = found[-1][0], place
-        else:
-            found.append((place, place))
-    return tuple(found)
+    begins = [at for at, place in enumerate(places) if not at or place != places[at - 1] + 1]
+    ends = [*begins[1:], len(places)]
+    return tuple((places[at], places[end - 1]) for at, end in zip(begins, ends, strict=False))
 
 
-def _parts(
-    context: Sequence[str | FrameRef | Video], places_of: Places, what: str
-) -> Iterator[str | StoredFrames]:
-    """Yield texts, frames and films; neighbouring frames are one part."""
+def _in_sequence(
+    context: Sequence[str | FrameRef | Video], what: str
+) -> Iterator[tuple[str, str | Sequence[FrameRef]]]:
+    """Yield texts, and frames with what they are; neighbouring frames are together."""
     for kind, group in groupby(context, type):
-        parts = list(group)
         if kind is FrameRef:
-            frames = [frame for part in parts for frame in _frames_in(part)]
-            yield StoredFrames(len(frames), stretches(places_of(frames)), what)
+            yield what, [part for part in group if isinstance(part, FrameRef)]
             continue
-        for part in parts:
+        for part in group:
             if isinstance(part, Video):
-                film = what.replace("frames", f"video of {part.fps:g} frames per second", 1)
-                yield StoredFrames(len(part.frames), stretches(places_of(part.frames)), film)
+                film = f"video of {part.fps:g} frames per second"
+                yield what.replace("frames", film, 1), part.frames
             elif isinstance(part, str):
-                yield part
-
-
-def _frames_in(part: str | FrameRef | Video) -> Sequence[FrameRef]:
-    if isinstance(part, Video):
-        return part.frames
-    return (part,) if isinstance(part, FrameRef) else ()
+                yield "", part
 
 
 def _joined(
