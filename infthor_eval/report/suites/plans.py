@@ -134,7 +134,7 @@ class PlansPresenter(PlainPresenter):
         """See `Presenter.group_scores`: net pairs of twins."""
         for pair in score_pairs(records):
             for name, score in pair.shares.by_metric.items():
-                yield GroupScore(name, pair.pair, pair.base, score)
+                yield GroupScore(name, pair.pair, pair.cluster, score)
 
     def sections(self, runs: Sequence[Run]) -> Iterator[Section]:
         """See `Presenter.sections`: curves of reward for each task that all runs have."""
