@@ -102,8 +102,8 @@ def is_right(side: Side, metric: str) -> bool:
 
 def is_flipped(one: Side, other: Side) -> bool:
     """Return True if both were answered, and not the same."""
-    first, second = _said(one.record), _said(other.record)
-    return first is not None and second is not None and first != second
+    said = {_said(one.record), _said(other.record)}
+    return None not in said and len(said) == 2
 
 
 def score_pairs(records: Iterable[Record], metric: str) -> list[PairScore]:
