@@ -129,6 +129,7 @@ class Chart:
     @property
     def table(self) -> Table:
         """All numbers of the chart."""
+        names = 1  # columns that are no numbers
         if self.form == "grid":
             columns = (self.axes[0], *(one.name for one in self.series))
             rows = [
@@ -136,8 +137,9 @@ class Chart:
                 for row, points in self.by_class()
             ]
         elif self.form == "rows":
-            names = (self.axes[0], "run") if len(self.series) > 1 else self.axes[:1]
-            columns = (*names, self.axes[1], "95 % interval", self.dashed, "samples")
+            names = 2 if len(self.series) > 1 else 1
+            numbers = (self.axes[1], "95 % interval", self.dashed, "samples")
+            columns = (*(self.axes[0], "run")[:names], *numbers)
             rows = list(self._rows())
         else:
             digits = ".3f" if self.form == "steps" else ".2f"
@@ -147,8 +149,7 @@ class Chart:
                 for one in self.series
                 for x, mean, low, high, _ in one.points
             ]
-        n_names = 2 if columns[1] == "run" else 1
-        heads = [Column(name, number >= n_names) for number, name in enumerate(columns)]
+        heads = (Column(name, number >= names) for number, name in enumerate(columns))
         return Table("", tuple(heads), tuple(map(Row, rows)))
 
     def _of_classes(self) -> Iterator[str]:
