@@ -23,7 +23,7 @@ from infthor_eval.nieh.results.cells import Cell
 from infthor_eval.nieh.results.evidence_tables import short_name
 from infthor_eval.nieh.results.facets import SHOWN_CLUES
 from infthor_eval.nieh.results.summary import NiehSummary, TaskSummary
-from infthor_eval.report.figures.style import LEGEND, add_legend, looks_of, save_figure
+from infthor_eval.report.figures import LEGEND, add_legend, looks_of, save_figure
 from infthor_eval.run import Run
 
 DOCS = Path(__file__).parents[1] / "docs"

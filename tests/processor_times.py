@@ -45,7 +45,7 @@ KEPT = (
     "tests/harness/test_host.py::test_our_model_under_lm_evals_own_command_gives_the_samples_of_our_own",
     "tests/cli/commands/data/test_data_commands.py::test_the_three_commands_make_a_set",
     "tests/plans/actors/test_planner.py::test_every_plan_is_carried_out[bedroom-2-seed7]",
-    "tests/report/figures/test_curves.py::test_the_six_panels_are_drawn_over_thousands_of_tokens_with_the_planner_in_each",
+    "tests/report/suites/test_reward_curves.py::test_the_six_panels_are_drawn_over_thousands_of_tokens_with_the_planner_in_each",
     "tests/report/web/test_browser.py::test_it_opens_without_errors_and_fetches_nothing",
     "tests/examples/test_sums.py::test_its_results_are_shown_and_exported",
     "tests/runs/work/test_worker_executor.py::test_workers_that_are_killed_lose_nothing_that_was_finished",

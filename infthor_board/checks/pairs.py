@@ -8,7 +8,13 @@ import scipy.stats
 from infthor_board.case import Case
 from infthor_board.expected import Expected
 from infthor_board.reading import Problem
-from infthor_eval.nieh.results.pair_summary import TwinRecords, find_pairs, summarise_pairs
+from infthor_eval.nieh.results.pair_summary import (
+    TwinRecords,
+    find_pairs,
+    is_flipped,
+    is_right,
+    summarise_pairs,
+)
 from infthor_eval.rates import clustered_rate
 
 _SAME = 5  # pairs with equal requests and other replies
@@ -31,7 +37,7 @@ class PairsOfWhatDiffers:
             if task.run.is_export or not _is_greedy(task):
                 continue
             alike = [pair for pair in find_pairs(task.graded)[0] if _is_alike(pair)]
-            flipped = sum(pair.is_flipped for pair in alike)
+            flipped = sum(is_flipped(*pair) for pair in alike)
             if flipped >= _SAME and flipped > _SAME_SHARE * len(alike):
                 yield Problem(
                     self.name,
@@ -53,7 +59,7 @@ class PairsOfBothWorlds:
             sides = [
                 _is_first_right(task, pair)
                 for pair in find_pairs(task.graded)[0]
-                if sum(pair.rights("strict")) == 1
+                if sum(is_right(side, "strict") for side in pair) == 1
             ]
             if sides and scipy.stats.binomtest(sum(sides), len(sides)).pvalue < _CHANCE:
                 yield Problem(
@@ -109,12 +115,12 @@ def _is_greedy(task: Expected) -> bool:
 
 
 def _is_alike(pair: TwinRecords) -> bool:
-    return all(side.twin.n_differing == 0 for side in pair.sides) and not any(
-        side.record.payload.recall for side in pair.sides
+    return all(side.twin.n_differing == 0 for side in pair) and not any(
+        side.record.payload.recall for side in pair
     )
 
 
 def _is_first_right(task: Expected, pair: TwinRecords) -> bool:
-    worlds = task.graded_data.twins[pair.sides[0].twin.traj_id].traj_ids
-    right = pair.sides[0] if pair.rights("strict")[0] else pair.sides[1]
+    worlds = task.graded_data.twins[pair[0].twin.traj_id].traj_ids
+    right = pair[0] if is_right(pair[0], "strict") else pair[1]
     return right.twin.traj_id == worlds[0]

@@ -49,8 +49,6 @@ def describe_result(step: StepRow) -> str:
 
 def unknown_requests(run: Run) -> list[str]:
     """Return why requests cannot be given, a line for each reason."""
-    problems = (("", Sample(run, record).request_problem) for record in run.records)
-    return [
-        f"{run.label}: {n} request(s) left out: {reason}"
-        for _, reason, n in count_reasons(item for item in problems if item[1])
-    ]
+    problems = [Sample(run, record).request_problem for record in run.records]
+    reasons = count_reasons(("", problem) for problem in problems if problem)
+    return [f"{run.label}: {n} request(s) left out: {reason}" for _, reason, n in reasons]

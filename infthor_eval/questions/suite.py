@@ -413,7 +413,9 @@ class BoundQuestions:
 
 def digest_of_questions(questions: Iterable[Question]) -> str:
     """Return the digest of questions; of their pictures the names count, not the folders."""
-    rows = [(*astuple(it)[:-1], [picture.name for picture in it.pictures]) for it in questions]
+    rows = []
+    for it in questions:
+        rows.append((*astuple(it)[:-1], [picture.name for picture in it.pictures]))
     return fingerprint({"questions": rows})
 
 

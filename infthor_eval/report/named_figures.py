@@ -53,7 +53,7 @@ def load_figure(
     panels: str | os.PathLike[str] | None,
 ) -> MatplotlibFigure:
     """See `infthor_eval.load_figure`."""
-    from infthor_eval.report.figures.style import plot_in_style
+    from infthor_eval.report.figures import plot_in_style
 
     request = FigureRequest(task, None if panels is None else Path(panels))
     return plot_in_style(build_figure([*map(Path, folders)], name, request, warnings.warn).plot)

@@ -8,6 +8,7 @@ from typing import Any
 
 import msgspec
 
+from infthor_eval.report.charts import Chart
 from infthor_eval.report.presenter import (
     Description,
     Figure,
@@ -19,7 +20,7 @@ from infthor_eval.report.presenter import (
 )
 from infthor_eval.report.sample_columns import SampleColumn
 from infthor_eval.report.web.samples import StepRow
-from infthor_eval.report.web.sections import Chart, Section
+from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord

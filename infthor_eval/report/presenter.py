@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.report.charts import Chart
 from infthor_eval.report.sample_columns import SampleColumn
 from infthor_eval.report.web.samples import FrameFacts, StepRow, Timeline
-from infthor_eval.report.web.sections import Chart, Section
+from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
@@ -110,7 +111,7 @@ class FigureResult:
 
     Attributes:
         table: the numbers of the figure.
-        plot: draws it with matplotlib, in whatever style is in effect (`report.figures.style`).
+        plot: draws it with matplotlib, in whatever style is in effect (`report.figures`).
         notes: remarks to print below the table, a line each.
     """
 

@@ -120,11 +120,9 @@ class Sample:
 
     @property
     def request_problem(self) -> str:
-        """Why the request is not known; empty if it is."""
-        if self.request is not None:
+        """Why the request is not known; empty if it is, and for a baseline, which is sent none."""
+        if self.request is not None or self.is_baseline:
             return ""
-        if self.is_baseline:
-            return "a baseline is sent none"
         if self.record.request:
             return "it is not in the journal; its line there is missing or bad"
         return f"none was made: {self.reason}" if self.reason else "the run's journal has none"
@@ -168,7 +166,9 @@ class Sample:
             yield f"    {line}"
         for name, value in self.details.items():
             yield f"  {name}: {value}"
-        yield f"  request: {self._request_in_words()}"
+        request = self._request_in_words()
+        if request:
+            yield f"  request: {request}"
         for number, step in enumerate(self.steps, 1):
             yield f"  {number:4d}. {_in_words(step)}"
 
@@ -211,7 +211,9 @@ class Sample:
         return [store.encoded[number] for number in numbers if number is not None], note
 
     def _request_in_words(self) -> str:
-        return self.request_text(_frames_in_words) or f"not known: {self.request_problem}"
+        problem = self.request_problem
+        known = self.request_text(_frames_in_words) or ""
+        return f"not known: {problem}" if problem else known
 
 
 def find_samples(runs: Sequence[Run], name: str, data: Path | None = None) -> list[Sample]:

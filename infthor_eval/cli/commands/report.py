@@ -222,7 +222,7 @@ class _PageBars:
 
 def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Path) -> None:
     from infthor_eval.cli.progress.notes import print_failure
-    from infthor_eval.report.figures.style import save_figure
+    from infthor_eval.report.figures import save_figure
     from infthor_eval.report.named_figures import build_figure
     from infthor_eval.report.terminal import print_table, table_console
     from infthor_eval.storage.files import prepare_folder, require_writable

@@ -5,9 +5,7 @@ of one fact, are within one cluster.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import groupby
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -16,8 +14,8 @@ from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_cl
 from infthor_eval.facets import Facet
 from infthor_eval.nieh.records import NiehAnswer, TwinSide
 from infthor_eval.nieh.scoring import SCORERS, compared_form, scores
-from infthor_eval.pairs import PAIR_BOUNDS, PairShares, net_pairs
-from infthor_eval.rates import Rate, clustered_rate
+from infthor_eval.pairs import Pairs, PairScore, PairShares, net_pairs
+from infthor_eval.rates import Rate
 from infthor_eval.runs import UnitRecord
 
 # Frames shown, in classes that double, as budgets of memories do.
@@ -70,79 +68,47 @@ class PairSummary(msgspec.Struct, frozen=True):
     scores: dict[str, dict[str, float]]
 
 
-@dataclass(frozen=True)
-class _Side:
+class Side(NamedTuple):
     """A question of a pair, with what it is paired with."""
 
     record: Record
     twin: TwinSide
 
 
-@dataclass(frozen=True)
-class TwinRecords:
-    """The two records of a pair in one repetition."""
-
-    sides: tuple[_Side, _Side]
-
-    @property
-    def cluster(self) -> str:
-        """The trajectory that both worlds were made of."""
-        return self.sides[0].record.cluster
-
-    def rights(self, metric: str) -> tuple[bool, bool]:
-        """Return which answers have full marks."""
-        first, second = (_is_right(side.record, metric) for side in self.sides)
-        return first, second
-
-    def is_right(self, metric: str) -> bool:
-        """Return True if both answers have full marks."""
-        return all(self.rights(metric))
-
-    def is_exchanged(self, metric: str) -> bool:
-        """Return True if both answers have full marks in the other world."""
-        return all(_is_right_in_twin(side, metric) for side in self.sides)
-
-    def shares(self, metric: str) -> PairShares:
-        """Return whether it is right, and whether it is exchanged."""
-        return PairShares(float(self.is_right(metric)), float(self.is_exchanged(metric)))
-
-    @property
-    def is_flipped(self) -> bool:
-        """True if both were answered, and not the same."""
-        first, second = (_said(side.record) for side in self.sides)
-        return first is not None and second is not None and first != second
-
-
-class PairScore(NamedTuple):
-    """The score of a pair over its repetitions."""
-
-    pair: str
-    variant: str
-    fact: str
-    cluster: str
-    shares: PairShares
+TwinRecords = tuple[Side, Side]
+"""The two records of a pair in one repetition."""
 
 
 def find_pairs(records: Iterable[Record]) -> tuple[list[TwinRecords], int]:
     """Return the answered pairs of a task's records, and the number of questions in none."""
-    sides: dict[tuple[str, str, int], list[_Side]] = {}
+    sides: dict[tuple[str, str, int], list[Side]] = {}
     for record in sorted(records, key=lambda record: record.key):
         twin = record.payload.twin
         if twin is not None:
             key = twin.pair, record.variant, record.repeat
-            sides.setdefault(key, []).append(_Side(record, twin))
-    pairs = [TwinRecords((it[0], it[1])) for _, it in sorted(sides.items()) if _is_answered(it)]
+            sides.setdefault(key, []).append(Side(record, twin))
+    pairs = [(it[0], it[1]) for _, it in sorted(sides.items()) if _is_answered(it)]
     return pairs, sum(len(it) for it in sides.values() if not _is_answered(it))
 
 
-def _is_answered(sides: Sequence[_Side]) -> bool:
+def _is_answered(sides: Sequence[Side]) -> bool:
     return len(sides) == 2 and all(side.record.state == "answered" for side in sides)
+
+
+def is_right(side: Side, metric: str) -> bool:
+    """Return True if an answer has full marks."""
+    return side.record.payload.scores.get(metric, 0.0) >= 1
+
+
+def is_flipped(one: Side, other: Side) -> bool:
+    """Return True if both were answered, and not the same."""
+    said = {_said(one.record), _said(other.record)}
+    return None not in said and len(said) == 2
 
 
 def score_pairs(records: Iterable[Record], metric: str) -> list[PairScore]:
     """Return the scores of the pairs of a task under a metric."""
-    pairs, _ = find_pairs(records)
-    return list(_scores(pairs, metric))
+    return _pairs(find_pairs(records)[0], metric).scores()
 
 
 def summarise_pairs(
@@ -155,13 +121,38 @@ def summarise_pairs(
     Args:
         n_missing: number of questions that a stopped run did not come to.
     """
-    pairs, n_incomplete = find_pairs(records)
-    if not pairs:
+    found, n_incomplete = find_pairs(records)
+    if not found:
         return None
-    summary = _Pairs(pairs, metric).summary(n_incomplete)
-    n_lost = _n_lost(records, n_missing)
-    of_all = {name: getattr(summary, name).out_of(summary.n_pairs + n_lost) for name in PAIR_BOUNDS}
-    return msgspec.structs.replace(summary, **of_all)
+    pairs = _pairs(found, metric)
+    scores = pairs.scores()
+    flipped = [pair for pair in found if is_flipped(*pair)]
+    one_right = [pair for pair in found if pairs.is_one_right(*pair)]
+    return PairSummary(
+        n_pairs=len(scores),
+        n_facts=len({it.fact for it in scores}),
+        n_trajectories=len({it.cluster for it in scores}),
+        n_incomplete=n_incomplete,
+        **pairs.rates(len(scores) + _n_lost(records, n_missing)),
+        by_fact=_by_fact(scores),
+        single=pairs.mean_of_worlds(pairs.is_right),
+        flipped=pairs.mean(is_flipped),
+        right_when_flipped=pairs.mean(pairs.are_right, flipped) if flipped else None,
+        one_right=pairs.mean(pairs.is_one_right),
+        one_is_commoner=_commoner(pairs, one_right) if one_right else None,
+        by={facet.name: facet.means(found, pairs.net) for facet in PAIR_FACETS},
+        scores=_by_trajectory(scores),
+    )
+
+
+def _pairs(pairs: Sequence[TwinRecords], metric: str) -> Pairs[Side]:
+    return Pairs(
+        pairs,
+        name_of=lambda side: (side.twin.pair, side.record.variant, side.twin.fact),
+        cluster_of=lambda side: side.record.cluster,
+        is_right=lambda side: is_right(side, metric),
+        is_exchanged=lambda side: _is_right_in_twin(side, metric),
+    )
 
 
 def _n_lost(records: Sequence[Record], n_missing: int) -> int:
@@ -180,86 +171,20 @@ def _n_lost(records: Sequence[Record], n_missing: int) -> int:
     return lost + min(alone, n_missing) + (max(0, n_missing - alone) + 1) // 2
 
 
-@dataclass(frozen=True)
-class _Pairs:
-    """Summarises pairs under a metric."""
+def _commoner(pairs: Pairs[Side], one_right: Sequence[TwinRecords]) -> Rate:
+    """Return how often the answer that was got right is the commoner one of its form."""
+    counts: dict[str, Counter[tuple[str | int | float, ...]]] = {}
+    for side in pairs.worlds:
+        payload = side.record.payload
+        counts.setdefault(payload.question_type, Counter())[payload.answers] += 1
 
-    pairs: Sequence[TwinRecords]
-    metric: str
+    def is_commoner(one: Side, other: Side) -> float:
+        right, wrong = (one, other) if pairs.is_right(one) else (other, one)
+        of_form = counts[right.record.payload.question_type]
+        margin = of_form[right.record.payload.answers] - of_form[wrong.record.payload.answers]
+        return 0.5 if margin == 0 else float(margin > 0)
 
-    def summary(self, n_incomplete: int) -> PairSummary:
-        """Return the summary."""
-        scores = list(_scores(self.pairs, self.metric))
-        clusters = [it.cluster for it in scores]
-        flipped = [pair for pair in self.pairs if pair.is_flipped]
-        one_right = [pair for pair in self.pairs if sum(pair.rights(self.metric)) == 1]
-        return PairSummary(
-            n_pairs=len(scores),
-            n_facts=len({it.fact for it in scores}),
-            n_trajectories=len({it.cluster for it in scores}),
-            n_incomplete=n_incomplete,
-            net_pairs=_certain(net_pairs([it.shares for it in scores], clusters)),
-            pair_accuracy=_certain(clustered_rate([it.shares.right for it in scores], clusters)),
-            pairs_exchanged=_certain(
-                clustered_rate([it.shares.exchanged for it in scores], clusters)
-            ),
-            by_fact=_by_fact(scores),
-            single=self._of_sides(lambda side: _is_right(side.record, self.metric)),
-            flipped=_mean(self.pairs, lambda pair: pair.is_flipped),
-            right_when_flipped=self._right(flipped) if flipped else None,
-            one_right=_mean(self.pairs, lambda pair: sum(pair.rights(self.metric)) == 1),
-            one_is_commoner=self._commoner(one_right) if one_right else None,
-            by={facet.name: facet.means(self.pairs, self._net_pairs) for facet in PAIR_FACETS},
-            scores=_by_trajectory(scores),
-        )
-
-    def _right(self, pairs: Sequence[TwinRecords]) -> Rate:
-        return _mean(pairs, lambda pair: pair.is_right(self.metric))
-
-    def _of_sides(self, value: Callable[[_Side], bool]) -> Rate:
-        """Return the mean over single answers."""
-        values = [float(value(side)) for pair in self.pairs for side in pair.sides]
-        clusters = [pair.cluster for pair in self.pairs for _ in pair.sides]
-        return _certain(clustered_rate(values, clusters))
-
-    def _net_pairs(self, pairs: Sequence[TwinRecords]) -> Rate | None:
-        return net_pairs([it.shares(self.metric) for it in pairs], [it.cluster for it in pairs])
-
-    def _commoner(self, pairs: Sequence[TwinRecords]) -> Rate:
-        """Return how often the answer that was got right is the commoner one of its form."""
-        counts: dict[str, Counter[tuple[str | int | float, ...]]] = {}
-        for pair in self.pairs:
-            for side in pair.sides:
-                payload = side.record.payload
-                counts.setdefault(payload.question_type, Counter())[payload.answers] += 1
-
-        def is_commoner(pair: TwinRecords) -> float:
-            right, wrong = sorted(
-                pair.sides, key=lambda side: not _is_right(side.record, self.metric)
-            )
-            of_form = counts[right.record.payload.question_type]
-            margin = of_form[right.record.payload.answers] - of_form[wrong.record.payload.answers]
-            return 0.5 if margin == 0 else float(margin > 0)
-
-        return _mean(pairs, is_commoner)
-
-
-def _scores(pairs: Sequence[TwinRecords], metric: str) -> Iterator[PairScore]:
-    """Yield the score of each pair in each variant, over its repetitions."""
-
-    def key(pair: TwinRecords) -> tuple[str, str]:
-        side = pair.sides[0]
-        return side.twin.pair, side.record.variant
-
-    for (name, variant), same in groupby(sorted(pairs, key=key), key=key):
-        repetitions = list(same)
-        yield PairScore(
-            name,
-            variant,
-            repetitions[0].sides[0].twin.fact,
-            repetitions[0].cluster,
-            PairShares.mean(pair.shares(metric) for pair in repetitions),
-        )
+    return pairs.mean(is_commoner, one_right)
 
 
 def _by_trajectory(scores: Iterable[PairScore]) -> dict[str, dict[str, float]]:
@@ -276,24 +201,10 @@ def _by_fact(scores: Sequence[PairScore]) -> Rate:
     for it in scores:
         facts.setdefault((it.cluster, it.fact), []).append(it.shares)
     shares = list(map(PairShares.mean, facts.values()))
-    return _certain(net_pairs(shares, [cluster for cluster, _ in facts]))
+    return net_pairs(shares, [cluster for cluster, _ in facts])
 
 
-def _mean(pairs: Sequence[TwinRecords], value: Callable[[TwinRecords], float]) -> Rate:
-    values = [float(value(pair)) for pair in pairs]
-    return _certain(clustered_rate(values, [pair.cluster for pair in pairs]))
-
-
-def _certain(rate: Rate | None) -> Rate:
-    assert rate is not None  # there are values
-    return rate
-
-
-def _is_right(record: Record, metric: str) -> bool:
-    return record.payload.scores.get(metric, 0.0) >= 1
-
-
-def _is_right_in_twin(side: _Side, metric: str) -> bool:
+def _is_right_in_twin(side: Side, metric: str) -> bool:
     reply = side.record.payload.reply
     if metric in SCORERS and reply is not None:
         return scores(reply, side.twin.answers)[metric] >= 1
@@ -307,7 +218,7 @@ def _said(record: Record) -> str | None:
 
 
 def _distance(pair: TwinRecords) -> str | None:
-    clues = [side.record.payload.shown_clues for side in pair.sides]
+    clues = [side.record.payload.shown_clues for side in pair]
     after = [it.n_after for it in clues if it is not None and it.n_after is not None]
     return distance_class(min(after)) if after else None
 
@@ -316,7 +227,7 @@ def _tokens(pair: TwinRecords) -> str | None:
     """Return the class of the tokens of frames after the last clue; each frame has as many."""
     tokens = [
         side.record.tokens.context * side.twin.n_after_clues / max(1, side.twin.n_frames)
-        for side in pair.sides
+        for side in pair
         if side.record.tokens.context is not None
         and side.twin.n_after_clues is not None
         and side.twin.n_frames is not None
@@ -325,7 +236,7 @@ def _tokens(pair: TwinRecords) -> str | None:
 
 
 def _shown(pair: TwinRecords) -> str | None:
-    sizes = [side.twin.n_frames for side in pair.sides]
+    sizes = [side.twin.n_frames for side in pair]
     known = [size for size in sizes if size is not None]
     if len(known) < len(sizes):
         return None
@@ -333,12 +244,12 @@ def _shown(pair: TwinRecords) -> str | None:
 
 
 def _difference(pair: TwinRecords) -> str | None:
-    counts = [side.twin.n_differing for side in pair.sides]
+    counts = [side.twin.n_differing for side in pair]
     return None if None in counts else SHOWN_DIFFERENCE[not all(counts)]
 
 
 def _age(pair: TwinRecords) -> str:
-    ages = [side.twin.n_since_change for side in pair.sides]
+    ages = [side.twin.n_since_change for side in pair]
     known = [age for age in ages if age is not None]
     return distance_class(min(known)) if known else NEVER_CHANGED
 
@@ -359,11 +270,11 @@ _AGE = Facet(
 )
 MEMORY_FACETS = (_DISTANCE, _SHOWN, _AGE)
 PAIR_FACETS: tuple[Facet[TwinRecords], ...] = (
-    Facet("kind", "kind of edit", lambda pair: pair.sides[0].twin.kind),
+    Facet("kind", "kind of edit", lambda pair: pair[0].twin.kind),
     Facet(
         "question_type",
         "type of question",
-        lambda pair: pair.sides[0].record.payload.question_type,
+        lambda pair: pair[0].record.payload.question_type,
     ),
     _DISTANCE,
     # Of models that count tokens.

@@ -1,15 +1,14 @@
 """Results of pairs of twins: pairs with both worlds right, less those with both exchanged."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
 
 import msgspec
 from msgspec import UNSET, UnsetType
 
 from infthor_eval.household.first_place import FirstPlace
-from infthor_eval.pairs import PairShares, net_pairs
+from infthor_eval.pairs import Pairs, PairScore
 from infthor_eval.plans.records import PlanRecord, TwinRecord
-from infthor_eval.rates import Rate, clustered_rate, paired_rate
+from infthor_eval.rates import Rate, paired_rate
 from infthor_eval.runs import UnitRecord
 
 Record = UnitRecord[PlanRecord]
@@ -39,16 +38,16 @@ class TwinResults(msgspec.Struct, frozen=True):
 
     n_pairs: int
     n_incomplete: int
-    net_pairs: Rate | None
-    pair_accuracy: Rate | None
-    pairs_exchanged: Rate | None
-    pair_success: Rate | None
-    accuracy: Rate | None
-    one_of_two: Rate | None
-    same_place: Rate | None
-    nowhere: Rate | None
-    opened: Rate | None
-    excess: Rate | None
+    net_pairs: Rate | None = None
+    pair_accuracy: Rate | None = None
+    pairs_exchanged: Rate | None = None
+    pair_success: Rate | None = None
+    accuracy: Rate | None = None
+    one_of_two: Rate | None = None
+    same_place: Rate | None = None
+    nowhere: Rate | None = None
+    opened: Rate | None = None
+    excess: Rate | None = None
 
 
 def first_place_score(plan: PlanRecord) -> dict[str, float]:
@@ -58,29 +57,45 @@ def first_place_score(plan: PlanRecord) -> dict[str, float]:
     return {"first_place": float(plan.twin.first == FirstPlace.OWN)}
 
 
-class PairScore(NamedTuple):
-    """The score of a pair."""
-
-    pair: str
-    base: str
-    shares: PairShares
-
-
 def score_pairs(records: Sequence[Record]) -> list[PairScore]:
     """Return the scores of the pairs of a task of which both worlds count."""
-    return [
-        PairScore(_twin(one).pair, _base(one), _shares(one, other))
-        for one, other in _whole_pairs(_worlds_of_pairs(records)[0])
-    ]
+    return _pairs(_worlds_of_pairs(records)[0]).scores()
 
 
 def twin_results(records: Sequence[Record]) -> TwinResults | UnsetType:
     """Return the results of a task's pairs; UNSET if its trajectories are no twins."""
-    pairs, lost = _worlds_of_pairs(records)
-    if not pairs:
+    worlds, lost = _worlds_of_pairs(records)
+    if not worlds:
         return UNSET
-    whole = _whole_pairs(pairs)
-    return _Pairs(whole, len(whole) + len(lost)).results(len(pairs) - len(whole))
+    whole = _pairs(worlds)
+    n_pairs = len(whole.pairs)
+    n_incomplete = len(worlds) - n_pairs
+    if not n_pairs:
+        return TwinResults(n_pairs, n_incomplete)
+    n_all = n_pairs + len(lost)
+    return TwinResults(
+        n_pairs=n_pairs,
+        n_incomplete=n_incomplete,
+        **whole.rates(n_all),
+        pair_success=whole.mean(lambda one, other: _is_done(one) and _is_done(other)).out_of(n_all),
+        accuracy=whole.mean_of_worlds(_is_right),
+        one_of_two=whole.mean(whole.is_one_right).out_of(n_all),
+        same_place=whole.mean(_went_to_the_same).out_of(n_all),
+        nowhere=whole.mean_of_worlds(lambda world: _first(world) is None),
+        opened=_mean_opened(whole.worlds),
+        excess=_mean_excess(whole.worlds),
+    )
+
+
+def _pairs(worlds: Mapping[str, Sequence[_World]]) -> Pairs[_World]:
+    """Return the pairs of which both worlds count."""
+    return Pairs(
+        [(both[0], both[1]) for _, both in sorted(worlds.items()) if len(both) == 2],
+        name_of=lambda world: (_twin(world).pair, "", ""),
+        cluster_of=_base,
+        is_right=_is_right,
+        is_exchanged=lambda world: _first(world) == FirstPlace.TWIN,
+    )
 
 
 def _worlds_of_pairs(records: Sequence[Record]) -> tuple[dict[str, list[_World]], set[str]]:
@@ -100,61 +115,17 @@ def _worlds_of_pairs(records: Sequence[Record]) -> tuple[dict[str, list[_World]]
     return pairs, lost
 
 
-def _whole_pairs(pairs: Mapping[str, Sequence[_World]]) -> list[tuple[_World, _World]]:
-    return [(worlds[0], worlds[1]) for _, worlds in sorted(pairs.items()) if len(worlds) == 2]
+def _mean_opened(worlds: Sequence[_World]) -> Rate | None:
+    counts = [float(_twin(world).n_opened) for world in worlds]
+    # Differences from 0: counts are no shares, also where none is above 1.
+    return paired_rate([0.0] * len(counts), counts, list(map(_base, worlds)))
 
 
-class _Pairs:
-    """Pairs of which both worlds count, of all those that were to be answered."""
-
-    def __init__(self, pairs: Sequence[tuple[_World, _World]], n_all: int) -> None:
-        self._pairs = pairs
-        self._n_all = n_all
-
-    def results(self, n_incomplete: int) -> TwinResults:
-        return TwinResults(
-            n_pairs=len(self._pairs),
-            n_incomplete=n_incomplete,
-            net_pairs=self._net_pairs(),
-            pair_accuracy=self._share(_are_right),
-            pairs_exchanged=self._share(_are_exchanged),
-            pair_success=self._share(lambda one, other: _is_done(one) and _is_done(other)),
-            accuracy=self._share_of_worlds(_is_right),
-            one_of_two=self._share(lambda one, other: _is_right(one) != _is_right(other)),
-            same_place=self._share(_went_to_the_same),
-            nowhere=self._share_of_worlds(lambda world: _first(world) is None),
-            opened=self._mean_opened(),
-            excess=self._mean_excess(),
-        )
-
-    def _net_pairs(self) -> Rate | None:
-        shares = [_shares(one, other) for one, other in self._pairs]
-        rate = net_pairs(shares, [_base(one) for one, _ in self._pairs])
-        return None if rate is None else rate.out_of(self._n_all)
-
-    def _share(self, holds: Callable[[_World, _World], bool]) -> Rate | None:
-        values = [float(holds(one, other)) for one, other in self._pairs]
-        rate = clustered_rate(values, [_base(one) for one, _ in self._pairs])
-        return None if rate is None else rate.out_of(self._n_all)
-
-    def _share_of_worlds(self, holds: Callable[[_World], bool]) -> Rate | None:
-        values = [float(holds(world)) for world in self._worlds]
-        return clustered_rate(values, [_base(world) for world in self._worlds])
-
-    def _mean_opened(self) -> Rate | None:
-        counts = [float(_twin(world).n_opened) for world in self._worlds]
-        # Differences from 0: counts are no shares, also where none is above 1.
-        return paired_rate([0.0] * len(counts), counts, [_base(world) for world in self._worlds])
-
-    def _mean_excess(self) -> Rate | None:
-        found = [world for world in self._worlds if world[0].payload.done]
-        own = [float(len(world[0].payload.steps)) for world in found]
-        expert = [float(world[0].payload.n_expert_steps) for world in found]
-        return paired_rate(expert, own, [_base(world) for world in found])
-
-    @property
-    def _worlds(self) -> list[_World]:
-        return [world for pair in self._pairs for world in pair]
+def _mean_excess(worlds: Sequence[_World]) -> Rate | None:
+    found = [world for world in worlds if world[0].payload.done]
+    own = [float(len(world[0].payload.steps)) for world in found]
+    expert = [float(world[0].payload.n_expert_steps) for world in found]
+    return paired_rate(expert, own, list(map(_base, found)))
 
 
 def _twin(world: _World) -> TwinRecord:
@@ -173,18 +144,6 @@ def _first(world: _World) -> FirstPlace | None:
 
 def _is_right(world: _World) -> bool:
     return _first(world) == FirstPlace.OWN
-
-
-def _are_right(one: _World, other: _World) -> bool:
-    return _is_right(one) and _is_right(other)
-
-
-def _are_exchanged(one: _World, other: _World) -> bool:
-    return _first(one) == _first(other) == FirstPlace.TWIN
-
-
-def _shares(one: _World, other: _World) -> PairShares:
-    return PairShares(float(_are_right(one, other)), float(_are_exchanged(one, other)))
 
 
 def _is_done(world: _World) -> bool:

@@ -81,7 +81,7 @@ def _named(
         first = ordered[0]
         texts[0] = f"{kind}{first.run} {finding.format(_share(first, has_interval=has_interval))}"
         return texts
-    highest, lowest = ordered[0], ordered[-1]
+    highest, *_, lowest = ordered
     what = "baselines" if kind else "runs"
     share = finding.format(_share(highest, has_interval=False))
     ties = next(len(list(same)) for _, same in groupby(ordered, key=_shown))

@@ -2,11 +2,8 @@
 
 from collections.abc import Sequence
 
+from infthor_eval.report.charts import Chart, Class, Point, Series, point_of
 from infthor_eval.report.headline.results import TaskResult
-from infthor_eval.report.svg.dots import DotRow, DotsChart, dot_of, dots_chart
-from infthor_eval.report.svg.drawing import Series
-from infthor_eval.report.svg.points import Point, PointsChart, points_chart
-from infthor_eval.report.web.sections import Chart
 from infthor_eval.tables import Column, Row, Table, answered_cell, interval_cell
 
 _MOST_ROWS = 24  # of the chart; the table has all
@@ -47,7 +44,8 @@ def results_chart(results: Sequence[TaskResult]) -> Chart | None:
     """Draw the score of each run and task with its interval; None if none has a score."""
     shown = sorted(results, key=lambda one: -(one.rate.mean if one.rate else -1.0))
     kept = set(map(id, shown[:_MOST_ROWS]))
-    rows = []
+    rows: list[Class] = []
+    points = []
     heading = ""
     tasks = list(dict.fromkeys(one.task for one in results))
     by_task = sorted(results, key=lambda one: tasks.index(one.task))
@@ -55,11 +53,12 @@ def results_chart(results: Sequence[TaskResult]) -> Chart | None:
         if id(result) not in kept:
             continue
         words = f"{result.task}: {result.measure}"
-        dot = None if result.rate is None else dot_of(result.rate, result.rate.n)
+        if result.rate is not None:
+            points.append(point_of(len(rows), result.rate, result.rate.n))
         chance = None if result.chance is None else 100 * result.chance
-        rows.append(DotRow(result.run, (dot,), chance, words if words != heading else ""))
+        rows.append(Class(result.run, words if words != heading else "", chance))
         heading = words
-    if not any(row.dots[0] for row in rows):
+    if not points:
         return None
     few = "" if len(rows) == len(results) else f" The {len(rows)} highest of {len(results)}."
     dashed = "; the dashed line is blind" if any(row.chance is not None for row in rows) else ""
@@ -67,9 +66,8 @@ def results_chart(results: Sequence[TaskResult]) -> Chart | None:
         "Further right is better: a dot is a run's score, its line the 95 % interval over "
         f"trajectories{dashed}.{few}"
     )
-    series = (Series("score"),)
-    contents = DotsChart("Results", caption, "%, higher is better", "run", series, rows)
-    return dots_chart(contents)
+    axes = ("run", "%, higher is better")
+    return Chart("Results", caption, axes, (Series("score", points),), classes=rows)
 
 
 def cost_chart(results: Sequence[TaskResult]) -> Chart | None:
@@ -82,16 +80,15 @@ def cost_chart(results: Sequence[TaskResult]) -> Chart | None:
         "seconds of a sample": [one.seconds for one in scored],
     }
     for axis, values in costs.items():
-        points: dict[str, list[Point]] = {}
+        points: dict[str, Point] = {}
         for one, value in zip(scored, values, strict=True):
             if value and one.rate is not None:
-                name = f"{one.run}, {one.task}"
-                points[name] = [Point(value, dot_of(one.rate, one.rate.n))]
+                points[f"{one.run}, {one.task}"] = point_of(value, one.rate, one.rate.n)
         if len(points) > 1 and (all(values) or axis.startswith("seconds")):
             caption = (
                 "Up and to the left is better: each mark is a run, its line the 95 % interval; "
                 "costs are on a log scale."
             )
-            title = "Score against cost"
-            return points_chart(PointsChart(title, caption, (axis, "score (%)"), points))
+            series = [Series(name, [points[name]], place) for place, name in enumerate(points)]
+            return Chart("Score against cost", caption, (axis, "score (%)"), series, "log")
     return None

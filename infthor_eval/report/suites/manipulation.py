@@ -4,15 +4,19 @@ import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from PIL import Image
 
 from infthor_eval.errors import UsageError
+from infthor_eval.manipulation.kinds import KIND_NAMES, ManipulationKind
 from infthor_eval.manipulation.recorded.curves import arm_curves
-from infthor_eval.manipulation.recorded.radii import success_by_radius
+from infthor_eval.manipulation.recorded.radii import Points, SuccessByRadius, success_by_radius
 from infthor_eval.manipulation.recorded.runs import ArmRun, label_by_radius
 from infthor_eval.manipulation.records import ArmRecord, ArmStep
+from infthor_eval.rates import format_percent
+from infthor_eval.report.charts import Chart, Class, Panels, Series, point_of
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
     Description,
@@ -27,16 +31,25 @@ from infthor_eval.report.recordings.episode_sheet import MOST_ROWS, draw_sheet, 
 from infthor_eval.report.recordings.reach_view import draw_reach
 from infthor_eval.report.runs import choose_evenly
 from infthor_eval.report.suites.episode_columns import ARM_COLUMNS
+from infthor_eval.report.suites.reward_curves import (
+    curves_on_page,
+    curves_result,
+    embedded_note,
+    figure_section,
+    trajectories_text,
+)
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Section
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord
+from infthor_eval.tables import Column, Row, Table
 
 if TYPE_CHECKING:
     from infthor_eval.manipulation.recorded.replay_frames import ArmFrame, ArmObservation
     from infthor_eval.manipulation.recorded.replaying import RecordedEpisodes
 
 Record = UnitRecord[ArmRecord]
+_FLOOR = "in the sphere at the start"
 
 
 class ArmEpisodesReplay:
@@ -108,16 +121,101 @@ def _runs_by_radius(runs: Sequence[Run]) -> list[ArmRun]:
 
 
 def _build_figure_6(runs: Sequence[Run], request: FigureRequest) -> FigureResult:
-    from infthor_eval.report.suites.reward_curves import curves_result
-
     return curves_result(arm_curves(_runs_by_radius(runs), request.task), request.panels)
 
 
 def _build_radius_figure(runs: Sequence[Run], request: FigureRequest) -> FigureResult:
-    from infthor_eval.report.figures.radius import radii_figure, radii_table
+    return radii_result(success_by_radius(_model_runs(runs), request.task))
 
-    by_radius = success_by_radius(_model_runs(runs), request.task)
-    return FigureResult(radii_table(by_radius), lambda: radii_figure(by_radius))
+
+def radii_result(success: SuccessByRadius) -> FigureResult:
+    """Return the figure of success by radius, a panel per kind."""
+    # Loads matplotlib, which the page does without.
+    from infthor_eval.report.figures import draw_figure
+
+    drawn = {line.kind for line in success.lines}
+    kinds = [kind for kind in ManipulationKind if kind in drawn]
+    charts = [_radii_chart(success, [kind], "radius of the hand's sphere (m)") for kind in kinds]
+    panels = Panels("", list(dict.fromkeys(line.label for line in success.lines)), charts)
+    titles = [KIND_NAMES[kind] for kind in kinds]
+    plot = partial(draw_figure, _radii_heading(success), titles, [panels], success.notes)
+    return FigureResult(radii_table(success), plot)
+
+
+def _radii_chart(success: SuccessByRadius, kinds: Iterable[ManipulationKind], axis: str) -> Chart:
+    """Return the chart of some kinds: a class per kind and radius, a series per model."""
+    floor = dict(success.floor)
+    classes: dict[tuple[ManipulationKind, float], Class] = {}
+    for kind in kinds:
+        of_kind = (line.points for line in success.lines if line.kind == kind)
+        for radius in sorted({radius for points in of_kind for radius, _ in points}):
+            heading = "" if any(other == kind for other, _ in classes) else KIND_NAMES[kind]
+            has_floor = kind == ManipulationKind.PICKUP and radius in floor
+            chance = 100 * floor[radius].mean if has_floor else None
+            classes[kind, radius] = Class(f"{radius:g} m", heading, chance, radius)
+    numbers = {known: number for number, known in enumerate(classes)}
+    series: dict[str, Series] = {}
+    for line in success.lines:
+        one = series.setdefault(line.label, Series(line.label, [], len(series), line.is_bound))
+        points = [
+            point_of(numbers[line.kind, radius], rate, rate.n)
+            for radius, rate in line.points
+            if (line.kind, radius) in numbers
+        ]
+        series[line.label] = one._replace(points=[*one.points, *points])
+    return Chart(
+        title="Success by the hand's radius",
+        caption=(
+            "A row is a radius of the hand's sphere, a dot a model with its 95 % interval; of "
+            "pick-ups the dashed line is an arm that only closes its hand."
+        ),
+        axes=(axis, "success (%)"),
+        series=list(series.values()),
+        classes=list(classes.values()),
+        dashed=_FLOOR,
+    )
+
+
+def radii_table(success: SuccessByRadius) -> Table:
+    """Return a table with a row per model and kind and a column per radius."""
+    all_points = (success.floor, *(line.points for line in success.lines))
+    radii = sorted({radius for points in all_points for radius, _ in points})
+    rows = [_radii_row(line.label, line.kind, line.points, radii) for line in success.lines]
+    if success.floor:
+        rows.append(_radii_row(f"({_FLOOR})", ManipulationKind.PICKUP, success.floor, radii))
+    names = (*(f"{radius:g} m" for radius in radii), "episodes")
+    columns = (Column("model", False), Column("kind", False), *map(Column, names))
+    title = f"{success.task}: success by radius, %, of {trajectories_text(success.n_trajectories)}"
+    return Table(title, columns, tuple(rows), (*_embedded(success), *success.notes))
+
+
+def _radii_row(
+    label: str,
+    kind: ManipulationKind,
+    points: Points,
+    radii: Sequence[float],
+) -> Row:
+    rates = dict(points)
+    cells = (format_percent(rates.get(radius)) for radius in radii)
+    return Row((label, KIND_NAMES[kind], *cells, str(points[0][1].n)))
+
+
+def _radii_heading(success: SuccessByRadius) -> list[str]:
+    intervals = ", 95 % intervals beside the points" if success.n_trajectories > 1 else ""
+    title = (
+        f"Success by radius on {success.task}: episodes of "
+        f"{trajectories_text(success.n_trajectories)}{intervals}"
+    )
+    return [title, *_embedded(success)]
+
+
+def _embedded(success: SuccessByRadius) -> tuple[str, ...]:
+    """Return the note on numbers of the embedded simulator."""
+    by_label = {line.label: line.is_embedded for line in success.lines}
+    label = embedded_note(
+        [name for name, is_embedded in by_label.items() if is_embedded], len(by_label), "results"
+    )
+    return () if label is None else (label,)
 
 
 class ManipulationPresenter(PlainPresenter):
@@ -149,16 +247,11 @@ class ManipulationPresenter(PlainPresenter):
     def sections(self, runs: Sequence[Run]) -> Iterator[Section]:
         """See `Presenter.sections`: reward along trajectories, and success by radius where there
         are several radii."""
-        from infthor_eval.report.figures.radius import radii_chart, radii_table
-        from infthor_eval.report.suites.reward_curves import (
-            DrawnFigure,
-            curves_on_page,
-            figure_section,
-        )
 
-        def radii_on_page() -> DrawnFigure:
-            by_radius = success_by_radius(_model_runs(runs))
-            return DrawnFigure([radii_chart(by_radius)], radii_table(by_radius))
+        def radii_on_page() -> tuple[Sequence[Chart], Table]:
+            success = success_by_radius(_model_runs(runs))
+            kinds = dict.fromkeys(line.kind for line in success.lines)
+            return [_radii_chart(success, kinds, "kind and radius")], radii_table(success)
 
         arm_runs = _runs_by_radius(runs)
         title = "Reward of pick-ups and puts"

@@ -13,6 +13,7 @@ from infthor_eval.nieh.results.pair_summary import score_pairs
 from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.pairs import PAIR_BOUNDS
+from infthor_eval.report.charts import Chart
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
     NET_PAIRS,
@@ -28,7 +29,7 @@ from infthor_eval.report.presenter import (
     Timelines,
 )
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
-from infthor_eval.report.web.sections import Chart, Section
+from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord

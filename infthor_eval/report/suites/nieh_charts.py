@@ -1,6 +1,5 @@
-"""Charts of NIEH: accuracy by clues, type, evidence and depth, and gains."""
+"""Charts of NIEH: accuracy by clues, type, evidence and depth, gains, and memories."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import NamedTuple
@@ -17,13 +16,18 @@ from infthor_eval.nieh.results.summary import (
     main_metric,
 )
 from infthor_eval.nieh.results.tables import by_depth
-from infthor_eval.report.suites.memory_chart import memory_charts
-from infthor_eval.report.svg.dots import Dot, DotRow, DotsChart, class_row, dot_of, dots_chart
-from infthor_eval.report.svg.drawing import Series
-from infthor_eval.report.web.sections import Chart
+from infthor_eval.rates import Rate
+from infthor_eval.report.charts import (
+    Chart,
+    Class,
+    Point,
+    Series,
+    class_series,
+    counted_classes,
+    point_of,
+)
 from infthor_eval.run import Run
 from infthor_eval.statistics import MeanEstimate
-from infthor_eval.tables import Column, Row, Table
 
 _COLUMNS = (*CLUE_COLUMNS, ABSENCE)
 
@@ -31,7 +35,8 @@ _COLUMNS = (*CLUE_COLUMNS, ABSENCE)
 class _Line(NamedTuple):
     """Results of a run on a task."""
 
-    series: Series
+    label: str
+    place: int
     task: TaskSummary
 
     @property
@@ -44,15 +49,15 @@ def nieh_charts(runs: Sequence[Run]) -> list[Chart]:
     charts: list[Chart] = []
     for task in dict.fromkeys(name for run in runs for name in run.summary.summary.tasks):
         lines = [
-            _Line(Series(run.label, place), run.summary.summary.tasks[task])
+            _Line(run.label, place, run.summary.summary.tasks[task])
             for place, run in enumerate(runs)
             if task in run.summary.summary.tasks and run.summary.summary.tasks[task].n
         ]
         if lines:
             charts += _charts_of_task(task, lines)
     summaries = [_gains_chart(runs), _above_blind_chart(runs)]
-    heat_maps = [_heat_map(run) for run in runs]
-    drawn = [chart for chart in (*summaries, *heat_maps) if chart is not None]
+    by_size = [_depths_and_sizes(run) for run in runs]
+    drawn = [chart for chart in (*summaries, *by_size) if chart is not None]
     return [*charts, *memory_charts(runs), *drawn]
 
 
@@ -97,30 +102,29 @@ def _by_class(
     lines: Sequence[_Line],
 ) -> Chart:
     """Draw a row per class with the dots of all lines, whose cells are by class."""
-    rows = []
-    for name in names:
-        dots = [_dot(of_line.get(name), line) for of_line, line in zip(cells, lines, strict=True)]
-        rows.append(class_row(name.removeprefix(DEPTH), dots))
-    return dots_chart(
-        DotsChart(
-            title=f"{task}: accuracy by {by}",
-            caption=(
-                "A row is a class of questions, with their number in parentheses; a dot is a run, "
-                "its line the 95 % interval over trajectories."
-            ),
-            axis=f"{lines[0].metric} (%)",
-            label=by,
-            series=[line.series for line in lines],
-            rows=rows,
-            description=_describe(lines),
-        )
+    series = [
+        class_series(line.label, line.place, names, _rates(of_line, line.metric))
+        for of_line, line in zip(cells, lines, strict=True)
+    ]
+    return Chart(
+        title=f"{task}: accuracy by {by}",
+        caption=(
+            "A row is a class of questions, with their number in parentheses; a dot is a run, "
+            "its line the 95 % interval over trajectories."
+        ),
+        axes=(by, f"{lines[0].metric} (%)"),
+        series=series,
+        classes=counted_classes([name.removeprefix(DEPTH) for name in names], series),
+        words=_describe(lines),
     )
 
 
-def _dot(cell: Cell | None, line: _Line) -> Dot | None:
-    if cell is None or not cell.scores:
-        return None
-    return dot_of(cell.scores[line.metric], cell.n_answered)
+def _rates(cells: Mapping[str, Cell], metric: str) -> dict[str, Rate]:
+    return {
+        name: Rate(score.mean, score.low, score.high, cell.n_answered)
+        for name, cell in cells.items()
+        if (score := cell.scores.get(metric)) is not None
+    }
 
 
 def _forms(line: _Line) -> Mapping[str, FormScore]:
@@ -131,31 +135,28 @@ def _forms(line: _Line) -> Mapping[str, FormScore]:
 def _by_form(task: str, lines: Sequence[_Line]) -> Chart:
     """Draw a row per form of question, with what `blind` scores in it."""
     forms = [_forms(line) for line in lines]
-    rows = []
-    for name in sorted(set().union(*forms)):
-        known = [of_line.get(name) for of_line in forms]
-        first = next(form for form in known if form is not None)
-        dots = [None if form is None else Dot(100 * form.score, n=form.n) for form in known]
-        rows.append(class_row(name, dots, 100 * first.blind))
-    return dots_chart(
-        DotsChart(
-            title=f"{task}: accuracy by form, beside blind",
-            caption=(
-                "A row is a form of question, with the number of those answered in parentheses: "
-                "dots to the right of the dashed line know more than blind, which sees no frame."
-            ),
-            axis=f"{lines[0].metric} (%)",
-            label="form",
-            series=[line.series for line in lines],
-            rows=rows,
-            description=_describe(lines),
-        )
+    names = sorted(set().union(*forms))
+    series = []
+    for line, known in zip(lines, forms, strict=True):
+        rates = {name: Rate(form.score, None, None, form.n) for name, form in known.items()}
+        series.append(class_series(line.label, line.place, names, rates))
+    blind = {name: form.blind for known in reversed(forms) for name, form in known.items()}
+    return Chart(
+        title=f"{task}: accuracy by form, beside blind",
+        caption=(
+            "A row is a form of question, with the number of those answered in parentheses: "
+            "dots to the right of the dashed line know more than blind, which sees no frame."
+        ),
+        axes=("form", f"{lines[0].metric} (%)"),
+        series=series,
+        classes=counted_classes(names, series, [100 * blind[name] for name in names]),
+        words=_describe(lines),
     )
 
 
 def _describe(lines: Sequence[_Line]) -> str:
     """Return the totals in words."""
-    totals = ((line.series.name, mean_cell(line.task.total, line.metric, 1)) for line in lines)
+    totals = ((line.label, mean_cell(line.task.total, line.metric, 1)) for line in lines)
     return "; ".join(f"{label} {mean} %" for label, mean in totals)
 
 
@@ -189,88 +190,88 @@ def _by_rows(
     """Draw a row with a dot for each value, around 0; None without rows."""
     if not rows:
         return None
-    description = "; ".join(f"{name} {100 * (value.mean or 0):+.1f}" for name, value in rows)
-    drawn = [DotRow(name, (dot_of(value),)) for name, value in rows]
     # Nothing at all would be drawn on a scale of hundredths.
-    limits = (-5.0, 5.0)
-    series = (Series("value"),)
-    return dots_chart(
-        DotsChart(
-            title,
-            caption,
-            axis,
-            "run and task",
-            series,
-            drawn,
-            limits=limits,
-            description=description,
-        )
+    return Chart(
+        title=title,
+        caption=caption,
+        axes=("run and task", axis),
+        series=(Series("value", [point_of(x, value) for x, (_, value) in enumerate(rows)]),),
+        classes=[Class(name) for name, _ in rows],
+        limits=(-5.0, 5.0),
+        words="; ".join(f"{name} {100 * (value.mean or 0):+.1f}" for name, value in rows),
     )
 
 
-def _heat_map(run: Run) -> Chart | None:
+def _depths_and_sizes(run: Run) -> Chart | None:
     """Draw accuracy by depth of the needle and context size; None if no task has depths."""
-    from matplotlib.figure import Figure
-
-    from infthor_eval.report.figures.style import inline_svg
-
     tasks: dict[int, TaskSummary] = {}
     for name, task in run.summary.summary.tasks.items():
         if by_depth(task):
             tasks[int(run.tasks[name].dataset_kwargs.get("ctx_size") or 0)] = task
     if not tasks:
         return None
-    sizes = sorted(tasks)
     metric = main_metric(next(iter(tasks.values())))
     depths = sorted(set().union(*map(by_depth, tasks.values())))
-    means = []
-    for depth in depths:
-        means.append([_percent(by_depth(tasks[size]).get(depth), metric) for size in sizes])
-
-    def draw() -> Figure:
-        figure = Figure(
-            figsize=(2.2 + 0.9 * len(sizes), 1.4 + 0.5 * len(depths)), layout="constrained"
-        )
-        axes = figure.subplots()
-        axes.grid(visible=False)
-        # One hue: colour-blind readers and prints tell its values apart by lightness alone.
-        picture = axes.imshow(means, cmap="Blues", vmin=0, vmax=100, aspect="auto")
-        for row, values in enumerate(means):
-            for column, value in enumerate(values):
-                ink = "white" if value > 55 else "#222222"
-                text = "-" if math.isnan(value) else f"{value:.0f}"
-                axes.text(column, row, text, ha="center", va="center", color=ink)
-        axes.set_xticks(range(len(sizes)), list(map(_size, sizes)))
-        axes.set_yticks(range(len(depths)), [depth.removeprefix(DEPTH) for depth in depths])
-        axes.set_xlabel("context (thousand tokens)")
-        axes.set_ylabel("depth of the needle")
-        figure.colorbar(picture, ax=axes, label=f"{metric} (%)")
-        return figure
-
     return Chart(
-        f"{run.label}: accuracy by depth and size of the context",
-        inline_svg(draw),
-        "see the table by depth",
-        f"Darker is better: {metric} in percent, by where the needle is and how long the context.",
-        _heat_table(depths, sizes, means),
+        title=f"{run.label}: accuracy by depth and size of the context",
+        caption=(
+            f"Darker is better: {metric} in percent, by where the needle is and how long the "
+            "context."
+        ),
+        axes=("depth", "context (thousand tokens)"),
+        series=[
+            class_series(f"{size}K" if size else "all", 0, depths, _rates(by_depth(task), metric))
+            for size, task in sorted(tasks.items())
+        ],
+        form="grid",
+        classes=[Class(depth.removeprefix(DEPTH)) for depth in depths],
+        words="see the table by depth",
     )
 
 
-def _heat_table(
-    depths: Sequence[str], sizes: Sequence[int], means: Sequence[Sequence[float]]
-) -> Table:
-    columns = (Column("depth", False), *(Column(_size(size)) for size in sizes))
-    rows = []
-    for depth, values in zip(depths, means, strict=True):
-        cells = ("-" if math.isnan(value) else f"{value:.2f}" for value in values)
-        rows.append(Row((depth.removeprefix(DEPTH), *cells)))
-    return Table("", columns, tuple(rows))
+def memory_charts(runs: Sequence[Run]) -> Iterator[Chart]:
+    """Yield accuracy against tokens for each task with memories whose models count them, a curve
+    over budgets for each memory."""
+    tasks = dict.fromkeys(
+        name
+        for run in runs
+        for name, task in run.summary.summary.tasks.items()
+        if task.memory is not None
+    )
+    for task in tasks:
+        curves = _memories(runs, task)
+        if curves:
+            yield Chart(
+                title=f"{task}: accuracy by tokens of what a memory recalls",
+                caption=(
+                    "Up and to the left is better: a mark is a memory at a budget, its line the "
+                    "95 % interval; tokens are on a log scale, and * marks memories that know what "
+                    "no agent can."
+                ),
+                axes=("tokens of a question (mean)", "accuracy (%)"),
+                series=curves,
+                form="log",
+            )
 
 
-def _size(size: int) -> str:
-    return f"{size}K" if size else "all"
-
-
-def _percent(cell: Cell | None, metric: str) -> float:
-    score = None if cell is None else cell.scores.get(metric)
-    return math.nan if score is None else 100 * score.mean
+def _memories(runs: Sequence[Run], task: str) -> list[Series]:
+    """Return the points of each memory, of each subject if there are several, by tokens."""
+    by_memory: dict[tuple[str, str], list[Point]] = {}
+    for run in runs:
+        of_task = run.summary.summary.tasks.get(task)
+        if of_task is None or of_task.memory is None or not of_task.memory.n_tokens:
+            continue
+        memory = f"{of_task.memory.name}{'*' if of_task.memory.privileged else ''}"
+        score = of_task.total.scores.get(main_metric(of_task))
+        if score is not None:
+            point = point_of(of_task.memory.n_tokens, score, of_task.total.n_answered)
+            by_memory.setdefault((run.model, memory), []).append(point)
+    several = len({subject for subject, _ in by_memory}) > 1
+    return [
+        Series(
+            f"{subject}, {memory}" if several else memory,
+            sorted(points, key=lambda point: point.x),
+            place,
+        )
+        for place, ((subject, memory), points) in enumerate(by_memory.items())
+    ]

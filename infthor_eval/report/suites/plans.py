@@ -16,6 +16,7 @@ from infthor_eval.plans.recorded.runs import PlansRun
 from infthor_eval.plans.records import PlanRecord
 from infthor_eval.plans.summary import PlansSummary
 from infthor_eval.plans.twins.results import score_pairs
+from infthor_eval.report.charts import Chart
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
     NET_PAIRS,
@@ -31,10 +32,16 @@ from infthor_eval.report.presenter import (
 from infthor_eval.report.recordings.plan_pictures import plan_pictures
 from infthor_eval.report.recordings.room_map import draw_map
 from infthor_eval.report.suites.episode_columns import PLAN_COLUMNS
+from infthor_eval.report.suites.reward_curves import (
+    curves_on_page,
+    curves_result,
+    figure_section,
+)
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Section
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord
+from infthor_eval.tables import Table
 
 if TYPE_CHECKING:
     from infthor_eval.plans.recorded.replay_frames import PlanFrame, PlanObservation
@@ -92,11 +99,8 @@ def _plans_run(run: Run) -> PlansRun:
 
 
 def _build_figure_7(runs: Sequence[Run], request: FigureRequest) -> FigureResult:
-    from infthor_eval.report.suites.reward_curves import curves_result
-
-    return curves_result(
-        plan_curves([_plans_run(run) for run in runs], request.task), request.panels
-    )
+    curves = plan_curves([_plans_run(run) for run in runs], request.task)
+    return curves_result(curves, request.panels)
 
 
 class PlansPresenter(PlainPresenter):
@@ -134,17 +138,12 @@ class PlansPresenter(PlainPresenter):
         """See `Presenter.group_scores`: net pairs of twins."""
         for pair in score_pairs(records):
             for name, score in pair.shares.by_metric.items():
-                yield GroupScore(name, pair.pair, pair.base, score)
+                yield GroupScore(name, pair.pair, pair.cluster, score)
 
     def sections(self, runs: Sequence[Run]) -> Iterator[Section]:
         """See `Presenter.sections`: curves of reward for each task that all runs have."""
-        from infthor_eval.report.suites.reward_curves import (
-            DrawnFigure,
-            curves_on_page,
-            figure_section,
-        )
 
-        def task_curves(task: str) -> DrawnFigure:
+        def task_curves(task: str) -> tuple[Sequence[Chart], Table]:
             return curves_on_page(plan_curves([_plans_run(run) for run in runs], task))
 
         for task in runs[0].tasks:

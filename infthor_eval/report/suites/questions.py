@@ -13,12 +13,10 @@ from infthor_eval.questions.suite import (
     QuestionSummary,
     digest_of_questions,
 )
+from infthor_eval.report.charts import Chart, class_series, counted_classes
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import THOUGHT, Description, FindFrames, Timelines
-from infthor_eval.report.svg.dots import Dot, DotRow, DotsChart, class_row, dot_of, dots_chart
-from infthor_eval.report.svg.drawing import Series
 from infthor_eval.report.web.samples import Timeline, TimelineFrame
-from infthor_eval.report.web.sections import Chart
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
@@ -55,10 +53,11 @@ class QuestionsPresenter(PlainPresenter):
     def charts(self, runs: Sequence[Run]) -> list[Chart]:
         """See `Presenter.charts`: scores by kind, a chart for each task."""
         tasks = dict.fromkeys(task for run in runs for task in run.summary.summary.tasks)
-        return [
-            _chart(task, [run for run in runs if task in run.summary.summary.tasks])
-            for task in tasks
-        ]
+        charts = []
+        for task in tasks:
+            with_task = [run for run in runs if task in run.summary.summary.tasks]
+            charts.append(_chart(task, with_task))
+        return charts
 
     def request_frames(self, run: Run, data: Path | None) -> FindFrames:
         """See `Presenter.request_frames`."""
@@ -116,23 +115,16 @@ def _questions(run: Run, task: str) -> dict[str, Question]:
 
 def _chart(task: str, runs: Sequence[Run]) -> Chart:
     summaries: list[QuestionSummary] = [run.summary.summary for run in runs]
-    rates = [summary.tasks[task] for summary in summaries]
-
-    def row(kind: str) -> DotRow:
-        dots: list[Dot | None] = [
-            dot_of(of_run[kind], of_run[kind].n) if kind in of_run else None for of_run in rates
-        ]
-        return class_row(kind, dots)
-
-    kinds = dict.fromkeys(kind for of_run in rates for kind in of_run)
+    kinds = list(dict.fromkeys(kind for summary in summaries for kind in summary.tasks[task]))
+    series = [
+        class_series(run.label, place, kinds, summary.tasks[task])
+        for place, (run, summary) in enumerate(zip(runs, summaries, strict=True))
+    ]
     metric = ", ".join(dict.fromkeys(summary.metric for summary in summaries))
-    return dots_chart(
-        DotsChart(
-            title=f"{task}: {metric} by kind",
-            caption="Higher is better: a dot is a mean score with its 95 % interval.",
-            axis=f"{metric} (%)",
-            label="kind",
-            series=[Series(run.label, place) for place, run in enumerate(runs)],
-            rows=[row(kind) for kind in kinds],
-        )
+    return Chart(
+        title=f"{task}: {metric} by kind",
+        caption="Higher is better: a dot is a mean score with its 95 % interval.",
+        axes=("kind", f"{metric} (%)"),
+        series=series,
+        classes=counted_classes(kinds, series),
     )

@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from infthor_eval.pages.one_file import LOOK, THEME, read_part, write_page_file
 from infthor_eval.report.exporting import export_tables
+from infthor_eval.report.svg import draw
 from infthor_eval.report.web.samples import FrameFacts, Numbered, PageSample, Prompt
 from infthor_eval.report.web.sections import Section
 
@@ -139,7 +140,7 @@ def write_page(page: Page, path: Path) -> int:
     values = {
         "page": page,
         "data": [_embedded(page, name, value) for name, value in _data(page).items()],
-        "svg": Markup,
+        "svg": lambda chart: Markup(draw(chart)),
         "csv": lambda table: export_tables([table], "csv"),
     }
     return write_page_file(

@@ -2,26 +2,8 @@
 
 from dataclasses import dataclass
 
+from infthor_eval.report.charts import Chart
 from infthor_eval.tables import Table
-
-
-@dataclass(frozen=True)
-class Chart:
-    """A chart.
-
-    Attributes:
-        title: heading of the chart.
-        svg: the chart as an SVG element.
-        description: contents in words, for screen readers.
-        caption: how it is read, in a sentence.
-        table: its numbers; None if a table of the page has them.
-    """
-
-    title: str
-    svg: str
-    description: str
-    caption: str = ""
-    table: Table | None = None
 
 
 @dataclass(frozen=True)

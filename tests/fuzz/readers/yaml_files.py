@@ -11,7 +11,7 @@ import click
 
 from infthor_eval.cli.commands.run import command as run_command
 from infthor_eval.formats.yaml_files import read_yaml
-from infthor_eval.report.figures.curve_tables import read_panels
+from infthor_eval.report.suites.reward_curves import read_panels
 from infthor_eval.runs.catalog import Catalog
 from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.suites import find_suite

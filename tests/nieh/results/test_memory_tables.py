@@ -147,7 +147,7 @@ def test_a_budget_of_whole_frames_says_so_where_people_read_it(tokens_per_frame,
 
 
 def test_the_picture_has_a_curve_for_each_memory_over_its_budgets():
-    from infthor_eval.report.suites.memory_chart import memory_charts
+    from infthor_eval.report.suites.nieh_charts import memory_charts
 
     runs = [
         SimpleNamespace(model="nano", summary=run_of("nano", memory, memory == "oracle", budget))

@@ -1,7 +1,6 @@
 """Pictures of curves, and the command that draws them."""
 
 import re
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -10,14 +9,13 @@ from PIL import Image
 from infthor_eval.errors import DataError
 from infthor_eval.plans.recorded.curves import plan_curves
 from infthor_eval.plans.records import RECORDS
-from infthor_eval.report.figures.curve_tables import (
+from infthor_eval.report.figures import looks_of, save_figure
+from infthor_eval.report.suites.reward_curves import (
+    curves_result,
     curves_table,
     embedded_label,
-    one_panel,
     read_panels,
 )
-from infthor_eval.report.figures.curves import curves_figure
-from infthor_eval.report.figures.style import looks_of, save_figure
 from infthor_eval.runs import read_run
 
 from ...helpers.command_line import option_words
@@ -53,7 +51,7 @@ def runs(**about):
 
 def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
     curves = plan_curves(runs())
-    png, svg = save_figure(lambda: curves_figure(curves, one_panel(curves)), tmp_path, "figure7")
+    png, svg = save_figure(curves_result(curves, None).plot, tmp_path, "figure7")
     with Image.open(png) as picture:
         assert min(picture.size) > 300
         assert len(picture.convert("RGB").getcolors(1 << 20)) > 10
@@ -78,16 +76,14 @@ def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
 
 def test_a_name_in_letters_that_the_font_lacks_is_no_warning(tmp_path, recwarn):
     curves = plan_curves([make_plans_run("模型", records(1.0))])
-    _, svg = save_figure(lambda: curves_figure(curves, one_panel(curves)), tmp_path, "figure7")
+    _, svg = save_figure(curves_result(curves, None).plot, tmp_path, "figure7")
     assert "模型" in read_texts(svg)
     assert not recwarn.list
 
 
 def test_the_same_curves_give_the_same_bytes(tmp_path):
     first, second = (
-        save_figure(partial(curves_figure, curves, one_panel(curves)), tmp_path, name)[
-            1
-        ].read_bytes()
+        save_figure(curves_result(curves, None).plot, tmp_path, name)[1].read_bytes()
         for name, curves in (("one", plan_curves(runs())), ("two", plan_curves(runs())))
     )
     assert first == second
@@ -95,7 +91,7 @@ def test_the_same_curves_give_the_same_bytes(tmp_path):
 
 def test_a_bound_without_tokens_leaves_one_column(tmp_path):
     curves = plan_curves([make_plans_run("m", records(1.0, tokens=False))])
-    _, svg = save_figure(lambda: curves_figure(curves, one_panel(curves)), tmp_path, "figure7")
+    _, svg = save_figure(curves_result(curves, None).plot, tmp_path, "figure7")
     assert "at most" in read_texts(svg)
     assert not any("(tokens)" in words for words in read_texts(svg))
 
@@ -131,9 +127,7 @@ def test_panels_have_their_runs_and_the_bound(tmp_path):
     curves = plan_curves(runs())
     file = tmp_path / "panels.yaml"
     file.write_text("First: ['model $x$ & <y>']\nSecond: [_random]\n")
-    _, svg = save_figure(
-        lambda: curves_figure(curves, read_panels(file, curves)), tmp_path, "figure7"
-    )
+    _, svg = save_figure(curves_result(curves, file).plot, tmp_path, "figure7")
     words_drawn = read_texts(svg)
     assert [words_drawn.count(words) for words in ("First", "Second", "planner", "_random")] == [
         1,

@@ -6,10 +6,9 @@ from PIL import Image
 
 from infthor_eval.manipulation.recorded.curves import arm_curves
 from infthor_eval.manipulation.recorded.radii import success_by_radius
-from infthor_eval.report.figures.curve_tables import curves_table, one_panel
-from infthor_eval.report.figures.curves import curves_figure
-from infthor_eval.report.figures.radius import radii_figure, radii_table
-from infthor_eval.report.figures.style import save_figure
+from infthor_eval.report.figures import save_figure
+from infthor_eval.report.suites.manipulation import radii_result
+from infthor_eval.report.suites.reward_curves import curves_result
 
 from ...helpers.arm_runs import make_arm_planner_run, make_arm_run, make_episode_record
 from .drawings import read_texts
@@ -35,7 +34,8 @@ def runs():
 
 def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
     curves = arm_curves([replace(run, label=f"run {number}") for number, run in enumerate(runs())])
-    _, svg = save_figure(lambda: curves_figure(curves, one_panel(curves)), tmp_path, "figure6")
+    result = curves_result(curves, None)
+    _, svg = save_figure(result.plot, tmp_path, "figure6")
     words_drawn = read_texts(svg)
     for words in (
         "Pick-up and put",
@@ -49,7 +49,7 @@ def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
     ):
         assert words in words_drawn
     assert words_drawn.count("the expert's step (low-level action)") == 3
-    table = curves_table(curves)
+    table = result.table
     names = [
         "run",
         "reward",
@@ -73,10 +73,8 @@ def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
 
 
 def test_success_by_radius_is_drawn_with_its_floor(tmp_path):
-    curves = success_by_radius(runs())
-    one, other = (
-        save_figure(lambda: radii_figure(curves), tmp_path, name)[1] for name in ("one", "other")
-    )
+    result = radii_result(success_by_radius(runs()))
+    one, other = (save_figure(result.plot, tmp_path, name)[1] for name in ("one", "other"))
     assert one.read_bytes() == other.read_bytes()
     for words in (
         "Pick-up",
@@ -89,7 +87,7 @@ def test_success_by_radius_is_drawn_with_its_floor(tmp_path):
         assert words in read_texts(one)
     with Image.open(tmp_path / "one.png") as picture:
         assert min(picture.size) > 300
-    table = radii_table(curves)
+    table = result.table
     assert [column.name for column in table.columns][2:] == ["0.1 m", "0.5 m", "episodes"]
     assert [row.cells[:2] for row in table.rows] == [
         ("m", "Pick-up"),
