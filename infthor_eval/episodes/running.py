@@ -82,7 +82,7 @@ class EpisodeRunner(Generic[E, P]):
             outcome = with_retries(self._simulator, run, self._drop_environment)
         except InfthorError as error:
             outcome = error
-        request = "" if self.request is None else keep_request(self.request, session)
+        request = keep_request(self.request, session)
         if isinstance(outcome, (InfeasibleError, SceneError)):
             return unit.record_exclusion(str(outcome), fingerprint)
         if isinstance(outcome, InfthorError):

@@ -86,7 +86,7 @@ class SampleWriter:
                 content.append(_text(question if part is None else part))
                 continue
             images = [_attach(next(frames), attachments) for _ in range(part.n)]
-            content += images if all(images) else [_text(_words(part))]
+            content += images if all(images) else [_text(part.in_words)]
         return {"role": "user", "content": _joined(content), "source": "input"}
 
     def _frames(self, sample: Sample) -> Iterator[FrameRef | None]:
@@ -191,13 +191,6 @@ def _data_uri(frame: FrameRef) -> str:
 
 def _text(text: str) -> Document:
     return {"type": "text", "text": text}
-
-
-def _words(frames: StoredFrames) -> str:
-    places = ", ".join(
-        str(first) if first == last else f"{first} to {last}" for first, last in frames.places
-    )
-    return f"[{frames.what}: {places}]" if places else f"[{frames.n} {frames.what}]"
 
 
 def _joined(content: Sequence[Document]) -> list[Document]:

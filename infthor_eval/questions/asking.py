@@ -112,8 +112,8 @@ class Request(Generic[Payload]):
         raise NotImplementedError
 
     @property
-    def stored(self) -> StoredRequest:
-        """The request as the journal has it."""
+    def stored(self) -> StoredRequest | None:
+        """The request as the journal has it; None for a baseline that is sent none."""
         raise NotImplementedError
 
     @cached_property

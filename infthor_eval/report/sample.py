@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -212,7 +213,7 @@ class Sample:
 
     def _request_in_words(self) -> str:
         problem = self.request_problem
-        known = self.request_text(_frames_in_words) or ""
+        known = self.request_text(attrgetter("in_words")) or ""
         return f"not known: {problem}" if problem else known
 
 
@@ -239,13 +240,6 @@ def load_sample(
     """See `infthor_eval.load_sample`."""
     runs = open_runs([Path(folder)], warnings.warn)
     return find_samples(runs, name, None if data is None else Path(data))[0]
-
-
-def _frames_in_words(frames: StoredFrames) -> str:
-    places = ", ".join(
-        str(first) if first == last else f"{first} to {last}" for first, last in frames.places
-    )
-    return f"[{frames.n} {frames.what}{f': {places}' if places else ''}]\n"
 
 
 def _in_words(step: StepRow) -> str:

@@ -146,8 +146,11 @@ class Session(Protocol[Payload]):
         """Cache an artifact for when the run is resumed, with what its requests took."""
 
 
-def keep_request(request: StoredRequest, session: Session[Any]) -> str:
-    """Put a request into the journal unless it is there; return the name that records have."""
+def keep_request(request: StoredRequest | None, session: Session[Any]) -> str:
+    """Put a request into the journal unless it is there; return the name that records have, which
+    is empty for none."""
+    if request is None:
+        return ""
     name = request.fingerprint
     if session.find_artifact(name, StoredRequest) is None:
         session.cache_artifact(name, request)

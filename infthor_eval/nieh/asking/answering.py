@@ -52,9 +52,12 @@ class NiehRequest(Request[NiehAnswer]):
         return self.prepared.task_samples.words
 
     @property
-    def stored(self) -> StoredRequest:
-        """See `Request`."""
-        return self.prepared.task_samples.stored_request(self.unit.sample, self.context, self.text)
+    def stored(self) -> StoredRequest | None:
+        """See `Request`; for baselines no memory recalls anything."""
+        sample = self.unit.sample
+        if sample.awaits_recall:
+            return None
+        return self.prepared.task_samples.stored_request(sample, self.context, self.text)
 
     def replied(self, reply: Reply, answer: str, thinking: str | None) -> NiehAnswer:
         """See `Request`."""

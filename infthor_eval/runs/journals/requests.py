@@ -32,6 +32,14 @@ class StoredFrames(msgspec.Struct, frozen=True, omit_defaults=True):
     places: tuple[Stretch, ...] = ()
     what: str = "frames"
 
+    @property
+    def in_words(self) -> str:
+        """Places of the frames, or their number, in square brackets: "[frames: 3, 5 to 9]"."""
+        places = ", ".join(
+            str(first) if first == last else f"{first} to {last}" for first, last in self.places
+        )
+        return f"[{self.what}: {places}]" if places else f"[{self.n} {self.what}]"
+
 
 class StoredRequest(
     msgspec.Struct, frozen=True, omit_defaults=True, tag_field="type", tag="request"
