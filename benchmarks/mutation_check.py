@@ -1,4 +1,4 @@
-"""Whether the tests of six core modules notice small faults: mutants of each module, and those that
+"""Whether the tests of core modules notice small faults: mutants of each module, and those that
 survive.
 
     python benchmarks/mutation_check.py [TREE] [--per-module 21] [--seed 0] [--only NAME,...]
@@ -52,6 +52,27 @@ _MODULES = {
         "tests/runs/work/test_driver.py tests/runs/work/test_refusals.py "
         "tests/runs/work/test_scheduling.py tests/runs/test_results.py",
     ),
+    "requests": (
+        "infthor_eval/runs/journals/requests.py",
+        "tests/runs/journals/test_requests.py tests/nieh/rescoring/test_rebuilt_requests.py",
+    ),
+    "run": (
+        "infthor_eval/run.py",
+        "tests/report/test_three_states.py tests/report/test_plain.py tests/test_data_frames.py "
+        "tests/cli/commands/test_show.py",
+    ),
+    "settings": ("infthor_eval/settings.py", "tests/test_settings.py tests/nieh/test_suite.py"),
+    "facets": ("infthor_eval/facets.py", "tests/nieh/results tests/report/suites"),
+    "pairs": (
+        "infthor_eval/pairs.py",
+        "tests/nieh/results/test_pair_summary.py tests/plans/twins/test_results.py",
+    ),
+    "asking": (
+        "infthor_eval/questions/asking.py",
+        "tests/questions/test_suite.py tests/nieh/asking",
+    ),
+    "sample": ("infthor_eval/report/sample.py", "tests/report/test_sample.py tests/exports"),
+    "charts": ("infthor_eval/report/charts.py", "tests/report/test_charts.py"),
 }
 # Hypothesis' profile "ci" draws the same examples each time, remembers none and sets no deadlines.
 _PYTEST = ("-x", "-q", "-p", "no:cacheprovider", "-m", "not slow", "--hypothesis-profile=ci")
