@@ -7,20 +7,19 @@ import os
 import re
 import signal
 import sys
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
 import infthor_eval
 from infthor_eval.cli.help import ExampleGroup
-from infthor_eval.cli.options.repeated import refuse_repeated_options
-from infthor_eval.cli.own_code import end_process, noticed
-from infthor_eval.cli.progress.patience import answer_ctrl_c
-from infthor_eval.cli.progress.stopping import handle_signal
+from infthor_eval.cli.progress.stopping import answer_ctrl_c, handle_signal
 from infthor_eval.errors import (
     InfthorError,
     OutputClosed,
@@ -30,6 +29,7 @@ from infthor_eval.errors import (
     unknown_name,
 )
 from infthor_eval.plugins import import_target
+from infthor_eval.storage.limits import OWN_CODE_SECONDS
 from infthor_eval.storage.scratch import remove_abandoned
 from infthor_eval.terminal import error_console, print_error
 
@@ -91,6 +91,8 @@ _USUAL = {"models", "tasks", "data", "model_args", "context", "memory", "frames"
 _INTERRUPTED, _TERMINATED = 130, 143  # exit codes
 _STOPPED = "stopped; run the same command to continue"
 _COLLECT_AFTER = 50_000  # new objects between two collections of garbage
+_SOON_S = 1.0  # in which most threads end by themselves
+end_process = os._exit
 
 
 class Program(ExampleGroup):
@@ -110,7 +112,7 @@ class Program(ExampleGroup):
             raise unknown_name("command", args[0], names)
         name, command, rest = super().resolve_command(ctx, args)
         if command is not None:
-            refuse_repeated_options(ctx, command, rest)
+            _refuse_repeated_options(ctx, command, rest)
         return name, command, rest
 
 
@@ -172,7 +174,43 @@ def main(args: list[str] | None = None) -> None:
     run_program(_infthor_eval, args)
 
 
-@noticed()
+@contextmanager
+def _own_code_contained() -> Iterator[None]:
+    """Make `os._exit` an error of whoever calls it within the context, as `sys.exit` is one, and
+    wait for threads that were begun in it for no longer than `limits.OWN_CODE_SECONDS`."""
+    process, before = os.getpid(), set(threading.enumerate())
+
+    def exit_as_error(status: int) -> NoReturn:
+        if os.getpid() != process:  # forked, as those of multiprocessing, which end so
+            end_process(status)
+        raise SystemExit(f"os._exit({status})")
+
+    os._exit = exit_as_error
+    try:
+        yield
+    except SystemExit as ended:
+        left = [it for it in set(threading.enumerate()) - before if not it.daemon]
+        threading.Thread(target=_end_at_last, args=(left, ended.code), daemon=True).start()
+        raise
+    finally:
+        os._exit = end_process
+
+
+def _end_at_last(left: list[threading.Thread], code: int) -> None:
+    """Once the main thread has ended, wait for others, as Python does, but not for ever."""
+    threading.main_thread().join()
+    time.sleep(_SOON_S)
+    alive = [thread.name for thread in left if thread.is_alive()]
+    if alive:
+        print_error(
+            f"your own code left a thread that runs on ({alive[0]}); make it end, or a daemon; the "
+            f"process ends in {OWN_CODE_SECONDS.value} s ({OWN_CODE_SECONDS.name})"
+        )
+        time.sleep(OWN_CODE_SECONDS.value)
+        end_process(code)
+
+
+@_own_code_contained()
 def run_program(program: click.Command, args: list[str] | None = None) -> None:
     """Run a program, of one command or several; errors meant for people are printed as one line on
     standard error."""
@@ -281,3 +319,38 @@ def _unknown_option(error: click.NoSuchOption) -> str:
 def _exit(program: str, message: str, code: int) -> None:
     print_error(message, program)
     sys.exit(code)
+
+
+def _refuse_repeated_options(
+    context: click.Context, command: click.Command, arguments: Sequence[str]
+) -> None:
+    """Refuse an option with one value that is given twice: click would take the last one without
+    a word. Of a group, its own command is checked."""
+    if isinstance(command, click.Group):
+        inner = command.get_command(context, arguments[0]) if arguments else None
+        if inner is not None:
+            _refuse_repeated_options(context, inner, arguments[1:])
+        return
+    options = filter(_takes_one_value, command.params)
+    with_one_value = {name: option for option in options for name in option.opts}
+    seen: set[str] = set()
+    rest = iter(arguments)
+    for argument in rest:
+        name, equals, _ = argument.partition("=")
+        if argument == "--":
+            return
+        if name not in with_one_value:
+            continue
+        if name in seen:
+            is_list = ",..." in str(with_one_value[name].make_metavar(context))
+            several = ", with commas between several values" if is_list else ""
+            raise click.UsageError(f"{name} is given twice; give it once{several}")
+        seen.add(name)
+        if not equals:
+            next(rest, None)  # its value, which may look like an option
+
+
+def _takes_one_value(option: click.Parameter) -> bool:
+    return isinstance(option, click.Option) and not (
+        option.multiple or option.is_flag or option.count
+    )
