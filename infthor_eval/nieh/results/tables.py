@@ -26,7 +26,6 @@ from infthor_eval.nieh.results.facets import DEPTH, FILE
 from infthor_eval.nieh.results.gains import Gain, find_gains, frames_of, name_of
 from infthor_eval.nieh.results.memory_tables import memory_tables
 from infthor_eval.nieh.results.pair_tables import pair_overview, pair_tables
-from infthor_eval.nieh.results.repeat_tables import repeat_tables
 from infthor_eval.nieh.results.summary import (
     CLUE_COLUMNS,
     OPEN_ENDED,
@@ -63,6 +62,28 @@ _WITHHELD = (
     "The answers of this set are withheld, so every score here is 0. Send the run to the owner of "
     "the set, who has the key."
 )
+_OF_REPEATS = (
+    "asked",
+    "questions",
+    "mean",
+    "95 %",
+    "drawing",
+    "consensus",
+    "agreement",
+    "always",
+    "sometimes",
+    "never",
+    "within",
+    "between",
+)
+_REPEATS_LEGEND = (
+    "95 %: interval over other trajectories, with all that drawing adds. drawing: what the mean "
+    "moves by if the same questions are asked again (95 %). consensus: score of each question's "
+    "commonest answer; agreement: share of its answers that say it.",
+    "always, sometimes, never: questions with full marks in all, some, none of their answers. "
+    "within, between: standard deviation of the scores of one question, and of the questions' true "
+    "means, in points.",
+)
 
 
 def tables(runs: Sequence[RunSummary]) -> list[Table]:
@@ -90,7 +111,7 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
         *question_facet_tables(runs),
         *effective_lengths(runs),
         *memory_tables(runs),
-        *repeat_tables(runs),
+        *_repeat_tables(runs),
         _replies_table(runs),
     ]
 
@@ -128,7 +149,7 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
         *control_tables(runs),
         *_gains_table(runs),
         *memory_tables(runs),
-        *repeat_tables(runs),
+        *_repeat_tables(runs),
     ]
 
 
@@ -414,3 +435,44 @@ def _replies_table(runs: Sequence[RunSummary]) -> Table:
         rows.append(Row((run, name, str(task.yes_no.n), *shares, *further, failures)))
     columns = (*_NAMES, *map(Column, numbers), Column("not in the form asked for", False))
     return Table("Form of the replies", columns, tuple(rows))
+
+
+def _repeat_tables(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return the table of runs with repeated answers; none if there are none."""
+    rows = []
+    for run in runs:
+        assert isinstance(run.summary, NiehSummary)
+        for name, of_task in run.summary.repeats.items():
+            task = run.summary.tasks[name]
+            score = task.total.scores[main_metric(task)]  # repeats are summed up from answers alone
+            interval = (
+                "-"
+                if score.low is None or score.high is None
+                else f"{_percent(score.low)}–{_percent(score.high)}"
+            )
+            shares = (
+                of_task.consensus,
+                of_task.agreement,
+                of_task.always,
+                of_task.sometimes,
+                of_task.never,
+            )
+            spreads = (of_task.variance_within**0.5, of_task.variance_between**0.5)
+            cells = (
+                f"{of_task.n_repeats}x",
+                str(of_task.n_questions),
+                answered_cell(_percent(of_task.mean), of_task.n_questions, task.n),
+                interval,
+                f"±{_percent(of_task.drawing)}",
+                *map(_percent, shares),
+                *map(_percent, spreads),
+            )
+            rows.append(Row((name_of(run), name, *cells)))
+    if not rows:
+        return []
+    columns = (Column("model", False), Column("task", False), *map(Column, _OF_REPEATS))
+    return [Table("Answers that repeat, %, strict scorer", columns, tuple(rows), _REPEATS_LEGEND)]
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.1f}"
