@@ -1,6 +1,6 @@
 """Training of the small model in two stages, from views and replayed sets to a loaded model."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,6 +8,9 @@ from typing import Any
 import msgspec
 import torch
 
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.household.sequence_text import MARKS
+from infthor_eval.household.wording import noun
 from infthor_eval.process_settings import keep_freed_memory
 from infthor_eval.reasons import count_reasons
 from infthor_eval.storage.digests import fingerprint
@@ -16,12 +19,10 @@ from infthor_eval.training.encoding import Encoder
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from recipes.nano.action_sampler import ActionSampler
 from recipes.nano.architecture import BLOCK, GRID, build_untrained, image_processor
-from recipes.nano.corpus import corpus_texts, single_tokens
-from recipes.nano.reading.asking import Asker
+from recipes.nano.reading.asking import Asker, question_intro
 from recipes.nano.reading.episodes import read_episodes
 from recipes.nano.reading.first_weights import set_first_weights
-from recipes.nano.reading.frame_units import read_frame_units
-from recipes.nano.reading.label_units import label_units
+from recipes.nano.reading.frame_units import label_units, read_frame_units
 from recipes.nano.reading.network import ReadingNetwork
 from recipes.nano.reading.question_sampler import QuestionSampler
 from recipes.nano.reading.renaming import Vocabulary
@@ -31,10 +32,13 @@ from recipes.nano.seeing.stage import lower_thresholds, raise_units, seeing_stag
 from recipes.nano.seeing.view_dataset import ViewDataset
 from recipes.nano.seen_objects import SeenFrame, read_seen_frames
 from recipes.nano.settings import NanoRecipe
+from recipes.nano.spelling import spellings
 from recipes.nano.steps import NanoProgress, Stage, run_stage
 
 # What the first stage depends on: with other settings of the second one its tower is still good.
 _SEEING = ("hidden", "layers", "seed", "threads", "vision", "weight_decay")
+_MOST_COUNTED = 30  # numbers up to this are words
+_BEFORE_PLACES = (" in the", " on the")
 
 
 @dataclass(frozen=True)
@@ -71,11 +75,6 @@ def train_small_model(
 
     Returns:
         The trained model with weights rounded to bfloat16.
-
-    Raises:
-        DataError: data cannot be read, or have nothing for one of the stages; or a state is damaged
-            or cannot be written.
-        UsageError: the states are of another recipe or other data.
     """
     keep_freed_memory()
     torch.set_num_threads(recipe.threads)
@@ -172,3 +171,41 @@ def _settings(recipe: NanoRecipe, names: Sequence[str] | None = None) -> dict[st
     settings = msgspec.to_builtins(recipe)
     chosen = {name: settings[name] for name in names or settings}
     return {"recipe": fingerprint(chosen)}
+
+
+def corpus_texts(folders: Sequence[Path], types: Iterable[str]) -> Iterator[str]:
+    """Yield all texts of the sets, for training a tokenizer that has their words."""
+    for object_type in types:
+        yield from spellings(object_type)
+        yield object_type
+    for folder in folders:
+        for path in sorted((folder / "metadata").glob("*/traj.txt")):
+            text = path.read_text(encoding="utf-8").replace("<image>", " ")
+            for mark in MARKS:
+                text = text.replace(mark, "\n")
+            yield from text.splitlines()
+        for question in NiehSet(folder).questions:
+            yield f" {question.text}"
+            yield from (f"{space}{answer}" for answer in question.answers for space in ("", " "))
+    yield from map(str, range(_MOST_COUNTED))
+    yield question_intro()
+
+
+def single_tokens(
+    folders: Sequence[Path], vocabulary: Vocabulary, types: Iterable[str]
+) -> list[str]:
+    """Return the texts of several words that become one token.
+
+    They are the introduction of every question of the published evaluation, which would otherwise
+    be three quarters of a question's tokens; what questions say around the things that they name;
+    and the names of these.
+    """
+    names = [f" {noun(name)}" for name in types]
+    phrases = {
+        phrase
+        for folder in folders
+        for question in NiehSet(folder).questions
+        for phrase in vocabulary.phrases(question.text)
+    }
+    texts = [*_BEFORE_PLACES, *sorted(phrases), *names]
+    return [question_intro(), *dict.fromkeys(text for text in texts if " " in text.strip())]
