@@ -51,7 +51,7 @@ RULES = {
 }
 KNOWN = {
     "NIEH, STRICT_RULES": ("3", "c6d20215bda257fb"),
-    "plans, `version` of `default` in rewards.yaml": (1, "e810903250283db3"),
+    "plans, `version` of `default` in rewards.yaml": (1, "4ad246986050da76"),
     "plans, `version` of `published` in rewards.yaml": (1, "12969017c5545988"),
     "manipulation, SUCCESS_RULES": (1, "7158e9013cc2da48"),
 }

@@ -31,7 +31,6 @@ from recipes.nano.reading.frame_units import read_frame_units
 from recipes.nano.reading.network import ReadingNetwork
 from recipes.nano.reading.renaming import Vocabulary
 from recipes.nano.seeing.network import SeeingNetwork
-from recipes.nano.seeing.stage import whiten_patches
 from recipes.nano.seeing.view_dataset import ViewDataset
 from recipes.nano.seen_objects import read_seen_frames
 from recipes.nano.settings import (
@@ -41,7 +40,13 @@ from recipes.nano.settings import (
     VisionSettings,
 )
 from recipes.nano.spelling import spellings
-from recipes.nano.stages import TrainingData, corpus_texts, single_tokens, train_small_model
+from recipes.nano.stages import (
+    TrainingData,
+    corpus_texts,
+    single_tokens,
+    train_small_model,
+    whiten_patches,
+)
 
 from ...helpers.bundled import bundled_name
 
