@@ -130,6 +130,10 @@ class PlanEnvironment:
             in_words: whether the past is also described in words; the simulator must then send
                 instance masks.
             in_one_go: whether published rewards are those of a final task that is done in one go.
+
+        Raises:
+            DataError: the trajectory has a task without a goal, or an unknown kind of plan.
+            SimulatorError: the simulator has no such scene or fails.
         """
         self.trajectory = trajectory
         self.plans: Sequence[Plan] = plans_of(trajectory, words)
@@ -163,6 +167,14 @@ class PlanEnvironment:
             (under the published rules the planner's, as there is no highest), `n_expert`, the
             number of the expert's actions, and `expert_reward`, what the published loop adds to the
             expert's total (None under other rules).
+
+        Raises:
+            IndexError: there is no such plan.
+            ExpertRefusedError: this simulator refuses an action of the expert before the plan's
+                end.
+            InfeasibleError: the scene lacks an object of the plan, or the published rewards fail in
+                it.
+            SimulatorError: the simulator fails.
         """
         if not 0 <= plan < len(self.plans):
             raise IndexError(f"there is no plan {plan}; there are 0 to {len(self.plans) - 1}")
@@ -191,6 +203,11 @@ class PlanEnvironment:
 
         The expert must have passed it (`expert_actions`) before the reset, as it would otherwise
         act in this world.
+
+        Raises:
+            InfeasibleError: the scene lacks an object of the plan, or the published rewards fail in
+                it.
+            SimulatorError: the simulator fails.
         """
         present = self.plans[plan]
         view = self._simulator.view
@@ -228,6 +245,10 @@ class PlanEnvironment:
 
         Args:
             action: text of the action (`PickupObject Mug`), or a call of AI2-THOR's.
+
+        Raises:
+            RuntimeError: the plan is over, or there was no reset.
+            SimulatorError: the simulator fails.
         """
         if self._plan is None:
             raise RuntimeError("no plan is under way; reset the environment to one")
@@ -250,7 +271,11 @@ class PlanEnvironment:
         return self._expert.actions(plan)
 
     def named_objects(self, plan: int) -> Sequence[str]:
-        """Return the ids of a plan's objects in the scene; for pictures, not for rewards."""
+        """Return the ids of a plan's objects in the scene; for pictures, not for rewards.
+
+        Raises:
+            ExpertRefusedError: as `reset`.
+        """
         present = self.plans[plan]
         view = self._expert.start(plan).mark.view
         # A grounding remembers its choices, and a picture must not decide any.
@@ -263,6 +288,9 @@ class PlanEnvironment:
         """Return the shortest way to where an object is visible; none if there is no such way.
 
         For subjects that know the room, not for what a subject sees.
+
+        Raises:
+            SimulatorError: the simulator fails.
         """
         grid = reachable_grid(self._simulator)
         viewpoint = find_viewpoint(self._simulator, grid, [object_id])
