@@ -52,7 +52,7 @@ RULES = {
 KNOWN = {
     "NIEH, STRICT_RULES": ("3", "c6d20215bda257fb"),
     "plans, `version` of `default` in rewards.yaml": (1, "4ad246986050da76"),
-    "plans, `version` of `published` in rewards.yaml": (1, "12969017c5545988"),
+    "plans, `version` of `published` in rewards.yaml": (1, "47022a5010ab61f0"),
     "manipulation, SUCCESS_RULES": (1, "7158e9013cc2da48"),
 }
 GOLDEN = ("3", "8706689b01e7ae64")

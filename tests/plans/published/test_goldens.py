@@ -35,10 +35,10 @@ from infthor_eval.plans.published.rewards import (
     Treated,
     UnscoredError,
 )
+from infthor_eval.plans.published.script import ground_published, published_call
 from infthor_eval.plans.records import PlanRecord, StepRecord
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.summary import log_rows
-from infthor_eval.thor.published_actions import ground_published, published_call
 from infthor_eval.thor.view import ThorObject, Vector
 
 GOLDENS = Path(__file__).parents[3] / "../shared/data/published_goldens"
