@@ -88,11 +88,17 @@ def _place_sink(plan: RoomPlan, top: SimObject, at: float) -> None:
     basin = plan.place_against(
         "z+", "SinkBasin", at, y=_HEIGHT - 0.169, size=(0.5, 0.164, 0.38), gap=0.12
     )
-    name_after(sink, basin)
+    _let_in(top, sink, basin)
     faucet = plan.place_against("z+", "Faucet", at, y=_HEIGHT, size=(0.16, 0.28, 0.2), gap=0.04)
     faucet.style = 0
-    top.pieces, sink.pieces = rim_pieces(top, sink), rim_pieces(sink, basin)
     plan.place_against("z+", "Window", at, y=1.25, size=(_MODULE - 0.04, 0.9, 0.06), gap=-0.02)
+
+
+def _let_in(top: SimObject, sink: SimObject, basin: SimObject) -> None:
+    """Let a sink into a counter, and its basin into the sink."""
+    name_after(sink, basin)
+    top.pieces = rim_pieces(top, sink)
+    sink.pieces = rim_pieces(sink, basin)
 
 
 def _place_stove(plan: RoomPlan, at: float) -> None:
@@ -314,8 +320,7 @@ def _place_washstand(plan: RoomPlan, at: float) -> None:
     basin = plan.place_against(
         "z+", "SinkBasin", at, y=_TOP - 0.149, size=(0.44, 0.144, 0.34), gap=0.1
     )
-    name_after(sink, basin)
-    top.pieces, sink.pieces = rim_pieces(top, sink), rim_pieces(sink, basin)
+    _let_in(top, sink, basin)
     plan.place_against("z+", "Faucet", at, y=_TOP, size=(0.14, 0.2, 0.16), gap=0.03)
     plan.place_against("z+", "Mirror", at, y=1.2, size=(1.0, 0.8, 0.04))
     for column in (-1, 0, 1):

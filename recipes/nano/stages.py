@@ -154,7 +154,9 @@ def _prepare(recipe: NanoRecipe, data: TrainingData) -> _Training:
 
 def _seeing(training: _Training) -> Stage:
     """The tower learns to see; its first layer is set to the views' principal components."""
-    recipe, views, vision = training.recipe, training.views, training.recipe.vision
+    recipe = training.recipe
+    views = training.views
+    vision = recipe.vision
     network = SeeingNetwork(training.tower, views, image_processor())
     rng = np.random.default_rng(recipe.seed)
     first = views.random_frames(min(_WHITENED_FRAMES, len(views)), rng)
@@ -232,8 +234,12 @@ def raise_units(tower: Any, units: Units) -> None:
 
 
 def _reading(training: _Training, print_note: Callable[[str], None]) -> Stage:
-    recipe, loaded, seen = training.recipe, training.loaded, training.seen
-    views, units, tower = training.views, training.views.units, training.tower
+    recipe = training.recipe
+    loaded = training.loaded
+    seen = training.seen
+    views = training.views
+    units = views.units
+    tower = training.tower
     lower_thresholds(tower, units)
     encoder = Encoder(loaded)
     episodes, skipped = read_episodes(training.sets)
