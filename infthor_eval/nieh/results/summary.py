@@ -38,7 +38,6 @@ from infthor_eval.runs import UnitRecord
 
 CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
 OPEN_ENDED = "open-ended"  # column of questions whose answer is neither yes, no nor a number
-
 _NORMAL_95 = 1.96
 
 Record = UnitRecord[NiehAnswer]
@@ -342,7 +341,7 @@ def _mean_record(records: Sequence[Record]) -> Record:
 
 
 def _scores(records: Sequence[Record], metric: str) -> list[float]:
-    return [record.payload.scores.get(metric, 0.0) for record in records]
+    return [score_of(record, metric) for record in records]
 
 
 def summarise_repeats(questions: Sequence[Sequence[Record]], metric: str) -> RepeatSummary | None:
