@@ -7,18 +7,17 @@ import os
 import re
 import signal
 import sys
-import threading
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from types import FrameType
-from typing import Any, NoReturn
+from typing import Any
 
 import click
 
 import infthor_eval
 from infthor_eval.cli.help import ExampleGroup
+from infthor_eval.cli.own_code import end_process, noticed
 from infthor_eval.cli.progress.stopping import answer_ctrl_c, handle_signal
 from infthor_eval.errors import (
     InfthorError,
@@ -29,7 +28,6 @@ from infthor_eval.errors import (
     unknown_name,
 )
 from infthor_eval.plugins import import_target
-from infthor_eval.storage.limits import OWN_CODE_SECONDS
 from infthor_eval.storage.scratch import remove_abandoned
 from infthor_eval.terminal import error_console, print_error
 
@@ -91,8 +89,6 @@ _USUAL = {"models", "tasks", "data", "model_args", "context", "memory", "frames"
 _INTERRUPTED, _TERMINATED = 130, 143  # exit codes
 _STOPPED = "stopped; run the same command to continue"
 _COLLECT_AFTER = 50_000  # new objects between two collections of garbage
-_SOON_S = 1.0  # in which most threads end by themselves
-end_process = os._exit
 
 
 class Program(ExampleGroup):
@@ -174,43 +170,7 @@ def main(args: list[str] | None = None) -> None:
     run_program(_infthor_eval, args)
 
 
-@contextmanager
-def _own_code_contained() -> Iterator[None]:
-    """Make `os._exit` an error of whoever calls it within the context, as `sys.exit` is one, and
-    wait for threads that were begun in it for no longer than `limits.OWN_CODE_SECONDS`."""
-    process, before = os.getpid(), set(threading.enumerate())
-
-    def exit_as_error(status: int) -> NoReturn:
-        if os.getpid() != process:  # forked, as those of multiprocessing, which end so
-            end_process(status)
-        raise SystemExit(f"os._exit({status})")
-
-    os._exit = exit_as_error
-    try:
-        yield
-    except SystemExit as ended:
-        left = [it for it in set(threading.enumerate()) - before if not it.daemon]
-        threading.Thread(target=_end_at_last, args=(left, ended.code), daemon=True).start()
-        raise
-    finally:
-        os._exit = end_process
-
-
-def _end_at_last(left: list[threading.Thread], code: int) -> None:
-    """Once the main thread has ended, wait for others, as Python does, but not for ever."""
-    threading.main_thread().join()
-    time.sleep(_SOON_S)
-    alive = [thread.name for thread in left if thread.is_alive()]
-    if alive:
-        print_error(
-            f"your own code left a thread that runs on ({alive[0]}); make it end, or a daemon; the "
-            f"process ends in {OWN_CODE_SECONDS.value} s ({OWN_CODE_SECONDS.name})"
-        )
-        time.sleep(OWN_CODE_SECONDS.value)
-        end_process(code)
-
-
-@_own_code_contained()
+@noticed()
 def run_program(program: click.Command, args: list[str] | None = None) -> None:
     """Run a program, of one command or several; errors meant for people are printed as one line on
     standard error."""

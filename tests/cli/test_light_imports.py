@@ -57,7 +57,7 @@ def test_listings_and_help_are_printed_at_once(typed: str) -> None:
 FIRST_QUESTION = """
 import sys
 from infthor_eval.cli import main
-from infthor_eval.cli.main import end_process
+from infthor_eval.cli.own_code import end_process
 from infthor_eval.questions import asking
 
 def print_modules(*_):
