@@ -28,9 +28,14 @@ from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans import task as plans_task
 from infthor_eval.plans.plan import PlanKind
-from infthor_eval.plans.published.goals import Treated
 from infthor_eval.plans.published.paths import PublishedPaths
-from infthor_eval.plans.published.rewards import PublishedState, PublishedTask, Transition, pose_of
+from infthor_eval.plans.published.rewards import (
+    PublishedState,
+    PublishedTask,
+    Transition,
+    Treated,
+    pose_of,
+)
 from infthor_eval.plans.published.script import PublishedReward, PublishedScript
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.rewards import StepReward

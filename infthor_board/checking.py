@@ -5,24 +5,33 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from infthor_board.case import Case, Check
-from infthor_board.checks.copies import CopiedRecords, CopiedReplies
-from infthor_board.checks.floors import AboveBlind, AboveOtherHome
-from infthor_board.checks.identity import CompleteIdentity, SameModel, UneditedConfig
-from infthor_board.checks.key import KeyForm, KeyScore, KeySpelling, KeyWords
-from infthor_board.checks.pairs import (
+from infthor_board.checks.replies import (
+    AboveBlind,
+    AboveOtherHome,
+    CopiedRecords,
+    CopiedReplies,
+    KeyForm,
+    KeyScore,
+    KeySpelling,
+    KeyWords,
     PairsOfBothWorlds,
     PairsOfWhatDiffers,
     PairsWithSingles,
 )
-from infthor_board.checks.questions import (
+from infthor_board.checks.requests import SameRequests
+from infthor_board.checks.runs import (
     AllThere,
     AskedOnce,
+    CompleteIdentity,
     NoneOfAnotherSet,
+    SameModel,
+    SameResults,
+    SameScorers,
+    SameScores,
     SameSet,
     SameTask,
+    UneditedConfig,
 )
-from infthor_board.checks.requests import SameRequests
-from infthor_board.checks.scores import SameResults, SameScorers, SameScores
 from infthor_board.expected import Expected, Owner
 from infthor_board.reading import Problem, Submission, describe, read_submission
 from infthor_board.statement import find_submissions
@@ -87,9 +96,6 @@ def check_submissions(
         owner: who checks, with the tasks and sets.
         others: folder of earlier submissions, which no reply may be copied from.
         allowed: names of checks that warn in place of refusing, as the owner has looked.
-
-    Raises:
-        DataError: there is no submission.
     """
     cases = [_open(path, owner) for path in find_submissions(folder)]
     earlier = [] if others is None else _earlier(cases, find_submissions(others), owner)

@@ -110,11 +110,7 @@ class Owner:
         include: Sequence[Path] = (),
         key: Path | None = None,
     ) -> None:
-        """Open the sets and the key, and find the task files below further folders.
-
-        Raises:
-            DataError: a set or the key cannot be read.
-        """
+        """Open the sets and the key, and find the task files below further folders."""
         self._sets = [NiehSet(path) for path in sets]
         self._key = None if key is None else read_key(key)
         self._catalog = Catalog.find_installed(include)
@@ -125,9 +121,6 @@ class Owner:
         Args:
             task: name of the task.
             fingerprint: that of the set that a run says it used; of several given ones it is taken.
-
-        Raises:
-            UsageError: there is no such task, or no set for it.
         """
         file = self._file(task)
         bundled = file.settings["dataset_kwargs"].get("bundled")
@@ -139,11 +132,7 @@ class Owner:
         return next(matching, self._sets[0])
 
     def expect(self, run: SubmittedRun) -> Iterator[Expected]:
-        """Yield each task of a run, set up anew.
-
-        Raises:
-            InfthorError: a task cannot be set up here.
-        """
+        """Yield each task of a run, set up anew."""
         for name, config in run.header.config.tasks.items():
             yield self._expect(run, name, config)
 

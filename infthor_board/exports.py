@@ -77,11 +77,7 @@ def _told_score(value: object) -> float | None:
 
 
 def read_exported_scores(path: Path) -> ExportedScores:
-    """Read the scores that a file of samples tells; a form without scores tells none.
-
-    Raises:
-        DataError: the file cannot be read.
-    """
+    """Read the scores that a file of samples tells; a form without scores tells none."""
     found = ExportedScores()
     if name := _LM_EVAL_NAME.fullmatch(path.name):
         found.tasks.add(name["task"])
@@ -148,11 +144,7 @@ def _add_lm_eval(found: ExportedScores, row: Mapping[str, Any]) -> None:
 
 
 def read_exported_means(samples: Path) -> Means:
-    """Return the means by task and metric that the file beside a file of samples tells.
-
-    Raises:
-        DataError: it cannot be read.
-    """
+    """Return the means by task and metric that the file beside a file of samples tells."""
     if named := _EVERY_EVAL_EVER_WITH_MEANS.fullmatch(samples.name):
         path = samples.with_name(f"{named['name']}.json")
         read = _means_of_every_eval_ever

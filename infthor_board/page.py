@@ -84,9 +84,6 @@ def write_leaderboard(
         title: title of the page.
         version: version of the package that checked the rows.
         refused: number of submissions that were refused.
-
-    Raises:
-        DataError: it cannot be written.
     """
     values = {
         "rows": sorted(rows, key=lambda row: row.order),

@@ -62,11 +62,7 @@ class Secret:
 
 
 def read_secret(path: Path) -> Secret:
-    """Read a seed file: 32 to 256 hexadecimal digits in one line.
-
-    Raises:
-        DataError: it cannot be read, or is shorter: what can be tried out is no secret.
-    """
+    """Read a seed file: 32 to 256 hexadecimal digits in one line."""
     text = read_text(path, _HINT).strip()
     if not _HEX.fullmatch(text):
         raise DataError(
@@ -118,9 +114,6 @@ def make_private_set(
         worker_settings: number and place of the workers.
         progress: called with the name of a stage after each home, and whether it was there.
         say: called with messages about the workers.
-
-    Raises:
-        DataError: no twins can be made, or something cannot be written.
     """
     key = prepare_folder(out / "key")
     key.chmod(_OWNER_ALONE)
@@ -166,9 +159,6 @@ def publish(data: NiehSet, secret: Secret, public: Path) -> Path:
 
     The public part has of each trajectory the frames alone, and of each question its words, type
     and clues, which are the same in both worlds. Pairs are not named.
-
-    Raises:
-        DataError: the folder is there already, or a frame cannot be read.
     """
     if public.exists() and any(public.iterdir()):
         raise DataError(f"{public}: is there already; move it away, or give another --out")

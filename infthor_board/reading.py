@@ -136,11 +136,7 @@ def describe(error: Exception) -> str:
 
 
 def _files(folder: Path) -> list[Path]:
-    """Return all files of a submission, sorted.
-
-    Raises:
-        DataError: a folder cannot be searched, or there is a link, which may lead out of it.
-    """
+    """Return all files of a submission, sorted."""
     files = []
     found = [folder]
     with wrap_errors(f"{folder}: cannot be searched", "make it readable, and less deep"):

@@ -44,11 +44,7 @@ class Statement(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 def read_statement(folder: Path) -> Statement:
-    """Read what a submitter says of the submission in a folder.
-
-    Raises:
-        DataError: the file is missing, or a field of it is missing, unknown or of another form.
-    """
+    """Read what a submitter says of the submission in a folder."""
     path = folder / STATEMENT
     if not path.is_file():
         raise DataError(f"{path}: no such file; {_HINT}")
@@ -58,11 +54,7 @@ def read_statement(folder: Path) -> Statement:
 
 
 def find_submissions(folder: Path) -> list[Path]:
-    """Return the folders of submissions: the folder itself, else those in it.
-
-    Raises:
-        DataError: there is none.
-    """
+    """Return the folders of submissions: the folder itself, else those in it."""
     if not folder.is_dir():
         raise DataError(f"{folder}: no such folder; give the folder of a submission, or of several")
     if (folder / STATEMENT).is_file():

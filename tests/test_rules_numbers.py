@@ -19,7 +19,6 @@ from infthor_eval.nieh import numbers, scoring
 from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.scoring import STRICT_RULES, score
 from infthor_eval.plans import rewards, targets
-from infthor_eval.plans.published import goals as published_goals
 from infthor_eval.plans.published import paths, script
 from infthor_eval.plans.published import rewards as published_rewards
 from infthor_eval.plans.reward_rules import reward_rules
@@ -40,7 +39,7 @@ RULES = {
     ),
     "plans, `version` of `published` in rewards.yaml": (
         reward_rules("published").version,
-        (published_rewards, published_goals, paths, script),
+        (published_rewards, paths, script),
     ),
     "manipulation, SUCCESS_RULES": (
         SUCCESS_RULES,
@@ -52,8 +51,8 @@ RULES = {
 }
 KNOWN = {
     "NIEH, STRICT_RULES": ("3", "c6d20215bda257fb"),
-    "plans, `version` of `default` in rewards.yaml": (1, "e810903250283db3"),
-    "plans, `version` of `published` in rewards.yaml": (1, "d52f291635cafbb5"),
+    "plans, `version` of `default` in rewards.yaml": (1, "4ad246986050da76"),
+    "plans, `version` of `published` in rewards.yaml": (1, "47022a5010ab61f0"),
     "manipulation, SUCCESS_RULES": (1, "7158e9013cc2da48"),
 }
 GOLDEN = ("3", "8706689b01e7ae64")

@@ -7,7 +7,7 @@ import os
 import re
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from types import FrameType
@@ -17,10 +17,8 @@ import click
 
 import infthor_eval
 from infthor_eval.cli.help import ExampleGroup
-from infthor_eval.cli.options.repeated import refuse_repeated_options
 from infthor_eval.cli.own_code import end_process, noticed
-from infthor_eval.cli.progress.patience import answer_ctrl_c
-from infthor_eval.cli.progress.stopping import handle_signal
+from infthor_eval.cli.progress.stopping import answer_ctrl_c, handle_signal
 from infthor_eval.errors import (
     InfthorError,
     OutputClosed,
@@ -110,7 +108,7 @@ class Program(ExampleGroup):
             raise unknown_name("command", args[0], names)
         name, command, rest = super().resolve_command(ctx, args)
         if command is not None:
-            refuse_repeated_options(ctx, command, rest)
+            _refuse_repeated_options(ctx, command, rest)
         return name, command, rest
 
 
@@ -281,3 +279,38 @@ def _unknown_option(error: click.NoSuchOption) -> str:
 def _exit(program: str, message: str, code: int) -> None:
     print_error(message, program)
     sys.exit(code)
+
+
+def _refuse_repeated_options(
+    context: click.Context, command: click.Command, arguments: Sequence[str]
+) -> None:
+    """Refuse an option with one value that is given twice: click would take the last one without
+    a word. Of a group, its own command is checked."""
+    if isinstance(command, click.Group):
+        inner = command.get_command(context, arguments[0]) if arguments else None
+        if inner is not None:
+            _refuse_repeated_options(context, inner, arguments[1:])
+        return
+    options = filter(_takes_one_value, command.params)
+    with_one_value = {name: option for option in options for name in option.opts}
+    seen: set[str] = set()
+    rest = iter(arguments)
+    for argument in rest:
+        name, equals, _ = argument.partition("=")
+        if argument == "--":
+            return
+        if name not in with_one_value:
+            continue
+        if name in seen:
+            is_list = ",..." in str(with_one_value[name].make_metavar(context))
+            several = ", with commas between several values" if is_list else ""
+            raise click.UsageError(f"{name} is given twice; give it once{several}")
+        seen.add(name)
+        if not equals:
+            next(rest, None)  # its value, which may look like an option
+
+
+def _takes_one_value(option: click.Parameter) -> bool:
+    return isinstance(option, click.Option) and not (
+        option.multiple or option.is_flag or option.count
+    )

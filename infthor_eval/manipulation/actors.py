@@ -1,7 +1,7 @@
 """What drives an arm: it begins an episode, and gives steps until the episode is over.
 
 To add a baseline of arms: a class in `BASELINES` here, and its name in `infthor_eval/suites.py`;
-how `planner-arm` moves is in `planner/reaching.py`.
+how `planner-arm` moves is in `planner/steps.py`.
 """
 
 import random
@@ -14,7 +14,7 @@ from infthor_eval.formats.pictures.blank import blank_like
 from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment
 from infthor_eval.manipulation.kinds import ManipulationKind
-from infthor_eval.manipulation.planner.reaching import plan_steps
+from infthor_eval.manipulation.planner.steps import plan_steps
 from infthor_eval.runs import StoredRequest
 from infthor_eval.runs.suite import BaselineSubject
 from model_adapters import ArmDelta, Capabilities, Policy, Subject

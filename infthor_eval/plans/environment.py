@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.household.goal_conditions import GoalConditions, goal_conditions
+from infthor_eval.household.goals import GoalConditions, goal_conditions
 from infthor_eval.household.navigation import Grid
 from infthor_eval.household.scout import (
     HORIZON_STEP,
@@ -22,13 +22,12 @@ from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.expert import Expert, ExpertAction
 from infthor_eval.plans.history.past import Past
 from infthor_eval.plans.plan import Plan, PlanKind, plans_of, tasks_of
-from infthor_eval.plans.published.script import PublishedReward, PublishedScript
+from infthor_eval.plans.published.script import PublishedReward, PublishedScript, current_call
 from infthor_eval.plans.reward_rules import RewardRules, reward_rules
 from infthor_eval.plans.rewards import PlanReward, StepReward, count_actions_to_goal, max_reward
 from infthor_eval.plans.targets import PlanTarget, target_of
 from infthor_eval.thor.actions import UngroundedError, ground, parse_action, text_of_call
 from infthor_eval.thor.frames import FrameKeeper, NoFrames
-from infthor_eval.thor.published_actions import current_call
 from infthor_eval.thor.recorded import degrees_of
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView

@@ -18,7 +18,7 @@ class RewardRules(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     Attributes:
         scoring: who rewards actions: "default" (`rewards`) or "published" (`published.rewards`).
         grounding: how a name becomes an object: "strict" (`thor.actions`) or "published"
-            (`thor.published_actions`).
+            (`plans.published.script`).
         force_action: whether calls of agents have `forceAction`, with which held objects never
             block a move.
         task_done: reward when the goal of the plan's task is reached.

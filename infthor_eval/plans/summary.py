@@ -1,6 +1,7 @@
 """Results of a run of plans: a pure function of its journal, without times."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -18,8 +19,8 @@ from infthor_eval.episodes.summary import (
 )
 from infthor_eval.facets import Facet
 from infthor_eval.plans.config import PlansConfig, PlansTaskConfig
+from infthor_eval.plans.environment import Ended
 from infthor_eval.plans.plan import PlanKind
-from infthor_eval.plans.published.log import log_rows
 from infthor_eval.plans.records import PlanRecord
 from infthor_eval.plans.twins.results import TwinResults, twin_results
 from infthor_eval.rates import Rate, clustered_rate, rate_over_clusters
@@ -34,6 +35,28 @@ _COLUMNS: dict[str, frozenset[str]] = {
 }
 NEVER = "not seen"  # class of plans whose clue was never in view, or is not known
 FINAL_COLUMNS = tuple(_COLUMNS)  # of the paper's table of final tasks
+
+
+@dataclass(frozen=True)
+class _LogRow:
+    """A row of the published log: the state of the totals after an action.
+
+    Attributes:
+        step: actions of the expert before the plan, and successful ones of the agent in it.
+        total_reward: reward of the expert before the plan, and of these actions.
+        agent_reward: reward of the agent in all plans.
+        reward: reward of the action (`t_reward`).
+        sub_goal: kind of the plan.
+        plan: index of the plan (`high_idx`).
+    """
+
+    step: int = 0
+    total_reward: float = 0.0
+    agent_reward: float = 0.0
+    action: str = "INIT"
+    reward: float = 0.0
+    sub_goal: str = "INIT"
+    plan: int = 0
 
 
 class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
@@ -149,6 +172,37 @@ def _logged(trajectories: Mapping[str, Sequence[PlanRecord]]) -> dict[str, Rate]
         for name, values in totals.items()
         if (rate := rate_over_clusters(values)) is not None
     }
+
+
+def log_rows(plans: Sequence[PlanRecord]) -> Iterator[_LogRow]:
+    """Yield what the published loop logs of a trajectory (`agent.log`), after `INIT`.
+
+    `total_reward` is set to the expert's at the beginning of each plan; `agent_reward` goes on from
+    plan to plan. The reward of an action that completes a plan enters neither, as the loop returns
+    before it adds it.
+
+    Args:
+        plans: in time order, run under the published rules.
+    """
+    last = _LogRow()
+    yield last
+    n_expert = 0
+    expert_total = 0.0
+    agent_total = 0.0
+    for plan in plans:
+        n_actions = n_expert
+        total = expert_total
+        for number, step in enumerate(plan.steps, 1):
+            # A failed action ends the plan and earns nothing; a completing one is left out.
+            ends = number == len(plan.steps) and plan.ended != Ended.LIMIT
+            if not ends:
+                n_actions += 1
+                total += step.reward
+                agent_total += step.reward
+            text = step.reply if step.reply is not None else step.action
+            yield _LogRow(n_actions, total, agent_total, text, step.reward, plan.kind, plan.index)
+        n_expert += plan.n_expert_steps
+        expert_total += plan.expert_reward or 0.0
 
 
 def _success(records: Sequence[Record], kinds: frozenset[str]) -> Rate | None:

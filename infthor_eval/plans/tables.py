@@ -21,7 +21,6 @@ from infthor_eval.plans.summary import (
     FINAL_COLUMNS,
     PlanTaskSummary,
 )
-from infthor_eval.plans.twins.tables import NET_PAIRS, format_pairs, twin_tables
 from infthor_eval.rates import Rate, format_number, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
@@ -41,6 +40,27 @@ _PUBLISHED_RULES = (
     "without end. The logged totals are the script's, which leaves out the reward of an action "
     "that completes a plan."
 )
+_NET_PAIRS = "net pairs, %"
+_TWIN_COLUMNS = (
+    _NET_PAIRS,
+    "right, %",
+    "exchanged, %",
+    "both done, %",
+    "worlds right, %",
+    "one of two, %",
+    "same place, %",
+    "nowhere, %",
+    "opened in vain",
+    "excess actions",
+    "pairs",
+    "incomplete",
+)
+_TWIN_NOTE = (
+    "Right is who looks first where the object is, in both worlds; exchanged, who looks in both "
+    "where it is in the other. net pairs: right less exchanged, with the 95 % bootstrap interval "
+    "over trajectories; 0 on average for who does not know which world is which. Containers and "
+    "actions are means of worlds."
+)
 
 
 def overview_table(runs: Sequence[RunSummary]) -> Table:
@@ -50,9 +70,10 @@ def overview_table(runs: Sequence[RunSummary]) -> Table:
     rows = []
     for *names, task in tasks:
         success = format_percent(task.success.get("total"), task.n_plans)
-        second = format_pairs(task.twins) if has_twins else format_percent(task.reward_share)
+        pairs = None if task.twins is UNSET else task.twins.net_pairs
+        second = format_percent(pairs if has_twins else task.reward_share)
         rows.append(Row((*names, success, second, *_sizes(task)[:3])))
-    second_column = NET_PAIRS if has_twins else "reward, % of the most"
+    second_column = _NET_PAIRS if has_twins else "reward, % of the most"
     columns = (*NAME_COLUMNS, *map(Column, ("completed, %", second_column, *_COUNTS[:3])))
     notes = (*result_notes(runs), *_decoding_notes(runs))
     return Table("Plans, 95 % interval in brackets", columns, tuple(rows), notes)
@@ -63,7 +84,7 @@ def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
     tasks = list(named_tasks(runs))
     endings = endings_table("How plans ended", tasks, "actions", _actions)
     return [
-        *twin_tables(tasks),
+        *_twin_tables(tasks),
         _success_table(runs, tasks),
         *_distance_tables(tasks),
         _reward_table(tasks),
@@ -197,3 +218,37 @@ def _is_comparable(run: RunSummary) -> bool:
 
 def _is_published(task: PlansTaskConfig, rewards: Mapping[str, Any]) -> bool:
     return task.protocol == "published" and rewards.get("scoring") == "published"
+
+
+def _twin_tables(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> list[Table]:
+    """Return the table of the tasks whose trajectories are twins; none without such a task."""
+    rows = []
+    for *names, task in tasks:
+        twins = task.twins
+        if twins is UNSET:
+            continue
+        shares = (
+            twins.net_pairs,
+            twins.pair_accuracy,
+            twins.pairs_exchanged,
+            twins.pair_success,
+            twins.accuracy,
+            twins.one_of_two,
+            twins.same_place,
+            twins.nowhere,
+        )
+        rows.append(
+            Row(
+                (
+                    *names,
+                    *map(format_percent, shares),
+                    format_number(twins.opened),
+                    format_number(twins.excess),
+                    str(twins.n_pairs),
+                    str(twins.n_incomplete),
+                )
+            )
+        )
+    columns = (*NAME_COLUMNS, *map(Column, _TWIN_COLUMNS))
+    table = Table("Twins: the place looked at first", columns, tuple(rows), (_TWIN_NOTE,))
+    return [table] if rows else []

@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.nieh.validation.cross_validation import DECISIONS, JudgedQuestion
+from infthor_eval.nieh.validation import DECISIONS, JudgedQuestion
 from infthor_eval.pages.one_file import read_part, write_page_file
 
 _IMAGES = "'self' file: data:"  # frames beside the page, from a disk or from a server

@@ -3,7 +3,7 @@
 Models read and write texts: `MoveAhead`, `PickupObject Mug`, `PutObject Mug Fridge`. Their
 arguments are names of objects (`Words`), whereas calls have object ids. A text is grounded to the
 nearest visible object of the name to which the action applies; how the published scripts ground it
-is in `published_actions`.
+is in `plans/published/script.py`.
 """
 
 from collections.abc import Callable, Container, Mapping, Sequence

@@ -133,11 +133,6 @@ class ArmState(msgspec.Struct, frozen=True):
         """Position of the wrist in world coordinates, metres."""
         return self.joints[-1].position
 
-    @property
-    def base_height(self) -> float:
-        """Height of the arm's base in world coordinates, metres."""
-        return self.joints[0].position.y
-
 
 @dataclass(frozen=True)
 class SimulatorView:

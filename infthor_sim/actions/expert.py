@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from infthor_sim.actions.agent_poses import TILT
-from infthor_sim.actions.queries import nearest_of_type
+from infthor_sim.actions.queries import TILT, nearest_of_type
 from infthor_sim.actions.registry import Vector3, action
 from infthor_sim.agent import MAX_UP
 from infthor_sim.errors import ActionError

@@ -3,9 +3,8 @@
 
 from functools import partial
 
-from infthor_sim.actions.movement import turn, walk
+from infthor_sim.actions.movement import teleport, turn, walk
 from infthor_sim.actions.registry import Vector3, action
-from infthor_sim.actions.teleport import teleport
 from infthor_sim.errors import ActionError
 from infthor_sim.settings import LOCOBOT
 from infthor_sim.simulation import Simulation

@@ -1,19 +1,15 @@
-"""The types of objects: one record each, in tables by theme.
+"""The types of objects: one record each, in a table by theme.
 
-To add an object type: a record here; if a plain box is not enough, a function with `@draws` in
-`infthor_sim/render/shapes/`, whose name is the record's `shape`.
+To add an object type: a record in `table.py`; if a plain box is not enough, a function with
+`@draws` in `infthor_sim/render/shapes/`, whose name is the record's `shape`.
 """
 
-from infthor_sim.object_types import appliances, fixtures, food, furniture, household, kitchenware
 from infthor_sim.object_types.record import ObjectType
+from infthor_sim.object_types.table import TYPES
 
 __all__ = ["FORMER_NAMES", "OBJECT_TYPES", "ObjectType", "allowed_in", "modern_type", "type_named"]
 
-OBJECT_TYPES: dict[str, ObjectType] = {
-    declared.name: declared
-    for theme in (appliances, fixtures, food, furniture, household, kitchenware)
-    for declared in theme.TYPES
-}
+OBJECT_TYPES = {declared.name: declared for declared in TYPES}
 
 FORMER_NAMES = {
     "Glassbottle": "Bottle",

@@ -7,10 +7,12 @@ import numpy as np
 
 from infthor_sim.errors import SimulatorError
 from infthor_sim.geometry import level_gaps
-from infthor_sim.scenes.bathroom import furnish_bathroom
-from infthor_sim.scenes.bedroom import furnish_bedroom
-from infthor_sim.scenes.kitchen import furnish_kitchen
-from infthor_sim.scenes.living_room import furnish_living_room
+from infthor_sim.scenes.furnishing import (
+    furnish_bathroom,
+    furnish_bedroom,
+    furnish_kitchen,
+    furnish_living_room,
+)
 from infthor_sim.scenes.roomplan import RoomPlan, build_world
 from infthor_sim.world import FLOOR_STYLES, RoomShell, World
 

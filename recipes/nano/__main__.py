@@ -85,12 +85,7 @@ def command(
 
 
 def read_nano_recipe(name: str, changes: dict[str, str]) -> NanoRecipe:
-    """Read a recipe of this folder by its name, or from a YAML file, with changed settings.
-
-    Raises:
-        UsageError: the recipe does not exist, or a setting is unknown or not valid.
-        DataError: the file is not YAML, or no mapping.
-    """
+    """Read a recipe of this folder by its name, or from a YAML file, with changed settings."""
     if not name.endswith(".yaml") and name not in _RECIPES:
         raise unknown_name("recipe", name, sorted(_RECIPES))
     return read_recipe_file(_RECIPES.get(name, Path(name)), changes, NanoRecipe)

@@ -30,9 +30,6 @@ class ActionSampler:
 
     Attributes:
         skipped: items that could not become a sequence.
-
-    Raises:
-        DataError: there are no histories or no plans.
     """
 
     def __init__(
@@ -130,12 +127,7 @@ class SyntheticPlans:
 def single_plans(
     encoder: Encoder, name: str, segments: Sequence[PlanSegment]
 ) -> Iterator[TrainingSequence]:
-    """Cut a history into sequences of one plan each, with its goal and the frame it begins with.
-
-    Raises:
-        DataError: a frame cannot be read, or a text of the history contains a mark.
-        ModelError: the template refuses the history.
-    """
+    """Cut a history into sequences of one plan each, with its goal and the frame it begins with."""
     for number, segment in enumerate(segments):
         if segment.steps:
             parts = segment_parts(restart_at(segments, number, number + 1))

@@ -35,9 +35,6 @@ def generate_training_data(
 
     Returns:
         The set, and the set of twins if the scenes have some.
-
-    Raises:
-        DataError: a trajectory cannot be generated or replayed, or no twins can be made of it.
     """
     trajectories = prepare_folder(out / "trajectories")
     sets = [prepare_folder(out / "set")]
@@ -69,9 +66,6 @@ def generate_training_views(
 
     Returns:
         A file for each room.
-
-    Raises:
-        DataError: a room has none.
     """
     side = PATCHES * PATCH_SIDE
     settings = f"seed{seed}-{views.arrangements}x{views.per_arrangement}-{side}px-{PATCHES}"

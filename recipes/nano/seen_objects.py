@@ -48,11 +48,7 @@ class SeenFrame(NamedTuple):
 
 
 def read_seen_frames(folders: Iterable[Path]) -> list[SeenFrame]:
-    """Read the distinct frames of the folders of replayed sets.
-
-    Raises:
-        DataError: a set cannot be read, or its step log does not list the objects in frames.
-    """
+    """Read the distinct frames of the folders of replayed sets."""
     frames: dict[str, SeenFrame] = {}
     for folder in folders:
         data = NiehSet(folder, needs_questions=False)

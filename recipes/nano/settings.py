@@ -46,11 +46,7 @@ class SceneSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     twins_per_edit: int = 1
 
     def __post_init__(self) -> None:
-        """Check the ranges of all settings.
-
-        Raises:
-            ValueError: a value is out of its range; the message names the setting.
-        """
+        """Check the ranges of all settings."""
         _require_counts(self, ("count", "min_steps", "twins_per_edit"))
         if not 0 <= self.twins <= self.count:
             raise ValueError(f"twins is {self.twins}; use 0 to count, which is {self.count}")
@@ -87,11 +83,7 @@ class ViewSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     per_arrangement: int = 17
 
     def __post_init__(self) -> None:
-        """Check the ranges of all settings.
-
-        Raises:
-            ValueError: a value is out of its range; the message names the setting.
-        """
+        """Check the ranges of all settings."""
         _require_counts(self, ("count", "arrangements", "per_arrangement"))
 
     @property
@@ -125,11 +117,7 @@ class VisionSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     matrix_lr: float = 1.5e-2
 
     def __post_init__(self) -> None:
-        """Check the ranges of all settings.
-
-        Raises:
-            ValueError: a value is out of its range; the message names the setting.
-        """
+        """Check the ranges of all settings."""
         _require_counts(self, ("layers", "steps", "patches_per_step"))
         _require_shares(self, ("crops", "mixed"))
         _require_width(self, 32)
@@ -179,11 +167,7 @@ class ReadingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     whole: float = 0.03
 
     def __post_init__(self) -> None:
-        """Check the ranges of all settings.
-
-        Raises:
-            ValueError: a value is out of its range; the message names the setting.
-        """
+        """Check the ranges of all settings."""
         _require_counts(
             self, ("tokens_per_step", "together", "synthetic_frames", "events_in_a_row")
         )
@@ -223,11 +207,7 @@ class ActingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     text_plans_weight: float = 0.5
 
     def __post_init__(self) -> None:
-        """Check the ranges of all settings.
-
-        Raises:
-            ValueError: a value is out of its range; the message names the setting.
-        """
+        """Check the ranges of all settings."""
         counts = ("windows_per_step", "window_tokens", "plans_per_step", "text_plans_per_step")
         _require_counts(self, counts)
         _require_shares(self, ("single_plan_share",))
@@ -274,10 +254,6 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Check the ranges of all settings.
-
-        Raises:
-            ValueError: a value is out of its range; the message names the setting.
-        """
+        """Check the ranges of all settings."""
         _require_counts(self, ("layers", "steps"))
         _require_width(self, 40)

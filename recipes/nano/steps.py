@@ -87,10 +87,6 @@ def run_stage(
 ) -> None:
     """Run the steps of a stage that its last state has not, with a linear warm-up and a cosine
     decay of the learning rates.
-
-    Raises:
-        DataError: a state is damaged or cannot be written.
-        UsageError: the states are of another recipe or other data.
     """
     highest = [group["lr"] for group in _groups(stage)]
     first = checkpoints.restore(stage.network, *stage.optimizers)

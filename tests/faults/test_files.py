@@ -23,7 +23,7 @@ from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.generation.bundle import read_manifest
 from infthor_eval.nieh.records import RECORDS
-from infthor_eval.nieh.validation.cross_validation import read_decisions
+from infthor_eval.nieh.validation import read_decisions
 from infthor_eval.runs import Catalog, read_run
 from model_adapters import load
 

@@ -2,8 +2,7 @@
 
 import pytest
 
-from infthor_eval.household.goal_conditions import goal_conditions
-from infthor_eval.household.goals import goal_holds
+from infthor_eval.household.goals import goal_conditions, goal_holds
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.household.treatments import Treatments
 from tests.plans.building import (

@@ -2,7 +2,7 @@
 
 import pytest
 
-from infthor_eval.cli.options.suites import expand_suite_options
+from infthor_eval.cli.options.run import expand_suite_options
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.manipulation.environment import Grasp
 from infthor_eval.manipulation.kinds import ManipulationKind

@@ -5,7 +5,7 @@ import re
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.nieh.validation.cross_validation import JudgedQuestion
+from infthor_eval.nieh.validation import JudgedQuestion
 from infthor_eval.report.inspection import write_inspection_page
 from infthor_eval.storage.folders import packaged_folder
 

@@ -52,7 +52,7 @@ def grasp(simulator: Simulator, thing: ThorObject) -> bool:
 def test_a_thing_is_picked_up_carried_and_put_down(simulator):
     view = simulator.reset("kitchen-1")
     assert view.arm.joints[-1].name == "robot_arm_4_jnt" and view.arm.held == []
-    assert view.arm.base_height == pytest.approx(0.898, abs=1e-3)
+    assert view.arm.joints[0].position.y == pytest.approx(0.898, abs=1e-3)
     plate = next(
         o for o in view.objects.values() if o.object_type == "Plate" and o.position.y > 0.9
     )

@@ -5,20 +5,17 @@ command, unless a suite has it.
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import click
+import msgspec
 
+from infthor_eval.cli.help import SuiteOption
 from infthor_eval.cli.options.config import comes_from_file, config_option
-from infthor_eval.cli.options.suites import (
-    expand_suite_options,
-    refuse_duplicate_options,
-    suite_options,
-    suite_values,
-)
 from infthor_eval.cli.options.values import (
     PATH,
     FiniteFloat,
@@ -33,7 +30,15 @@ from infthor_eval.cli.options.values import (
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import Catalog, RunRequest, Suite, TaskRequest
-from infthor_eval.suites import baseline_suites, find_suite, split_by_suite, suite_code
+from infthor_eval.settings import Declared, Shorthand, settings_of
+from infthor_eval.suites import (
+    baseline_suites,
+    find_suite,
+    options_class,
+    split_by_suite,
+    suite_code,
+    suite_names,
+)
 from infthor_eval.workers import WorkerSettings
 from model_adapters import has_option, is_known, name_on_engine
 
@@ -129,9 +134,9 @@ _AS_GIVEN = ("data", "output", "limit", "seed", "name", "fresh", "recover", "inc
 
 def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add all options of a run to a command, for `RunOptions.from_click`."""
-    for option in reversed((config_option, *_OPTIONS, worker_options, suite_options)):
+    for option in reversed((config_option, *_OPTIONS, worker_options, _add_suite_options)):
         command = option(command)
-    refuse_duplicate_options(command)
+    _refuse_duplicate_options(command)
     return command
 
 
@@ -169,12 +174,7 @@ class RunOptions:
 
     @classmethod
     def from_click(cls, params: Mapping[str, Any]) -> "RunOptions":
-        """Return the options among the parameters of a command.
-
-        Raises:
-            click.UsageError: options that exclude each other.
-            UsageError: an engine that does not run the model.
-        """
+        """Return the options among the parameters of a command."""
         for_all = _options_of_all_models(params)
         engine = params["engine"]
         specs = []
@@ -199,18 +199,12 @@ class RunOptions:
             models=models,
             tasks=split_names(params["tasks"], "--tasks"),
             worker_settings=workers,
-            suite_options=suite_values(params),
+            suite_options=_suite_values(params),
             **{name: params[name] for name in _AS_GIVEN},
         )
 
     def requests(self) -> list[tuple[RunRequest, Suite]]:
-        """Return the runs, each with its suite: one a model, suite, and value of an `each` option.
-
-        Raises:
-            UsageError: an unknown task, a name that cannot be a folder's, or a baseline or an
-                option of a suite that has none of the tasks.
-            DataError: a task file is not what it should be.
-        """
+        """Return a run and its suite for each model, suite, and value of an `each` option."""
         if self.name is not None and not re.fullmatch(r"\w[\w.@+ -]*", self.name):
             raise UsageError(
                 f"--name {self.name!r}: names a folder; use letters, digits, '.', '_', '-', '@', "
@@ -253,11 +247,7 @@ def _refuse_baseline_of_others(model: str, suite: str, task: str) -> None:
 
 
 def _with_threads(threads: int | None, models: Sequence[ModelSpec]) -> tuple[ModelSpec, ...]:
-    """Give the number of threads to the models that compute here, unless they have their own.
-
-    Raises:
-        UsageError: none of them does.
-    """
+    """Give the number of threads to the models that compute here, unless they have their own."""
     if threads is None:
         return tuple(models)
     computing = {
@@ -288,3 +278,146 @@ def _options_of_all_models(params: Mapping[str, Any]) -> dict[str, str]:
         if name not in options or not comes_from_file(name):  # what is typed wins over the file
             options[name] = str(params[name])
     return options
+
+
+def _add_suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of every suite to a command, which passes them to `_suite_values`.
+
+    Suites with an option of one name share it; its help has the text of each.
+    """
+    for name, flags in _shorthands().items():
+        command = click.option(
+            f"--{name}",
+            cls=SuiteOption,
+            suites=tuple(flags),
+            is_flag=True,
+            default=None,
+            help=next(iter(flags.values())).help,
+        )(command)
+    for name, by_suite in reversed(_options_by_name().items()):
+        option = next(iter(by_suite.values()))
+        kind, setting = option.kind, option.setting
+        choices = () if setting.each else tuple(map(str, setting.choices))
+        types = {bool: None, int: WholeNumber()} if not setting.each else {kind: str}
+        command = click.option(
+            f"--{name.replace('_', '-')}",
+            cls=SuiteOption,
+            suites=tuple(by_suite),
+            type=click.Choice(choices) if choices else types.get(kind, kind),
+            is_flag=kind is bool,
+            default=None,
+            metavar=setting.metavar,
+            help=_help(by_suite),
+        )(command)
+    return command
+
+
+def _suite_values(params: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options of all suites among the parameters of a command; None where not given."""
+    # A suite that was installed after the command was imported has options that the command does
+    # not know.
+    return {name: params.get(name) for name in (*_options_by_name(), *_shorthands())}
+
+
+def expand_suite_options(suite: str, params: Mapping[str, Any], used: Collection[str]) -> list[Any]:
+    """Return the options of a suite for each of its runs.
+
+    An option with `each` takes several values with commas, and there is a run for each of them. A
+    flag in its `shorthands` stands for such values.
+
+    Args:
+        suite: name of the suite.
+        params: options of all suites by name; None where not given.
+        used: names of the suites that the tasks belong to.
+    """
+    _refuse_unused(params, used)
+    values: dict[str, list[Any]] = {}
+    for name, option in settings_of(options_class(suite)).items():
+        value = _value(name, option, params)
+        if value is not None:
+            typed = split_names(value, f"--{name}") if option.setting.each else (value,)
+            values[name] = [_convert(name, option, value) for value in typed]
+        elif option.default is MISSING:
+            raise UsageError(
+                f"--{name.replace('_', '-')}: {suite} needs it, as its field has no "
+                "default; give it"
+            )
+    return [
+        options_class(suite)(**dict(zip(values, chosen, strict=True)))
+        for chosen in product(*values.values())
+    ]
+
+
+def _convert(name: str, option: Declared, text: Any) -> Any:
+    try:
+        return msgspec.convert(text, option.kind, strict=False)
+    except msgspec.ValidationError as error:
+        raise UsageError(f"--{name.replace('_', '-')} {text}: give {option.valid}") from error
+
+
+def _refuse_duplicate_options(command: Callable[..., Any]) -> None:
+    """Refuse options of another package's suite that the command, which has those of all suites,
+    has already.
+    """
+    options: list[click.Parameter] = command.__click_params__  # type: ignore[attr-defined]
+    names = [option.name for option in options]
+    duplicates = sorted({str(name) for name in names if names.count(name) > 1})
+    if duplicates:
+        suite = next(iter(_options_by_name()[duplicates[0]]))
+        raise UsageError(
+            f"the option {duplicates[0]} of the suite {suite} is one of every run; give it another "
+            "name"
+        )
+
+
+def _value(name: str, option: Declared, params: Mapping[str, Any]) -> Any:
+    """Return what is given for an option, by itself or by a flag that stands for its values."""
+    value = params.get(name)
+    for flag in option.setting.shorthands:
+        if params.get(flag.name):
+            if value is not None:
+                raise UsageError(
+                    f"--{flag.name} and --{name}: the first is --{name} {flag.values}; give one of "
+                    "them"
+                )
+            return flag.values
+    return value
+
+
+def _options_by_name() -> dict[str, dict[str, Declared]]:
+    """The options of all suites by name, then by suite."""
+    options: dict[str, dict[str, Declared]] = {}
+    for suite in suite_names():
+        for name, option in settings_of(options_class(suite)).items():
+            options.setdefault(name, {})[suite] = option
+    return options
+
+
+def _shorthands() -> dict[str, dict[str, Shorthand]]:
+    """The flags for several values of an option: by name, then by suite."""
+    flags: dict[str, dict[str, Shorthand]] = {}
+    for by_suite in _options_by_name().values():
+        for suite, option in by_suite.items():
+            for flag in option.setting.shorthands:
+                flags.setdefault(flag.name, {})[suite] = flag
+    return flags
+
+
+def _refuse_unused(params: Mapping[str, Any], used: Collection[str]) -> None:
+    every: dict[str, Mapping[str, Any]] = {**_options_by_name(), **_shorthands()}
+    for name, by_suite in every.items():
+        if params.get(name) is not None and not set(by_suite) & set(used):
+            raise UsageError(
+                f"--{name.replace('_', '-')} is for tasks of {' and '.join(by_suite)}; --tasks "
+                "names none of these"
+            )
+
+
+def _help(by_suite: Mapping[str, Declared]) -> str:
+    """The text of all suites, or those of each with its name."""
+    suites: dict[str, list[str]] = {}
+    for suite, option in by_suite.items():
+        suites.setdefault(option.setting.help, []).append(suite)
+    if len(suites) == 1:
+        return next(iter(suites))
+    return " ".join(f"{text} [{', '.join(names)}]" for text, names in suites.items())

@@ -1,11 +1,23 @@
-"""Ctrl-C during a run: the first one finishes the present unit, the second stops at once."""
+"""Ctrl-C during a run: the first one finishes the present unit, the second stops at once.
+
+Python tells nobody of one while a call computes: a signal's handler runs in the main thread,
+between two instructions of Python, and a step of training or a long prompt on a CPU is one call of
+many seconds.
+"""
 
 import contextlib
+import math
+import select
 import signal
+import socket
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import FrameType
+
+_ANSWER_S = 1.0
+_SAME_S = 0.1  # a forked process tells of the same press; a person takes longer for two
 
 
 class _Handled:
@@ -49,11 +61,6 @@ def handle_signal(number: int, handler: Callable[[int, FrameType | None], None])
         signal.signal(number, before)
 
 
-def n_handled() -> int:
-    """Return how often Ctrl-C was handled in this process."""
-    return _Handled.n
-
-
 @contextlib.contextmanager
 def stop_on_sigint(print_note: Callable[[str], None]) -> Iterator[Stop]:
     """Request a stop at the first SIGINT; interrupt at the second, or before the first unit."""
@@ -67,3 +74,84 @@ def stop_on_sigint(print_note: Callable[[str], None]) -> Iterator[Stop]:
 
     with handle_signal(signal.SIGINT, request_stop):
         yield stop
+
+
+@contextlib.contextmanager
+def answer_ctrl_c(tell: Callable[[], None], end: Callable[[], None]) -> Iterator[None]:
+    """Answer each Ctrl-C within a second, if this is the main thread.
+
+    Args:
+        tell: called if a press has not been handled after a second.
+        end: called if it was pressed twice in the same calculation; it ends the process.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    reading, writing = socket.socketpair()
+    writing.setblocking(False)
+    thread = threading.Thread(
+        target=_Presses(reading, tell, end).answer, name="ctrl-c", daemon=True
+    )
+    thread.start()
+    before = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+        writing.close()  # which ends the thread
+        thread.join()
+        reading.close()
+
+
+class _Presses:
+    """The presses that nobody has handled yet."""
+
+    def __init__(
+        self, signals: socket.socket, tell: Callable[[], None], end: Callable[[], None]
+    ) -> None:
+        self._signals = signals
+        self._tell = tell
+        self._end = end
+        self._times: list[float] = []
+        self._last = -math.inf
+        self._n_settled = _Handled.n
+        self._is_told = False
+
+    def answer(self) -> None:
+        """Answer presses until the other end of the socket is closed."""
+        while True:
+            is_pressed = bool(select.select([self._signals], [], [], self._patience())[0])
+            self._settle()  # earlier presses before the new one, which comes after them
+            if is_pressed and not self._take():
+                return
+            self._settle()
+            if self._patience() == 0:
+                if len(self._times) > 1:
+                    self._end()
+                    return
+                self._tell()
+                self._is_told = True
+
+    def _patience(self) -> float | None:
+        """Return the seconds until the first press must be answered; None to wait for another."""
+        if not self._times or (self._is_told and len(self._times) == 1):
+            return None
+        return max(0.0, self._times[0] + _ANSWER_S - time.monotonic())
+
+    def _settle(self) -> None:
+        """Forget the presses that were handled; Python handles several in one call once."""
+        n_new = _Handled.n - self._n_settled
+        if self._times and n_new:
+            self._n_settled += min(n_new, len(self._times))
+            self._times.clear()
+            self._is_told = False
+
+    def _take(self) -> bool:
+        """Note a press; return False at the end."""
+        numbers = self._signals.recv(64)
+        if signal.SIGINT in numbers:
+            now = time.monotonic()
+            if now - self._last > _SAME_S:
+                self._times.append(now)
+            self._last = now
+        return bool(numbers)

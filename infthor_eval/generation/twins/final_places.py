@@ -38,11 +38,6 @@ class Errand:
     places: tuple[TwinPlace, TwinPlace]
     receptacle: str
 
-    @property
-    def item_type(self) -> str:
-        """Type of the object."""
-        return self.items[0].partition("|")[0]
-
 
 def errands(
     worlds: Worlds,

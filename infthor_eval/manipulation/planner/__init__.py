@@ -1,1 +1,1 @@
-"""A planner of arms: `reaching.plan_steps` finds collision-free paths to pick up and to put."""
+"""A planner of arms: `steps.plan_steps` finds collision-free paths to pick up and to put."""

@@ -5,7 +5,7 @@ file in `tasks/nieh/contexts/`.
 """
 
 from infthor_eval.errors import UsageError
-from infthor_eval.nieh.contexts import interleaved, memory, plans, retrieval, video, views
+from infthor_eval.nieh.contexts import interleaved, memory, video, views
 from infthor_eval.nieh.contexts.base import (
     Context,
     ContextPart,
@@ -46,7 +46,7 @@ CONTEXTS = {
         sources=trajectories_identity,
     ),
     "interleaved_plans": Context(
-        plans.interleaved_plans, intro=_INTERLEAVED, parts=plans.plans_parts
+        interleaved.interleaved_plans, intro=_INTERLEAVED, parts=interleaved.plans_parts
     ),
     "text_state": Context(
         views.text_state,
@@ -55,9 +55,7 @@ CONTEXTS = {
         parts=views.state_parts,
         sources=trajectories_identity,
     ),
-    RETRIEVED: Context(
-        retrieval.clip_retrieval, prompts=PROMPTS, sources=retrieval.retriever_identity
-    ),
+    RETRIEVED: Context(views.clip_retrieval, prompts=PROMPTS, sources=views.retriever_identity),
     "video": Context(
         video.video,
         intro="Answer the question given the video showing the agent's trajectory over time.",
@@ -71,11 +69,7 @@ CONTEXTS = {
 
 
 def context_named(name: str) -> Context:
-    """Return the context of a name.
-
-    Raises:
-        UsageError: there is none.
-    """
+    """Return the context of a name."""
     if name not in CONTEXTS:
         raise UsageError(
             f"unknown context {name!r}; a task's dataset_kwargs takes {', '.join(CONTEXTS)}"
@@ -84,11 +78,7 @@ def context_named(name: str) -> Context:
 
 
 def check_prompt(name: str, prompt: str) -> None:
-    """Check that a context can be asked in the words of a prompt.
-
-    Raises:
-        UsageError: it has words of its own.
-    """
+    """Check that a context can be asked in the words of a prompt."""
     if prompt not in context_named(name).prompts:
         takers = ", ".join(
             other for other, context in CONTEXTS.items() if prompt in context.prompts

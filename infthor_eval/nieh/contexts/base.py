@@ -119,11 +119,7 @@ class ContextSettings(NiehSettings):
     seed: Annotated[int, Setting(help="Seed of everything sampled.")] = 0
 
     def n_frames(self, k_tokens: int) -> int:
-        """Return how many frames fill the context, given the published tokens of its kilo-token.
-
-        Raises:
-            UsageError: the size, or the tokens of a frame, are not given.
-        """
+        """Return how many frames fill the context, given the published tokens of its kilo-token."""
         if self.ctx_size is None:
             raise UsageError(
                 "this context needs its size: ctx_size under dataset_kwargs of the task file"

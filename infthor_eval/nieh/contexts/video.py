@@ -34,11 +34,7 @@ def video(
 
 
 def video_frames(data: NiehSet, traj_id: str, fps: float | None) -> Sequence[FrameRef]:
-    """Return the frames that positions refer to: the mp4's samples, or all where there is none.
-
-    Raises:
-        DataError: the trajectory has a video that cannot be decoded.
-    """
+    """Return the frames that positions refer to: the mp4's samples, or all where there is none."""
     if fps is None:
         raise ValueError("a sample of video lacks the rate of its frames")
     return (

@@ -26,9 +26,6 @@ def fetch_nieh(folder: Path, token: str | None = None, endpoint: str | None = No
         folder: folder of the set.
         token: access token; None for the one that `hf auth login` stored.
         endpoint: URL of another hub; None for the public one.
-
-    Raises:
-        DataError: there is no network or no access, or the data are malformed.
     """
     if not (folder / "metadata").is_dir():
         _download(folder, token, endpoint)

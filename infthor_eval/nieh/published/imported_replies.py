@@ -16,12 +16,13 @@ from infthor_eval.nieh.config import MetricsConfig, NiehConfig, NiehTaskConfig
 from infthor_eval.nieh.contexts import CONTEXTS
 from infthor_eval.nieh.guessing.blind import find_floor, visible_knowledge
 from infthor_eval.nieh.options import FRAMES, SHOWN
-from infthor_eval.nieh.published.asked_prompt import asked_prompt
-from infthor_eval.nieh.published.imported_records import WHOLE, Known, imported_record
-from infthor_eval.nieh.records import NiehAnswer
-from infthor_eval.nieh.scoring import SCORERS
-from infthor_eval.runs import Catalog, RunHeader, Session, UnitRecord
-from infthor_eval.storage.digests import digest_of_file
+from infthor_eval.nieh.prompts import PUBLISHED_LOGS, PUBLISHED_MAIN
+from infthor_eval.nieh.records import BlindGuess, NiehAnswer, ShownClues
+from infthor_eval.nieh.scoring import SCORERS, scores
+from infthor_eval.nieh.twins import twin_of_reply
+from infthor_eval.runs import Catalog, RunHeader, Session, Tokens, Unit, UnitKey, UnitRecord
+from infthor_eval.storage.digests import digest_of_file, fingerprint
+from model_adapters import Reply, answer_of
 
 _PUBLISHED_NAME = re.compile(
     r"eval_(?P<file>qa_set_.+?_clue)_(?P<model>.+?)_(?:full_traj.*)\.log(?:\.gz)?$"
@@ -38,6 +39,15 @@ _MODES = {
     "video": ("nieh_video", "video"),
 }
 _OTHER = ("imported", "imported")  # of logs that name no mode
+_PER_FRAME = 123  # of 300x300 pixels: 121 and two marks
+_PER_PAIR = 144  # of two frames of a film; beside them two marks a request
+_MARKS = 2
+# Tokens of the chat template and the prompt's own words, by prompt;
+# tests/nieh/published/test_asked_prompt.py counts them with the public vocabulary.
+_OF_FRAMES = {PUBLISHED_MAIN: 52, PUBLISHED_LOGS: 60}
+_OF_FILMS = {PUBLISHED_MAIN: 54}
+_MOST_SPLITS = 7  # the prompts' distance less one
+_WHOLE = (None, "full_traj")  # published modes that show all frames; early logs name no mode
 
 
 @dataclass(frozen=True)
@@ -108,6 +118,22 @@ class ImportedRun:
         )
 
 
+@dataclass(frozen=True)
+class _Known:
+    """What is known of the questions: their set, what `blind` says to them by id, and numbers of
+    frames by trajectory."""
+
+    data: NiehSet
+    blind: Mapping[str, BlindGuess]
+    n_frames: Mapping[str, int]
+
+    def length(self, traj_id: str) -> int | None:
+        """Return a trajectory's number of frames; None if neither a log nor the set tells."""
+        if traj_id in self.n_frames or not self.data.has_frames:
+            return self.n_frames.get(traj_id)
+        return len(self.data.frames(traj_id))
+
+
 def import_logs(
     logs: Sequence[Path],
     data: NiehSet,
@@ -121,11 +147,6 @@ def import_logs(
         data: the set that they answer.
         model: name of the model; None for the one in the names of published logs.
         tasks: tasks of the set; replies that name another one are left out. None for any task.
-
-    Raises:
-        UsageError: a log names no model and none is given, or no row of a log answers a question of
-            the set.
-        DataError: a log cannot be read.
     """
     runs: dict[tuple[str, ...], ImportedRun] = {}
     rows_of = {log: list(read_reply_log(log)) for log in dict.fromkeys(logs)}
@@ -150,7 +171,7 @@ def import_logs(
                 ImportedRun(of_model, task, settings, frames if frames in FRAMES else SHOWN),
             )
             blind = find_floor(data, visible_knowledge(settings["context"]))
-            known = Known(data, blind, n_frames)
+            known = _Known(data, blind, n_frames)
             _add_log(run, log, part, _questions_of(data, name), known)
     return list(runs.values())
 
@@ -175,7 +196,7 @@ def _trajectory_lengths(replies: Iterable[LoggedReply]) -> dict[str, int]:
     lengths: dict[str, int] = {}
     for reply in replies:
         n_frames = None
-        if reply.mode in WHOLE:
+        if reply.mode in _WHOLE:
             n_frames = reply.n_frames
         elif reply.mode == "truncate_head" and reply.frames:
             n_frames = max(reply.frames) + 1
@@ -232,7 +253,7 @@ def _add_log(
     log: Path,
     rows: Sequence[LoggedReply | UnreadRow],
     questions: Sequence[Question | SkippedQuestion],
-    known: Known,
+    known: _Known,
 ) -> None:
     by_id = {question.id: question for question in questions if isinstance(question, Question)}
     answered = {record.key for record in run.records}
@@ -243,7 +264,7 @@ def _add_log(
         if isinstance(question, str):
             refused.append(Refusal(log, row.line, question))
         elif isinstance(row, LoggedReply):
-            record = imported_record(run.task, question, row, known)
+            record = _imported_record(run.task, question, row, known)
             if record.key in answered:
                 reason = f"answers {question.id} again; the first reply is kept"
                 refused.append(Refusal(log, row.line, reason))
@@ -303,3 +324,74 @@ def _compare_scores(
         yield Refusal(
             log, reply.line, f"has the score {reply.score:g}; the reference scorer gives {ours:g}"
         )
+
+
+def asked_prompt(replies: Iterable[LoggedReply]) -> str | None:
+    """Return the prompt that fits every row; None if none does, or if a row does not tell.
+
+    A request is frames, the chat template, the words of a prompt, and the question. The tokens of
+    all but the question are known, as Qwen2.5-VL counts them; the question has at least one for
+    each word and one for its mark. So what is left over is how often its words were split: 0 to 4
+    times in each of the 1,303 published questions. The two prompts of frames are 8 tokens apart,
+    hence each row fits one of them at most, without the model's vocabulary.
+    """
+    fitting = [_fitting(reply) for reply in replies if reply.published]
+    prompts = set(fitting)
+    return prompts.pop() if len(prompts) == 1 else None
+
+
+def _fitting(reply: LoggedReply) -> str | None:
+    if reply.published is None or reply.n_context_tokens is None:
+        return None
+    known: Mapping[str, int]
+    # Rows of videos do not count frames, and no text is as long as a pair of them.
+    if reply.mode == "video":
+        n_text = reply.n_context_tokens % _PER_PAIR - _MARKS
+        known = _OF_FILMS
+    elif reply.n_frames is None:
+        return None
+    else:
+        n_text = reply.n_context_tokens - _PER_FRAME * reply.n_frames
+        known = _OF_FRAMES
+    n_least = len(reply.published.text.split()) + 1
+    return next(
+        (prompt for prompt, n in known.items() if 0 <= n_text - n - n_least <= _MOST_SPLITS), None
+    )
+
+
+def _imported_record(
+    task: str, question: Question, reply: LoggedReply, known: _Known
+) -> UnitRecord[NiehAnswer]:
+    """Return the record of a reply, or of why there is none, as the log says it."""
+    payload = NiehAnswer.of(
+        question,
+        known.blind.get(question.id),
+        _shown_clues(question, reply, known),
+        twin_of_reply(known.data, question, reply.frames),
+    )
+    key = UnitKey(task, question.id, reply.variant, reply.repeat)
+    unit = Unit(key, question.cluster, payload)
+    tokens = Tokens(context=reply.n_context_tokens, reply=reply.n_reply_tokens)
+    if reply.failure is not None:
+        made_of = {"question": question.id, "failure": reply.failure}
+        return unit.record_failure(reply.failure, fingerprint(made_of), seconds=reply.seconds)
+    thinking, answer = answer_of(Reply(reply.text, thinking=reply.thinking))
+    return unit.record(
+        fingerprint({"question": question.id, "reply": reply.text}),
+        payload.with_reply(answer, scores(answer, question.answers), thinking),
+        seconds=reply.seconds,
+        tokens=tokens,
+    )
+
+
+def _shown_clues(question: Question, reply: LoggedReply, known: _Known) -> ShownClues | None:
+    """Return the clue frames shown; None if the row does not tell, or if no frame is evidence."""
+    clues = set(question.clues)
+    is_whole = reply.published is not None and reply.mode in _WHOLE
+    if question.absence or (reply.frames is None and not is_whole):
+        return None
+    n_frames = known.length(question.traj_id)
+    n_shown = len(clues if reply.frames is None else clues.intersection(reply.frames))
+    # A log of a model that takes only some frames counts these alone, and a clue can lie beyond.
+    n_after = None if n_frames is None or n_frames <= max(clues) else n_frames - 1 - max(clues)
+    return ShownClues(n_shown=n_shown, n_clues=len(clues), n_after=n_after)

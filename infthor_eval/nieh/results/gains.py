@@ -1,6 +1,8 @@
-"""Gains by frames: how much higher a model scores with some frames than with others or with none.
+"""Runs that are alike but for their frames, side by side: gains by frames, and controls.
 
-Runs are set side by side if they are alike but for their frames.
+A gain is how much higher a model scores with some frames than with others or with none. Controls
+tell what of a score is memory of this home, and what knowledge of homes. All are defined in
+docs/reference/metrics.md.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -8,15 +10,37 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
+from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.config import NiehConfig
-from infthor_eval.nieh.options import BLANK, SHOWN
-from infthor_eval.nieh.results.summary import TaskSummary
+from infthor_eval.nieh.options import BLANK, NO_CLUE, OTHER, SHOWN
+from infthor_eval.nieh.results.cells import mean_cell
+from infthor_eval.nieh.results.summary import CLUE_COLUMNS, OPEN_ENDED, TaskSummary, main_metric
+from infthor_eval.rates import format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.statistics import MeanEstimate, paired_difference
-from infthor_eval.tables import TableCell, answered_cell, interval_cell
+from infthor_eval.tables import Column, Row, Table, TableCell, answered_cell, interval_cell
 
 Scores = Mapping[str, Mapping[str, float]]
 """Scores by trajectory and sample."""
+_FRAMES = (SHOWN, NO_CLUE, OTHER, BLANK)
+_DIFFERENCES = ((SHOWN, NO_CLUE), (OTHER, BLANK))  # memory, knowledge
+_OF_CONTROLS = (
+    "Accuracy, %, by the main scorer: with the true frames; without the clue frames (blank ones in "
+    "their place where no other is shown, or a memory recalls); with another home's of the same "
+    "kind of room; with blank ones.",
+    "memory: shown minus no-clue. knowledge of homes: other minus blank. In points, with the 95 % "
+    "interval, paired by question and clustered by trajectory.",
+)
+_ON_CLUES = (
+    "On the clue frames alone no-clue is blank, so its difference has knowledge of homes in it: "
+    "what is of this home there is shown minus other."
+)
+_PAIRS = (
+    "net pairs: pairs right less pairs exchanged, %. Who sees the same in both worlds has 0, "
+    "whatever it knows of homes."
+)
+
+_Controls = Mapping[str, RunSummary]  # runs that are alike but for the frames, by these
 
 
 @dataclass(frozen=True)
@@ -78,7 +102,7 @@ def find_gains(runs: Sequence[RunSummary]) -> Iterator[Gain]:
                     )
 
 
-def alike_but_for_frames(runs: Sequence[RunSummary]) -> list[dict[str, RunSummary]]:
+def _alike_but_for_frames(runs: Sequence[RunSummary]) -> list[dict[str, RunSummary]]:
     """Return the groups of runs that differ in their frames alone: of each group by its frames."""
     groups: list[tuple[NiehConfig, dict[str, RunSummary]]] = []
     for run in runs:
@@ -120,8 +144,117 @@ def difference_cell(total: MeanEstimate | None, n_all: int) -> TableCell:
     """Return a difference in points with its interval, of so many samples if all are answered."""
     if total is None:
         return TableCell("-", {"": "", "low": "", "high": ""})
-    low, high = (None if end is None else 100 * end for end in (total.low, total.high))
+    low, high = _in_percent(total)
     interval = interval_cell(low, high, "+.1f")
     mean = answered_cell(f"{100 * total.mean:+.1f}", total.n, n_all)
     numbers = {"": "", **interval.numbers, **mean.numbers}
     return TableCell(mean if low is None else f"{mean} {interval}", numbers)
+
+
+def _in_percent(total: MeanEstimate) -> tuple[float | None, ...]:
+    """Return the ends of the interval, which one trajectory alone has not."""
+    return tuple(None if end is None else 100 * end for end in (total.low, total.high))
+
+
+def gains_table(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return a table of each run's gain over its run on blank frames, if there is a pair."""
+    rows = [
+        Row((name_of(gain.run), gain.task, gain.metric, *_gain_cells(gain)))
+        for gain in find_gains(runs)
+    ]
+    if not rows:
+        return []
+    note = (
+        "95 %: of the total, paired by question and clustered by trajectory, as `infthor-eval "
+        "compare` has it."
+    )
+    title = "Gain over the same model's run on blank frames, in points"
+    names = (Column(name, False) for name in ("model", "task", "scorer"))
+    columns = (*names, *map(Column, (*CLUE_COLUMNS, "95 %", OPEN_ENDED, ABSENCE)))
+    return [Table(title, columns, tuple(rows), (note,))]
+
+
+def _gain_cells(gain: Gain) -> tuple[str, ...]:
+    by_clues = [_points(gain.in_column(name)) for name in CLUE_COLUMNS[:-1]]
+    apart = [_points(gain.in_column(name)) for name in (OPEN_ENDED, ABSENCE)]
+    total = gain.total()
+    mean = "-" if total is None else answered_cell(_points(total.mean), total.n, gain.n_all)
+    low, high = (None, None) if total is None else _in_percent(total)
+    return *by_clues, mean, interval_cell(low, high, "+.2f"), *apart
+
+
+def _points(gain: float | None) -> str:
+    return "-" if gain is None else f"{100 * gain:+.2f}"
+
+
+def control_tables(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return the table of the runs that have their control beside them, if there are any."""
+    groups = [group for group in _alike_but_for_frames(runs) if _has_difference(group)]
+    found = [(group, task) for group in groups for task in _tasks(group)]
+    if not found:
+        return []
+    with_pairs = any(_summary(run, task).pairs for group, task in found for run in group.values())
+    columns = (
+        *(Column(name, False) for name in ("model", "task", "context")),
+        *map(Column, _FRAMES),
+        *(Column(f"net pairs, {name}") for name in _FRAMES if with_pairs),
+        *map(Column, ("of which memory", "knowledge of homes", "n")),
+    )
+    rows = tuple(Row(tuple(_control_cells(group, task, with_pairs))) for group, task in found)
+    on_clues = any(row.cells[2] == "clues" for row in rows)
+    notes = (
+        *_OF_CONTROLS,
+        *((_ON_CLUES,) if on_clues else ()),
+        *((_PAIRS,) if with_pairs else ()),
+    )
+    return [Table("Controls: memory of this home, and knowledge of homes", columns, rows, notes)]
+
+
+def without_alike_notes(runs: Sequence[RunSummary]) -> list[str]:
+    """Return what the other home was not: of the same kind of room, where there is no other."""
+    names = {
+        traj_id
+        for run in runs
+        for task in run.header.config.tasks.values()
+        for traj_id in task.without_alike
+    }
+    if not names:
+        return []
+    return [
+        f"other: {', '.join(sorted(names))}: the set has no other home of this kind of room, so "
+        "one of another kind was shown."
+    ]
+
+
+def _has_difference(group: _Controls) -> bool:
+    return any(first in group and second in group for first, second in _DIFFERENCES)
+
+
+def _tasks(group: _Controls) -> Iterator[str]:
+    run = next(iter(group.values()))
+    return (name for name, task in run.summary.tasks.items() if task.n)
+
+
+def _summary(run: RunSummary, task: str) -> TaskSummary:
+    summary: TaskSummary = run.summary.tasks[task]
+    return summary
+
+
+def _control_cells(group: _Controls, task: str, with_pairs: bool) -> Iterator[str]:
+    tasks = {frames: _summary(run, task) for frames, run in group.items()}
+    first = next(iter(tasks.values()))
+    metric = main_metric(first)
+    yield next(iter(group.values())).header.name
+    yield task
+    yield first.context
+    for frames in _FRAMES:
+        yield mean_cell(tasks[frames].total if frames in tasks else None, metric, 1)
+    for frames in _FRAMES if with_pairs else ():
+        pairs = tasks[frames].pairs if frames in tasks else None
+        yield format_percent(pairs.net_pairs if pairs else None)
+    for frames, without in _DIFFERENCES:
+        is_known = frames in group and without in group
+        yield gain_cell(
+            Gain(group[frames], task, metric, tasks[frames], tasks[without]) if is_known else None
+        )
+    yield str(first.n)

@@ -1,4 +1,4 @@
-"""NIEH results as tables: by clues beside the published rows, by depth, gains, form of replies."""
+"""NIEH results as tables: by clues beside published rows, by depth, form of replies, repeats."""
 
 from collections.abc import Iterator, Sequence
 
@@ -14,7 +14,6 @@ from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.rescoring.report import sources_of
 from infthor_eval.nieh.results.answer_form import form_notes
 from infthor_eval.nieh.results.cells import Cell, both_intervals, mean_cell
-from infthor_eval.nieh.results.control_tables import control_tables, without_alike_notes
 from infthor_eval.nieh.results.effective_length import effective_lengths
 from infthor_eval.nieh.results.evidence_tables import (
     above_blind_cell,
@@ -23,10 +22,15 @@ from infthor_eval.nieh.results.evidence_tables import (
     short_name,
 )
 from infthor_eval.nieh.results.facets import DEPTH, FILE
-from infthor_eval.nieh.results.gains import Gain, find_gains, frames_of, name_of
+from infthor_eval.nieh.results.gains import (
+    control_tables,
+    frames_of,
+    gains_table,
+    name_of,
+    without_alike_notes,
+)
 from infthor_eval.nieh.results.memory_tables import memory_tables
 from infthor_eval.nieh.results.pair_tables import pair_overview, pair_tables
-from infthor_eval.nieh.results.repeat_tables import repeat_tables
 from infthor_eval.nieh.results.summary import (
     CLUE_COLUMNS,
     OPEN_ENDED,
@@ -36,7 +40,7 @@ from infthor_eval.nieh.results.summary import (
 )
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table, TableCell, answered_cell, interval_cell
+from infthor_eval.tables import Column, Row, Table, TableCell, answered_cell
 
 _NAMES = (Column("model", False), Column("task", False))
 _METRIC = Column("scorer", False)
@@ -63,6 +67,28 @@ _WITHHELD = (
     "The answers of this set are withheld, so every score here is 0. Send the run to the owner of "
     "the set, who has the key."
 )
+_OF_REPEATS = (
+    "asked",
+    "questions",
+    "mean",
+    "95 %",
+    "drawing",
+    "consensus",
+    "agreement",
+    "always",
+    "sometimes",
+    "never",
+    "within",
+    "between",
+)
+_REPEATS_LEGEND = (
+    "95 %: interval over other trajectories, with all that drawing adds. drawing: what the mean "
+    "moves by if the same questions are asked again (95 %). consensus: score of each question's "
+    "commonest answer; agreement: share of its answers that say it.",
+    "always, sometimes, never: questions with full marks in all, some, none of their answers. "
+    "within, between: standard deviation of the scores of one question, and of the questions' true "
+    "means, in points.",
+)
 
 
 def tables(runs: Sequence[RunSummary]) -> list[Table]:
@@ -86,11 +112,11 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
         *_depth_table(runs),
         *others,
         clues_table(runs),
-        *_gains_table(runs),
+        *gains_table(runs),
         *question_facet_tables(runs),
         *effective_lengths(runs),
         *memory_tables(runs),
-        *repeat_tables(runs),
+        *_repeat_tables(runs),
         _replies_table(runs),
     ]
 
@@ -126,9 +152,9 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
         *pair_overview(runs),
         table,
         *control_tables(runs),
-        *_gains_table(runs),
+        *gains_table(runs),
         *memory_tables(runs),
-        *repeat_tables(runs),
+        *_repeat_tables(runs),
     ]
 
 
@@ -250,10 +276,6 @@ def _mean_of(cell: Cell | None, metric: str) -> TableCell:
     return TableCell(f"{mean} ({cell.n})", {**mean.numbers, "questions": str(cell.n)})
 
 
-def _in_percent(share: float | None) -> float | None:
-    return None if share is None else 100 * share
-
-
 def _published_rows(table: PublishedTable, runs: Sequence[RunSummary]) -> Iterator[Row]:
     """Yield the published rows, each followed by the differences of runs of its checkpoint."""
     for row in table.rows:
@@ -333,41 +355,6 @@ def _made_by(row: PublishedRow, table: PublishedTable) -> str:
     return ", ".join(filter(None, (row.task, row.source))) or table.context
 
 
-# -- gain by frames
-
-
-def _gains_table(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return a table of each run's gain over its run on blank frames, if there is a pair."""
-    rows = [
-        Row((name_of(gain.run), gain.task, gain.metric, *_gain_cells(gain)))
-        for gain in find_gains(runs)
-    ]
-    if not rows:
-        return []
-    note = (
-        "95 %: of the total, paired by question and clustered by trajectory, as `infthor-eval "
-        "compare` has it."
-    )
-    title = "Gain over the same model's run on blank frames, in points"
-    columns = (*CLUE_COLUMNS, "95 %", OPEN_ENDED, ABSENCE)
-    return [Table(title, (*_NAMES, _METRIC, *map(Column, columns)), tuple(rows), (note,))]
-
-
-def _gain_cells(gain: Gain) -> tuple[str, ...]:
-    by_clues = [_points(gain.in_column(name)) for name in CLUE_COLUMNS[:-1]]
-    apart = [_points(gain.in_column(name)) for name in (OPEN_ENDED, ABSENCE)]
-    total = gain.total()
-    mean = "-" if total is None else answered_cell(_points(total.mean), total.n, gain.n_all)
-    # One trajectory alone tells nothing about others, and has no interval.
-    low = None if total is None else _in_percent(total.low)
-    high = None if total is None else _in_percent(total.high)
-    return *by_clues, mean, interval_cell(low, high, "+.2f"), *apart
-
-
-def _points(gain: float | None) -> str:
-    return "-" if gain is None else f"{100 * gain:+.2f}"
-
-
 # -- by depth
 
 
@@ -414,3 +401,47 @@ def _replies_table(runs: Sequence[RunSummary]) -> Table:
         rows.append(Row((run, name, str(task.yes_no.n), *shares, *further, failures)))
     columns = (*_NAMES, *map(Column, numbers), Column("not in the form asked for", False))
     return Table("Form of the replies", columns, tuple(rows))
+
+
+# -- repeated answers
+
+
+def _repeat_tables(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return the table of runs with repeated answers; none if there are none."""
+    rows = []
+    for run in runs:
+        assert isinstance(run.summary, NiehSummary)
+        for name, of_task in run.summary.repeats.items():
+            task = run.summary.tasks[name]
+            score = task.total.scores[main_metric(task)]  # repeats are summed up from answers alone
+            interval = (
+                "-"
+                if score.low is None or score.high is None
+                else f"{_percent(score.low)}–{_percent(score.high)}"
+            )
+            shares = (
+                of_task.consensus,
+                of_task.agreement,
+                of_task.always,
+                of_task.sometimes,
+                of_task.never,
+            )
+            spreads = (of_task.variance_within**0.5, of_task.variance_between**0.5)
+            cells = (
+                f"{of_task.n_repeats}x",
+                str(of_task.n_questions),
+                answered_cell(_percent(of_task.mean), of_task.n_questions, task.n),
+                interval,
+                f"±{_percent(of_task.drawing)}",
+                *map(_percent, shares),
+                *map(_percent, spreads),
+            )
+            rows.append(Row((name_of(run), name, *cells)))
+    if not rows:
+        return []
+    columns = (Column("model", False), Column("task", False), *map(Column, _OF_REPEATS))
+    return [Table("Answers that repeat, %, strict scorer", columns, tuple(rows), _REPEATS_LEGEND)]
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.1f}"

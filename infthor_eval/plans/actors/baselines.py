@@ -8,15 +8,17 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from infthor_eval.formats.object_ids import Words
+from infthor_eval.formats.step_log import ObjectLog
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.household.affordances import KNOWN_TYPES
 from infthor_eval.plans.actors.habits import Habits
 from infthor_eval.plans.actors.protocols import Act, PlanActor, PlanBaseline, PlanSituation
-from infthor_eval.plans.actors.recall import way_by_memory
-from infthor_eval.plans.actors.script import scripted_action
-from infthor_eval.plans.environment import StepOutcome
+from infthor_eval.plans.actors.script import read_plan, scripted_action
+from infthor_eval.plans.environment import PlanEnvironment, StepOutcome
 from infthor_eval.plans.history.clue_steps import object_logs
 from infthor_eval.runs.suite import BaselineSubject
 from infthor_eval.thor.actions import applicable_calls
+from infthor_eval.thor.view import SimulatorView, ThorObject
 from model_adapters import Capabilities
 
 _IN_FLIGHT = 4  # trajectories at a time; each has its own simulator
@@ -138,3 +140,54 @@ BASELINES: Mapping[str, Callable[[int], PlanBaseline]] = {
     baseline.name: baseline
     for baseline in (PlannerAgent, RandomAgent, ScriptedAgent, HabitualAgent, RecallingAgent)
 }
+
+
+def way_by_memory(
+    plan: str, environment: PlanEnvironment, view: SimulatorView, logs: Sequence[ObjectLog]
+) -> list[str]:
+    """Return the actions to where a plan's object was last seen, or is to be put.
+
+    What it is in is opened. There are none for plans that neither pick up nor put, and where the
+    place is not known. The log has types alone. So of several drawers this goes to the nearest, and
+    on a long counter it may look at the wrong end.
+
+    Args:
+        plan: text of the plan.
+        environment: the environment, reset to it.
+        view: what that shows.
+        logs: log of each frame so far.
+    """
+    verb, names = read_plan(plan)
+    place = None
+    if names and verb == "put":
+        place = names[-1]
+    elif names and verb == "pick up":
+        place = last_place(names[0], logs)
+    known = [obj for obj in view.objects.values() if _is_named(obj, place)]
+    if not known:
+        return []
+    nearest = min(known, key=lambda obj: (obj.distance, obj.object_id))
+    actions = environment.actions_to(nearest.object_id)
+    if verb == "pick up" and nearest.openable and not nearest.is_open:
+        actions.append(f"OpenObject {nearest.object_type}")
+    return actions
+
+
+def last_place(name: str, logs: Sequence[ObjectLog]) -> str | None:
+    """Return the type of the furniture that an object was last seen in or on; None if never."""
+    for log in reversed(logs):
+        holders = [
+            (len(contents), receptacle)
+            for receptacle, contents in log.recep_objs.items()
+            if name in contents and receptacle in KNOWN_TYPES
+        ]
+        if holders:
+            return min(holders)[1]  # a drawer rather than the dresser that it is in
+    return None
+
+
+def _is_named(obj: ThorObject, name: str | None) -> bool:
+    return bool(obj.receptacle) and name in (
+        obj.object_type,
+        Words.PUBLISHED.name_of(obj.object_id),
+    )

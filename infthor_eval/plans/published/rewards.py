@@ -2,9 +2,14 @@
 
 What they do otherwise than one would expect is kept, and listed in docs/plan-rewards.md. Where they
 raise an exception, which ends the published script, `UnscoredError` is raised here.
+
+Their goals differ from ALFRED's, which `household.goals` tests: no lamp is ever asked for, so that
+looking at an object in light never counts; objects are told apart by the first part of their ids,
+so that no slice is ever asked for by its type; the basin of a sink is found in tasks of two objects
+alone.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -13,14 +18,43 @@ from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import HighAction, PlannerAction, TaskInfo
 from infthor_eval.plans.plan import PlanKind
-from infthor_eval.plans.published.goals import Scene, Treated, goal_holds
 from infthor_eval.plans.published.paths import Pose, PublishedPaths
 from infthor_eval.plans.reward_rules import RewardRules
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
 _CELL = 0.25  # metres
 _QUARTER = 90
+
+
+@dataclass(frozen=True)
+class Treated:
+    """Ids of washed, heated and cooled objects. In the published script all stay empty."""
+
+    cleaned: Collection[str] = frozenset()
+    heated: Collection[str] = frozenset()
+    cooled: Collection[str] = frozenset()
+
+
 _UNTREATED = Treated()  # as in the published script, which never notices a treatment
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """What goals are tested on: objects by id, ids of held ones, and what was done to objects."""
+
+    objects: Mapping[str, ThorObject]
+    held: tuple[str, ...]
+    treated: Treated
+
+    def named(
+        self, name: str | None, has_property: Callable[[ThorObject], bool]
+    ) -> list[ThorObject]:
+        """Return the objects of a name that have a property."""
+        return [
+            candidate
+            for candidate in self.objects.values()
+            if Words.PUBLISHED.name_of(candidate.object_id) == name and has_property(candidate)
+        ]
 
 
 class UnscoredError(InfeasibleError):
@@ -100,9 +134,6 @@ class PublishedTask:
             state: state after the action.
             treated: objects that were washed, heated and cooled so far.
             target: the sub-goal whose rule applies; with 0 and None the task's own counter decides.
-
-        Raises:
-            UnscoredError: the published function raises an exception.
         """
         if self.goal_reached:
             return Transition(self.rules.task_done, True, True)
@@ -125,7 +156,8 @@ class PublishedTask:
         return Transition(reward, task_done, plan_done)
 
     def _goal_holds(self, state: PublishedState, treated: Treated) -> bool:
-        return goal_holds(self.info, Scene(state.objects, state.held, treated))
+        holds = _GOALS[self.info.goal.replace(" ", "_")]
+        return holds(self.info, _Scene(state.objects, state.held, treated))
 
     def _plan_reward(self, step: "_Step") -> tuple[float, bool]:
         kind = PlanKind(self.plan[step.index].planner_action.action)
@@ -275,4 +307,97 @@ _RULES: dict[PlanKind, Callable[[PublishedTask, _Step], tuple[float, bool]]] = {
     PlanKind.CLEAN: PublishedTask._clean,
     PlanKind.HEAT: PublishedTask._heat,
     PlanKind.COOL: PublishedTask._cool,
+}
+
+
+def _pickupable(thor_object: ThorObject) -> bool:
+    return bool(thor_object.pickupable)
+
+
+def _receptacle(thor_object: ThorObject) -> bool:
+    return bool(thor_object.receptacle)
+
+
+def _inside(target: ThorObject, receptacles: Iterable[ThorObject]) -> bool:
+    return bool(_filled([target], receptacles))
+
+
+def _filled(targets: Sequence[ThorObject], receptacles: Iterable[ThorObject]) -> list[ThorObject]:
+    """Return the receptacles with any of the objects in them."""
+    ids = {target.object_id for target in targets}
+    return [each for each in receptacles if ids & set(each.receptacle_object_ids or ())]
+
+
+def _targets(info: TaskInfo, scene: _Scene) -> tuple[list[ThorObject], list[ThorObject], int]:
+    """Return a task's objects, its receptacles, and the number of slices that it lacks."""
+    targets = scene.named(info.pickup, _pickupable)
+    n_slices = sum("Sliced" in target.object_id for target in targets)
+    if info.pickup is None:
+        raise TypeError("the task names no object")
+    lacking = max(0, 1 - n_slices) if "Sliced" in info.pickup else 0
+    return targets, scene.named(info.receptacle, _receptacle), lacking
+
+
+def _place(info: TaskInfo, scene: _Scene) -> bool:
+    targets, receptacles, lacking = _targets(info, scene)
+    return not lacking and any(_inside(target, receptacles) for target in targets)
+
+
+def _place_two(info: TaskInfo, scene: _Scene) -> bool:
+    targets, receptacles, _ = _targets(info, scene)
+    if not receptacles and info.receptacle == "SinkBasin":
+        receptacles = scene.named("Sink", _receptacle)
+    if "Sliced" in str(info.pickup) and sum("Sliced" in target.object_id for target in targets) < 2:
+        return False
+    ids = {target.object_id for target in targets}
+    contents = [set(receptacle.receptacle_object_ids or ()) for receptacle in receptacles]
+    return any(len(ids & inside) >= 2 for inside in contents)
+
+
+def _look_in_light(info: TaskInfo, scene: _Scene) -> bool:
+    _targets(info, scene)  # which raises for a task without an object
+    return False
+
+
+def _place_treated(
+    chosen: Callable[[Treated], Collection[str]],
+) -> Callable[[TaskInfo, _Scene], bool]:
+    def holds(info: TaskInfo, scene: _Scene) -> bool:
+        targets, receptacles, lacking = _targets(info, scene)
+        ready = [target for target in targets if target.object_id in chosen(scene.treated)]
+        return not lacking and any(_inside(target, receptacles) for target in ready)
+
+    return holds
+
+
+def _place_with_movable(info: TaskInfo, scene: _Scene) -> bool:
+    targets, receptacles, lacking = _targets(info, scene)
+    carriers = scene.named(info.movable, _pickupable)
+    filled = _filled(targets, carriers)
+    there = any(_inside(carrier, receptacles) for carrier in carriers)
+    ids = {receptacle.object_id for receptacle in receptacles}
+    stacked = any(ids & set(carrier.parent_receptacles or ()) for carrier in filled)
+    return not lacking and bool(filled) and there and stacked
+
+
+def _put(info: TaskInfo, scene: _Scene) -> bool:
+    """Whether anything of a name lies in anything of another, and the hand is empty.
+
+    This is what is put away after a task.
+    """
+    wanted = {info.pickup, info.movable}
+    receptacles = [] if scene.held else scene.named(info.receptacle, _receptacle)
+    inside = (key for receptacle in receptacles for key in receptacle.receptacle_object_ids or ())
+    return any(Words.PUBLISHED.name_of(key) in wanted for key in inside)
+
+
+_GOALS: Mapping[str, Callable[[TaskInfo, _Scene], bool]] = {
+    "pick_and_place_simple": _place,
+    "pick_two_obj_and_place": _place_two,
+    "look_at_obj_in_light": _look_in_light,
+    "pick_clean_then_place_in_recep": _place_treated(lambda treated: treated.cleaned),
+    "pick_heat_then_place_in_recep": _place_treated(lambda treated: treated.heated),
+    "pick_cool_then_place_in_recep": _place_treated(lambda treated: treated.cooled),
+    "pick_and_place_with_movable_recep": _place_with_movable,
+    "put_object": _put,
 }

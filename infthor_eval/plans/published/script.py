@@ -1,4 +1,5 @@
-"""The published loop's tasks (`run_interactive_eval.py`): which state each plan is rewarded from.
+"""The published loop (`run_interactive_eval.py`): which state each plan is rewarded from, and which
+call an agent's text is.
 
 The loop sets up a task at its first plan, and again after each plan, before the expert repeats that
 plan. So the agent meets a task that has counted the expert's actions of the plan before, from the
@@ -7,9 +8,11 @@ scene's first one. A sub-goal without actions ends the loop. The scripts of fina
 the next task, and look at the last one before the final one alone.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from msgspec import UNSET, UnsetType
 
 from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.formats.trajectory import Trajectory
@@ -20,11 +23,30 @@ from infthor_eval.plans.published.paths import PublishedGraph, PublishedPaths
 from infthor_eval.plans.published.rewards import PublishedState, PublishedTask, UnscoredError
 from infthor_eval.plans.reward_rules import RewardRules
 from infthor_eval.plans.rewards import StepReward
+from infthor_eval.thor.actions import Misuse, UngroundedError
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import SimulatorView
+from infthor_eval.thor.view import SimulatorView, ThorObject
 
 _CELL = 0.25  # metres
 _FIRST = "TeleportFull"  # the last action of a scene that was set up
+_Has = Callable[[ThorObject], bool | UnsetType]
+
+_HAS: Mapping[str, _Has] = {
+    "OpenObject": lambda obj: obj.openable,
+    "CloseObject": lambda obj: obj.is_open,
+    "PickupObject": lambda obj: obj.pickupable,
+    "SliceObject": lambda obj: obj.sliceable,
+}
+_WITHOUT_OBJECT = {
+    *("MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "RotateRight"),
+    *("LookUp", "LookDown", "Crouch", "Stand", "Pass", "NoOp", "Done"),
+}
+_PUT = "PutObject"
+_TOGGLE = "ToggleObject"
+
+
+class _UnreportedError(LookupError):
+    """The metadata of an object lack a property."""
 
 
 class PublishedReward:
@@ -188,3 +210,88 @@ def _first_empty(plans: Sequence[Plan], tasks: Sequence[TrajectoryTask]) -> int 
     acted = {plan.high for plan in plans}
     every = (high for task in tasks for high in range(task.first_high, task.end_high))
     return next((high for high in every if high not in acted), None)
+
+
+def ground_published(text: str, objects: Iterable[ThorObject]) -> tuple[str | None, str | None]:
+    """Return the action and object id of a text with "Object" in it; None where there is none.
+
+    As the published `interact_with_env` and `post_processing_action` do it: a name is sought as a
+    part of the objects' names, case apart, and the first visible object that has the property is
+    taken, whatever its state. Where the metadata of an object that is looked at lack the property,
+    the script drops the action with the error.
+
+    Args:
+        text: what the agent said.
+        objects: all objects, in the order of the metadata.
+    """
+    try:
+        if text.startswith(_PUT):
+            return _PUT, _first(objects, _last_word(text), lambda obj: obj.receptacle)
+        if text.startswith(_TOGGLE):  # on and off alike
+            return _TOGGLE, _first(objects, _last_word(text), lambda obj: obj.toggleable)
+        for action, has in _HAS.items():
+            if text.startswith(action):
+                return action, _first(objects, text.rsplit(action, maxsplit=1)[-1].strip(), has)
+    except _UnreportedError:
+        pass
+    return None, None
+
+
+def published_call(text: str, objects: Iterable[ThorObject], held: str | None) -> dict[str, Any]:
+    """Return the call that the published script sends for a text, in AI2-THOR 2.1.0's form.
+
+    Args:
+        held: id of the held object; None if there is none.
+
+    Raises:
+        LookupError: an object is to be put, and none is held; the script then sends nothing.
+    """
+    if "Object" not in text:
+        return {"action": text, "forceAction": True}
+    action, object_id = ground_published(text, objects)
+    if _PUT in text and object_id is not None:
+        if held is None:
+            raise LookupError("nothing is held")
+        ids = {"objectId": held, "receptacleObjectId": object_id}
+        return {"action": _PUT, **ids, "forceAction": True, "placeStationary": True}
+    ids = {} if object_id is None else {"objectId": object_id}
+    return {"action": action, **ids, "forceAction": True}
+
+
+def _last_word(text: str) -> str:
+    return text.rsplit(maxsplit=1)[-1]
+
+
+def _first(objects: Iterable[ThorObject], name: str, has: _Has) -> str | None:
+    """Return the id of the first visible object with this text in its name that has a property."""
+    wanted = name.lower()
+    for obj in objects:
+        if wanted in obj.name.lower() and obj.visible:
+            value = has(obj)
+            if value is UNSET:
+                raise _UnreportedError(obj.object_id)
+            if value:
+                return obj.object_id
+    return None
+
+
+def current_call(text: str, view: SimulatorView) -> dict[str, Any]:
+    """Return the published call for a text in the form of AI2-THOR 5.x.
+
+    A text that is no action of an agent is not sent: the published script would send it as a
+    command to the simulator, which refuses what it does not know, and would also take `Reset` from
+    an agent.
+
+    Raises:
+        UngroundedError: there is nothing to send.
+    """
+    try:
+        call = published_call(text, view.objects.values(), next(iter(view.inventory), None))
+    except LookupError as error:
+        raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: {error}") from error
+    if call["action"] is None or ("Object" not in text and text not in _WITHOUT_OBJECT):
+        raise UngroundedError(Misuse.NO_ACTION, f"unknown action '{text}'")
+    if text == "NoOp":
+        call["action"] = "Pass"
+    receptacle = call.pop("receptacleObjectId", None)
+    return call if receptacle is None else {**call, "objectId": receptacle}

@@ -26,8 +26,12 @@ from infthor_eval.report.presenter import (
     FigureResult,
     Recording,
 )
-from infthor_eval.report.recordings.arm_pictures import arm_pictures
-from infthor_eval.report.recordings.episode_sheet import MOST_ROWS, draw_sheet, sheet_rows
+from infthor_eval.report.recordings.arm_pictures import (
+    MOST_ROWS,
+    arm_pictures,
+    draw_sheet,
+    sheet_rows,
+)
 from infthor_eval.report.recordings.reach_view import draw_reach
 from infthor_eval.report.runs import choose_evenly
 from infthor_eval.report.suites.episode_columns import ARM_COLUMNS

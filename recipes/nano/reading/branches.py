@@ -62,9 +62,6 @@ def collate_branched(sequences: Sequence[BranchedSequence], family: Family, pad_
     """Combine one or more sequences to a batch.
 
     Its attention mask is true where a token sees another, (batch, 1, tokens, tokens).
-
-    Raises:
-        DataError: a sequence has no token with loss.
     """
     batch = collate(sequences, family, pad_id)
     batch["attention_mask"] = _seen(sequences)

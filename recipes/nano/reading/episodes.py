@@ -75,9 +75,6 @@ def read_episodes(folders: Sequence[Path]) -> tuple[list[Episode], list[SkippedS
 
     Returns:
         The episodes, and the questions that cannot be used.
-
-    Raises:
-        DataError: a set cannot be read, or none has a question.
     """
     episodes: dict[tuple[str, ...], Episode] = {}
     skipped: list[SkippedSequence] = []

@@ -48,9 +48,6 @@ def read_events(folder: Path) -> list[Happening]:
 
     Args:
         folder: folder of the trajectory, with its step log.
-
-    Raises:
-        DataError: the step log cannot be read.
     """
     steps = sorted(read_steps(folder), key=lambda step: step.img_idx)
     happenings: list[Happening] = []

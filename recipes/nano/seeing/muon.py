@@ -28,9 +28,6 @@ class Muon(torch.optim.Optimizer):
         lr: learning rate; steps are as large as AdamW's of this rate.
         weight_decay: share of a matrix that is taken off in a step, times `lr`.
         momentum: share of the earlier gradients that remains, with Nesterov's look ahead.
-
-    Raises:
-        ValueError: a parameter is no matrix.
     """
 
     def __init__(

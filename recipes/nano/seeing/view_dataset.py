@@ -73,9 +73,6 @@ class ViewDataset:
         units: units of the types in the views.
         loose: [types], True for the types of things that can be picked up.
         fixtures: [types], True for the types of all others that hold something or can be opened.
-
-    Raises:
-        DataError: there are no files, one cannot be read, or their sizes differ.
     """
 
     def __init__(self, paths: Sequence[Path], block: int) -> None:

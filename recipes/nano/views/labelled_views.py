@@ -100,11 +100,7 @@ def views_of(frames: Sequence[NDArray[np.uint8]], things: Sequence[ThingInView])
 
 
 def write_views(path: Path, views: LabelledViews) -> None:
-    """Write views to a file; it is there when it is whole.
-
-    Raises:
-        DataError: it cannot be written.
-    """
+    """Write views to a file; it is there when it is whole."""
     hint = writing_hint(" and run the same command again, which resumes")
     with (
         wrap_errors(f"{path}: cannot be written", hint),
@@ -115,11 +111,7 @@ def write_views(path: Path, views: LabelledViews) -> None:
 
 
 def read_views(path: Path) -> LabelledViews:
-    """Read a file of views.
-
-    Raises:
-        DataError: it cannot be read, or its arrays do not belong together.
-    """
+    """Read a file of views."""
     hint = "remove it, and run the command that made it again"
     with (
         wrap_errors(f"{path}: no labelled views", hint, catch=_MALFORMED),

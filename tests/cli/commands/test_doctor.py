@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from infthor_eval.cli.commands import doctor as checks
-from infthor_eval.cli.set_checks import Check
+from infthor_eval.cli.commands.doctor import Check
 from infthor_eval.formats.question import Question
 
 from ...helpers.bundled import BUNDLED

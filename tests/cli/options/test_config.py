@@ -12,8 +12,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from infthor_eval.cli.options import suites
-from infthor_eval.cli.options.run import RunOptions, run_options
+from infthor_eval.cli.options.run import RunOptions, expand_suite_options, run_options
 from infthor_eval.cli.options.values import ModelList
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import RunRequest, Suite, read_stored_command
@@ -235,8 +234,8 @@ def test_a_suites_option_without_a_default_must_be_given(monkeypatch: pytest.Mon
     class Required:
         size_m: int
 
-    monkeypatch.setattr(suites, "options_class", lambda _: Required)
-    monkeypatch.setattr(suites, "suite_names", lambda: ["toy"])
-    assert suites.expand_suite_options("toy", {"size_m": "3"}, ["toy"]) == [Required(3)]
+    monkeypatch.setattr("infthor_eval.cli.options.run.options_class", lambda _: Required)
+    monkeypatch.setattr("infthor_eval.cli.options.run.suite_names", lambda: ["toy"])
+    assert expand_suite_options("toy", {"size_m": "3"}, ["toy"]) == [Required(3)]
     with pytest.raises(UsageError, match="--size-m: toy needs it, as its field has no default"):
-        suites.expand_suite_options("toy", {}, ["toy"])
+        expand_suite_options("toy", {}, ["toy"])

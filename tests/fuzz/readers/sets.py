@@ -9,7 +9,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.generation.questions.generate import generate_questions
 from infthor_eval.nieh.asking.recalling import recall_all
 from infthor_eval.nieh.samples import find_samples, open_set
-from infthor_eval.nieh.validation.cross_validation import read_decisions
+from infthor_eval.nieh.validation import read_decisions
 
 from ..damage import Form
 from ..reader import Reader

@@ -7,9 +7,9 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.memory.registry import open_memory, parse_options
 from infthor_eval.nieh.rescoring.judge_prompts import JUDGE_PROMPTS
 from infthor_eval.nieh.scoring import scores
+from infthor_eval.plans.published.script import current_call
 from infthor_eval.thor.actions import UngroundedError, ground, parse_action
 from infthor_eval.thor.launch import embedded_launch
-from infthor_eval.thor.published_actions import current_call
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView
 from model_adapters.thinking import split_thinking

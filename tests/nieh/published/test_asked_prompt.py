@@ -15,8 +15,8 @@ from infthor_eval.formats.replies.logged import LoggedReply
 from infthor_eval.formats.replies.logs import read_reply_log
 from infthor_eval.nieh.contexts import CONTEXTS
 from infthor_eval.nieh.prompts import PUBLISHED_LOGS, PUBLISHED_MAIN, question_text
-from infthor_eval.nieh.published import asked_prompt as module
-from infthor_eval.nieh.published.asked_prompt import asked_prompt
+from infthor_eval.nieh.published import imported_replies as module
+from infthor_eval.nieh.published.imported_replies import asked_prompt
 
 from ...helpers.files import read_json_lines
 from ...helpers.questions import make_question

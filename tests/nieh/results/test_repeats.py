@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from infthor_eval.nieh.results.repeat_summary import by_question, summarise_repeats
+from infthor_eval.nieh.results.summary import by_question, summarise_repeats
 from infthor_eval.nieh.results.tables import tables
 from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.report.comparison import compare, comparison_table

@@ -3,7 +3,7 @@
 import pytest
 
 from infthor_eval.formats.step_log import ObjectLog
-from infthor_eval.plans.actors.recall import last_place, way_by_memory
+from infthor_eval.plans.actors.baselines import last_place, way_by_memory
 from tests.plans.building import DRAWER, FRIDGE, TABLE, kitchen
 
 LOGS = [

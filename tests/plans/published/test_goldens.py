@@ -28,13 +28,17 @@ from infthor_eval.plans.history.forms import PublishedHistory
 from infthor_eval.plans.history.past import Past
 from infthor_eval.plans.history.segments import PlanSegment
 from infthor_eval.plans.plan import plans_of, tasks_of
-from infthor_eval.plans.published.goals import Treated
-from infthor_eval.plans.published.log import log_rows
 from infthor_eval.plans.published.paths import PublishedGraph, PublishedPaths
-from infthor_eval.plans.published.rewards import PublishedState, PublishedTask, UnscoredError
+from infthor_eval.plans.published.rewards import (
+    PublishedState,
+    PublishedTask,
+    Treated,
+    UnscoredError,
+)
+from infthor_eval.plans.published.script import ground_published, published_call
 from infthor_eval.plans.records import PlanRecord, StepRecord
 from infthor_eval.plans.reward_rules import reward_rules
-from infthor_eval.thor.published_actions import ground_published, published_call
+from infthor_eval.plans.summary import log_rows
 from infthor_eval.thor.view import ThorObject, Vector
 
 GOLDENS = Path(__file__).parents[3] / "../shared/data/published_goldens"

@@ -26,7 +26,6 @@ from model_adapters.hf.prompting.prompt import Frame
 from recipes.nano import steps
 from recipes.nano.action_sampler import ActionSampler, SyntheticPlans, single_plans
 from recipes.nano.architecture import BLOCK, PATCHES, build_untrained, image_processor
-from recipes.nano.corpus import corpus_texts, single_tokens
 from recipes.nano.reading.asking import question_intro
 from recipes.nano.reading.frame_units import read_frame_units
 from recipes.nano.reading.network import ReadingNetwork
@@ -41,8 +40,13 @@ from recipes.nano.settings import (
     VisionSettings,
 )
 from recipes.nano.spelling import spellings
-from recipes.nano.stages import TrainingData, train_small_model
-from recipes.nano.whitening import whiten_patches
+from recipes.nano.stages import (
+    TrainingData,
+    corpus_texts,
+    single_tokens,
+    train_small_model,
+    whiten_patches,
+)
 
 from ...helpers.bundled import bundled_name
 

@@ -12,9 +12,15 @@ from infthor_eval.manipulation.recorded.replay_frames import (
     NearbyObject,
     Reach,
 )
-from infthor_eval.report.recordings.arm_pictures import arm_pictures, draw_arm_frame, draw_arm_title
+from infthor_eval.report.recordings.arm_pictures import (
+    COLUMNS,
+    arm_pictures,
+    draw_arm_frame,
+    draw_arm_title,
+    draw_sheet,
+    shown_steps,
+)
 from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
-from infthor_eval.report.recordings.episode_sheet import COLUMNS, draw_sheet, shown_steps
 from infthor_eval.report.recordings.reach_view import draw_reach
 
 from .pictures import find_colours

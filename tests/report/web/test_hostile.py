@@ -14,7 +14,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.records import RECORDS
-from infthor_eval.nieh.validation.cross_validation import JudgedQuestion
+from infthor_eval.nieh.validation import JudgedQuestion
 from infthor_eval.report.inspection import write_inspection_page
 from infthor_eval.runs import read_run
 from tests.helpers.browser import Opened

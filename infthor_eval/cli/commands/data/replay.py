@@ -9,16 +9,29 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.rendering import parse_form, rendering_options
 from infthor_eval.cli.options.values import PATH, floor_plans_option
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from infthor_eval.generation.replay_set import ReplayForm
     from infthor_eval.generation.replay_summary import ReplaySummary
 
 _MAX_SHOWN = 20  # failures and divergences printed one by one; all are in the JSON summary
+# AI2-THOR 5.0.0's rendering qualities, best last.
+QUALITIES = (
+    "Very Low",
+    "Low",
+    "Medium",
+    "MediumCloseFitShadows",
+    "High",
+    "High WebGL",
+    "Very High",
+    "Ultra",
+)
+_PUBLISHED_QUALITY = "MediumCloseFitShadows"
+_SIZE = click.IntRange(1, 8192)  # pixels
 
 
 @click.command("replay", cls=ExampleCommand, example="infthor-eval replay trajectories --out SET")
@@ -39,7 +52,36 @@ _MAX_SHOWN = 20  # failures and divergences printed one by one; all are in the J
 @click.option(
     "--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator."
 )
-@rendering_options
+@click.option(
+    "--timeline",
+    is_flag=True,
+    help="Write what the published renderer writes for the authors' website, in a folder "
+    "for each trajectory: frames/000000.jpg and so on, and timeline.json.",
+)
+@click.option(
+    "--smooth",
+    type=click.IntRange(1),
+    help="With --timeline: pictures of a move or look; a turn has twice as many.  [default: 1]",
+)
+@click.option("--width", type=_SIZE, help="With --timeline: pixels of a picture.  [default: 640]")
+@click.option("--height", type=_SIZE, help="With --timeline: pixels of a picture.  [default: 640]")
+@click.option(
+    "--quality",
+    type=click.Choice(QUALITIES),
+    metavar="NAME",
+    help=f"With --timeline --unity: rendering quality: {', '.join(QUALITIES)}.  "
+    f"[default: {_PUBLISHED_QUALITY}]",
+)
+@click.option(
+    "--jpeg-quality",
+    type=click.IntRange(1, 100),
+    help="With --timeline: quality of the pictures' files.  [default: 88]",
+)
+@click.option(
+    "--keep-going",
+    is_flag=True,
+    help="With --timeline: go on after a refused action, instead of ending there.",
+)
 @worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
 @click.pass_context
@@ -124,3 +166,26 @@ def _print(summary: ReplaySummary, output: Console) -> None:
     hidden = len(summary.diverged) - _MAX_SHOWN
     if hidden > 0:
         output.print(f"and {hidden} more; --json lists all")
+
+
+def parse_form(
+    *, timeline: bool, frames: int, unity: bool, keep_going: bool, **rendering: Any
+) -> ReplayForm:
+    """Return the form that the options give; without --timeline that of a set."""
+    from infthor_eval.errors import UsageError
+    from infthor_eval.generation.rendering import RenderSettings
+    from infthor_eval.generation.replay import SetForm
+
+    given = {name: value for name, value in rendering.items() if value is not None}
+    if not timeline:
+        names = [f"--{name.replace('_', '-')}" for name in (*given, *["keep_going"] * keep_going)]
+        if names:
+            raise UsageError(f"{names[0]}: is for --timeline; add it, or leave {names[0]} out")
+        return SetForm(frames)
+    if frames != 1:
+        raise UsageError("--frames: is for sets; with --timeline give --smooth")
+    if unity:
+        given.setdefault("quality", _PUBLISHED_QUALITY)
+    elif "quality" in given:
+        raise UsageError("--quality: is Unity's; add --unity, or leave it out")
+    return RenderSettings(**given, keep_going=keep_going)

@@ -18,13 +18,14 @@ from infthor_eval.errors import UsageError
 from infthor_eval.nieh.results.tables import clues_table
 from infthor_eval.nieh.samples import find_set
 from infthor_eval.nieh.scoring import Scorer
-from infthor_eval.nieh.validation.cross_validation import (
+from infthor_eval.nieh.validation import (
     Verdicts,
     check_decisions,
+    check_output,
     judge_questions,
     read_decisions,
+    write_validated_set,
 )
-from infthor_eval.nieh.validation.validated_set import check_output, write_validated_set
 from infthor_eval.report.inspection import write_inspection_page
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare_all

@@ -10,7 +10,7 @@ import pytest
 from ai2thor._quality_settings import QUALITY_SETTINGS
 
 from infthor_eval.cli import main
-from infthor_eval.cli.options.rendering import QUALITIES, parse_form
+from infthor_eval.cli.commands.data.replay import QUALITIES, parse_form
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import read_questions
 

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import pytest
 
 from recipes.nano.reading.episodes import World, read_episodes
-from recipes.nano.reading.event_questions import EventQuestions
 from recipes.nano.reading.events import Event, Happening
+from recipes.nano.reading.question_sampler import EventQuestions
 from recipes.nano.seen_objects import SeenFrame, SeenObject, read_seen_frames
 
 # A mug is moved from a table to a shelf and on to the sink, and a plate from a cabinet to the sink.

@@ -12,7 +12,6 @@ from infthor_eval.nieh.samples import find_samples
 from infthor_eval.training.data import question_sequences
 from infthor_eval.training.encoding import Encoder
 from recipes.nano.architecture import build_untrained
-from recipes.nano.corpus import corpus_texts
 from recipes.nano.reading.asking import Asker, question_intro
 from recipes.nano.reading.episodes import read_episodes
 from recipes.nano.reading.question_sampler import QuestionSampler
@@ -20,6 +19,7 @@ from recipes.nano.reading.renaming import Vocabulary
 from recipes.nano.seeing.units import Units
 from recipes.nano.seen_objects import SeenFrame, read_seen_frames
 from recipes.nano.settings import NanoRecipe, ReadingSettings
+from recipes.nano.stages import corpus_texts
 
 from ....helpers.twin_sets import CLUES, write_twin_set
 

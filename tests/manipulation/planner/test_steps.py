@@ -7,8 +7,8 @@ from infthor_eval.manipulation.geometry import Corners
 from infthor_eval.manipulation.planner.linkage import ArmStand
 from infthor_eval.manipulation.planner.obstacles import obstacles_of
 from infthor_eval.manipulation.planner.places import Entry, Places, support
-from infthor_eval.manipulation.planner.putting import PutGoal, passing_poses, release_poses
 from infthor_eval.manipulation.planner.roadmap import Contact, Terrain
+from infthor_eval.manipulation.planner.steps import PutGoal, passing_poses, release_poses
 
 from .test_places import lattice
 from .test_roadmap import linkage

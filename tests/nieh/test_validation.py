@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.formats.qa_csv import read_questions
-from infthor_eval.nieh.validation.cross_validation import JudgedQuestion, Verdicts, judge_scores
+from infthor_eval.nieh.validation import JudgedQuestion, Verdicts, judge_scores
 
-SETS = Path(__file__).parents[4] / "shared" / "data" / "published_sets"
+SETS = Path(__file__).parents[3] / "shared" / "data" / "published_sets"
 
 
 def filtered(file: str, *, partial_credit: bool) -> Verdicts:

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from recipes.nano.reading.label_units import label_units
+from recipes.nano.reading.frame_units import label_units
 from recipes.nano.seeing.units import Role, Units
 from recipes.nano.seen_objects import SeenFrame, SeenObject, read_seen_frames
 

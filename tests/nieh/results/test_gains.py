@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 from msgspec.structs import replace
 
-from infthor_eval.nieh.results.control_tables import control_tables
+from infthor_eval.nieh.results.gains import control_tables
 from infthor_eval.nieh.results.tables import overview, tables
 
 from ...helpers.nieh_runs import make_config, make_record, make_run

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from infthor_eval.cli.progress.patience import answer_ctrl_c
-from infthor_eval.cli.progress.stopping import handle_signal
+from infthor_eval.cli.progress.stopping import answer_ctrl_c, handle_signal
 
 STUCK_S = 2.0  # twice as long as an answer takes
 

@@ -1,6 +1,6 @@
 import numpy as np
 
-from recipes.nano.seeing.labels import cell_shares, token_labels
+from recipes.nano.seeing.network import cell_shares, token_labels
 from recipes.nano.seeing.units import Role
 from recipes.nano.seeing.view_dataset import ViewDataset
 

@@ -7,17 +7,26 @@ inspects it and decides. All others are rejected.
 """
 
 import itertools
+import os
+import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from infthor_eval.errors import DataError
+import msgspec
+
+from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.formats.csv_files import read_rows, unshield, write_sheet
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.scoring import Scorer, scores
+from infthor_eval.storage.files import prepare_folder, write_atomically
 
 DECISIONS = ("keep", "drop")
 _COLUMNS = ("question_id", "traj_id", "question", "gt_img_idx", "answer", "replies", "decision")
+_INSPECTION = "inspection.csv"
 
 
 @dataclass(frozen=True)
@@ -81,10 +90,6 @@ def judge_questions(
         decisions: "keep" or "drop", by question id.
         scorer: scorer whose full marks are a correct answer.
         partial_credit: whether any part of them is one already, as in the published filter.
-
-    Raises:
-        DataError: a model was not asked one of the questions, or a decision is about a question of
-            another set.
     """
     check_decisions(decisions, questions)
     verdicts = Verdicts()
@@ -107,11 +112,7 @@ def judge_scores(scores: Mapping[str, float], *, partial_credit: bool) -> tuple[
 
 
 def check_decisions(decisions: Mapping[str, str], questions: Iterable[Question]) -> None:
-    """Refuse decisions on another set.
-
-    Raises:
-        DataError: a decision is about a question that is not in the set.
-    """
+    """Refuse decisions on another set."""
     unknown = sorted(set(decisions) - {question.id for question in questions})
     if unknown:
         raise DataError(
@@ -131,10 +132,6 @@ def write_inspection_list(path: Path, items: Iterable[JudgedQuestion]) -> Path |
 
     Decisions in an existing list are kept. A list with decisions on other questions is renamed, and
     its new path is returned; else None.
-
-    Raises:
-        DataError: an existing list cannot be read.
-        OSError: the list cannot be written.
     """
     earlier = read_decisions(path) if path.exists() else {}
     listed = list(items)
@@ -159,11 +156,7 @@ def _row(judged: JudgedQuestion, decision: str) -> list[object]:
 
 
 def read_decisions(path: Path) -> dict[str, str]:
-    """Read an inspection list that a person has filled; rows without a decision are ignored.
-
-    Raises:
-        DataError: the file cannot be read, lacks a column, or a decision is neither keep nor drop.
-    """
+    """Read an inspection list that a person has filled; rows without a decision are ignored."""
     decisions: dict[str, str] = {}
     hint = "fill the list that `validate` wrote"
     for row in read_rows(path, ("question_id", "decision"), hint, line_breaks=True):
@@ -179,3 +172,58 @@ def read_decisions(path: Path) -> dict[str, str]:
         if decision:
             decisions[name] = decision
     return decisions
+
+
+def check_output(out: Path, data: NiehSet) -> None:
+    """Refuse an output folder that the validated set would damage, before the models run."""
+    if not (data.root / "metadata").is_dir():
+        raise UsageError(
+            f"{data.root}: has no metadata/, which a validated set links; give a set in the layout "
+            "of the published one"
+        )
+    prepare_folder(out)
+    if out.resolve() == data.root.resolve():
+        raise UsageError(
+            f"--out {out}: is the set itself, in which every question would be listed twice; give "
+            "another"
+        )
+    link = out / "metadata"
+    if os.path.lexists(link) and link.resolve() != (data.root / "metadata").resolve():
+        raise DataError(f"{link}: holds the frames of another set; give another --out")
+    if (out / _INSPECTION).exists():
+        read_decisions(out / _INSPECTION)
+
+
+def write_validated_set(out: Path, data: NiehSet, verdicts: Verdicts) -> Path | None:
+    """Write the validated set into a folder, created if needed; its frames are linked, not copied.
+
+    Returns:
+        New path of an existing inspection list, if it has decisions that the new one has no rows
+        for.
+    """
+    with wrap_errors(f"{out}: cannot be written", "give another --out"):
+        out.mkdir(parents=True, exist_ok=True)
+        link = out / "metadata"
+        if not link.exists():
+            link.symlink_to((data.root / "metadata").resolve(), target_is_directory=True)
+        if (data.root / "set.json").is_file():
+            shutil.copy(data.root / "set.json", out / "set.json")
+        write_questions(out / "qa_set_validated.csv", [judged.question for judged in verdicts.kept])
+        lines = [msgspec.json.encode(_as_json(judged)) for judged in verdicts.rejected]
+        with write_atomically(out / "rejected.jsonl") as partial:
+            partial.write_bytes(b"".join(line + b"\n" for line in lines))
+        return write_inspection_list(out / _INSPECTION, verdicts.to_inspect)
+
+
+def _as_json(judged: JudgedQuestion) -> dict[str, Any]:
+    question = judged.question
+    return {
+        "question_id": question.id,
+        "traj_id": question.traj_id,
+        "question": question.text,
+        "gt_img_idx": question.clues,
+        "answer": question.answers,
+        "question_type": question.question_type,
+        "replies": judged.replies,
+        "decision": judged.decision,
+    }

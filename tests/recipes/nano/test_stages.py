@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import torch
 
-from recipes.nano.seeing.stage import lower_thresholds, raise_units
 from recipes.nano.seeing.units import Role, Units
+from recipes.nano.stages import lower_thresholds, raise_units
 
 UNITS = Units(["Mug", "Sink"])
 BEYOND = 3  # features of the layer that are no units
