@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 import torch
 
-from infthor_eval.process_settings import keep_freed_memory
+from infthor_eval.process_settings import tune_malloc
 from infthor_eval.reasons import count_reasons
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.training.checkpoints import Checkpoints
@@ -77,7 +77,7 @@ def train_small_model(
             or cannot be written.
         UsageError: the states are of another recipe or other data.
     """
-    keep_freed_memory()
+    tune_malloc()
     torch.set_num_threads(recipe.threads)
     torch.manual_seed(recipe.seed)
     training = _prepare(recipe, data)

@@ -116,7 +116,8 @@ def _name(obj: ThorObject) -> str:
 class CountKind:
     """Base of the counts: one thing is carried once more than another one, which is not touched.
 
-    How often cannot be asked where it was never. So both worlds may have the same carries before.
+    "How often" cannot be asked about a thing that was never carried, so both worlds may start with
+    the same carries.
     """
 
     def propose(self, episode: Episode, rng: random.Random) -> Iterator[Insertion]:

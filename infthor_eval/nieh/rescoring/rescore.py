@@ -29,7 +29,7 @@ from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.questions.asking import MetricError
 from infthor_eval.runs import NOTHING, RunHeader, Session, Unit, UnitRecord, read_header, read_run
-from infthor_eval.runs.journals.shards import Tell
+from infthor_eval.runs.journals.shards import Notify
 from infthor_eval.runs.results import write_document
 from infthor_eval.runs.stored.writing import Stored, store_run
 
@@ -191,8 +191,8 @@ class Rescoring:
         )
 
 
-def read_source(folder: Path, tell: Tell | None = None) -> Source:
-    """Read the run in a folder; `tell` is told of bad lines, see `read_run`.
+def read_source(folder: Path, notify: Notify | None = None) -> Source:
+    """Read the run in a folder; `notify` is called with each bad line, see `read_run`.
 
     Raises:
         UsageError: it is a run of another suite.
@@ -204,7 +204,7 @@ def read_source(folder: Path, tell: Tell | None = None) -> Source:
             f"{folder}: is a run of {header.suite}; give a run of {NiehSuite.name}, which has "
             "replies"
         )
-    return Source(*read_run(folder, RECORDS, tell))
+    return Source(*read_run(folder, RECORDS, notify))
 
 
 def score_again(

@@ -8,7 +8,7 @@ from infthor_eval.plans.actors.model import ModelActor
 from infthor_eval.plans.actors.person import PersonActor
 from infthor_eval.plans.actors.protocols import PlanActor, PlanBaseline
 from infthor_eval.plans.task import PlansTask
-from model_adapters import Attended, Model, Subject, identity_of
+from model_adapters import Model, PersonModel, Subject, identity_of
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ def actor_factory(subject: Subject, trajectories: Sequence[Trajectory]) -> Actor
     if isinstance(subject, PlanBaseline):
         subject.fit(trajectories)
         return ActorFactory(False, lambda task, trajectory: subject.actor(trajectory, task.words))
-    if isinstance(subject, Attended):
+    if isinstance(subject, PersonModel):
         return ActorFactory(True, lambda task, _: PersonActor(subject, task.agent_config()))
     if isinstance(subject, Model):
         trained = identity_of(subject).get("trained_words")

@@ -4,13 +4,13 @@ from infthor_eval.plans.actors.model import AgentConfig, ModelActor
 from infthor_eval.plans.actors.protocols import Act, PlanSituation
 from infthor_eval.plans.environment import StepOutcome
 from infthor_eval.thor.actions import applicable_actions
-from model_adapters import Attended, Notice
+from model_adapters import Notice, PersonModel
 
 
 class PersonActor(ModelActor):
     """Asks a person for actions; tells goal, plan, rewards, and the actions that are possible."""
 
-    def __init__(self, person: Attended, config: AgentConfig) -> None:
+    def __init__(self, person: PersonModel, config: AgentConfig) -> None:
         super().__init__(person, config)
         self._person = person
         self._of_trajectory = self._of_plan = 0.0
@@ -34,7 +34,7 @@ class PersonActor(ModelActor):
             "reward so far": f"{self._of_trajectory:g}",
         }
         replies = tuple(map(str, possible))
-        self._person.tell(
+        self._person.show_notice(
             Notice(
                 title=self._title,
                 unit="plan",
