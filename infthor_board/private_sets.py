@@ -53,7 +53,7 @@ class Secret:
         return "Secret(...)"  # never in a traceback or a log
 
     def digest(self, what: str) -> str:
-        """Return what nobody can compute without the secret (hex, 64 characters)."""
+        """Return a digest that needs the secret (hex, 64 characters)."""
         return hmac.new(self._content, what.encode(), "sha256").hexdigest()
 
     def seed(self, what: str) -> int:

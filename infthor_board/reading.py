@@ -131,7 +131,7 @@ def read_submission(folder: Path, find_set: FindSet) -> Submission:
 
 
 def describe(error: Exception) -> str:
-    """Return an error as a reason, whatever it is: a stranger's file ends nobody else's check."""
+    """Return any error as a reason: one submission's file must not end the check of others."""
     return str(error) if isinstance(error, InfthorError) else describe_exception(error)
 
 

@@ -327,7 +327,7 @@ class Adapter(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Notice:
-    """What a person is told beside the conversation, which models are not.
+    """What a person is shown beside the conversation, and models are not.
 
     Attributes:
         title: heading of what is asked.

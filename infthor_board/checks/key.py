@@ -88,7 +88,7 @@ class KeyScore:
     """Not all is right."""
 
     name: ClassVar[str] = "key score"
-    reason: ClassVar[str] = "who reworded the key is right about what nobody can see"
+    reason: ClassVar[str] = "a reworded key is right about things that no frame shows"
 
     def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
         """See `Check`."""

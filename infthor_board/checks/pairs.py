@@ -42,7 +42,7 @@ class PairsOfWhatDiffers:
 
 
 class PairsOfBothWorlds:
-    """Who is right in one world alone is so in either: their order was drawn by coin."""
+    """Right answers in one world alone are as many in either world: a coin drew their order."""
 
     name: ClassVar[str] = "pairs one-sided"
     reason: ClassVar[str] = "the key of one world, given in both"

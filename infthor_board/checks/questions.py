@@ -65,7 +65,7 @@ class AllThere:
     """Every question of the set has a record: none missing, left out, or not asked."""
 
     name: ClassVar[str] = "complete"
-    reason: ClassVar[str] = "who leaves out what is hard scores higher"
+    reason: ClassVar[str] = "leaving out hard questions raises a score"
 
     def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
         """See `Check`."""

@@ -51,7 +51,7 @@ class SameScores:
     """Each stored score is the one of its reply."""
 
     name: ClassVar[str] = "scores"
-    reason: ClassVar[str] = "what is stored counts for nothing, but who edits it edits more"
+    reason: ClassVar[str] = "stored scores are not used, but edited ones cast doubt on the replies"
 
     def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
         """See `Check`."""

@@ -209,9 +209,9 @@ def _by_key(side: Side | None) -> dict[UnitKey, Record]:
 
 
 def _decode_alike(runs: tuple[Run, Run], sides: tuple[Side, Side]) -> bool:
-    """Return whether hashes of requests, which have the decoding in them, tell of the rest.
+    """Return whether the runs decode alike: only then do hashes of requests show other differences.
 
-    Those of imported replies are of the replies.
+    Hashes of imported replies are of the replies.
     """
     configs = [run.header.config for run in runs]
     if any(config.model.get("imported") for config in configs):

@@ -24,7 +24,7 @@ class ScreenClock:
 
     @property
     def seconds(self) -> float | None:
-        """Seconds so far; None if no page has told that it was shown."""
+        """Seconds so far; None if no page has reported that it was shown."""
         if not self._is_shown_once:
             return None
         return self._before + (0.0 if self._since is None else time.monotonic() - self._since)

@@ -15,8 +15,8 @@ from model_adapters.protocols import Capabilities, Conversation, Decoding, Notic
 from model_adapters.thinking import cut_at_stop
 
 UNTIMED = (
-    "the page never told that the question was on the screen: its seconds count from when it was "
-    "asked"
+    "the page never reported that the question was on the screen: its seconds count from when it "
+    "was asked"
 )
 
 

@@ -42,7 +42,7 @@ class _AnswerForm(msgspec.Struct):
 
 
 class _ScreenForm(msgspec.Struct):
-    """What a page tells of its screen: whether it shows a question; `page` tells pages apart."""
+    """A page's report on its screen: whether it shows a question; `page` identifies the page."""
 
     number: int
     page: Annotated[str, msgspec.Meta(max_length=40)]
@@ -114,11 +114,11 @@ class _Page:
         return await run_in_threadpool(_take, self._desk, form)
 
     async def screen(self, request: Request) -> Response:
-        """Take what a page tells of its screen."""
+        """Take a page's report on its screen."""
         try:
             form = msgspec.json.decode(await request.body(), type=_ScreenForm)
         except (msgspec.ValidationError, msgspec.DecodeError):
-            return _problem("not what a page tells of its screen", 400)
+            return _problem("not a page's report on its screen", 400)
         self._desk.tell_screen(form.number, form.page, shows=form.shows)
         return JSONResponse({})
 

@@ -47,7 +47,7 @@ def answer_ctrl_c(warn: Callable[[], None], end: Callable[[], None]) -> Iterator
 
 
 class _Presses:
-    """The presses that nobody has handled yet."""
+    """The presses that have not been handled yet."""
 
     def __init__(
         self, signals: socket.socket, warn: Callable[[], None], end: Callable[[], None]

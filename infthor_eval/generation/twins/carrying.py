@@ -97,7 +97,7 @@ def _carries_back(episode: Episode, frame: int) -> list[_Carry]:
 
 
 def _is_plain(episode: Episode, frame: int, item: ThorObject, place: ThorObject) -> bool:
-    """Return True if all can tell which object is carried from and to which place."""
+    """Return True if it is clear which object is carried from and to which place."""
     actions = episode.actions_on(item.object_id)
     is_clear = episode.n_handled(item.object_type) <= bool(actions) and set(actions) <= _CARRYING
     is_open = episode.history.states(frame)[place.object_id].is_open is not False
@@ -135,7 +135,7 @@ class CountKind:
             yield _insertion(index, [*before, one], [*before, other], ALL)
 
     def _may_differ(self, episode: Episode, one: _Carry, other: _Carry) -> bool:
-        """Return True if both things are told apart, and how often one was moved is clear."""
+        """Return True if the things can be distinguished, and their moves be counted."""
         key = one.item.object_id
         moves = episode.history.moves_of(key)
         is_counted = len(moves) == episode.history.pickups[key]

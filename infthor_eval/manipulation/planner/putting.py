@@ -1,4 +1,4 @@
-"""Putting down a held object: paths to a place, and what collisions tell of the surroundings.
+"""Putting down a held object: paths to a place, and what collisions show of the surroundings.
 
 Poses to release the object in, and to pass on the way, are drawn at random.
 """

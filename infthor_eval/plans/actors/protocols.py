@@ -74,7 +74,7 @@ class CountingActor(PlanActor, Protocol):
 
 @runtime_checkable
 class EndedActor(PlanActor, Protocol):
-    """An actor that is told how its plan ended."""
+    """An actor that learns how its plan ended."""
 
     def end(self, outcome: StepOutcome) -> None:
         """Take the outcome of the plan's last action."""

@@ -1,4 +1,4 @@
-"""Units of recorded frames: what the trained tower tells of them, computed once for all.
+"""Units of recorded frames: what the trained tower sees in them, computed once.
 
 The tower takes most of a step's time, and is not trained any more when the decoder learns to read.
 """

@@ -1,4 +1,4 @@
-"""Units of recorded frames as a tower without mistakes would tell them.
+"""Units of recorded frames as a tower without mistakes would see them.
 
 What to compare with what is learned in minutes from what frames do show, and not in hours from what
 a tower tells of them. So the decoder reads labels first.

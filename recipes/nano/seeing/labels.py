@@ -1,4 +1,4 @@
-"""What the tower should tell of pictures: labels of units, and shares of types in each cell.
+"""What the tower should see in pictures: labels of units, and shares of types in each cell.
 
 Pixels are those of frames of 300 x 300, of which a thousandth counts as seen in questions.
 """
