@@ -13,7 +13,7 @@ from infthor_eval.tables import Column, Row, Table, TableCell
 _HEADS = (Column("model", False), Column("task", False), Column("context", False))
 _NOTES = (
     "net pairs: pairs right (both worlds' answers) less pairs exchanged (each answer right in the "
-    "other world), %. Who does not know which world is which has 0 on average, whatever it says. "
+    "other world), %; 0 on average for a model that does not know which world is which. "
     "In brackets: 95 % bootstrap interval over the trajectories that the worlds were made of; all "
     "equal: each of them has this value, so resampling them finds no interval.",
     "by fact: mean over changed facts, which several pairs may be about, of net pairs. flipped: "
