@@ -1,7 +1,7 @@
 """By what questions are grouped: their form, what was shown of their evidence, their length.
 
 To add a facet of questions: an entry in `FACETS`; it is then in results.json, in the tables, on the
-page, in the table of samples, and in what exports tell of a sample.
+page, in the table of samples, and in exports.
 """
 
 from collections.abc import Callable, Collection
