@@ -68,7 +68,8 @@ class JobBar:
     def show(self, job: JobProgress) -> None:
         """Show how far a job is; another name than before starts the bar anew."""
         if job.name != self._name:
-            self._name, self._pace = job.name, Pace(job.n_units, self._shown_at)
+            self._name = job.name
+            self._pace = Pace(job.n_units, self._shown_at)
         self._shown_at = now = time.monotonic()
         self._pace.go_on(job.n_done, job.n_units)
         detail = f"; {job.detail}" if job.detail else ""
