@@ -276,7 +276,7 @@ class BrokenRun:
 def open_runs(
     folders: Sequence[Path], notify: Notify | None = None, *, twice: bool = False
 ) -> list[Run]:
-    """Open runs by names that tell them apart, at least one.
+    """Open runs, at least one, under distinct names.
 
     Args:
         folders: their folders.
@@ -289,14 +289,14 @@ def open_runs(
     """
     if not twice and len({folder.resolve() for folder in folders}) < len(folders):
         raise UsageError("one run is given twice; give each once")
-    runs = told_apart([Run.open(folder, notify) for folder in folders], by_task=True)
+    runs = with_distinct_names([Run.open(folder, notify) for folder in folders], by_task=True)
     return [run.read() for run in runs]
 
 
-def told_apart(
+def with_distinct_names(
     runs: Sequence[Run], *, by_task: bool = False, ignore: Collection[str] = _SHOWN_BY_TABLES
 ) -> list[Run]:
-    """Return runs by names that tell them apart; see `label_runs`."""
+    """Return the runs under distinct names; see `label_runs`."""
     places = [(run.folder, run.listed) for run in runs]
     names = label_runs(places, ignore, by_task=by_task)
     return [run.named(name) for run, name in zip(runs, names, strict=True)]

@@ -72,11 +72,11 @@ class SameModel:
             yield from self._of_export(run, statement)
 
     def _of_export(self, run: SubmittedRun, statement: Statement) -> Iterator[Problem]:
-        for told in sorted(run.told_models):
-            if told.rpartition("/")[2] != statement.model.rpartition("/")[2]:
+        for stated in sorted(run.stated_models):
+            if stated.rpartition("/")[2] != statement.model.rpartition("/")[2]:
                 yield Problem(
                     self.name,
-                    f"{run.path.name}: says that it is of {told!r:.60}, submission.yaml "
+                    f"{run.path.name}: says that it is of {stated!r:.60}, submission.yaml "
                     f"{statement.model!r:.60}; make them say the same",
                 )
 

@@ -57,7 +57,7 @@ def serve_desk(desk: Desk, options: HumanOptions, listening: socket) -> Iterator
         if options.browser and _has_screen():
             webbrowser.open(server.address)
         yield
-        desk.wait_until_told(_LAST_NEWS_S, _LAST_LOOK_S)
+        desk.wait_until_informed(_LAST_NEWS_S, _LAST_LOOK_S)
 
 
 def desk_routes(desk: Desk) -> list[BaseRoute]:
@@ -91,8 +91,8 @@ class _Page:
                 while self._desk.version == seen and time.monotonic() < end:
                     await asyncio.sleep(_LOOK_S)
         state = _state_of(self._desk)
-        told = BackgroundTask(self._desk.tell_closed) if state["closed"] else None
-        return JSONResponse(state, background=told)
+        informing = BackgroundTask(self._desk.report_closed) if state["closed"] else None
+        return JSONResponse(state, background=informing)
 
     async def frame(self, request: Request) -> Response:
         """One frame of the question of a number."""
@@ -119,7 +119,7 @@ class _Page:
             form = msgspec.json.decode(await request.body(), type=_ScreenForm)
         except (msgspec.ValidationError, msgspec.DecodeError):
             return _problem("not a page's report on its screen", 400)
-        self._desk.tell_screen(form.number, form.page, shows=form.shows)
+        self._desk.report_screen(form.number, form.page, shows=form.shows)
         return JSONResponse({})
 
     async def stop(self, _request: Request) -> Response:

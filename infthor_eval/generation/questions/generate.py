@@ -217,7 +217,7 @@ class _QuestionWorker:
 
     def do(self, job: _RuleJob | _CheckJob) -> Iterator[Any]:
         try:
-            with _telling_inconsistency(job.path):
+            with _naming_inconsistency(job.path):
                 result: Any = job.run()
         except DataError as error:  # of this trajectory alone
             yield error
@@ -248,11 +248,11 @@ def _share_out(
 
 
 def _read_history(path: Path, share: float) -> TrajectoryHistory:
-    with _telling_inconsistency(path):
+    with _naming_inconsistency(path):
         return TrajectoryHistory(path.name, read_steps(path), share)
 
 
-def _telling_inconsistency(path: Path) -> AbstractContextManager[None]:
+def _naming_inconsistency(path: Path) -> AbstractContextManager[None]:
     return wrap_errors(
         f"{path}: its log is inconsistent", "replay the trajectory again", catch=_INCONSISTENT
     )
