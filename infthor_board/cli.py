@@ -217,8 +217,8 @@ def private_set(
             min_steps=min_steps,
             per_trajectory=per_trajectory,
             worker_settings=worker_settings,
-            progress=lambda name, resumed: bars[name].advance(resumed),
-            say=print_note,
+            advance=lambda name, resumed: bars[name].advance(resumed),
+            notify=print_note,
         )
     print_line(f"{made.n_pairs} pairs of questions on {made.n_trajectories} trajectories")
     print_line(f"to publish: {made.public}")

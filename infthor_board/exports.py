@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.formats.reading import json_lines_of, read_json
-from infthor_eval.formats.replies.exported_samples import told_of
+from infthor_eval.formats.replies.exported_samples import fields_of_metadata
 from infthor_eval.formats.replies.inspect_logs import INSPECT_SUFFIX, inspect_documents
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.quantities import MOST
@@ -38,7 +38,7 @@ _LM_EVAL_NAME = re.compile(r"samples_(?P<task>.+)_\d{4}-\d\d-\d\dT.*\.jsonl(?:\.
 _EVERY_EVAL_EVER_WITH_MEANS = re.compile(r"(?P<name>.+)_samples\.jsonl")
 _LM_EVAL_WITH_MEANS = re.compile(r"samples_.+_(?P<time>\d{4}-\d\d-\d\dT.*)\.jsonl")
 Means = dict[tuple[str, str], float]  # by task and metric
-# task (empty if it is not told), id of the question, variant, number of the repetition
+# task (empty if unknown), id of the question, variant, number of the repetition
 _Unit = tuple[str, str, str, int]
 
 
@@ -63,13 +63,13 @@ class ExportedScores:
 
     def add(self, unit: _Unit, metric: str, score: object) -> None:
         """Add a score, if it is a number under one of our scorers."""
-        told = _told_score(score)
-        if metric in SCORERS and told is not None:
-            self.by_unit.setdefault(unit, {})[metric] = told
+        stated = _stated_score(score)
+        if metric in SCORERS and stated is not None:
+            self.by_unit.setdefault(unit, {})[metric] = stated
 
 
-def _told_score(value: object) -> float | None:
-    """Return a score that others tell, None for what is no number; whatever no float holds, and
+def _stated_score(value: object) -> float | None:
+    """Return a score that others state, None for what is no number; whatever no float holds, and
     what is none itself, is infinite, as it is the score of no reply."""
     if not isinstance(value, int | float):
         return None
@@ -108,8 +108,8 @@ def _mapping(value: object) -> Mapping[str, Any]:
 
 
 def _unit(metadata: Mapping[str, Any], sample_id: str) -> _Unit:
-    told = told_of(metadata, sample_id)
-    return told["task"], told["question_id"], told["variant"], told["repeat"]
+    fields = fields_of_metadata(metadata, sample_id)
+    return fields["task"], fields["question_id"], fields["variant"], fields["repeat"]
 
 
 def _add_every_eval_ever(found: ExportedScores, row: Mapping[str, Any]) -> None:
@@ -166,7 +166,7 @@ def _means_of_every_eval_ever(
             continue
         task, _, metric = str(result.get("evaluation_result_id")).rpartition("/")
         details = result.get("score_details")
-        score = _told_score(details.get("score") if isinstance(details, Mapping) else None)
+        score = _stated_score(details.get("score") if isinstance(details, Mapping) else None)
         if metric in SCORERS and score is not None:
             yield (task, metric), score
 
@@ -175,6 +175,6 @@ def _means_of_lm_eval(document: Mapping[str, Any]) -> Iterator[tuple[tuple[str, 
     results = document.get("results")
     for task, values in results.items() if isinstance(results, Mapping) else ():
         for metric in SCORERS:
-            told = values.get(f"{metric},none") if isinstance(values, Mapping) else None
-            if (score := _told_score(told)) is not None:
+            stated = values.get(f"{metric},none") if isinstance(values, Mapping) else None
+            if (score := _stated_score(stated)) is not None:
                 yield (str(task), metric), score

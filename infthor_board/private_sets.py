@@ -53,7 +53,7 @@ class Secret:
         return "Secret(...)"  # never in a traceback or a log
 
     def digest(self, what: str) -> str:
-        """Return what nobody can compute without the secret (hex, 64 characters)."""
+        """Return a digest that needs the secret (hex, 64 characters)."""
         return hmac.new(self._content, what.encode(), "sha256").hexdigest()
 
     def seed(self, what: str) -> int:
@@ -99,8 +99,8 @@ def make_private_set(
     min_steps: int,
     per_trajectory: int,
     worker_settings: WorkerSettings,
-    progress: Callable[[str, bool], None] = lambda _name, _resumed: None,
-    say: Callable[[str], None] = lambda _: None,
+    advance: Callable[[str, bool], None] = lambda _name, _resumed: None,
+    notify: Callable[[str], None] = lambda _: None,
 ) -> PrivateSet:
     """Make the key and the public part; the same secret and options make the same files.
 
@@ -112,8 +112,8 @@ def make_private_set(
         min_steps: least number of steps of each.
         per_trajectory: most pairs of questions of each.
         worker_settings: number and place of the workers.
-        progress: called with the name of a stage after each home, and whether it was there.
-        say: called with messages about the workers.
+        advance: called with the name of a stage after each home, and whether it was there.
+        notify: called with messages about the workers.
     """
     key = prepare_folder(out / "key")
     key.chmod(_OWNER_ALONE)
@@ -124,8 +124,8 @@ def make_private_set(
         embedded_launch(),
         trajectories,
         worker_settings,
-        lambda resumed: progress("trajectories", resumed),
-        say,
+        lambda resumed: advance("trajectories", resumed),
+        notify,
     )
     selection = select([trajectories])
     summary = make_twins(
@@ -136,8 +136,8 @@ def make_private_set(
         partial(score, scorer="strict"),
         per_trajectory=per_trajectory,
         worker_settings=worker_settings,
-        progress=lambda resumed: progress("twins", resumed),
-        say=say,
+        advance=lambda resumed: advance("twins", resumed),
+        notify=notify,
     )
     failures = [*generated.failures, *summary.failures]
     if not summary.pairs:

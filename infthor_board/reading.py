@@ -60,8 +60,8 @@ class SubmittedRun:
         header: its header; of an export, as `import-replies` makes it.
         records: the latest record of each unit.
         results: every record with a reply, also those that a later one replaced.
-        told: scores that it says of its units, by metric.
-        told_models: names of models that an export says.
+        stated: scores that it states for its units, by metric.
+        stated_models: names of models that an export states.
         unread: rows of an export that are no replies to questions of the set, with the reason.
         is_export: True for an export, which has no hashes of requests.
     """
@@ -70,8 +70,8 @@ class SubmittedRun:
     header: RunHeader[NiehConfig]
     records: Sequence[Record]
     results: Sequence[Record]
-    told: Mapping[UnitKey, Mapping[str, float]]
-    told_models: Sequence[str] = ()
+    stated: Mapping[UnitKey, Mapping[str, float]]
+    stated_models: Sequence[str] = ()
     unread: Sequence[str] = ()
     is_export: bool = False
 
@@ -131,7 +131,7 @@ def read_submission(folder: Path, find_set: FindSet) -> Submission:
 
 
 def describe(error: Exception) -> str:
-    """Return an error as a reason, whatever it is: a stranger's file ends nobody else's check."""
+    """Return any error as a reason: one submission's file must not end the check of others."""
     return str(error) if isinstance(error, InfthorError) else describe_exception(error)
 
 
@@ -159,8 +159,8 @@ def _read_journal(folder: Path) -> SubmittedRun:
         )
     header, records = read_run(folder, RECORDS)
     results = [it for it in _all_records(folder, header) if it.payload.reply is not None]
-    told = {record.key: record.payload.scores for record in records}
-    return SubmittedRun(folder, header, records, results, told)
+    stated = {record.key: record.payload.scores for record in records}
+    return SubmittedRun(folder, header, records, results, stated)
 
 
 def _all_records(folder: Path, header: RunHeader[NiehConfig]) -> Iterator[Record]:
@@ -193,9 +193,9 @@ def _exported_run(
     path: Path, run: ImportedRun, scores: ExportedScores, data: NiehSet, task: str
 ) -> SubmittedRun:
     """Return a run of an export; one that does not tell its task is of the given one."""
-    told = {record.key: scores.of(run.task, record.key) for record in run.records}
+    stated = {record.key: scores.of(run.task, record.key) for record in run.records}
     if run.task not in scores.tasks:
-        told = {key._replace(task=task): of_unit for key, of_unit in told.items()}
+        stated = {key._replace(task=task): of_unit for key, of_unit in stated.items()}
         run.records[:] = [replace(record, task=task) for record in run.records]
         run.task = task
     return SubmittedRun(
@@ -203,7 +203,7 @@ def _exported_run(
         run.header(data),
         run.records,
         [record for record in run.records if record.payload.reply is not None],
-        told,
+        stated,
         sorted(scores.models),
         [f"line {row.line} {row.reason}" for row in run.refused],
         is_export=True,

@@ -1,4 +1,5 @@
-"""Settings of this process: freed memory, and where those that it starts look for modules."""
+"""Settings of this process: its use of freed memory, and where its child processes look for
+modules."""
 
 import ctypes
 import os
@@ -9,7 +10,7 @@ from contextlib import contextmanager
 from threading import RLock
 
 _SETTINGS = (  # numbers of <malloc.h>, and bytes
-    (-1, 2**28),  # M_TRIM_THRESHOLD: kept at the end of the heap
+    (-1, 2**28),  # M_TRIM_THRESHOLD: bytes kept at the end of the heap
     (-2, 2**26),  # M_TOP_PAD: asked for ahead; a thread's heap is not given back when it is empty
     (-3, 2**25),  # M_MMAP_THRESHOLD: least that is always asked for anew, at its highest
 )
@@ -17,12 +18,12 @@ _SAFE_PATH = "PYTHONSAFEPATH"  # Python's -P
 _CHANGING = RLock()  # the environment is of all threads
 
 
-def keep_freed_memory() -> None:
-    """Have glibc keep freed memory of this process for what is allocated next (mallopt(3)).
+def tune_malloc() -> None:
+    """Have glibc reuse this process's freed memory in place of returning it (mallopt(3)).
 
-    It gives larger pieces back to the system and asks for them anew, and the system clears every
-    page of them. For a frame of several crops that took as long as half of its arithmetic, for a
-    step of the small model's training up to three times as long as all of its arithmetic.
+    By default glibc returns large blocks to the system and asks for them again, and the system
+    clears every page. A frame of several crops lost half as much time to that as its arithmetic
+    takes; a training step of the small model, up to three times as much.
     """
     if platform.libc_ver()[0] == "glibc":
         for setting in _SETTINGS:
@@ -31,7 +32,7 @@ def keep_freed_memory() -> None:
 
 @contextmanager
 def safe_path() -> Iterator[None]:
-    """Keep the folder where one stands from processes that multiprocessing starts meanwhile.
+    """Keep the working directory from processes that multiprocessing starts meanwhile.
 
     They take over this one's `sys.path`, but import modules before.
     """

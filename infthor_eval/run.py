@@ -27,8 +27,8 @@ from infthor_eval.runs.completeness import (
 from infthor_eval.runs.journals.records import RunHeader, State, UnitRecord
 from infthor_eval.runs.journals.requests import StoredRequest
 from infthor_eval.runs.journals.shards import (
+    Notify,
     RunLog,
-    Tell,
     last_change,
     read_header,
     read_run_log,
@@ -59,22 +59,22 @@ class Run:
         name: name of the run beside others; its own until `named`.
     """
 
-    def __init__(self, folder: Path, listed: RunHeader, tell: Tell | None = None) -> None:
-        """Take folder and header of a run; `tell` is told of bad lines, see `read_run`."""
+    def __init__(self, folder: Path, listed: RunHeader, notify: Notify | None = None) -> None:
+        """Take folder and header of a run; `notify` as in `read_run`."""
         self.folder = folder
         self.listed = listed
-        self._tell = tell
+        self._notify = notify
         self.name = listed.name
 
     @classmethod
-    def open(cls, folder: Path, tell: Tell | None = None) -> Self:
+    def open(cls, folder: Path, notify: Notify | None = None) -> Self:
         """Open the run in a folder.
 
         Raises:
             DataError: there is no journal, or one of another format. What is read later may raise
                 it, too, and UsageError where the suite of the run is not known here.
         """
-        return cls(folder, read_header(folder), tell)
+        return cls(folder, read_header(folder), notify)
 
     @classmethod
     def held(
@@ -127,7 +127,7 @@ class Run:
 
     @cached_property
     def _log(self) -> tuple[RunHeader, RunLog[Any]]:
-        return read_run_log(self.folder, self.suite.records, self._tell)
+        return read_run_log(self.folder, self.suite.records, self._notify)
 
     @cached_property
     def own_header(self) -> RunHeader:
@@ -194,7 +194,7 @@ class Run:
     @cached_property
     def states(self) -> Counter[State]:
         """Number of units by state, read without the suite."""
-        return Counter(read_states(self.folder, self._tell).values())
+        return Counter(read_states(self.folder, self._notify).values())
 
     @property
     def n_not_asked(self) -> int | None:
@@ -280,13 +280,13 @@ class BrokenRun:
 
 
 def open_runs(
-    folders: Sequence[Path], tell: Tell | None = None, *, twice: bool = False
+    folders: Sequence[Path], notify: Notify | None = None, *, twice: bool = False
 ) -> list[Run]:
-    """Open runs by names that tell them apart, at least one.
+    """Open runs, at least one, under distinct names.
 
     Args:
         folders: their folders.
-        tell: told of bad lines of journals, see `read_run`.
+        notify: called with each bad line of a journal, see `read_run`.
         twice: whether a folder may be given twice.
 
     Raises:
@@ -295,20 +295,20 @@ def open_runs(
     """
     if not twice and len({folder.resolve() for folder in folders}) < len(folders):
         raise UsageError("one run is given twice; give each once")
-    runs = told_apart([Run.open(folder, tell) for folder in folders], by_task=True)
+    runs = with_distinct_names([Run.open(folder, notify) for folder in folders], by_task=True)
     return [run.read() for run in runs]
 
 
-def told_apart(
+def with_distinct_names(
     runs: Sequence[Run], *, by_task: bool = False, ignore: Collection[str] = _SHOWN_BY_TABLES
 ) -> list[Run]:
-    """Return runs by names that tell them apart; see `label_runs`."""
+    """Return the runs under distinct names; see `label_runs`."""
     places = [(run.folder, run.listed) for run in runs]
     names = label_runs(places, ignore, by_task=by_task)
     return [run.named(name) for run, name in zip(runs, names, strict=True)]
 
 
-def find_runs(folder: Path, tell: Tell | None = None) -> Iterator[Run | BrokenRun]:
+def find_runs(folder: Path, notify: Notify | None = None) -> Iterator[Run | BrokenRun]:
     """Yield the runs below a folder, in the order of their paths, with their states and results.
 
     Raises:
@@ -320,7 +320,7 @@ def find_runs(folder: Path, tell: Tell | None = None) -> Iterator[Run | BrokenRu
         )
     for path in run_folders(folder):
         try:
-            run = Run.open(path, tell)
+            run = Run.open(path, notify)
             _ = run.states, run.results
         except InfthorError as error:
             yield BrokenRun(path, str(error))

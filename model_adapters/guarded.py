@@ -129,17 +129,17 @@ class _GuardedModel(_Guarded):
 
 
 class _GuardedPerson(_GuardedModel):
-    """See `Attended`."""
+    """See `PersonModel`."""
 
-    def tell(self, notice: Notice) -> None:
-        """See `Attended`."""
+    def show_notice(self, notice: Notice) -> None:
+        """See `PersonModel`."""
         with wrap_request_errors(self.name):
-            self._adapter.tell(notice)
+            self._adapter.show_notice(notice)
 
-    def tell_position(self, number: int, n_units: int) -> None:
-        """See `Attended`."""
+    def show_position(self, number: int, n_units: int) -> None:
+        """See `PersonModel`."""
         with wrap_request_errors(self.name):
-            self._adapter.tell_position(number, n_units)
+            self._adapter.show_position(number, n_units)
 
 
 class _GuardedConversation:

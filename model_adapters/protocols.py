@@ -327,7 +327,7 @@ class Adapter(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Notice:
-    """What a person is told beside the conversation, which models are not.
+    """What a person is shown beside the conversation, and models are not.
 
     Attributes:
         title: heading of what is asked.
@@ -348,29 +348,29 @@ class Notice:
 
 
 @runtime_checkable
-class Attended(Model, Protocol):
-    """A model that is a person at a page."""
+class PersonModel(Model, Protocol):
+    """A person who answers on a page in place of a model."""
 
-    def tell(self, notice: Notice) -> None:
-        """Take what is shown with the next request, and those after it until the next notice."""
+    def show_notice(self, notice: Notice) -> None:
+        """Show this with each request until the next notice."""
 
-    def tell_position(self, number: int, n_units: int) -> None:
-        """Take which unit of the run the next requests belong to, from 1, and of how many.
+    def show_position(self, number: int, n_units: int) -> None:
+        """Show which unit of the run comes next, from 1, and how many there are.
 
-        It is told where one person answers all of the run, which that person may stop.
+        Called only if one person answers the whole run, and so may stop it.
         """
 
 
 class Batches(Protocol):
-    """The requests of a run that are answered together, hours later."""
+    """The requests of a run that a server answers together, hours later."""
 
-    def gathering(self) -> AbstractContextManager[None]:
-        """Within this context `Conversation.replies` notes its requests and raises `NotAskedError`;
-        after it, it returns the replies that were fetched."""
+    def collecting(self) -> AbstractContextManager[None]:
+        """Within this context `Conversation.replies` records its requests and raises
+        `NotAskedError`; after `fetch` it returns their replies."""
 
     def fetch(self) -> bool:
-        """Have the gathered requests answered; return whether to gather once more, as some were not
-        processed.
+        """Have the collected requests answered; return whether some were not processed, so that
+        they must be collected again.
 
         Raises:
             ModelError: the server cannot be asked.
@@ -379,25 +379,25 @@ class Batches(Protocol):
 
 
 @runtime_checkable
-class Deferring(Model, Protocol):
-    """A model that can have requests answered together, by a server's batches.
+class BatchModel(Model, Protocol):
+    """A model whose server can answer many requests together, as a batch.
 
-    Each is asked at once until `open_batches` is called.
+    Each request is sent at once until `open_batches` is called.
     """
 
     @property
-    def defers(self) -> bool:
-        """True if that is what the user wants."""
+    def uses_batches(self) -> bool:
+        """True if the user asked for batches."""
 
     def open_batches(
-        self, folder: Path, report: Callable[[str], None], should_stop: Callable[[], bool]
+        self, folder: Path, notify: Callable[[str], None], should_stop: Callable[[], bool]
     ) -> Batches:
-        """Return the batches of a run; from then on replies come from them alone.
+        """Return the batches of a run; from then on all replies come from them.
 
         Args:
-            folder: where the batches are kept, so that they are found again.
-            report: gets a line when a batch begins or ends.
-            should_stop: returns true when no more is to be waited for.
+            folder: where the batches are kept, so that a later command finds them.
+            notify: called with a line when a batch begins or ends.
+            should_stop: returns True to stop waiting.
 
         Raises:
             DataError: the folder cannot be read or written.

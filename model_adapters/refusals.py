@@ -8,7 +8,7 @@ from infthor_eval.formats.pictures.video import Video
 from infthor_eval.quantities import MOST
 from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
-from model_adapters.protocols import ArmDelta, Capabilities, Decoding, Deferring, Subject, Turn
+from model_adapters.protocols import ArmDelta, BatchModel, Capabilities, Decoding, Subject, Turn
 
 _N_NUMBERS = 7  # of a policy's step
 
@@ -46,9 +46,9 @@ def check_turns(name: str, capabilities: Capabilities, turns: Sequence[Turn]) ->
         raise ModelError(f"{name} has no video input; give it the video's frames as images")
 
 
-def refuse_deferring(subject: Subject) -> None:
+def refuse_batches(subject: Subject) -> None:
     """Refuse batches where replies are needed at once (UsageError)."""
-    if isinstance(subject, Deferring) and subject.defers:
+    if isinstance(subject, BatchModel) and subject.uses_batches:
         subject.close()
         raise UsageError(
             f"{subject.name}: batch=true is for `infthor-eval run`, where replies may come hours "

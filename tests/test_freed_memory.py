@@ -1,4 +1,4 @@
-"""What is freed is used again, and not asked of the system anew."""
+"""Freed memory is used again, and not requested from the system again."""
 
 import os
 import platform
@@ -9,9 +9,9 @@ import pytest
 
 _FAULTS = """
 import resource, numpy as np
-from infthor_eval.process_settings import keep_freed_memory
+from infthor_eval.process_settings import tune_malloc
 if {kept}:
-    keep_freed_memory()
+    tune_malloc()
 
 def use():
     pieces = [np.ones(10 * 2**20, np.uint8) for _ in range(4)]

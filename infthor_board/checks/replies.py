@@ -246,7 +246,7 @@ class KeyScore:
     """Not all is right."""
 
     name: ClassVar[str] = "key score"
-    reason: ClassVar[str] = "who reworded the key is right about what nobody can see"
+    reason: ClassVar[str] = "a reworded key is right about things that no frame shows"
 
     def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
         """See `Check`."""
@@ -320,7 +320,7 @@ class PairsOfWhatDiffers:
 
 
 class PairsOfBothWorlds:
-    """Who is right in one world alone is so in either: their order was drawn by coin."""
+    """Right answers in one world alone are as many in either world: a coin drew their order."""
 
     name: ClassVar[str] = "pairs one-sided"
     reason: ClassVar[str] = "the key of one world, given in both"

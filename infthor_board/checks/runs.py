@@ -93,11 +93,11 @@ class SameModel:
             yield from self._of_export(run, statement)
 
     def _of_export(self, run: SubmittedRun, statement: Statement) -> Iterator[Problem]:
-        for told in sorted(run.told_models):
-            if told.rpartition("/")[2] != statement.model.rpartition("/")[2]:
+        for stated in sorted(run.stated_models):
+            if stated.rpartition("/")[2] != statement.model.rpartition("/")[2]:
                 yield Problem(
                     self.name,
-                    f"{run.path.name}: says that it is of {told!r:.60}, submission.yaml "
+                    f"{run.path.name}: says that it is of {stated!r:.60}, submission.yaml "
                     f"{statement.model!r:.60}; make them say the same",
                 )
 
@@ -196,7 +196,7 @@ class AllThere:
     """Every question of the set has a record: none missing, left out, or not asked."""
 
     name: ClassVar[str] = "complete"
-    reason: ClassVar[str] = "who leaves out what is hard scores higher"
+    reason: ClassVar[str] = "leaving out hard questions raises a score"
 
     def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
         """See `Check`."""
@@ -343,7 +343,7 @@ class SameScores:
     """Each stored score is the one of its reply."""
 
     name: ClassVar[str] = "scores"
-    reason: ClassVar[str] = "what is stored counts for nothing, but who edits it edits more"
+    reason: ClassVar[str] = "stored scores are not used, but edited ones cast doubt on the replies"
 
     def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
         """See `Check`."""
@@ -358,14 +358,14 @@ class SameScores:
 
 
 def _is_edited(run: SubmittedRun, record: Record) -> bool:
-    told = run.told.get(record.key, {})
+    stated = run.stated.get(record.key, {})
     reply = record.payload.reply
     if record.failure is not None or reply is None:
-        return any(told.get(name, _FAILED) != _FAILED for name in SCORERS)
-    if not told and not run.is_export:
+        return any(stated.get(name, _FAILED) != _FAILED for name in SCORERS)
+    if not stated and not run.is_export:
         return True  # an answered unit of a journal has its scores
     right = scores(reply, record.payload.answers)
-    return any(abs(told[name] - right[name]) > _TOLERANCE for name in SCORERS if name in told)
+    return any(abs(stated[name] - right[name]) > _TOLERANCE for name in SCORERS if name in stated)
 
 
 class SameResults:
@@ -387,9 +387,9 @@ class SameResults:
         if stored is not None:
             summary = RunSummary.of(suite, run.header, run.records)
             for task, rate in suite.primary_metrics(summary.summary).items():
-                told = stored.primary_metrics.get(task)
-                if told is None or abs(told.mean - rate.mean) > _TOLERANCE:
-                    said = "no score" if told is None else f"{100 * told.mean:.2f} %"
+                stated = stored.primary_metrics.get(task)
+                if stated is None or abs(stated.mean - rate.mean) > _TOLERANCE:
+                    said = "no score" if stated is None else f"{100 * stated.mean:.2f} %"
                     yield (
                         f"results.json has {said} for {task}, its records give "
                         f"{100 * rate.mean:.2f} %"
@@ -403,15 +403,15 @@ class SameResults:
 
     @staticmethod
     def _of_export(run: SubmittedRun) -> Iterator[str]:
-        for (task, metric), told in read_exported_means(run.path).items():
+        for (task, metric), stated in read_exported_means(run.path).items():
             records = [record for record in run.records if record.task == task]
             given = [it.payload.scores.get(metric) for it in records]
             known = [score for score in given if score is not None]
             if not known:
                 continue
             mean = fmean(known)  # failed units are in no mean
-            if abs(told - mean) > _ROUNDED:
+            if abs(stated - mean) > _ROUNDED:
                 yield (
-                    f"its results have {100 * told:.2f} % for {task} ({metric}), its replies give "
-                    f"{100 * mean:.2f} %"
+                    f"its results have {100 * stated:.2f} % for {task} ({metric}), its replies "
+                    f"give {100 * mean:.2f} %"
                 )

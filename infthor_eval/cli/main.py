@@ -184,7 +184,7 @@ def run_program(program: click.Command, args: list[str] | None = None) -> None:
         with (
             handle_signal(signal.SIGTERM, _raise_terminated),
             handle_signal(signal.SIGINT, signal.default_int_handler),
-            answer_ctrl_c(partial(_tell_patience, name), partial(_end, name)),
+            answer_ctrl_c(partial(_ask_for_patience, name), partial(_end, name)),
             collecting_seldom(),
         ):
             remove_abandoned()
@@ -244,7 +244,7 @@ def _raise_terminated(_number: int, _frame: FrameType | None) -> None:
     raise Terminated(_TERMINATED)
 
 
-def _tell_patience(program: str) -> None:
+def _ask_for_patience(program: str) -> None:
     text = "a calculation has to end first; press Ctrl-C again to end the program now"
     print_error(text, program)
 

@@ -14,7 +14,7 @@ from infthor_eval.cli.progress.notes import print_failure
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
-from infthor_eval.run import Run, told_apart
+from infthor_eval.run import Run, with_distinct_names
 from infthor_eval.runs import (
     UnitRecord,
 )
@@ -47,7 +47,7 @@ def print_results(runs: Sequence[Run], options: ShowOptions) -> None:
     if options.format == "json":
         _print_json(runs)
         return
-    labelled = told_apart(runs)
+    labelled = with_distinct_names(runs)
     if not options.quiet:
         _print_tables(labelled, options)
     if options.format is None:

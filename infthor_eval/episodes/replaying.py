@@ -125,7 +125,7 @@ class EpisodeReplay(ABC, Generic[P, F]):
 
     @abstractmethod
     def _frame(self, record: UnitRecord[P], number: int, observation: Any, note: str) -> F:
-        """Return the frame after so many steps; `observation` is None if nobody acted."""
+        """Return the frame after so many steps; `observation` is None if there was no action."""
 
     @abstractmethod
     def _describe_step(self, record: UnitRecord[P], number: int) -> str:
@@ -160,7 +160,7 @@ class EpisodeReplay(ABC, Generic[P, F]):
 
 
 def ending_of(record: UnitRecord[P], number: int) -> str:
-    """Return how an episode ended with that step, or why nobody acted in it, or an empty text."""
+    """Return how an episode ended with that step, or why it had no action, or an empty text."""
     if record.excluded is not None:
         return f"excluded: {record.excluded}"
     if not record.payload.attempted and record.failure is not None:

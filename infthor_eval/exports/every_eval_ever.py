@@ -75,7 +75,7 @@ class _RunExport:
 
     @property
     def unknown(self) -> list[str]:
-        """What nobody has told, and readers will miss, a line each."""
+        """What is unknown and readers will miss, a line each."""
         missing = {
             "the model's developer; give --model-id": self._facts.developer == UNKNOWN,
             "who made the run; give --organization": self._request.organization

@@ -146,7 +146,7 @@ def _further(run: Run, task: str, records: Sequence[Record]) -> Iterator[Measure
     """Yield the scores that only some samples have."""
     by_metric: dict[str, list[tuple[Record, float]]] = {}
     for record in records:
-        for name, score in run.presenter.further_scores(record).items():
+        for name, score in run.presenter.extra_scores(record).items():
             by_metric.setdefault(name, []).append((record, score))
     for metric, scored in by_metric.items():
         yield _measure(run, task, metric, _by_unit(scored), resampled=True)

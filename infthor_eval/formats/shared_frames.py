@@ -43,7 +43,7 @@ def store_picture(root: Path, picture: Path, writer: str) -> str:
 
 
 def store_encoded(root: Path, content: bytes) -> str:
-    """Write the content of a picture (PNG) into a set that nobody else writes; return its name."""
+    """Write a picture (PNG) into a set that no other process writes; return its name."""
     name = digest(content)
     path = _path(root, name)
     path.parent.mkdir(exist_ok=True)

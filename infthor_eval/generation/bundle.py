@@ -126,7 +126,7 @@ def build_bundle(
     manifest: Manifest,
     simulator: Simulator,
     out: Path,
-    progress: Callable[[bool], None] = lambda _: None,
+    advance: Callable[[bool], None] = lambda _: None,
 ) -> tuple[Manifest, GeneratedQuestions]:
     """Build the set: generate and replay trajectories, generate questions, compress the frames.
 
@@ -134,15 +134,15 @@ def build_bundle(
         manifest: the manifest; its digests are not used.
         simulator: the embedded simulator.
         out: folder of the set: new, empty, or with a build that was stopped.
-        progress: called twice for each trajectory, with True if it is of an earlier run.
+        advance: called twice for each trajectory, with True if it is of an earlier run.
 
     Returns:
         The manifest with the digests of the new files, and the questions.
     """
     with _building(manifest, out) as work:
-        _generate(manifest, simulator, work / _TRAJECTORIES, progress)
+        _generate(manifest, simulator, work / _TRAJECTORIES, advance)
         selection = select([work / _TRAJECTORIES])
-        replayed = replay_set(selection, simulator, work / _REPLAYED, progress)
+        replayed = replay_set(selection, simulator, work / _REPLAYED, advance)
         _raise_first([failure.message for failure in replayed.failures])
         generated = generate_questions(
             work / _REPLAYED,
@@ -162,7 +162,7 @@ def build_twins(
     manifest: TwinsManifest,
     score: ScoreReply,
     out: Path,
-    progress: Callable[[bool], None] = lambda _: None,
+    advance: Callable[[bool], None] = lambda _: None,
 ) -> tuple[TwinsManifest, TwinSummary]:
     """Build the set: generate trajectories, make twins of them, keep what their questions need.
 
@@ -170,14 +170,14 @@ def build_twins(
         manifest: the manifest; its digests are not used.
         score: the strict score of a reply.
         out: folder of the set: new, empty, or with a build that was stopped.
-        progress: called twice for each trajectory, with True if it is of an earlier run.
+        advance: called twice for each trajectory, with True if it is of an earlier run.
 
     Returns:
         The manifest with the digests of the new files, and the numbers of the set.
     """
     with _building(manifest, out) as work:
         with Simulator(embedded_launch(), image=False) as simulator:
-            _generate(manifest, simulator, work / _TRAJECTORIES, progress)
+            _generate(manifest, simulator, work / _TRAJECTORIES, advance)
         summary = make_twins(
             select([work / _TRAJECTORIES]),
             embedded_launch(),
@@ -186,7 +186,7 @@ def build_twins(
             score,
             per_trajectory=manifest.per_trajectory,
             worker_settings=WorkerSettings(),
-            progress=progress,
+            advance=advance,
         )
         _raise_first(summary.failures)
         whole = work / _SET
@@ -237,11 +237,11 @@ def _generate(
     manifest: Manifest | TwinsManifest,
     simulator: Simulator,
     folder: Path,
-    progress: Callable[[bool], None],
+    advance: Callable[[bool], None],
 ) -> None:
     recipes = manifest.trajectories
     jobs = [TrajectorySettings(**msgspec.structs.asdict(recipe)) for recipe in recipes]
-    _raise_first(generate_set(jobs, simulator, folder, progress).failures)
+    _raise_first(generate_set(jobs, simulator, folder, advance).failures)
 
 
 def _write_manifest(manifest: _AnyManifest, out: Path) -> _AnyManifest:

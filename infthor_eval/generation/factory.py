@@ -24,7 +24,7 @@ from infthor_eval.generation.look_around import look_around
 from infthor_eval.generation.rollout import Rollout
 from infthor_eval.generation.sampling import TaskPool
 from infthor_eval.generation.settings import MEMORY, TrajectorySettings
-from infthor_eval.generation.simulator_jobs import JobProgress, TellProgress, tell_nobody
+from infthor_eval.generation.simulator_jobs import JobProgress, OnProgress, ignore_progress
 from infthor_eval.generation.statistics import AttemptStatistics, RollBack
 from infthor_eval.generation.trace import RolloutError, Trace
 from infthor_eval.generation.walking import Walker
@@ -61,16 +61,16 @@ class GeneratedTrajectory:
 
 
 def generate(
-    settings: TrajectorySettings, simulator: Simulator, tell: TellProgress = tell_nobody
+    settings: TrajectorySettings, simulator: Simulator, on_progress: OnProgress = ignore_progress
 ) -> GeneratedTrajectory:
     """Generate one trajectory in a simulator, which loads its scene.
 
     Args:
         settings: settings of the trajectory.
         simulator: the simulator.
-        tell: told how far it is, after each task that was tried.
+        on_progress: called after each attempted task.
     """
-    factory = _Factory(settings, simulator, tell)
+    factory = _Factory(settings, simulator, on_progress)
     try:
         while not factory.long_enough():
             factory.extend()
@@ -108,11 +108,11 @@ class _Outcome:
 
 class _Factory:
     def __init__(
-        self, settings: TrajectorySettings, simulator: Simulator, tell: TellProgress
+        self, settings: TrajectorySettings, simulator: Simulator, on_progress: OnProgress
     ) -> None:
         """Load the scene and place the agent at random."""
         self._settings = settings
-        self._tell = tell
+        self._on_progress = on_progress
         self._name = f"scene {settings.scene}, seed {settings.seed}"
         self._simulator = simulator
         # One stream for all random choices, seeded by a text, which Python hashes alike in every
@@ -185,7 +185,7 @@ class _Factory:
                 self._begin_pool_again(candidates)
                 continue
             outcome = self._try(task, room)
-            self._tell(self._progress())
+            self._on_progress(self._progress())
             self._count(outcome)
             if self._n_in_row > self._settings.max_fail:
                 self._roll_back()

@@ -13,11 +13,11 @@ from infthor_eval.generation.factory import GeneratedTrajectory, generate
 from infthor_eval.generation.final_task import violation
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.simulator_jobs import (
+    OnProgress,
     SimulatorWorker,
-    TellProgress,
     collect_outcomes,
     freeze_existing_objects,
-    tell_nobody,
+    ignore_progress,
 )
 from infthor_eval.generation.statistics import AttemptStatistics
 from infthor_eval.household.pddl import DOMAIN
@@ -147,7 +147,7 @@ def generate_set(
     jobs: Sequence[TrajectorySettings],
     simulator: Simulator,
     out: Path,
-    progress: Callable[[bool], None] = lambda _: None,
+    advance: Callable[[bool], None] = lambda _: None,
 ) -> GeneratedSet:
     """Generate the trajectories that `out` lacks: a file each, with a folder of its tasks as PDDL.
 
@@ -155,11 +155,11 @@ def generate_set(
         jobs: settings of the trajectories.
         simulator: simulator to generate them in.
         out: folder of the files; created if it does not exist.
-        progress: called after each trajectory, with True if it is of an earlier run.
+        advance: called after each trajectory, with True if it is of an earlier run.
     """
     out.mkdir(parents=True, exist_ok=True)
     outcomes = (_generate_one(job, simulator, out) for job in jobs)
-    return _summarise(enumerate(outcomes), progress)
+    return _summarise(enumerate(outcomes), advance)
 
 
 def generate_with_workers(
@@ -167,9 +167,9 @@ def generate_with_workers(
     launch: Launch,
     out: Path,
     worker_settings: WorkerSettings,
-    progress: Callable[[bool], None] = lambda _: None,
-    say: Callable[[str], None] = lambda _: None,
-    tell: TellProgress = tell_nobody,
+    advance: Callable[[bool], None] = lambda _: None,
+    notify: Callable[[str], None] = lambda _: None,
+    on_progress: OnProgress = ignore_progress,
 ) -> GeneratedSet:
     """Generate as `generate_set` does, with equal files and errors, by workers of one folder.
 
@@ -178,28 +178,28 @@ def generate_with_workers(
         launch: simulator that each worker starts.
         out: see `generate_set`.
         worker_settings: number and place of the workers.
-        progress: see `generate_set`.
-        say: called with messages about the workers.
-        tell: told how far a trajectory is, if this process is the worker.
+        advance: see `generate_set`.
+        notify: called with messages about the workers.
+        on_progress: called within a trajectory, if this process is the worker.
     """
     out.mkdir(parents=True, exist_ok=True)
     # Frames are drawn by the replay. A dead end goes back some tasks, whose states are kept.
     simulator = partial(Simulator, launch, image=False, max_copies=_MAX_COPIES)
-    told = tell if worker_settings.is_local else tell_nobody
-    start = partial(SimulatorWorker, simulator, partial(_generate_one, out=out, tell=told))
-    return _summarise(run_jobs(start, jobs, worker_settings, say), progress)
+    shown = on_progress if worker_settings.is_local else ignore_progress
+    start = partial(SimulatorWorker, simulator, partial(_generate_one, out=out, on_progress=shown))
+    return _summarise(run_jobs(start, jobs, worker_settings, notify), advance)
 
 
 def _summarise(
     outcomes: Iterable[tuple[int, _GenerationOutcome | InfthorError]],
-    progress: Callable[[bool], None],
+    advance: Callable[[bool], None],
 ) -> GeneratedSet:
     result = GeneratedSet()
 
     def failed(_: int, error: InfthorError) -> _GenerationOutcome:
         return _GenerationOutcome(failure=str(error))
 
-    for outcome in collect_outcomes(outcomes, failed, progress):
+    for outcome in collect_outcomes(outcomes, failed, advance):
         if outcome.path is None:
             result.failures.append(str(outcome.failure))
             continue
@@ -216,14 +216,17 @@ def _summarise(
 
 
 def _generate_one(
-    job: TrajectorySettings, simulator: Simulator, out: Path, tell: TellProgress = tell_nobody
+    job: TrajectorySettings,
+    simulator: Simulator,
+    out: Path,
+    on_progress: OnProgress = ignore_progress,
 ) -> _GenerationOutcome:
     path = out / f"{file_name(job.traj_id)}.json"
     try:
         if is_written(path):
             return _GenerationOutcome.of(path, _read_earlier(path, job))
         with freeze_existing_objects():
-            generated = generate(job, simulator, tell)
+            generated = generate(job, simulator, on_progress)
     except InfthorError as error:
         return _GenerationOutcome(failure=str(error))
     # Outside of `try`: if this file has no room, generating the other trajectories would be wasted.

@@ -23,7 +23,7 @@ from infthor_eval.errors import DataError, SimulatorError
 from infthor_eval.formats.trajectory import LowAction, Trajectory, TrajectorySource
 from infthor_eval.generation.motion import intermediate_views
 from infthor_eval.generation.replay import ActionReplay, ReplayReport
-from infthor_eval.generation.simulator_jobs import TellProgress, tell_nobody
+from infthor_eval.generation.simulator_jobs import OnProgress, ignore_progress
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView
 
@@ -72,12 +72,12 @@ class RenderSettings(msgspec.Struct, frozen=True):
         trajectory: Trajectory,
         simulator: Simulator,
         folder: Path,
-        tell: TellProgress = tell_nobody,
+        on_progress: OnProgress = ignore_progress,
     ) -> "RenderReport":
         """Write the pictures and the timeline of a trajectory."""
         scene = trajectory.scene.floor_plan
         report = RenderReport(trajectory.traj_id, source.digest, scene, self.smooth, settings=self)
-        actions = ActionReplay(simulator, trajectory, report, tell)
+        actions = ActionReplay(simulator, trajectory, report, on_progress)
         film = _Film(folder / "frames", self.jpeg_quality)
         film.add(simulator.view)
         log = _StepLog(trajectory)

@@ -16,7 +16,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import write_steps
 from infthor_eval.formats.trajectory import LowAction, Trajectory, TrajectorySource
 from infthor_eval.generation.motion import intermediate_views
-from infthor_eval.generation.simulator_jobs import JobProgress, TellProgress, tell_nobody
+from infthor_eval.generation.simulator_jobs import JobProgress, OnProgress, ignore_progress
 from infthor_eval.household.sequence_text import sequence_text
 from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.thor.actions import text_of
@@ -82,7 +82,7 @@ def replay(
     folder: Path,
     digest: str,
     frames: int = 1,
-    tell: TellProgress = tell_nobody,
+    on_progress: OnProgress = ignore_progress,
 ) -> ReplayReport:
     """Run a trajectory and write its frames and logs into a folder.
 
@@ -96,10 +96,10 @@ def replay(
         digest: hash of the trajectory's JSON, for the report.
         frames: number of frames of each action that moves the agent or its camera; other actions
             have one.
-        tell: told how far it is, after each action.
+        on_progress: called after each action.
     """
     report = ReplayReport(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames)
-    actions = ActionReplay(simulator, trajectory, report, tell)
+    actions = ActionReplay(simulator, trajectory, report, on_progress)
     (folder / "img").mkdir()
     run = _Run(simulator, actions, folder / "img", frames)
     for index, low in enumerate(trajectory.plan.low_actions):
@@ -135,10 +135,10 @@ class SetForm:
         trajectory: Trajectory,
         simulator: Simulator,
         folder: Path,
-        tell: TellProgress = tell_nobody,
+        on_progress: OnProgress = ignore_progress,
     ) -> ReplayReport:
         """Write the frames and logs of a replay, and the trajectory as it came."""
-        report = replay(trajectory, simulator, folder, source.digest, self.frames, tell)
+        report = replay(trajectory, simulator, folder, source.digest, self.frames, on_progress)
         (folder / "traj_data.json").write_bytes(source.raw.strip() + b"\n")
         return report
 
@@ -174,12 +174,12 @@ class ActionReplay:
         simulator: Simulator,
         trajectory: Trajectory,
         report: ReplayReport,
-        tell: TellProgress = tell_nobody,
+        on_progress: OnProgress = ignore_progress,
     ) -> None:
         report.restore = restore(simulator, trajectory.scene).lines()
         self._simulator = simulator
         self._report = report
-        self._tell = tell
+        self._on_progress = on_progress
         self._n_actions = len(trajectory.plan.low_actions)
         self._grounding = Grounding(simulator.view)
 
@@ -195,7 +195,7 @@ class ActionReplay:
             self._report.accepted[name] = self._report.accepted.get(name, 0) + 1
         else:
             self._report.refusals.append(Refusal(index, _text_of(low), error))
-        self._tell(self._progress(index))
+        self._on_progress(self._progress(index))
         return target, error
 
     def _progress(self, index: int) -> JobProgress:

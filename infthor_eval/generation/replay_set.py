@@ -27,11 +27,11 @@ from infthor_eval.formats.trajectory import (
 )
 from infthor_eval.generation.replay import ReplayReport, SetForm
 from infthor_eval.generation.simulator_jobs import (
+    OnProgress,
     SimulatorWorker,
-    TellProgress,
     collect_outcomes,
     freeze_existing_objects,
-    tell_nobody,
+    ignore_progress,
 )
 from infthor_eval.storage.files import file_name, is_written, write_atomically, writing_hint
 from infthor_eval.thor.launch import Launch
@@ -68,9 +68,9 @@ class ReplayForm(Protocol):
         trajectory: Trajectory,
         simulator: Simulator,
         folder: Path,
-        tell: TellProgress = tell_nobody,
+        on_progress: OnProgress = ignore_progress,
     ) -> ReplayReport:
-        """Replay a trajectory into an existing, empty folder; `tell` is told how far it is."""
+        """Replay a trajectory into an existing, empty folder; see `replay`."""
         ...
 
     def require_same(self, report: Any, folder: Path) -> None:
@@ -159,7 +159,7 @@ def replay_set(
     selection: Selection,
     simulator: Simulator,
     out: Path,
-    progress: Callable[[bool], None] = lambda _: None,
+    advance: Callable[[bool], None] = lambda _: None,
     form: ReplayForm = _SET,
 ) -> ReplayedSet:
     """Replay trajectories into folders, those of a set into `out/metadata/<traj_id>`.
@@ -170,12 +170,12 @@ def replay_set(
         selection: the trajectories.
         simulator: simulator to replay them in.
         out: folder of the set; created if it does not exist.
-        progress: called after each trajectory, with True if an earlier run replayed it.
+        advance: called after each trajectory, with True if an earlier run replayed it.
         form: what is written of each.
     """
     folder = _prepare_set(out, simulator.label, form)
     outcomes = enumerate(_replay_one(item, simulator, folder, form) for item in selection.items)
-    return _collect(outcomes, selection, progress)
+    return _collect(outcomes, selection, advance)
 
 
 def replay_with_workers(
@@ -184,9 +184,9 @@ def replay_with_workers(
     out: Path,
     worker_settings: WorkerSettings,
     form: ReplayForm = _SET,
-    progress: Callable[[bool], None] = lambda _: None,
-    say: Callable[[str], None] = lambda _: None,
-    tell: TellProgress = tell_nobody,
+    advance: Callable[[bool], None] = lambda _: None,
+    notify: Callable[[str], None] = lambda _: None,
+    on_progress: OnProgress = ignore_progress,
 ) -> ReplayedSet:
     """Replay as `replay_set` does, with the same files, by workers that share the folder.
 
@@ -196,16 +196,16 @@ def replay_with_workers(
         out: see `replay_set`.
         worker_settings: number and place of the workers.
         form: see `replay_set`.
-        progress: see `replay_set`.
-        say: called with messages about the workers.
-        tell: told how far a trajectory is, if this process is the worker.
+        advance: see `replay_set`.
+        notify: called with messages about the workers.
+        on_progress: called within a trajectory, if this process is the worker.
     """
-    told = tell if worker_settings.is_local else tell_nobody
+    shown = on_progress if worker_settings.is_local else ignore_progress
     folder = _prepare_set(out, launch.label, form)
-    replay_one = partial(_replay_one, out=folder, form=form, tell=told)
+    replay_one = partial(_replay_one, out=folder, form=form, on_progress=shown)
     open_simulator = partial(Simulator, launch, **form.simulator_options)
     start = partial(SimulatorWorker, open_simulator, replay_one)
-    return _collect(run_jobs(start, selection.items, worker_settings, say), selection, progress)
+    return _collect(run_jobs(start, selection.items, worker_settings, notify), selection, advance)
 
 
 def _prepare_set(out: Path, label: str, form: ReplayForm) -> Path:
@@ -219,7 +219,7 @@ def _prepare_set(out: Path, label: str, form: ReplayForm) -> Path:
 def _collect(
     outcomes: Iterable[tuple[int, _ReplayOutcome | InfthorError]],
     selection: Selection,
-    progress: Callable[[bool], None],
+    advance: Callable[[bool], None],
 ) -> ReplayedSet:
     """Return the set of the outcomes, in the order of the selection."""
     started = time.monotonic()
@@ -227,7 +227,7 @@ def _collect(
     def failed(number: int, error: InfthorError) -> _ReplayOutcome:
         return _failure_outcome(selection.items[number], error)
 
-    collected = collect_outcomes(outcomes, failed, progress)
+    collected = collect_outcomes(outcomes, failed, advance)
     result = ReplayedSet(failures=list(selection.failures), seconds=time.monotonic() - started)
     for outcome in collected:
         if outcome.report is not None:
@@ -243,12 +243,12 @@ def _replay_one(
     simulator: Simulator,
     out: Path,
     form: ReplayForm,
-    tell: TellProgress = tell_nobody,
+    on_progress: OnProgress = ignore_progress,
 ) -> _ReplayOutcome:
     source, trajectory = item
     try:
         with freeze_existing_objects(), wrap_malformed():
-            return _replay_or_check(source, trajectory, simulator, out, form, tell)
+            return _replay_or_check(source, trajectory, simulator, out, form, on_progress)
     except InfthorError as error:
         return _failure_outcome(item, error)
 
@@ -292,7 +292,7 @@ def _replay_or_check(
     simulator: Simulator,
     out: Path,
     form: ReplayForm,
-    tell: TellProgress,
+    on_progress: OnProgress,
 ) -> _ReplayOutcome:
     final = out / file_name(trajectory.traj_id)
     if is_written(final):
@@ -304,7 +304,7 @@ def _replay_or_check(
         write_atomically(final) as folder,
     ):
         folder.mkdir()
-        report = form.write(source, trajectory, simulator, folder, tell)
+        report = form.write(source, trajectory, simulator, folder, on_progress)
         report.seconds = round(time.monotonic() - started, 3)
         (folder / _REPORT).write_bytes(msgspec.json.encode(report) + b"\n")
     return _ReplayOutcome(report)

@@ -27,11 +27,11 @@ class JobProgress:
     detail: str = ""
 
 
-TellProgress = Callable[[JobProgress], None]
+OnProgress = Callable[[JobProgress], None]
 
 
-def tell_nobody(_: JobProgress) -> None:
-    """Do nothing: who runs the job does not follow it."""
+def ignore_progress(_: JobProgress) -> None:
+    """Do nothing."""
 
 
 class _JobOutcome(Protocol):
@@ -77,20 +77,20 @@ class SimulatorWorker:
 def collect_outcomes(
     outcomes: Iterable[tuple[int, T | InfthorError]],
     failed: Callable[[int, InfthorError], T],
-    progress: Callable[[bool], None],
+    advance: Callable[[bool], None],
 ) -> list[T]:
     """Return the outcomes in the order of the jobs.
 
     Args:
         outcomes: number and outcome of each job as they finish; an error if its workers were lost.
         failed: returns the outcome of a job that ended in an error.
-        progress: called after each job, with True if its result is of an earlier run.
+        advance: called after each job, with True if its result is of an earlier run.
     """
     by_number: dict[int, T] = {}
     for number, outcome in outcomes:
         result = failed(number, outcome) if isinstance(outcome, InfthorError) else outcome
         by_number[number] = result
-        progress(result.is_resumed)
+        advance(result.is_resumed)
     return [by_number[number] for number in sorted(by_number)]
 
 

@@ -13,8 +13,8 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.harness.registration import NAME, say_model_takes_references
 from infthor_eval.harness.requests import Payload, RequestAdapter, SuiteUnit
 from infthor_eval.runs import RunHeader, Suite, UnitRecord
-from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.journal import Journal
+from infthor_eval.runs.journals.record_encoder import RecordEncoder
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.work.binding import require_capability
 from infthor_eval.runs.work.group_records import group_records
@@ -26,7 +26,7 @@ from model_adapters import (
     identity_of,
     label,
     load,
-    refuse_deferring,
+    refuse_batches,
 )
 
 _DEFAULT_DEVICE = "cuda:0"  # lm-eval's default
@@ -88,7 +88,7 @@ class InfthorLM(LM):
         }
         say_model_takes_references()
         self._model = load(adapter, option_texts, seed)
-        refuse_deferring(self._model)
+        refuse_batches(self._model)
         self._seed = seed
         self._name, self._code = label(adapter, option_texts), adapter_identity(adapter)
         self._scratch = ScratchFolder()
@@ -137,7 +137,7 @@ class InfthorLM(LM):
         require_capability(self._model, self._name, suite)
         adapter: RequestAdapter[SuiteUnit, Payload] = find_request_adapter(suite.name)
         session = self._session(suite)
-        gate = Gate(suite.records)
+        encoder = RecordEncoder(suite.records)
         docs = [request.doc for request in requests]
         records: dict[Hashable, list[UnitRecord[Payload]]] = {
             adapter.doc_id(doc): [] for doc in docs
@@ -151,7 +151,7 @@ class InfthorLM(LM):
                     if adapter.doc_id_of_unit(unit.key, unit.cluster) in records
                 ]
                 part = replace(group, units=units)
-                for record in group_records(bound, part, session, gate) if units else ():
+                for record in group_records(bound, part, session, encoder) if units else ():
                     doc_id = adapter.doc_id_of_unit(record.key, record.cluster)
                     records[doc_id].append(session.append_new(record)[0])
         return [adapter.response(records[adapter.doc_id(doc)]) for doc in docs]

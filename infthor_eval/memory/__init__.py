@@ -13,7 +13,7 @@ from infthor_eval.memory.protocol import (
 )
 from infthor_eval.memory.registry import (
     MEMORIES,
-    MemoryOptions,
+    MemoryArgs,
     accepted_options,
     memory_class,
     memory_identity,
@@ -25,8 +25,8 @@ from infthor_eval.memory.registry import (
 __all__ = [
     "MEMORIES",
     "Memory",
+    "MemoryArgs",
     "MemoryCapabilities",
-    "MemoryOptions",
     "Observation",
     "Query",
     "Recalled",

@@ -11,7 +11,7 @@ _CAUSE = "the memory"
 
 @dataclass(frozen=True, kw_only=True)
 class MemoryOptions:
-    """The options."""
+    """The options `--memory`, `--memory-args` and `--budget`."""
 
     memory: Annotated[
         str | None,

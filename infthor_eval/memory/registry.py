@@ -59,11 +59,11 @@ MEMORIES = PluginTable(
     },
     "docs/memories.md",
 )
-MemoryOptions = tuple[tuple[str, Any], ...]  # sorted pairs
+MemoryArgs = tuple[tuple[str, Any], ...]  # names and values, sorted
 _FORM = ("images", "question")
 
 
-def open_memory(name: str, options: MemoryOptions = ()) -> Memory:
+def open_memory(name: str, options: MemoryArgs = ()) -> Memory:
     """Return a memory, the same object each time for a class and its options.
 
     Args:
@@ -88,7 +88,7 @@ def accepted_options(name: str) -> Mapping[str, inspect.Parameter]:
     return inspect.signature(memory_class(name)).parameters
 
 
-def memory_identity(name: str, options: MemoryOptions = ()) -> dict[str, Any]:
+def memory_identity(name: str, options: MemoryArgs = ()) -> dict[str, Any]:
     """Return everything that can change what a memory recalls, as JSON values.
 
     Raises:
@@ -134,7 +134,7 @@ def wrap_memory_errors(name: str) -> Iterator[None]:
 
 
 @lru_cache(maxsize=8)  # by the class: an edited file has another one
-def _build(name: str, kind: Any, options: MemoryOptions) -> Memory:
+def _build(name: str, kind: Any, options: MemoryArgs) -> Memory:
     values = _converted(name, kind, dict(options))
     with wrap_memory_errors(name):
         try:

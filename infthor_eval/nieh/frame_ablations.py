@@ -76,7 +76,7 @@ class FrameAblation:
         return [kept for part in parts for kept in _with_frames(part, left)]
 
     def hidden(self, data: NiehSet, question: Question) -> frozenset[int]:
-        """Return the positions in the trajectory of the frames that nobody is shown: the clues.
+        """Return the positions in the trajectory of the frames that are not shown: the clues.
 
         There are none without this ablation, and for an absence, of which no frame is evidence.
         """

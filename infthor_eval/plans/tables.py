@@ -56,10 +56,10 @@ _TWIN_COLUMNS = (
     "incomplete",
 )
 _TWIN_NOTE = (
-    "Right is who looks first where the object is, in both worlds; exchanged, who looks in both "
-    "where it is in the other. net pairs: right less exchanged, with the 95 % bootstrap interval "
-    "over trajectories; 0 on average for who does not know which world is which. Containers and "
-    "actions are means of worlds."
+    "A pair is right if the agent looks first where the object is, in both worlds, and exchanged "
+    "if it looks first where the object is in the other world, in both. net pairs: right less "
+    "exchanged, with the 95 % bootstrap interval over trajectories; 0 on average for an agent that "
+    "does not know which world is which. Containers and actions are means of worlds."
 )
 
 

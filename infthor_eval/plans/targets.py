@@ -58,7 +58,7 @@ def subject_of(target: PlanTarget, start: SimulatorView) -> str | None:
 
 
 def in_hand(wanted: str, view: SimulatorView) -> bool:
-    """Return whether an object of this name is held, whole or sliced: words do not tell which."""
+    """Return whether an object of this name is held, whole or sliced: words do not say which."""
     return any(
         Words.PUBLISHED.name_of(held) == Words.PUBLISHED.name_of(wanted) for held in view.inventory
     )

@@ -39,11 +39,11 @@ from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.storage.limits import SCORER_SECONDS
 from model_adapters import (
-    Attended,
     Decoding,
     Model,
     Notice,
     Part,
+    PersonModel,
     Reply,
     answer_of,
     cut_at_stop,
@@ -191,7 +191,7 @@ class ModelReplier:
         self.batch_size = model.capabilities.batch_size
         self.batch_contexts = model.capabilities.batch_contexts
         self._name = model.name
-        self._person = model if isinstance(model, Attended) else None
+        self._person = model if isinstance(model, PersonModel) else None
         self._conversation = model.conversation()
         self._start = self._conversation.mark()
         self._after_context = self._start
@@ -202,7 +202,9 @@ class ModelReplier:
         context = requests[0].context
         decoding = requests[0].decoding
         if self._person is not None:
-            self._person.tell(Notice(title="Question", unit="question", words=requests[0].words))
+            self._person.show_notice(
+                Notice(title="Question", unit="question", words=requests[0].words)
+            )
         with wrap_request_errors(self._name):
             if any(request.context != context for request in requests[1:]):
                 self._go_to(())

@@ -1,8 +1,8 @@
 """Why two runs may differ: the settings that do, and what each can change.
 
-What a setting can change is what it is told by. Frames in another order make other requests, whose
-hashes differ; another template makes other tokens of the same request, other sizes of images other
-pixels; another precision makes neither, and replies alone.
+A setting is known as a cause by what it changes. Frames in another order change the requests, whose
+hashes then differ; another template changes the tokens of the same request, another image size the
+pixels; another precision changes the replies alone.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -162,8 +162,8 @@ _KINDS = (
     _Kind("the version of infthor-eval", _ANY, ("infthor_eval", "suite_code")),
     _Kind("other settings", _ANY, ("*",)),
 )
-# Names of tasks, and what other settings tell too: decoding, the set's digest, the skipped.
-_TOLD_ELSEWHERE = _Kind(
+# Names of tasks, and what other settings show too: decoding, the set's digest, skipped questions.
+_COVERED_ELSEWHERE = _Kind(
     "",
     frozenset(),
     (
@@ -173,21 +173,21 @@ _TOLD_ELSEWHERE = _Kind(
     ),
 )
 
-# What a difference is put down to that no setting can explain.
-UNTOLD = {
+# The cause to name where no setting explains a difference.
+UNEXPLAINED = {
     Effect.ASKED: Cause("questions that one run did not come to", _CHOSEN),
     Effect.FAILED: Cause("questions that failed or were not asked", frozenset({Effect.FAILED})),
     Effect.SCORES: Cause("the scores of equal replies", _SCORED),
-    Effect.REQUEST: Cause("frames or words that no setting tells of", _SENT),
-    Effect.TOKENS: Cause("tokens that no setting tells of", _TOKENS),
-    Effect.PIXELS: Cause("pixels that no setting tells of", frozenset({Effect.PIXELS})),
+    Effect.REQUEST: Cause("frames or words that no setting accounts for", _SENT),
+    Effect.TOKENS: Cause("tokens that no setting accounts for", _TOKENS),
+    Effect.PIXELS: Cause("pixels that no setting accounts for", frozenset({Effect.PIXELS})),
     Effect.CUT: Cause("nothing that is recorded", _WRITTEN),
     Effect.REPLY: Cause("nothing that is recorded", _WRITTEN),
 }
 
 
 def differing_causes(first: RunConfig[Any], second: RunConfig[Any]) -> list[Cause]:
-    """Return the causes that the settings of two runs tell of, in the order of `_KINDS`.
+    """Return the causes by which the settings of two runs differ, in the order of `_KINDS`.
 
     The only task of one run is compared with the only one of the other, whatever their names.
     """
@@ -197,7 +197,7 @@ def differing_causes(first: RunConfig[Any], second: RunConfig[Any]) -> list[Caus
     declared = causes_of(type(first))
     found: dict[str, list[Setting]] = {}
     for path, values in differing.items():
-        if _TOLD_ELSEWHERE.has(path):
+        if _COVERED_ELSEWHERE.has(path):
             continue
         kind = _find_kind(path, declared)
         if _ENGINE_SETTING in differing and _is_of_engine(path, values):

@@ -73,7 +73,7 @@ def compare(
         compared = _TaskComparison(presenter, task, n_unshared)
         comparisons += compared.by_groups(_of_task(firsts, task), _of_task(seconds, task))
         comparisons += compared.by_scores(units, suite)
-        comparisons += compared.by_further_scores(units, suite)
+        comparisons += compared.by_extra_scores(units, suite)
     return comparisons
 
 
@@ -152,10 +152,10 @@ class _TaskComparison:
         for metric in _shared_metrics(scores):
             yield self._compare(metric, scores)
 
-    def by_further_scores(self, units: Sequence[_PairedUnit], suite: Suite) -> Iterator[Comparison]:
+    def by_extra_scores(self, units: Sequence[_PairedUnit], suite: Suite) -> Iterator[Comparison]:
         """Compare in scores that not every unit has, whatever it was replied: in those of the units
         with a result, if there are any."""
-        further = [unit.scores(self.presenter.further_scores) for unit in units]
+        further = [unit.scores(self.presenter.extra_scores) for unit in units]
         scored = []
         for unit, scores in zip(units, further, strict=True):
             if unit.scores(suite.scores).is_scored:
@@ -169,7 +169,7 @@ class _TaskComparison:
             for unit, scores in zip(units, further, strict=True):
                 if metric in scores.shared_names:
                     chosen.append(scores)
-                    low, high = self.presenter.further_ranges(unit.first[0])[metric]
+                    low, high = self.presenter.extra_ranges(unit.first[0])[metric]
                     most.append(high - low)
             yield self._compare(metric, chosen, fmean(most))
 

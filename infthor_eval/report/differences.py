@@ -177,7 +177,7 @@ def compare_questions(first: Run, second: Run) -> Compared:
         if effects:
             record = pair.first or pair.second
             assert record is not None
-            possible = _untold(pair, effects)
+            possible = _unexplained(pair, effects)
             title = first.presenter.describe(record).title
             by = carried.by(both)
             differences.append(QuestionDifference(title, both, effects, possible, by))
@@ -209,9 +209,9 @@ def _by_key(side: Side | None) -> dict[UnitKey, Record]:
 
 
 def _decode_alike(runs: tuple[Run, Run], sides: tuple[Side, Side]) -> bool:
-    """Return whether hashes of requests, which have the decoding in them, tell of the rest.
+    """Return whether the runs decode alike: only then do hashes of requests show other differences.
 
-    Those of imported replies are of the replies.
+    Hashes of imported replies are of the replies.
     """
     configs = [run.header.config for run in runs]
     if any(config.model.get("imported") for config in configs):
@@ -278,7 +278,7 @@ def _request_effects(first: Record, second: Record, same_decoding: bool) -> set[
     return effects | ({Effect.REQUEST} if effects and not same_decoding else set())
 
 
-def _untold(pair: _Pair, effects: frozenset[Effect]) -> frozenset[Effect]:
+def _unexplained(pair: _Pair, effects: frozenset[Effect]) -> frozenset[Effect]:
     """Return how what was read may differ besides, where the records do not tell."""
     first, second = pair.first, pair.second
     if Effect.REPLY not in effects or Effect.REQUEST in effects:

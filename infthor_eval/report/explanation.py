@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from infthor_eval.errors import UsageError
-from infthor_eval.report.causes import UNTOLD, Cause, Effect, differing_causes
+from infthor_eval.report.causes import UNEXPLAINED, Cause, Effect, differing_causes
 from infthor_eval.report.differences import (
     NEAR_TIE,
     Answer,
@@ -23,8 +23,9 @@ from infthor_eval.tables import Column, Row, Table
 _N_SHOWN = 5  # questions in the table, unless all are wanted
 _LONGEST = 36  # characters of a value or a reply in a cell
 _BEFORE = 12  # of these, before the first that differs
-# Of those that a setting must have, for it to explain the question; the first is the one to name.
-_TELLING = (
+# A setting explains a question only if it can have one of these effects that the question shows;
+# if none can, the first of them is named.
+_NEEDED = (
     Effect.ASKED,
     Effect.FAILED,
     Effect.SCORES,
@@ -38,9 +39,9 @@ _ADVICE = {
     Effect.REQUEST: "The hashes of the requests differ: the content of the frames, or the words, "
     "changed between the runs.",
     Effect.TOKENS: "The same requests became other tokens: the template, the tokenizer or the size "
-    "of images changed where no setting tells.",
-    Effect.PIXELS: "The same frames became other pixels: they were scaled otherwise where no "
-    "setting tells.",
+    "of images changed, and no setting says so.",
+    Effect.PIXELS: "The same frames became other pixels: they were scaled differently, and "
+    "no setting says so.",
     Effect.REPLY: "Ask one of them again with another --out to see whether the model repeats "
     "itself.",
 }
@@ -157,7 +158,7 @@ class Explanation:
         if reasons:
             reason, n = reasons.most_common(1)[0]
             return f"{n} {reason}."
-        effect = next((it for it, cause in UNTOLD.items() if cause is finding.cause), None)
+        effect = next((it for it, cause in UNEXPLAINED.items() if cause is finding.cause), None)
         return "" if effect is None else _ADVICE.get(effect, "")
 
     @property
@@ -243,21 +244,21 @@ def _find(causes: Sequence[Cause], differences: Sequence[QuestionDifference]) ->
     findings = {cause.name: _Finding(cause) for cause in causes}
     for difference in differences:
         able = [it for it in causes if it.effects & (difference.effects | difference.possible)]
-        untold = _untold(able, difference.effects)
-        for cause in able if untold is None else (*able, untold):
+        unexplained = _unexplained(able, difference.effects)
+        for cause in able if unexplained is None else (*able, unexplained):
             finding = findings.setdefault(cause.name, _Finding(cause))
             finding.questions.append(difference)
             finding.n_showing += bool(cause.effects & (difference.effects - {Effect.REPLY}))
     return sorted(findings.values(), key=lambda finding: finding.rank)
 
 
-def _untold(able: Sequence[Cause], effects: frozenset[Effect]) -> Cause | None:
-    """Return what a question is put down to if no setting can change it in the way it differs."""
-    telling = [effect for effect in _TELLING if effect in effects]
-    if telling:
-        is_told = any(cause.effects & set(telling) for cause in able)
-        return None if is_told else UNTOLD[telling[0]]
-    return None if able else UNTOLD[Effect.REPLY]
+def _unexplained(able: Sequence[Cause], effects: frozenset[Effect]) -> Cause | None:
+    """Return the cause to name if no setting can explain how a question differs."""
+    needed = [effect for effect in _NEEDED if effect in effects]
+    if needed:
+        is_explained = any(cause.effects & set(needed) for cause in able)
+        return None if is_explained else UNEXPLAINED[needed[0]]
+    return None if able else UNEXPLAINED[Effect.REPLY]
 
 
 def _count(n: int, noun: str) -> str:

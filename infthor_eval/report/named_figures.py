@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def build_figure(
-    folders: Sequence[Path], name: str, request: FigureRequest, tell: Callable[[str], None]
+    folders: Sequence[Path], name: str, request: FigureRequest, notify: Callable[[str], None]
 ) -> FigureResult:
     """Read runs and build a figure of them.
 
@@ -26,7 +26,7 @@ def build_figure(
         folders: folders of the runs.
         name: name of the figure.
         request: which task and panels.
-        tell: told of bad lines of journals.
+        notify: called with each bad line of a journal.
 
     Raises:
         UsageError: there is no such figure, it is not of these runs, or it has panels of its own.
@@ -39,7 +39,7 @@ def build_figure(
         raise UsageError(
             f"--figure {name}: is none that can be drawn; there are {', '.join(abouts)}"
         )
-    runs = open_runs(folders, tell)
+    runs = open_runs(folders, notify)
     figure = _require_figure(runs, name, owners)
     if request.panels is not None and not figure.has_panels:
         raise UsageError(f"--panels: figure {name} has panels of its own; leave it out")

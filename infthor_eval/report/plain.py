@@ -63,12 +63,12 @@ class PlainPresenter:
         """See `Presenter.bounds`: none is known."""
         return -math.inf, math.inf
 
-    def further_scores(self, record: UnitRecord[Any]) -> Mapping[str, float]:
-        """See `Presenter.further_scores`: none."""
+    def extra_scores(self, record: UnitRecord[Any]) -> Mapping[str, float]:
+        """See `Presenter.extra_scores`: none."""
         return {}
 
-    def further_ranges(self, record: UnitRecord[Any]) -> Mapping[str, tuple[float, float]]:
-        """See `Presenter.further_ranges`: none."""
+    def extra_ranges(self, record: UnitRecord[Any]) -> Mapping[str, tuple[float, float]]:
+        """See `Presenter.extra_ranges`: none."""
         return {}
 
     def explain(self, record: UnitRecord[Any]) -> Sequence[str]:

@@ -279,14 +279,14 @@ class Presenter(Protocol):
         shown as they are."""
 
     def bounds(self, metric: str) -> tuple[float, float]:
-        """Return the lowest and the highest possible score of a metric, one of `further_scores` or
+        """Return the lowest and the highest possible score of a metric, one of `extra_scores` or
         `group_scores` included; infinite where there is no limit, or none is known."""
 
-    def further_scores(self, record: Record) -> Mapping[str, float]:
+    def extra_scores(self, record: Record) -> Mapping[str, float]:
         """Return scores that only some samples have, by name; runs are compared on those."""
 
-    def further_ranges(self, record: Record) -> Mapping[str, tuple[float, float]]:
-        """Return the lowest and the highest possible value of each of `further_scores`."""
+    def extra_ranges(self, record: Record) -> Mapping[str, tuple[float, float]]:
+        """Return the lowest and the highest possible value of each of `extra_scores`."""
 
     def explain(self, record: Record) -> Sequence[str]:
         """Return why the reply of a record got its scores, a line each."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from infthor_eval.rates import Rate
-from infthor_eval.run import Run, find_runs, told_apart
+from infthor_eval.run import Run, find_runs, with_distinct_names
 from infthor_eval.runs import NOTHING
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def load_runs(*folders: str | os.PathLike[str]) -> DataFrame:
             stored.append(run)
         else:
             warnings.warn(f"{run.folder}: cannot be read: {run.reason}", stacklevel=2)
-    rows = [row for run in told_apart(stored, ignore=()) for row in _rows(run)]
+    rows = [row for run in with_distinct_names(stored, ignore=()) for row in _rows(run)]
     return pandas.DataFrame(rows, columns=_COLUMNS)
 
 

@@ -49,7 +49,7 @@ def file_name(text: str) -> str:
 
 
 def plain_name(text: str) -> str:
-    """Return what of a text can be in a name, without what tells it from others; may be empty."""
+    """Return the part of a text that a name can have, without a hash; may be empty."""
     name = _NOT_IN_NAMES.sub("_", text).lstrip(". ")[:_LONGEST_NAME].rstrip(". ")
     return f"_{name}" if _DEVICES.match(name) else name
 

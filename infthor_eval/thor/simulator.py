@@ -144,7 +144,7 @@ class Simulator:
                 self._recover_from(fault)
 
     def step(self, action: str, **arguments: Any) -> SimulatorView:
-        """Run an action and return the state after it; `success` and `error` tell of a refusal."""
+        """Run an action and return the state after it; `success` and `error` show a refusal."""
         call = {"action": action, **arguments}
         while True:
             try:

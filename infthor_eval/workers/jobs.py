@@ -16,7 +16,7 @@ def run_jobs(
     open_worker: OpenWorker,
     jobs: Sequence[Any],
     worker_settings: WorkerSettings,
-    report: Callable[[str], None],
+    notify: Callable[[str], None],
 ) -> Iterator[tuple[int, Any | InfthorError]]:
     """Yield each job's number with its result, or an error if worker after worker was lost at it.
 
@@ -24,7 +24,7 @@ def run_jobs(
         open_worker: creates a worker, which gives one result for each job.
         worker_settings: number and place of the workers; a local one does the jobs in this process,
             in order.
-        report: called with a line when a worker is lost or cannot be started.
+        notify: called with a line when a worker is lost or cannot be started.
 
     Raises:
         Exception: a worker raised it; all workers are ended.
@@ -46,9 +46,9 @@ def run_jobs(
                     WorkerLostError(f"worker after worker was lost at it ({event.reason})"),
                 )
             elif isinstance(event, WorkerLost):
-                report(f"{event.reason}; its work goes to another")
+                notify(f"{event.reason}; its work goes to another")
             elif isinstance(event, WorkerWithdrawn):
-                report(f"worker {event.worker} cannot be started, the others go on: {event.reason}")
+                notify(f"worker {event.worker} cannot be started, the others go on: {event.reason}")
     finally:
         pool.close()
 

@@ -1,4 +1,4 @@
-"""Jobs done by several workers: each goes to who is free, and again if its worker is lost."""
+"""Jobs done by several workers: each goes to a free worker, and to another if that is lost."""
 
 import contextlib
 from collections import Counter, deque

@@ -1,4 +1,4 @@
-"""The next action of somebody who knows the scene, on the way to an object or a point."""
+"""The next action of an expert that knows the scene, on the way to an object or a point."""
 
 import math
 

@@ -38,7 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
     from infthor_sim.settings import SMOOTH_LEVELS
     from infthor_sim.simulation import Simulation
 
-    _keep_freed_memory()
+    _tune_malloc()
     parser = ArgumentParser(
         prog="python -m infthor_sim.player",
         description="The embedded simulator that takes the place of AI2-THOR's Unity build",
@@ -83,11 +83,11 @@ def _remove_if_orphaned(files: Path, controller: int) -> None:
     shutil.rmtree(files, ignore_errors=True)
 
 
-def _keep_freed_memory() -> None:
-    """Have the C library reuse the memory of pictures, which it would give back after each one.
+def _tune_malloc() -> None:
+    """Have glibc reuse the memory of pictures in place of returning it after each one.
 
-    Getting it anew, page by page, takes a tenth of a step. Other C libraries than GNU's have no
-    such setting.
+    Getting it again, page by page, takes a tenth of a step. Other C libraries have no such
+    setting.
     """
     set_option = getattr(ctypes.CDLL(None), "mallopt", None)
     if set_option is not None:

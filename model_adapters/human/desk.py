@@ -24,7 +24,7 @@ class ScreenClock:
 
     @property
     def seconds(self) -> float | None:
-        """Seconds so far; None if no page has told that it was shown."""
+        """Seconds so far; None if no page has reported that it was shown."""
         if not self._is_shown_once:
             return None
         return self._before + (0.0 if self._since is None else time.monotonic() - self._since)
@@ -90,7 +90,7 @@ class Desk:
         self._version = 0
         self._has_readers = False
         self._n_reading = 0  # pages that wait for a change
-        self._is_told = self._is_awaited = False
+        self._is_informed = self._is_awaited = False
         self._n_kept = 0
         self._in_hand: int | None = None  # number of an answer that may not be on disk yet
         self._is_closed = self._is_stopped = False
@@ -162,10 +162,10 @@ class Desk:
             self._answer = Answer(text, n_watched, self._question.clock.seconds)
             self._changed.notify_all()
 
-    def tell_screen(self, number: int, page: str, *, shows: bool) -> None:
-        """Take whether a page shows the question of this number, frames and all.
+    def report_screen(self, number: int, page: str, *, shows: bool) -> None:
+        """Report whether a page shows the question of this number, frames and all.
 
-        What is told of another question, which is answered by now, is of no interest.
+        Reports on earlier questions are ignored.
         """
         with self._changed:
             if self._question is not None and self._question.number == number:
@@ -188,14 +188,14 @@ class Desk:
         finally:
             self._n_reading -= 1
 
-    def tell_closed(self) -> None:
-        """Say that a page has learned that nothing will be asked any more."""
+    def report_closed(self) -> None:
+        """Report that a page knows that the run is over."""
         with self._changed:
-            self._is_told = True
+            self._is_informed = True
             self._changed.notify_all()
 
-    def wait_until_told(self, timeout_s: float, absent_s: float) -> None:
-        """Wait until a page, if there is one, knows that it is over.
+    def wait_until_informed(self, timeout_s: float, absent_s: float) -> None:
+        """Wait until a page, if there is one, knows that the run is over.
 
         Args:
             timeout_s: seconds to wait at most for a page that waited for a change when it closed.
@@ -203,7 +203,7 @@ class Desk:
         """
         with self._changed:
             self._changed.wait_for(
-                lambda: self._is_told or not self._has_readers,
+                lambda: self._is_informed or not self._has_readers,
                 timeout_s if self._is_awaited else absent_s,
             )
 

@@ -15,8 +15,8 @@ from model_adapters.protocols import Capabilities, Conversation, Decoding, Notic
 from model_adapters.thinking import cut_at_stop
 
 UNTIMED = (
-    "the page never told that the question was on the screen: its seconds count from when it was "
-    "asked"
+    "the page never reported that the question was on the screen: its seconds count from when it "
+    "was asked"
 )
 
 
@@ -56,12 +56,12 @@ class HumanModel:
     def count(self, turns: Sequence[Turn]) -> None:
         """Return None, as `tokens_per_frame`."""
 
-    def tell(self, notice: Notice) -> None:
-        """See `Attended`."""
+    def show_notice(self, notice: Notice) -> None:
+        """See `PersonModel`."""
         self._notice = notice
 
-    def tell_position(self, number: int, n_units: int) -> None:
-        """See `Attended`."""
+    def show_position(self, number: int, n_units: int) -> None:
+        """See `PersonModel`."""
         self._position = number, n_units
 
     def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:

@@ -42,7 +42,7 @@ class _AnswerForm(msgspec.Struct):
 
 
 class _ScreenForm(msgspec.Struct):
-    """What a page tells of its screen: whether it shows a question; `page` tells pages apart."""
+    """A page's report on its screen: whether it shows a question; `page` identifies the page."""
 
     number: int
     page: Annotated[str, msgspec.Meta(max_length=40)]
@@ -57,7 +57,7 @@ def serve_desk(desk: Desk, options: HumanOptions, listening: socket) -> Iterator
         if options.browser and _has_screen():
             webbrowser.open(server.address)
         yield
-        desk.wait_until_told(_LAST_NEWS_S, _LAST_LOOK_S)
+        desk.wait_until_informed(_LAST_NEWS_S, _LAST_LOOK_S)
 
 
 def desk_routes(desk: Desk) -> list[BaseRoute]:
@@ -91,8 +91,8 @@ class _Page:
                 while self._desk.version == seen and time.monotonic() < end:
                     await asyncio.sleep(_LOOK_S)
         state = _state_of(self._desk)
-        told = BackgroundTask(self._desk.tell_closed) if state["closed"] else None
-        return JSONResponse(state, background=told)
+        informing = BackgroundTask(self._desk.report_closed) if state["closed"] else None
+        return JSONResponse(state, background=informing)
 
     async def frame(self, request: Request) -> Response:
         """One frame of the question of a number."""
@@ -114,12 +114,12 @@ class _Page:
         return await run_in_threadpool(_take, self._desk, form)
 
     async def screen(self, request: Request) -> Response:
-        """Take what a page tells of its screen."""
+        """Take a page's report on its screen."""
         try:
             form = msgspec.json.decode(await request.body(), type=_ScreenForm)
         except (msgspec.ValidationError, msgspec.DecodeError):
-            return _problem("not what a page tells of its screen", 400)
-        self._desk.tell_screen(form.number, form.page, shows=form.shows)
+            return _problem("not a page's report on its screen", 400)
+        self._desk.report_screen(form.number, form.page, shows=form.shows)
         return JSONResponse({})
 
     async def stop(self, _request: Request) -> Response:

@@ -94,8 +94,8 @@ class ServedModel:
         )
 
     @property
-    def defers(self) -> bool:
-        """See `Deferring`."""
+    def uses_batches(self) -> bool:
+        """See `BatchModel`."""
         return self._options.batch
 
     def identity(self) -> dict[str, Any]:
@@ -134,9 +134,9 @@ class ServedModel:
         return [self._answer_in_batch(self._queue, turns, decoding) for turns in conversations]
 
     def open_batches(
-        self, folder: Path, report: Callable[[str], None], should_stop: Callable[[], bool]
+        self, folder: Path, notify: Callable[[str], None], should_stop: Callable[[], bool]
     ) -> BatchQueue:
-        """See `Deferring`."""
+        """See `BatchModel`."""
         rules = BatchRules(
             most_requests=self._options.batch_requests,
             most_mb=self._options.batch_mb,
@@ -149,7 +149,7 @@ class ServedModel:
             where=self._endpoint.where,
         )
         service = self._dialect.batch_service(self._endpoint)
-        self._queue = BatchQueue(folder, service, rules, report, should_stop)
+        self._queue = BatchQueue(folder, service, rules, notify, should_stop)
         return self._queue
 
     def close(self) -> None:

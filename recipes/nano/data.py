@@ -47,7 +47,7 @@ def generate_training_data(
         further=True,
         by_subject=False,
         worker_settings=worker_settings,
-        say=print_note,
+        notify=print_note,
     ).questions
     write_questions(sets[0] / "qa_set_data.csv", questions)
     print_note(f"{len(scenes.names)} trajectories, {len(questions):,} questions: {sets[0]}")
@@ -109,7 +109,7 @@ def _generate(
             worker_settings,
             bar.advance,
             print_note,
-            JobBar(progress).tell,
+            JobBar(progress).show,
         )
     _require_whole(trajectories, generated.failures)
 
@@ -123,9 +123,9 @@ def _replay(trajectories: Path, replayed_set: Path, worker_settings: WorkerSetti
             embedded_launch(),
             replayed_set,
             worker_settings,
-            progress=bar.advance,
-            say=print_note,
-            tell=JobBar(progress).tell,
+            advance=bar.advance,
+            notify=print_note,
+            on_progress=JobBar(progress).show,
         )
     failures = [f"{failure.place}: {failure.message}" for failure in replayed.failures]
     _require_whole(replayed_set, failures)
@@ -149,8 +149,8 @@ def _make_twins(
             partial(score, scorer="strict"),
             per_trajectory=_EVERY,
             worker_settings=worker_settings,
-            progress=PacedBar(progress, "twins", len(selection.items)).advance,
-            say=print_note,
+            advance=PacedBar(progress, "twins", len(selection.items)).advance,
+            notify=print_note,
         )
     _require_whole(twin_set, summary.failures)
     print_note(

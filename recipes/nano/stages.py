@@ -15,7 +15,7 @@ from torch import Tensor
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.household.sequence_text import MARKS
 from infthor_eval.household.wording import noun
-from infthor_eval.process_settings import keep_freed_memory
+from infthor_eval.process_settings import tune_malloc
 from infthor_eval.reasons import count_reasons
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.training.batches import collate
@@ -89,7 +89,7 @@ def train_small_model(
     Returns:
         The trained model with weights rounded to bfloat16.
     """
-    keep_freed_memory()
+    tune_malloc()
     torch.set_num_threads(recipe.threads)
     torch.manual_seed(recipe.seed)
     training = _prepare(recipe, data)

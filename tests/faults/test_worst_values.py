@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from infthor_eval import runs
 from infthor_eval.runs import RunRequest, TaskRequest, execute, prepare, read_run
-from infthor_eval.runs.journals.gate import Gate, RefusedRecordError
+from infthor_eval.runs.journals.record_encoder import RecordEncoder, RefusedRecordError
 from infthor_eval.suites import find_suite
 
 from ..helpers.nieh_runs import make_record
@@ -127,7 +127,7 @@ def test_what_passes_the_gate_is_read_as_it_was_given(name: str, data: st.DataOb
     path = data.draw(st.sampled_from(list(fields_of(whole))))
     record = replace_field(whole, path, data.draw(_worst_values()))
     try:
-        line = Gate(suite.records).line_of(record)
+        line = RecordEncoder(suite.records).encode(record)
     except RefusedRecordError as error:
         assert "\n" not in str(error)
         return

@@ -116,7 +116,7 @@ class Watching:
     def done(self, record, resumed):
         self.seen.append((record.id, record.failure, resumed))
 
-    def note(self, text):
+    def notify(self, text):
         raise AssertionError(text)
 
 

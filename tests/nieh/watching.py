@@ -25,7 +25,7 @@ class Watcher:
         """See `Observer`."""
         self.done_units.append((record, resumed))
 
-    def note(self, text: str) -> None:
+    def notify(self, text: str) -> None:
         """See `Observer`."""
         self.notes.append(text)
 

@@ -29,14 +29,14 @@ def compared(first, second, presenter=None):
     }
 
 
-def test_further_scores_are_those_above_blind_where_guessing_does_not_solve_the_form():
+def test_extra_scores_are_those_above_blind_where_guessing_does_not_solve_the_form():
     presenter = NiehPresenter()
-    assert presenter.further_scores(make_guessed_record(0, "mug", 0.0)) == {ABOVE: 2.0}
-    assert presenter.further_scores(make_guessed_record(0, "cup", 1.0)) == {ABOVE: -2.0}
-    assert presenter.further_scores(make_guessed_record(0, None, 0.25, 0.75)) == {ABOVE: -1.0}
-    assert presenter.further_scores(make_guessed_record(0, "mug", 1.0, 0.96)) == {}
-    assert presenter.further_scores(make_record(0, "mug")) == {}
-    assert PlainPresenter().further_scores(make_guessed_record(0, "mug")) == {}
+    assert presenter.extra_scores(make_guessed_record(0, "mug", 0.0)) == {ABOVE: 2.0}
+    assert presenter.extra_scores(make_guessed_record(0, "cup", 1.0)) == {ABOVE: -2.0}
+    assert presenter.extra_scores(make_guessed_record(0, None, 0.25, 0.75)) == {ABOVE: -1.0}
+    assert presenter.extra_scores(make_guessed_record(0, "mug", 1.0, 0.96)) == {}
+    assert presenter.extra_scores(make_record(0, "mug")) == {}
+    assert PlainPresenter().extra_scores(make_guessed_record(0, "mug")) == {}
 
 
 def test_runs_are_compared_above_blind_on_the_questions_that_have_it():

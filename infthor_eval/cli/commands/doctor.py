@@ -157,8 +157,8 @@ def _rehearse(
     """Rehearse models, one after the other, and print what was found."""
     if not models or not tasks:
         raise UsageError("--rehearse needs --model and --tasks")
-    from infthor_eval.cli.rehearsal.gathering import rehearse
     from infthor_eval.cli.rehearsal.printing import print_rehearsed
+    from infthor_eval.cli.rehearsal.rehearse import rehearse
 
     found = []
     for name, options in models:

@@ -150,8 +150,7 @@ def _import_replies(
         print_note(f"{name}: {len(run.records)} replies imported, {counts}")
         if "prompt" in run.settings:
             unknown = (
-                "not told by its counts of tokens, which fit no published prompt as Qwen2.5-VL "
-                "counts"
+                "unknown, as its counts of tokens fit no published prompt in tokens of Qwen2.5-VL"
             )
             print_note(f"{name}: the prompt it was asked with: {run.settings['prompt'] or unknown}")
         problems = {"not imported": run.refused, "scored otherwise than logged": run.rescored}

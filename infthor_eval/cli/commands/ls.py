@@ -18,7 +18,7 @@ from infthor_eval.memory import MEMORIES, accepted_options, memory_class
 from infthor_eval.rates import Rate
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
-from infthor_eval.run import BrokenRun, Run, find_runs, told_apart
+from infthor_eval.run import BrokenRun, Run, find_runs, with_distinct_names
 from infthor_eval.runs.catalog import Catalog, TaskFile
 from infthor_eval.runs.completeness import mark_incomplete
 from infthor_eval.storage.folders import packaged_folder
@@ -223,7 +223,7 @@ def _scenes(data: Path | None) -> None:
 def _runs(folder: Path, output_format: str | None) -> None:
     """Runs below DIR (default: results): units by state; primary metrics of tasks."""
     runs = list(find_runs(folder, print_failure))
-    stored = told_apart([run for run in runs if isinstance(run, Run)], ignore=())
+    stored = with_distinct_names([run for run in runs if isinstance(run, Run)], ignore=())
     if not runs:
         print_line(f"no runs in {folder}; `infthor-eval --model MODEL --tasks TASKS` starts one")
     if stored:

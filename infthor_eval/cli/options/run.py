@@ -255,7 +255,8 @@ def _with_threads(threads: int | None, models: Sequence[ModelSpec]) -> tuple[Mod
     }
     if not computing:
         raise UsageError(
-            f"--threads {threads}: {models[0].name} takes no threads, as it computes nothing here"
+            f"--threads {threads}: {models[0].name} takes no threads; give them to a model "
+            "that runs on this machine"
         )
     own = {"threads": str(threads)}
     return tuple(

@@ -62,14 +62,15 @@ class JobBar:
         self._progress = progress
         self._bar = progress.add_task("", visible=False)
         self._name = ""
-        self._told_at = time.monotonic()
-        self._pace = Pace(0, self._told_at)
+        self._shown_at = time.monotonic()
+        self._pace = Pace(0, self._shown_at)
 
-    def tell(self, job: JobProgress) -> None:
-        """Take how far a job is; one of another name than before begins anew."""
+    def show(self, job: JobProgress) -> None:
+        """Show how far a job is; another name than before starts the bar anew."""
         if job.name != self._name:
-            self._name, self._pace = job.name, Pace(job.n_units, self._told_at)
-        self._told_at = now = time.monotonic()
+            self._name = job.name
+            self._pace = Pace(job.n_units, self._shown_at)
+        self._shown_at = now = time.monotonic()
         self._pace.go_on(job.n_done, job.n_units)
         detail = f"; {job.detail}" if job.detail else ""
         self._progress.update(

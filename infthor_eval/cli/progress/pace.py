@@ -6,7 +6,7 @@ _STEP = 0.05  # of all units, after which there is a line
 
 
 class Pace:
-    """Counts units and tells how fast they come.
+    """Counts units and measures how fast they come.
 
     Attributes:
         n_resumed: units that an earlier run had done.

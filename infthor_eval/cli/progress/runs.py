@@ -54,7 +54,7 @@ class _ProgressObserver:
         if self._weights:
             self.bar.pace.weigh(self._weight, sum(self._weights.values()), time.monotonic())
 
-    def note(self, text: str) -> None:
+    def notify(self, text: str) -> None:
         print_note(f"{self._name}: {text}", "yellow")
 
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from types import FrameType
 
 _ANSWER_S = 1.0
-_SAME_S = 0.1  # a forked process tells of the same press; a person takes longer for two
+_SAME_S = 0.1  # a forked process reports the same press; a person takes longer for two
 
 
 class _Handled:
@@ -77,11 +77,11 @@ def stop_on_sigint(print_note: Callable[[str], None]) -> Iterator[Stop]:
 
 
 @contextlib.contextmanager
-def answer_ctrl_c(tell: Callable[[], None], end: Callable[[], None]) -> Iterator[None]:
+def answer_ctrl_c(warn: Callable[[], None], end: Callable[[], None]) -> Iterator[None]:
     """Answer each Ctrl-C within a second, if this is the main thread.
 
     Args:
-        tell: called if a press has not been handled after a second.
+        warn: called if a press has not been handled after a second.
         end: called if it was pressed twice in the same calculation; it ends the process.
     """
     if threading.current_thread() is not threading.main_thread():
@@ -90,7 +90,7 @@ def answer_ctrl_c(tell: Callable[[], None], end: Callable[[], None]) -> Iterator
     reading, writing = socket.socketpair()
     writing.setblocking(False)
     thread = threading.Thread(
-        target=_Presses(reading, tell, end).answer, name="ctrl-c", daemon=True
+        target=_Presses(reading, warn, end).answer, name="ctrl-c", daemon=True
     )
     thread.start()
     before = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
@@ -104,18 +104,18 @@ def answer_ctrl_c(tell: Callable[[], None], end: Callable[[], None]) -> Iterator
 
 
 class _Presses:
-    """The presses that nobody has handled yet."""
+    """The presses that have not been handled yet."""
 
     def __init__(
-        self, signals: socket.socket, tell: Callable[[], None], end: Callable[[], None]
+        self, signals: socket.socket, warn: Callable[[], None], end: Callable[[], None]
     ) -> None:
         self._signals = signals
-        self._tell = tell
+        self._warn = warn
         self._end = end
         self._times: list[float] = []
         self._last = -math.inf
         self._n_settled = _Handled.n
-        self._is_told = False
+        self._is_warned = False
 
     def answer(self) -> None:
         """Answer presses until the other end of the socket is closed."""
@@ -129,12 +129,12 @@ class _Presses:
                 if len(self._times) > 1:
                     self._end()
                     return
-                self._tell()
-                self._is_told = True
+                self._warn()
+                self._is_warned = True
 
     def _patience(self) -> float | None:
         """Return the seconds until the first press must be answered; None to wait for another."""
-        if not self._times or (self._is_told and len(self._times) == 1):
+        if not self._times or (self._is_warned and len(self._times) == 1):
             return None
         return max(0.0, self._times[0] + _ANSWER_S - time.monotonic())
 
@@ -144,7 +144,7 @@ class _Presses:
         if self._times and n_new:
             self._n_settled += min(n_new, len(self._times))
             self._times.clear()
-            self._is_told = False
+            self._is_warned = False
 
     def _take(self) -> bool:
         """Note a press; return False at the end."""

@@ -83,7 +83,7 @@ def _closing(found: Rehearsed) -> list[str]:
         f"frames; {frames.total:,} frames, {_gb(frames.disk)} GB on disk ({frames.source})"
     )
     for task in found.tasks:
-        tokens = "its context cannot be told without the set"
+        tokens = "its context is unknown without the set"
         if task.tokens is not None:
             tokens = f"up to {task.tokens:,} tokens"
             if found.limit is not None and task.tokens > found.limit:

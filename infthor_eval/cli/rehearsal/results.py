@@ -106,7 +106,7 @@ class Task(msgspec.Struct, frozen=True):
 
     Attributes:
         name: of the task.
-        tokens: of its longest context; None where it cannot be told.
+        tokens: of its longest context; None where it is unknown.
     """
 
     name: str

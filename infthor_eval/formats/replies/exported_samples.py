@@ -47,7 +47,7 @@ class EveryEvalEverRows:
     """Reads the lines of one file, which has each reply once for each metric."""
 
     def __init__(self) -> None:
-        self._told: set[tuple[str, str, str, int]] = set()
+        self._seen: set[tuple[str, str, str, int]] = set()
 
     def read(self, number: int, entry: Mapping[str, Any]) -> list[LoggedReply]:
         """Return the replies of a line that none before it had; none of a line on a group.
@@ -56,7 +56,7 @@ class EveryEvalEverRows:
             ValueError: it is no sample of this form, or an episode.
         """
         row = msgspec.convert(entry, _Row)
-        told = told_of(row.metadata or {}, row.sample_id)
+        fields = fields_of_metadata(row.metadata or {}, row.sample_id)
         if "members" in (row.metadata or {}):
             return []
         if row.output is None:
@@ -77,7 +77,7 @@ class EveryEvalEverRows:
                 n_reply_tokens=None if tokens is None else tokens.output_tokens,
                 seconds=seconds,
                 thinking=thoughts[0] if thoughts else None,
-                **{**told, "repeat": told["repeat"] + at},
+                **{**fields, "repeat": fields["repeat"] + at},
             )
             for at, text in enumerate(texts)
         ]
@@ -85,14 +85,14 @@ class EveryEvalEverRows:
 
     def _is_new(self, reply: LoggedReply) -> bool:
         what = reply.task, f"{reply.question_id} {reply.variant}", reply.text, reply.repeat
-        if what in self._told:
+        if what in self._seen:
             return False
-        self._told.add(what)
+        self._seen.add(what)
         return True
 
 
-def told_of(metadata: Mapping[str, Any], sample_id: str) -> dict[str, Any]:
-    """Return the fields of a `LoggedReply` that a sample's metadata tell, if they are ours."""
+def fields_of_metadata(metadata: Mapping[str, Any], sample_id: str) -> dict[str, Any]:
+    """Return the fields of a `LoggedReply` in a sample's metadata, if they are ours."""
     texts = {
         name: str(metadata.get(name, ""))
         for name in ("task", "context", "frame_ablation", "variant")

@@ -16,7 +16,7 @@ import msgspec
 
 from infthor_eval.errors import DataError, in_one_line
 from infthor_eval.formats.reading import DAMAGED_ZIP, json_value, require_file
-from infthor_eval.formats.replies.exported_samples import told_of
+from infthor_eval.formats.replies.exported_samples import fields_of_metadata
 from infthor_eval.formats.replies.logged import LoggedReply
 from infthor_eval.quantities import Amount, Count, Repetition
 from infthor_eval.storage.limits import FILE_MB, LINE_MB
@@ -138,7 +138,7 @@ def _unpack(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
 
 def _read(number: int, document: Any, spec: _Spec) -> list[LoggedReply]:
     sample = msgspec.convert(document, _Sample)
-    told = told_of(sample.metadata, str(sample.id))
+    fields = fields_of_metadata(sample.metadata, str(sample.id))
     failure = None if sample.error is None else sample.error.message
     if failure is None and not sample.output.choices:
         raise ValueError("output has no choice")
@@ -153,7 +153,7 @@ def _read(number: int, document: Any, spec: _Spec) -> list[LoggedReply]:
         n_reply_tokens=sum(it.output_tokens for it in usage) if usage else None,
         seconds=sample.total_time or 0.0,
         thinking=_text(content, "reasoning") or None if isinstance(content, list) else None,
-        **{**told, "task": told["task"] or spec.task, "repeat": sample.epoch},
+        **{**fields, "task": fields["task"] or spec.task, "repeat": sample.epoch},
     )
     return [reply]
 

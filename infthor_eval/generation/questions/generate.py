@@ -83,7 +83,7 @@ def generate_questions(
     published_words: bool = False,
     by_subject: bool = True,
     worker_settings: WorkerSettings = _ONE_PROCESS,
-    say: Callable[[str], None] = lambda _: None,
+    notify: Callable[[str], None] = lambda _: None,
     begin: Callable[[str, int], Callable[[], object]] = lambda *_: lambda: None,
 ) -> GeneratedQuestions:
     """Generate questions on a replayed set.
@@ -98,7 +98,7 @@ def generate_questions(
         by_subject: True to balance the answers on each object in each kind of room, too; False
             leaves more questions, for training.
         worker_settings: number and place of the workers; they do not change the questions.
-        say: called with messages about the workers.
+        notify: called with messages about the workers.
         begin: called with the name of a part of the work and its number of trajectories; returns
             what is called after each.
 
@@ -118,7 +118,7 @@ def generate_questions(
         vocabularies[kind] = vocabularies.get(kind, frozenset()) | types[path]
     rule_jobs = [_RuleJob(path, vocabularies[rooms[path]], seed, share, further) for path in types]
     advance = begin("questions found", len(rule_jobs))
-    candidates_by_path = _share_out(rule_jobs, worker_settings, say, advance, result)
+    candidates_by_path = _share_out(rule_jobs, worker_settings, notify, advance, result)
     chooser = Chooser(by_subject=by_subject)
     check_jobs = []
     chosen_by_path = {}
@@ -129,7 +129,7 @@ def generate_questions(
         questions = tuple(candidate.question(path.name) for candidate in chosen)
         check_jobs.append(_CheckJob(path, questions, share))
     advance = begin("questions checked", len(check_jobs))
-    soundness = _share_out(check_jobs, worker_settings, say, advance, result)
+    soundness = _share_out(check_jobs, worker_settings, notify, advance, result)
     for job in check_jobs:
         # Checked in our words, which the checker reads.
         checked = zip(chosen_by_path[job.path], soundness.get(job.path, ()), strict=False)
@@ -217,7 +217,7 @@ class _QuestionWorker:
 
     def do(self, job: _RuleJob | _CheckJob) -> Iterator[Any]:
         try:
-            with _telling_inconsistency(job.path):
+            with _naming_inconsistency(job.path):
                 result: Any = job.run()
         except DataError as error:  # of this trajectory alone
             yield error
@@ -231,13 +231,13 @@ class _QuestionWorker:
 def _share_out(
     jobs: Sequence[_RuleJob] | Sequence[_CheckJob],
     worker_settings: WorkerSettings,
-    say: Callable[[str], None],
+    notify: Callable[[str], None],
     advance: Callable[[], object],
     result: GeneratedQuestions,
 ) -> dict[Path, Any]:
     """Return the results by trajectory; one at which several workers were lost is skipped."""
     results: dict[Path, Any] = {}
-    for number, outcome in run_jobs(_QuestionWorker, jobs, worker_settings, say):
+    for number, outcome in run_jobs(_QuestionWorker, jobs, worker_settings, notify):
         advance()
         if isinstance(outcome, InfthorError):
             place = "" if isinstance(outcome, DataError) else f"{jobs[number].path}: "
@@ -248,11 +248,11 @@ def _share_out(
 
 
 def _read_history(path: Path, share: float) -> TrajectoryHistory:
-    with _telling_inconsistency(path):
+    with _naming_inconsistency(path):
         return TrajectoryHistory(path.name, read_steps(path), share)
 
 
-def _telling_inconsistency(path: Path) -> AbstractContextManager[None]:
+def _naming_inconsistency(path: Path) -> AbstractContextManager[None]:
     return wrap_errors(
         f"{path}: its log is inconsistent", "replay the trajectory again", catch=_INCONSISTENT
     )

@@ -97,7 +97,7 @@ def _carries_back(episode: Episode, frame: int) -> list[_Carry]:
 
 
 def _is_plain(episode: Episode, frame: int, item: ThorObject, place: ThorObject) -> bool:
-    """Return True if all can tell which object is carried from and to which place."""
+    """Return True if it is clear which object is carried from and to which place."""
     actions = episode.actions_on(item.object_id)
     is_clear = episode.n_handled(item.object_type) <= bool(actions) and set(actions) <= _CARRYING
     is_open = episode.history.states(frame)[place.object_id].is_open is not False
@@ -116,7 +116,8 @@ def _name(obj: ThorObject) -> str:
 class CountKind:
     """Base of the counts: one thing is carried once more than another one, which is not touched.
 
-    How often cannot be asked where it was never. So both worlds may have the same carries before.
+    "How often" cannot be asked about a thing that was never carried, so both worlds may start with
+    the same carries.
     """
 
     def propose(self, episode: Episode, rng: random.Random) -> Iterator[Insertion]:
@@ -134,7 +135,7 @@ class CountKind:
             yield _insertion(index, [*before, one], [*before, other], ALL)
 
     def _may_differ(self, episode: Episode, one: _Carry, other: _Carry) -> bool:
-        """Return True if both things are told apart, and how often one was moved is clear."""
+        """Return True if the things can be distinguished, and their moves be counted."""
         key = one.item.object_id
         moves = episode.history.moves_of(key)
         is_counted = len(moves) == episode.history.pickups[key]

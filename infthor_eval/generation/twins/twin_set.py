@@ -113,8 +113,8 @@ def make_twins(
     *,
     per_trajectory: int = 25,
     worker_settings: WorkerSettings,
-    progress: Callable[[bool], None] = lambda _: None,
-    say: Callable[[str], None] = lambda _: None,
+    advance: Callable[[bool], None] = lambda _: None,
+    notify: Callable[[str], None] = lambda _: None,
 ) -> TwinSummary:
     """Make a set of twins.
 
@@ -126,8 +126,8 @@ def make_twins(
         score: returns the strict score of a reply for gold answers; pickled for workers.
         per_trajectory: most paired questions of one trajectory.
         worker_settings: number and place of the workers; they do not change the set.
-        progress: called after each trajectory, with True if an earlier run made its draft.
-        say: called with messages about the workers.
+        advance: called after each trajectory, with True if an earlier run made its draft.
+        notify: called with messages about the workers.
     """
     started = time.monotonic()
     for name in ("metadata", _DRAFTS):
@@ -140,7 +140,7 @@ def make_twins(
     def failed(number: int, error: InfthorError) -> _DraftOutcome[TwinDraft]:
         return _DraftOutcome[TwinDraft](failure=_failure_line(items[number], error))
 
-    outcomes = collect_outcomes(run_jobs(start, items, worker_settings, say), failed, progress)
+    outcomes = collect_outcomes(run_jobs(start, items, worker_settings, notify), failed, advance)
     drafts = [outcome.draft for outcome in outcomes if outcome.draft is not None]
     _require_distinct(drafts)
     chosen = choose_pairs([draft.pairs for draft in drafts], per_trajectory)
@@ -308,8 +308,8 @@ def make_final_tasks(
     settings: TwinSettings,
     *,
     worker_settings: WorkerSettings,
-    progress: Callable[[bool], None] = lambda _: None,
-    say: Callable[[str], None] = lambda _: None,
+    advance: Callable[[bool], None] = lambda _: None,
+    notify: Callable[[str], None] = lambda _: None,
 ) -> FinalTaskSummary:
     """Make twins with final tasks; arguments and errors are those of `make_twins`."""
     started = time.monotonic()
@@ -323,7 +323,7 @@ def make_final_tasks(
     def failed(number: int, error: InfthorError) -> _DraftOutcome[FinalTaskDraft]:
         return _DraftOutcome[FinalTaskDraft](failure=_failure_line(items[number], error))
 
-    outcomes = collect_outcomes(run_jobs(start, items, worker_settings, say), failed, progress)
+    outcomes = collect_outcomes(run_jobs(start, items, worker_settings, notify), failed, advance)
     failures = [failure.message for failure in selection.failures]
     failures += [outcome.failure for outcome in outcomes if outcome.failure]
     drafts = [outcome.draft for outcome in outcomes if outcome.draft is not None]

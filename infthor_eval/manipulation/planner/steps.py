@@ -1,6 +1,6 @@
 """How an arm that knows where everything is moves its hand to pick an object up or put it down.
 
-To put down takes paths to a place, and what collisions tell of the surroundings. Poses to release
+To put down takes paths to a place, and what collisions show of the surroundings. Poses to release
 the object in, and to pass on the way, are drawn at random.
 """
 

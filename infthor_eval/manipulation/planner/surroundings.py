@@ -37,7 +37,7 @@ _Boxes = list[tuple[str, Corners]]
 
 
 class Belief(IntEnum):
-    """Which boxes are taken for obstacles: metadata do not tell which furniture is partly empty."""
+    """The boxes that count as obstacles: metadata do not show which furniture is partly empty."""
 
     NOTHING = 0
     RECEPTACLE = 1  # the parts of the receptacle that the object is to be put into

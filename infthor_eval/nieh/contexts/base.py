@@ -11,7 +11,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.pictures.video import FILM_FPS, Video
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.memory import MemoryOptions
+from infthor_eval.memory import MemoryArgs
 from infthor_eval.nieh.options import NiehSettings
 from infthor_eval.nieh.prompts import PUBLISHED_MAIN, question_text
 from infthor_eval.quantities import Share, Total
@@ -35,7 +35,7 @@ class RecallSettings:
     """
 
     memory: str
-    options: MemoryOptions = ()
+    options: MemoryArgs = ()
     budget: int | None = None
     tokens_per_frame: int | None = None
     seed: int = 0

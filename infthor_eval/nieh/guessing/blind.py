@@ -31,7 +31,7 @@ from infthor_eval.storage.folders import user_cache
 
 
 def visible_knowledge(context: str) -> Knowledge:
-    """Return what a model is told in a context of that name without looking at a frame.
+    """Return what a model can know in a context of that name without looking at a frame.
 
     On the clue frames alone their number is in the request; elsewhere it says nothing of the
     question.

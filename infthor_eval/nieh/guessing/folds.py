@@ -1,4 +1,4 @@
-"""Who is guessed without whom: questions are held out with their trajectories, in a few folds."""
+"""Cross-validation folds: questions are held out with their trajectories."""
 
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType

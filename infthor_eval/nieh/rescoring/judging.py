@@ -38,7 +38,7 @@ from model_adapters import (
     label,
     load,
     names,
-    refuse_deferring,
+    refuse_batches,
     wrap_request_errors,
 )
 
@@ -147,7 +147,7 @@ class Judge:
         check_options(name, options)
         code = adapter_identity(name)
         model = load(name, options, seed)
-        refuse_deferring(model)
+        refuse_batches(model)
         if not isinstance(model, Model):
             model.close()
             raise UsageError(

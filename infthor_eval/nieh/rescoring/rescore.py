@@ -38,7 +38,7 @@ from infthor_eval.runs import (
     keep_request,
     read_header,
 )
-from infthor_eval.runs.journals.shards import Tell, read_run_log
+from infthor_eval.runs.journals.shards import Notify, read_run_log
 from infthor_eval.runs.results import write_document
 from infthor_eval.runs.stored.writing import Stored, store_run
 
@@ -208,8 +208,8 @@ class Rescoring:
         )
 
 
-def read_source(folder: Path, tell: Tell | None = None) -> Source:
-    """Read the run in a folder; `tell` is told of bad lines, see `read_run`.
+def read_source(folder: Path, notify: Notify | None = None) -> Source:
+    """Read the run in a folder; `notify` is called with each bad line, see `read_run`.
 
     Raises:
         UsageError: it is a run of another suite.
@@ -221,7 +221,7 @@ def read_source(folder: Path, tell: Tell | None = None) -> Source:
             f"{folder}: is a run of {header.suite}; give a run of {NiehSuite.name}, which has "
             "replies"
         )
-    header, log = read_run_log(folder, RECORDS, tell)
+    header, log = read_run_log(folder, RECORDS, notify)
     return Source(header, log.records, log.requests)
 
 

@@ -1,7 +1,7 @@
 """By what questions are grouped: their form, what was shown of their evidence, their length.
 
 To add a facet of questions: an entry in `FACETS`; it is then in results.json, in the tables, on the
-page, in the table of samples, and in what exports tell of a sample.
+page, in the table of samples, and in exports.
 """
 
 from collections.abc import Callable, Collection
@@ -30,16 +30,16 @@ class QuestionFacet(Facet[Record]):
 
     Attributes:
         title: what the classes are of, in the heading of its table; "" for `heading`.
-        is_told: whether a sample tells its class already, in a column of another name.
+        has_column: whether samples show the class already, in a column of another name.
         of_files: whether the questions of each file are grouped too.
         has_all: whether tables and charts have all classes, with those of no question.
         in_tables: whether it has a table of its own.
         in_charts: whether it has a chart of its own.
-        is_worth: whether a task's classes tell anything, by its context and their names.
+        is_worth: whether a task's classes are worth a table, by its context and their names.
     """
 
     title: str = ""
-    is_told: bool = False
+    has_column: bool = False
     of_files: bool = False
     has_all: bool = False
     in_tables: bool = True
@@ -77,13 +77,15 @@ def _words(record: Record) -> str:
     return N_WORDS[sum(n_words > most for most in _WORDS)]
 
 
-FILE = QuestionFacet("file", "question file", _file, is_told=True, in_tables=False, in_charts=False)
+FILE = QuestionFacet(
+    "file", "question file", _file, has_column=True, in_tables=False, in_charts=False
+)
 LENGTH = QuestionFacet(
     "length",
     "length of the context, thousand tokens",
     _length,
     LENGTHS,
-    is_told=True,
+    has_column=True,
     in_tables=False,
 )
 FACETS = (
@@ -91,7 +93,7 @@ FACETS = (
         "question_type",
         "type of question",
         lambda record: record.payload.question_type or "untyped",
-        is_told=True,
+        has_column=True,
         in_tables=False,
     ),
     # Its table and its chart are of depths alone.
@@ -99,7 +101,7 @@ FACETS = (
         "variant",
         "depth of the needle",
         lambda record: record.variant or "-",
-        is_told=True,
+        has_column=True,
         in_tables=False,
         in_charts=False,
     ),
@@ -111,7 +113,7 @@ FACETS = (
         _share_shown,
         SHOWN_CLUES,
         title="how many of the clue frames were shown",
-        is_told=True,
+        has_column=True,
         of_files=True,
         has_all=True,
         is_worth=lambda _, classes: bool(set(classes) - {"all"}),
@@ -122,7 +124,7 @@ FACETS = (
         _distance,
         DISTANCES,
         title="frames between the last clue and the end of the trajectory",
-        is_told=True,
+        has_column=True,
         of_files=True,
         is_worth=lambda context, classes: bool(classes) and context != "clues",
     ),

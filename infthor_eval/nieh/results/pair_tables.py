@@ -13,14 +13,14 @@ from infthor_eval.tables import Column, Row, Table, TableCell
 _HEADS = (Column("model", False), Column("task", False), Column("context", False))
 _NOTES = (
     "net pairs: pairs right (both worlds' answers) less pairs exchanged (each answer right in the "
-    "other world), %. Who does not know which world is which has 0 on average, whatever it says. "
+    "other world), %; 0 on average for a model that does not know which world is which. "
     "In brackets: 95 % bootstrap interval over the trajectories that the worlds were made of; all "
     "equal: each of them has this value, so resampling them finds no interval.",
-    "by fact: mean over changed facts, which several pairs may be about, of net pairs. flipped: "
-    "the reply to the twin is another one; right then: both right, of these. one right: of both, "
-    "and how often it is the commoner answer of its form (prior knowledge). single: answers with "
-    "full marks, while the task's accuracy counts lists that are right in part, too. bases: "
-    "trajectories that the worlds were made of.",
+    "by fact: net pairs, as a mean over changed facts, as several pairs may be about one. flipped: "
+    "pairs with two different replies; right then: of these, pairs right. one right: pairs right "
+    "in one world alone; commoner: of these, how often the right answer is the commoner one of its "
+    "form (prior knowledge). single: answers with full marks, while the task's accuracy counts "
+    "partly right lists, too. bases: trajectories that the worlds were made of.",
 )
 
 

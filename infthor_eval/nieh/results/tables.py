@@ -55,10 +55,10 @@ _LEGEND = (
     "drops no article; `infthor-eval show RUN --question ID` says why a reply got its score.",
 )
 _EQUAL = (
-    "The interval of 100.00 or 0.00 tells how little a few trajectories, all alike, say of others "
-    "(Wilson's: 6 of 6 are 61.0 to 100.0)."
+    "A score of 100.00 or 0.00 has an interval, too: a few trajectories, all alike, say little "
+    "about others (Wilson's: 6 of 6 are 61.0 to 100.0)."
 )
-_ALONE = "Questions on one trajectory alone have no interval: nothing is known of others."
+_ALONE = "Questions on one trajectory alone have no interval: nothing is known about others."
 _EMBEDDED = (
     "Questions on frames of the embedded simulator: not comparable with the published rows, which "
     "are on AI2-THOR's own frames."

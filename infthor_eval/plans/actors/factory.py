@@ -9,13 +9,13 @@ from infthor_eval.plans.actors.protocols import Act, PlanActor, PlanBaseline, Pl
 from infthor_eval.plans.environment import StepOutcome
 from infthor_eval.plans.task import PlansTask
 from infthor_eval.thor.actions import applicable_actions
-from model_adapters import Attended, Model, Notice, Subject, identity_of
+from model_adapters import Model, Notice, PersonModel, Subject, identity_of
 
 
 class _PersonActor(ModelActor):
     """Asks a person for actions, with what a model is not told: goal, rewards, possible actions."""
 
-    def __init__(self, person: Attended, config: AgentConfig) -> None:
+    def __init__(self, person: PersonModel, config: AgentConfig) -> None:
         super().__init__(person, config)
         self._person = person
         self._of_trajectory = self._of_plan = 0.0
@@ -39,7 +39,7 @@ class _PersonActor(ModelActor):
             "reward so far": f"{self._of_trajectory:g}",
         }
         replies = tuple(map(str, possible))
-        self._person.tell(
+        self._person.show_notice(
             Notice(
                 title=self._title,
                 unit="plan",
@@ -87,7 +87,7 @@ def actor_factory(subject: Subject, trajectories: Sequence[Trajectory]) -> Actor
     if isinstance(subject, PlanBaseline):
         subject.fit(trajectories)
         return ActorFactory(False, lambda task, trajectory: subject.actor(trajectory, task.words))
-    if isinstance(subject, Attended):
+    if isinstance(subject, PersonModel):
         return ActorFactory(True, lambda task, _: _PersonActor(subject, task.agent_config()))
     if isinstance(subject, Model):
         trained = identity_of(subject).get("trained_words")

@@ -80,7 +80,7 @@ class AskingActor(PlanActor, Protocol):
 
 @runtime_checkable
 class EndedActor(PlanActor, Protocol):
-    """An actor that is told how its plan ended."""
+    """An actor that learns how its plan ended."""
 
     def end(self, outcome: StepOutcome) -> None:
         """Take the outcome of the plan's last action."""

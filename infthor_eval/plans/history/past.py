@@ -80,7 +80,7 @@ class Past:
 
 
 class History(Protocol):
-    """Selects a model's past; `needs_state` tells whether it needs the state in words."""
+    """Selects a model's past; `needs_state` is True if it needs the state in words."""
 
     needs_state: ClassVar[bool]
 

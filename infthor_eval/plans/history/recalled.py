@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from infthor_eval.errors import DataError, ModelError, UsageError
 from infthor_eval.household.sequence_text import goal_part, plan_part
 from infthor_eval.memory import (
-    MemoryOptions,
+    MemoryArgs,
     Observation,
     Query,
     TrajectoryFacts,
@@ -35,7 +35,7 @@ class RecalledHistory:
     needs_state: ClassVar[bool] = False
 
     def __init__(
-        self, name: str, options: MemoryOptions = (), budget: int | None = None, blank: bool = False
+        self, name: str, options: MemoryArgs = (), budget: int | None = None, blank: bool = False
     ) -> None:
         """Open a memory.
 

@@ -22,7 +22,7 @@ class TwinResults(msgspec.Struct, frozen=True):
         n_pairs: pairs of which both worlds count.
         n_incomplete: pairs of which one does not, as it is excluded or left out, or has no result.
         net_pairs: pairs right less pairs exchanged, -1 to 1, with the bootstrap interval of that
-            difference: 0 on average for whoever does not know which world is which.
+            difference: 0 on average for an agent that does not know which world is which.
         pair_accuracy: share of pairs in which the place looked at first is right in both worlds.
         pairs_exchanged: share of pairs in which it is in both worlds the place of the other one.
         pair_success: share of pairs whose final task was carried out in both worlds.

@@ -48,7 +48,7 @@ def arm_pictures(frames: Iterable[ArmFrame], heading: str) -> Iterator[Image.Ima
 
 
 def draw_arm_title(frame: ArmFrame, heading: str) -> Image.Image:
-    """Draw the card before an episode; for an episode in which nobody acted it has the reason."""
+    """Draw the card before an episode; for an episode without actions it has the reason."""
     title = frame.title
     position = (
         f"{title.kind}, episode {title.number} of {title.n_episodes} (the expert's action "

@@ -99,8 +99,8 @@ class NiehPresenter(PlainPresenter):
         `blind`, of a part of a set, can be anything, and so can a task's own metrics."""
         return _BOUNDS.get(metric, (-math.inf, math.inf))
 
-    def further_scores(self, record: Record) -> Mapping[str, float]:
-        """See `Presenter.further_scores`: scores above `blind` where that does not solve all."""
+    def extra_scores(self, record: Record) -> Mapping[str, float]:
+        """See `Presenter.extra_scores`: scores above `blind` where that does not solve all."""
         scores = {scorer: score_above_blind(record.payload, scorer) for scorer in SCORERS}
         return {
             f"{scorer}{_ABOVE_BLIND}": score
@@ -108,10 +108,10 @@ class NiehPresenter(PlainPresenter):
             if score is not None
         }
 
-    def further_ranges(self, record: Record) -> Mapping[str, tuple[float, float]]:
-        """See `Presenter.further_ranges`."""
+    def extra_ranges(self, record: Record) -> Mapping[str, tuple[float, float]]:
+        """See `Presenter.extra_ranges`."""
         counted = [
-            scorer for scorer in SCORERS if f"{scorer}{_ABOVE_BLIND}" in self.further_scores(record)
+            scorer for scorer in SCORERS if f"{scorer}{_ABOVE_BLIND}" in self.extra_scores(record)
         ]
         return {f"{scorer}{_ABOVE_BLIND}": score_range([record], scorer) for scorer in counted}
 
@@ -177,11 +177,9 @@ class NiehPresenter(PlainPresenter):
             )
         if payload.blind is not None:
             details["blind"] = _blind(payload.blind)
-            details |= {
-                name: f"{score:+.2f}" for name, score in self.further_scores(record).items()
-            }
+            details |= {name: f"{score:+.2f}" for name, score in self.extra_scores(record).items()}
         for facet in FACETS:
-            told = None if facet.is_told else facet.class_of(record)
+            told = None if facet.has_column else facet.class_of(record)
             details |= {} if told is None else {facet.heading: told}
         if payload.thinking is not None:
             details[THOUGHT] = payload.thinking

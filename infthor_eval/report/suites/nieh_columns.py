@@ -56,5 +56,5 @@ NIEH_COLUMNS = (
     SampleColumn("n_recalled", int, _n_recalled),
     SampleColumn("build_seconds", float, partial(_recall, "build_s")),
     SampleColumn("recall_seconds", float, partial(_recall, "recall_s")),
-    *(SampleColumn(facet.name, str, facet.class_of) for facet in FACETS if not facet.is_told),
+    *(SampleColumn(facet.name, str, facet.class_of) for facet in FACETS if not facet.has_column),
 )

@@ -98,7 +98,7 @@ def _chart(task: str, curve: Facet[TwinRecords], lines: Sequence[_Line]) -> Char
         title=f"{task}: net pairs of twins, by {curve.heading}",
         caption=(
             "A row is a class of pairs, with their number in parentheses; a dot is a run, its "
-            "line the 95 % interval; who does not know which world is which has 0 on average."
+            "line the 95 % interval; 0 on average if the worlds cannot be told apart."
         ),
         axes=(curve.heading, "net pairs (%)"),
         series=series,

@@ -16,7 +16,7 @@ from infthor_eval.report.web.page import Page, embedded_remark, write_page
 from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import n_processors
-from infthor_eval.run import Run, told_apart
+from infthor_eval.run import Run, with_distinct_names
 from infthor_eval.storage.files import file_name, prepare_folder
 from infthor_eval.tables import Column, Row, Table
 
@@ -116,7 +116,7 @@ def _plan(folders: Sequence[Path], pages: Path) -> tuple[list[_Job], list[tuple[
         except InfthorError as error:
             unread.append((str(folder), str(error)))
     jobs = []
-    for number, run in enumerate(told_apart(runs, by_task=True)):
+    for number, run in enumerate(with_distinct_names(runs, by_task=True)):
         page = pages / f"{number:04}-{file_name(run.listed.name)}.html"
         jobs.append(_Job(run.folder, run.name, page))
     return jobs, unread

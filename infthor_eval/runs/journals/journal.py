@@ -25,7 +25,7 @@ import msgspec
 
 from infthor_eval.errors import DataError, UsageError, in_one_line, wrap_errors
 from infthor_eval.formats.reading import NOT_JSON, require_file
-from infthor_eval.runs.journals.gate import Gate
+from infthor_eval.runs.journals.record_encoder import RecordEncoder
 from infthor_eval.runs.journals.records import (
     Artifact,
     ArtifactRecord,
@@ -95,7 +95,7 @@ class Journal(Generic[Payload]):
         try:
             _lock(self._file, path, wait_s)
             self._types = types
-            self._gate = Gate(types)
+            self._encoder = RecordEncoder(types)
             self._log: RunLog[Payload] = read_shards(run, types)
             self._start_shard()
         except (DataError, UsageError):
@@ -212,7 +212,7 @@ class Journal(Generic[Payload]):
             self._write(self.header)
 
     def _write(self, record: msgspec.Struct) -> None:
-        line = memoryview(self._gate.line_of(record) + b"\n")
+        line = memoryview(self._encoder.encode(record) + b"\n")
         if os.fstat(self._file.fileno()).st_size + len(line) > FILE_MB.value * _MB:
             raise DataError(f"{self._path}: holds {FILE_MB.value} MiB, the most; {FILE_MB.hint}")
         hint = writing_hint(" and run the same command again, which resumes it")
@@ -280,7 +280,7 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes[Any]) -> in
         if not bad:
             return 0
         if not (good and isinstance(decoder.decode(good[0]), RunHeader)):
-            good.insert(0, Gate(types).line_of(header))
+            good.insert(0, RecordEncoder(types).encode(header))
         # The bad lines first: a crash between the two leaves them twice, not lost.
         with (path.parent / _BAD_LINES).open("ab") as file_of_bad:
             file_of_bad.write(b"".join(line + b"\n" for line in bad))

@@ -30,7 +30,7 @@ from infthor_eval.runs.usage import Usage
 FOLDER = "journal"  # within the run's folder
 Decoder = msgspec.json.Decoder[Any]
 # Called with a message for each bad line of a journal, which is then left out.
-Tell = Callable[[str], None]
+Notify = Callable[[str], None]
 _FORMAT_1 = "journal.jsonl"  # the single file of format 1, in the run's folder
 _HINT = (
     "run the same command with --recover to resume without such lines, or with --fresh to restart"
@@ -121,24 +121,24 @@ def read_header(run: Path) -> RunHeader:
 
 
 def read_run(
-    run: Path, types: RecordTypes[Payload], tell: Tell | None = None
+    run: Path, types: RecordTypes[Payload], notify: Notify | None = None
 ) -> tuple[RunHeader, list[UnitRecord[Payload]]]:
     """Read the header of the run in a folder, and the latest record of each unit of all shards.
 
     Args:
         run: the folder.
         types: types of the suite's records.
-        tell: told of each bad line, which is left out; None to refuse a journal that has one.
+        notify: called with each bad line, which is left out; None to refuse a journal that has one.
 
     Raises:
         DataError: there is no journal, or one with a bad line, of another format or suite.
     """
-    header, log = read_run_log(run, types, tell)
+    header, log = read_run_log(run, types, notify)
     return header, log.records
 
 
 def read_run_log(
-    run: Path, types: RecordTypes[Payload], tell: Tell | None = None
+    run: Path, types: RecordTypes[Payload], notify: Notify | None = None
 ) -> tuple[RunHeader, RunLog[Payload]]:
     """Read the header of the run in a folder, and the contents of all its shards; see `read_run`.
 
@@ -146,7 +146,7 @@ def read_run_log(
         DataError: there is no journal, or one with a bad line, of another format or suite.
     """
     any_header = read_header(run)  # or says that there is no journal
-    log = read_shards(run, types, tell)
+    log = read_shards(run, types, notify)
     return log.header or any_header, log
 
 
@@ -176,12 +176,12 @@ class _AnyHeader(msgspec.Struct, tag_field="type", tag="run"):
     """A header; no field of it is read."""
 
 
-def read_states(run: Path, tell: Tell | None = None) -> dict[UnitKey, State]:
+def read_states(run: Path, notify: Notify | None = None) -> dict[UnitKey, State]:
     """Return the state of each unit with a record, by its latest attempt; needs no suite.
 
     Args:
         run: the folder.
-        tell: see `read_run`.
+        notify: see `read_run`.
 
     Raises:
         DataError: a line is bad.
@@ -190,7 +190,7 @@ def read_states(run: Path, tell: Tell | None = None) -> dict[UnitKey, State]:
     latest: dict[UnitKey, _UnitOutcome] = {}
     for path in find_shards(run):
         for number, line in enumerate(read_lines(path), 1):
-            with _told(tell), _naming(path, number):
+            with _notifying(notify), _naming(path, number):
                 unit = decoder.decode(line)
                 if not isinstance(unit, _UnitOutcome):
                     continue
@@ -223,7 +223,7 @@ def last_change(folder: Path) -> datetime:
 
 
 def read_shards(
-    run: Path, types: RecordTypes[Payload], tell: Tell | None = None
+    run: Path, types: RecordTypes[Payload], notify: Notify | None = None
 ) -> RunLog[Payload]:
     """Read all shards of a run, see `read_run`; an empty log if there is none.
 
@@ -232,12 +232,12 @@ def read_shards(
     """
     log: RunLog[Payload] = RunLog()
     for path in find_shards(run):
-        read_shard(path, types, log, tell)
+        read_shard(path, types, log, notify)
     return log
 
 
 def read_shard(
-    path: Path, types: RecordTypes[Payload], log: RunLog[Payload], tell: Tell | None = None
+    path: Path, types: RecordTypes[Payload], log: RunLog[Payload], notify: Notify | None = None
 ) -> None:
     """Add the contents of a shard to a log, see `read_run`."""
     lines = read_lines(path)
@@ -251,19 +251,19 @@ def read_shard(
     log.header = header
     decoder = types.decoder()
     for number, line in enumerate(lines[1:], 2):
-        with _told(tell):
+        with _notifying(notify):
             log.add(parse_record(path, number, line, decoder, header))
 
 
 @contextmanager
-def _told(tell: Tell | None) -> Iterator[None]:
-    """Tell of a bad line instead of refusing it, if there is whom to tell."""
+def _notifying(notify: Notify | None) -> Iterator[None]:
+    """Notify of a bad line instead of raising its error, if `notify` is given."""
     try:
         yield
     except DataError as error:
-        if tell is None:
+        if notify is None:
             raise
-        tell(f"left out: {error}")
+        notify(f"left out: {error}")
 
 
 def _naming(path: Path, number: int) -> AbstractContextManager[None]:

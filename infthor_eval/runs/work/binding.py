@@ -10,7 +10,7 @@ from infthor_eval.errors import UsageError, UserCodeError, wrap_user_code
 from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import BoundEvaluation, Need, Suite, Workload
-from infthor_eval.runs.work.deferring import require_independent
+from infthor_eval.runs.work.batches import require_independent
 from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
 from model_adapters import Model, Policy, Subject, adapter_identity, identity_of, load

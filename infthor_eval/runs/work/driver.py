@@ -28,7 +28,7 @@ class Observer(Protocol):
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
         """Called for each unit; `resumed` if its record is that of an earlier, stopped run."""
 
-    def note(self, text: str) -> None:
+    def notify(self, text: str) -> None:
         """Called with a line when a worker is lost, or a batch of requests begins or ends."""
 
 
@@ -41,7 +41,7 @@ class Silent:
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
         """Nothing."""
 
-    def note(self, text: str) -> None:
+    def notify(self, text: str) -> None:
         """Nothing."""
 
 
@@ -95,7 +95,7 @@ def execute(
         DataError: the journal has a bad line, or the results cannot be written.
     """
     observer = observer or Silent()
-    executor = _start_executor(run, observer.note)
+    executor = _start_executor(run, observer.notify)
     try:
         outcome = _evaluate(run, executor, observer, should_stop)
     except BaseException:
@@ -138,11 +138,11 @@ def _evaluate(
 
 
 def _start_executor(
-    run: PreparedRun[SuiteUnit, Payload], report: Callable[[str], None]
+    run: PreparedRun[SuiteUnit, Payload], notify: Callable[[str], None]
 ) -> Executor[Payload]:
     if run.request.worker_settings.is_local:
-        return LocalExecutor(run, report)
-    return WorkerPoolExecutor(run, report)
+        return LocalExecutor(run, notify)
+    return WorkerPoolExecutor(run, notify)
 
 
 def _write_results(

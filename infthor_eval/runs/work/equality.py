@@ -9,7 +9,7 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 
 from infthor_eval.errors import UsageError
-from infthor_eval.runs.journals.gate import Gate
+from infthor_eval.runs.journals.record_encoder import RecordEncoder
 from infthor_eval.runs.journals.records import Payload, SuiteUnit, UnitKey
 from infthor_eval.runs.request import RunRequest, prepare
 from infthor_eval.runs.suite import Suite
@@ -77,19 +77,19 @@ def check_equality(request: RunRequest, suite: Suite[SuiteUnit, Payload], n_unit
     limit = request.tasks.limit
     few = n_units if limit is None else min(n_units, limit)
     request = replace(request, tasks=replace(request.tasks, limit=few))
-    gate = Gate(suite.records)
+    encoder = RecordEncoder(suite.records)
     with closing(_bind(request, suite, switched)) as bound:
-        ours = _replies(bound, gate)
+        ours = _replies(bound, encoder)
     with closing(_bind(request, suite, {})) as bound:
-        plain = _replies(bound, gate)
+        plain = _replies(bound, encoder)
         n_differing = _n_differing(ours, plain)
         if not n_differing:
             return Equality(switched, len(plain), 0)
-        n_unstable = _n_differing(_replies(bound, gate, backwards=True), plain)
+        n_unstable = _n_differing(_replies(bound, encoder, backwards=True), plain)
     alone = {}
     for option, value in switched.items() if len(switched) > 1 else ():
         with closing(_bind(request, suite, {option: value})) as bound:
-            alone[option] = _n_differing(_replies(bound, gate), plain)
+            alone[option] = _n_differing(_replies(bound, encoder), plain)
     return Equality(switched, len(plain), n_differing, n_unstable, alone)
 
 
@@ -103,20 +103,20 @@ def _bind(
 
 
 def _replies(
-    bound: BoundRun[SuiteUnit, Payload], gate: Gate[Payload], *, backwards: bool = False
+    bound: BoundRun[SuiteUnit, Payload], encoder: RecordEncoder[Payload], *, backwards: bool = False
 ) -> _Replies:
     """Return the replies by unit; a failure in its place, as it has to be the same."""
-    return dict(_each_reply(bound, gate, -1 if backwards else 1))
+    return dict(_each_reply(bound, encoder, -1 if backwards else 1))
 
 
 def _each_reply(
-    bound: BoundRun[SuiteUnit, Payload], gate: Gate[Payload], step: int
+    bound: BoundRun[SuiteUnit, Payload], encoder: RecordEncoder[Payload], step: int
 ) -> Iterator[tuple[UnitKey, str]]:
     session = UnrecordedSession()
     evaluation = bound.evaluation
     for group in evaluation.workload.groups[::step]:
         ordered = replace(group, units=group.units[::step])
-        for record in group_records(evaluation, ordered, session, gate):
+        for record in group_records(evaluation, ordered, session, encoder):
             reply = bound.prepared.evaluation.to_doc(bound.header, record).reply
             yield record.key, reply if record.failure is None else f"failed: {record.failure}"
 

@@ -16,7 +16,7 @@ from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from infthor_eval.runs.journals.gate import Gate
+from infthor_eval.runs.journals.record_encoder import RecordEncoder
 from infthor_eval.runs.journals.records import (
     Payload,
     SuiteUnit,
@@ -105,11 +105,11 @@ def estimate_run(
     request: RunRequest,
     suite: Suite[SuiteUnit, Payload],
     n_units: int,
-    progress: Callable[[], None],
+    advance: Callable[[], None],
 ) -> Estimate:
     """Load the subject, do about `n_units` units of each task, and estimate the quantities of all.
 
-    Nothing is written. `progress` is called after each measured group.
+    Nothing is written. `advance` is called after each measured group.
 
     Raises:
         InfthorError: as `execute`.
@@ -117,16 +117,16 @@ def estimate_run(
     with closing(bind_run(prepare(request, suite))) as bound:
         workload = bound.evaluation.workload
         groups = []
-        for group in _measure(bound.evaluation, n_units, Gate(suite.records)):
+        for group in _measure(bound.evaluation, n_units, RecordEncoder(suite.records)):
             groups.append(group)
-            progress()
+            advance()
     failures = [failure for group in groups for failure in group.failures]
     is_measured = any(group.quantities for group in groups)
     return Estimate(workload, estimate_tasks(workload, groups) if is_measured else (), failures)
 
 
 def _measure(
-    evaluation: BoundEvaluation[SuiteUnit, Payload], n_units: int, gate: Gate[Payload]
+    evaluation: BoundEvaluation[SuiteUnit, Payload], n_units: int, encoder: RecordEncoder[Payload]
 ) -> Iterator[_MeasuredGroup]:
     """Do a few units of each task: of groups of all sizes, the first, middle and last unit."""
     session = UnrecordedSession()
@@ -139,7 +139,7 @@ def _measure(
         failures = []
         few = replace(group, units=[units[n] for n in part])
         start = time.perf_counter()
-        for record in group_records(evaluation, few, session, gate):
+        for record in group_records(evaluation, few, session, encoder):
             now = time.perf_counter()
             if record.failure is None:
                 quantities.append((record.task, Quantities.of(record, now - start)))

@@ -5,8 +5,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Generic, Protocol
 
-from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.journal import Journal
+from infthor_eval.runs.journals.record_encoder import RecordEncoder
 from infthor_eval.runs.journals.records import (
     Artifact,
     Payload,
@@ -20,11 +20,11 @@ from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Workload
 from infthor_eval.runs.usage import NOTHING, Usage
+from infthor_eval.runs.work.batches import fetch_replies
 from infthor_eval.runs.work.binding import bind_run
-from infthor_eval.runs.work.deferring import fetch_replies
 from infthor_eval.runs.work.group_records import group_records
 from infthor_eval.runs.work.scheduling import run_groups
-from model_adapters import Attended, Deferring
+from model_adapters import BatchModel, PersonModel
 
 # A record that is on disk; True if an earlier run had put it there.
 Recorded = tuple[UnitRecord[Payload], bool]
@@ -53,15 +53,15 @@ class Executor(Protocol[Payload]):
 class LocalExecutor(Generic[SuiteUnit, Payload]):
     """The executor of this process."""
 
-    def __init__(self, run: PreparedRun[SuiteUnit, Payload], report: Callable[[str], None]) -> None:
-        """Load the subject and find the work; `report` gets a line on each batch of requests.
+    def __init__(self, run: PreparedRun[SuiteUnit, Payload], notify: Callable[[str], None]) -> None:
+        """Load the subject and find the work; `notify` is called for each batch.
 
         Raises:
             InfthorError: see `bind_run`.
         """
-        self._report = report
+        self._notify = notify
         self._bound = bind_run(run)
-        self._gate = Gate(run.suite.records)
+        self._encoder = RecordEncoder(run.suite.records)
         self.header = self._bound.header
         self.workload = self._bound.evaluation.workload
 
@@ -72,31 +72,31 @@ class LocalExecutor(Generic[SuiteUnit, Payload]):
         session = JournalSession(journal)
         evaluation = self._bound.evaluation
         subject = self._bound.subject
-        if isinstance(subject, Deferring) and subject.defers:
-            given = (evaluation, session, self._gate, folder, self._report, should_stop)
+        if isinstance(subject, BatchModel) and subject.uses_batches:
+            given = (evaluation, session, self._encoder, folder, self._notify, should_stop)
             if not fetch_replies(subject, *given):
                 return
         in_flight = subject.capabilities.max_in_flight
         records = run_groups(
             self.workload.groups,
-            lambda group: group_records(evaluation, group, session, self._gate),
+            lambda group: group_records(evaluation, group, session, self._encoder),
             in_flight,
         )
-        for record in self._telling_positions(records):
+        for record in self._showing_positions(records):
             yield session.append_new(record)
             if should_stop():
                 return
 
-    def _telling_positions(
+    def _showing_positions(
         self, records: Iterator[UnitRecord[Payload]]
     ) -> Iterator[UnitRecord[Payload]]:
         """Yield the records, and tell a person which unit comes next, before it is asked."""
         subject, n_units = self._bound.subject, self.workload.n_units
-        if not isinstance(subject, Attended):
+        if not isinstance(subject, PersonModel):
             yield from records
             return
         for number in range(1, n_units + 1):
-            subject.tell_position(number, n_units)
+            subject.show_position(number, n_units)
             yield from islice(records, 1)
 
     def close(self) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from infthor_eval.errors import STOPS, ModelError
-from infthor_eval.runs.journals.gate import Gate, RefusedRecordError
+from infthor_eval.runs.journals.record_encoder import RecordEncoder, RefusedRecordError
 from infthor_eval.runs.journals.records import Payload, SuiteUnit, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.suite import BoundEvaluation, Group, Session
 
@@ -12,7 +12,7 @@ def group_records(
     evaluation: BoundEvaluation[SuiteUnit, Payload],
     group: Group[SuiteUnit],
     session: Session[Payload],
-    gate: Gate[Payload],
+    encoder: RecordEncoder[Payload],
 ) -> Iterator[UnitRecord[Payload]]:
     """Yield the records of a group; units without a record when it ends have failed.
 
@@ -41,7 +41,7 @@ def group_records(
             fault = error
             break
         waiting.pop(record.key, None)
-        yield _kept(record, unit, session, gate)
+        yield _kept(record, unit, session, encoder)
     for unit in waiting.values():
         yield unit.record_failure(session.describe_failure(unit, fault))
 
@@ -59,11 +59,11 @@ def _kept(
     record: UnitRecord[Payload],
     unit: Unit[Payload],
     session: Session[Payload],
-    gate: Gate[Payload],
+    encoder: RecordEncoder[Payload],
 ) -> UnitRecord[Payload]:
     """Return a record that the journal can hold, or else that of its unit's failure."""
     try:
-        gate.line_of(record)
+        encoder.encode(record)
     except RefusedRecordError as error:
         return unit.record_failure(session.describe_failure(unit, error))
     return record

@@ -12,8 +12,8 @@ from typing import Any, Generic
 
 from infthor_eval.errors import UsageError, UserCodeError
 from infthor_eval.runs.config import RunConfig
-from infthor_eval.runs.journals.gate import Gate
 from infthor_eval.runs.journals.journal import Journal
+from infthor_eval.runs.journals.record_encoder import RecordEncoder
 from infthor_eval.runs.journals.records import (
     Payload,
     RunHeader,
@@ -98,7 +98,7 @@ class _Evaluator(Generic[SuiteUnit, Payload]):
 
     def __init__(self, run: PreparedRun[SuiteUnit, Payload], number: int) -> None:
         self._records = run.suite.records
-        self._gate = Gate(run.suite.records)
+        self._encoder = RecordEncoder(run.suite.records)
         self._number = number
         self._bound = bind_run(run)
         self._session: JournalSession[Payload] | None = None
@@ -120,7 +120,7 @@ class _Evaluator(Generic[SuiteUnit, Payload]):
         for record in job.earlier:
             session.journal.add(record)
         group = job.portion.select(evaluation.workload.groups)
-        for made in group_records(evaluation, group, session, self._gate):
+        for made in group_records(evaluation, group, session, self._encoder):
             record, resumed = session.append_new(made)
             is_new = not resumed and record.request not in self._named
             self._named.add(record.request)
@@ -157,15 +157,15 @@ class _Progress(Generic[Payload]):
 class WorkerPoolExecutor(Generic[SuiteUnit, Payload]):
     """The executor of several workers; see `infthor_eval.runs.work.executor.Executor`."""
 
-    def __init__(self, run: PreparedRun[SuiteUnit, Payload], report: Callable[[str], None]) -> None:
-        """Start the workers and wait for the first; `report` gets a line when one is lost or cannot
+    def __init__(self, run: PreparedRun[SuiteUnit, Payload], notify: Callable[[str], None]) -> None:
+        """Start the workers and wait for the first; `notify` is called when one is lost or cannot
         be started.
 
         Raises:
             UsageError: there is no such cluster.
             InfthorError: no worker can be started; the reason of the last one.
         """
-        self._report = report
+        self._notify = notify
         self._expected: RunConfig[Any] | None = None
         settings = run.request.worker_settings
         self._n_workers = settings.workers
@@ -253,8 +253,8 @@ class WorkerPoolExecutor(Generic[SuiteUnit, Payload]):
 
     def _report_loss(self, event: Event) -> None:
         if isinstance(event, WorkerLost):
-            self._report(f"{event.reason}; what it had not finished goes to another")
+            self._notify(f"{event.reason}; what it had not finished goes to another")
         elif isinstance(event, WorkerWithdrawn):
-            self._report(
+            self._notify(
                 f"worker {event.worker} cannot be started, the others go on: {event.reason}"
             )

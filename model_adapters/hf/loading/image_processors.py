@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from transformers.image_processing_backends import PilBackend
 
 from infthor_eval.errors import ModelError
-from infthor_eval.process_settings import keep_freed_memory
+from infthor_eval.process_settings import tune_malloc
 from model_adapters.hf.loading.resampling import FILTERS, Resize, find_resize
 from model_adapters.options.checkpoints import FrameScaling
 
@@ -43,7 +43,7 @@ def load_image_processor(
         trust_remote_code: run code that comes with the checkpoint.
         settings: settings of the image processor.
     """
-    keep_freed_memory()
+    tune_malloc()
     scaling = options if isinstance(options, FrameScaling) else FrameScaling()
     processor = cast(Any, transformers).AutoImageProcessor.from_pretrained(
         folder, backend=scaling.image_backend, trust_remote_code=trust_remote_code, **settings

@@ -36,7 +36,7 @@ def pack_attention(model: Any) -> None:
 
 
 def _innermost(module: torch.nn.Module) -> list[torch.nn.Module]:
-    """Return the modules that are told where images end, without those that only pass it on."""
+    """Return the modules that use where images end, without those that only pass it on."""
     within = [found for child in module.children() for found in _innermost(child)]
     if within or "cu_seqlens" not in inspect.signature(module.forward).parameters:
         return within

@@ -82,7 +82,7 @@ class PixelsAhead:
             self._begin()
 
     def take(self, piece: Frame | Clip) -> Pixels:
-        """Return the pixels of a piece, and no longer keep them; prepare them if nobody has."""
+        """Return the pixels of a piece, and no longer keep them; prepare them if needed."""
         begun = self._begun.pop(piece, None)
         if begun is None:
             if piece in self._coming:

@@ -1,4 +1,4 @@
-"""Short hashes of what a model reads, by which two runs are told apart: tokens, and pixels.
+"""Short hashes of what a model reads, by which runs are compared: tokens, and pixels.
 
 A hash of all bytes of a frame's pixels takes longer than making them. They are added up first, row
 by row, in rows of 4 KiB: a value that differs changes a sum.

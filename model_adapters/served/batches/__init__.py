@@ -1,1 +1,1 @@
-"""Requests in batches: gathered, submitted once, waited for, fetched, in whatever dialect."""
+"""Requests in batches: collected, submitted once, waited for, fetched, in whatever dialect."""

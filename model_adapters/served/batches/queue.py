@@ -77,7 +77,7 @@ class BatchedReply:
 
 @dataclass
 class _Draft:
-    """A batch that is being gathered: its requests are in the file already."""
+    """A batch that is being collected: its requests are in the file already."""
 
     name: str
     file: BinaryIO
@@ -90,11 +90,11 @@ class _TooLargeError(ModelError):
 
 
 class BatchQueue:
-    """Gathers requests, submits a batch when it is full, waits for all, and gives the replies.
+    """Collects requests, submits a batch when it is full, waits for all, and gives the replies.
 
     A request is named by what it asks, so that equal requests of a run are one. What is in a batch
     is on disk before the batch is submitted; a batch whose name at the server was lost in between
-    is found there by its own name. Requests that were not processed are gathered once more.
+    is found there by its own name. Requests that were not processed are collected once more.
     """
 
     def __init__(
@@ -102,14 +102,14 @@ class BatchQueue:
         folder: Path,
         service: BatchService,
         rules: BatchRules,
-        report: Callable[[str], None],
+        notify: Callable[[str], None],
         should_stop: Callable[[], bool],
     ) -> None:
         """Read the batches of earlier commands."""
         self._ledger = Ledger(folder)
         self._service = service
         self._rules = rules
-        self._report = report
+        self._notify = notify
         self._should_stop = should_stop
         self._most_requests = min(
             service.most_requests, rules.most_requests or service.most_requests
@@ -117,7 +117,7 @@ class BatchQueue:
         most_mb = rules.most_mb
         self._most_bytes = min(service.most_bytes, (most_mb or service.most_bytes) * _MB)
         self._lock = Lock()
-        self._is_gathering = False
+        self._is_collecting = False
         self._draft: _Draft | None = None
         self._fault: InfthorError | None = None  # of the server or the disk: nothing more is asked
         self._in_hand: set[str] = set()  # requests in the draft, or in batches that have not ended
@@ -135,33 +135,33 @@ class BatchQueue:
             self._answered |= {reply.id: reply for reply in checked if reply.is_answered}
 
     @contextmanager
-    def gathering(self) -> Iterator[None]:
-        """Within this context requests are gathered, and none is answered."""
+    def collecting(self) -> Iterator[None]:
+        """Within this context requests are collected, and none is answered."""
         self._wanted.clear()
         self._refused.clear()
         for batch in self._unfinished:
             if batch.server_id is None:  # a command that was stopped may have submitted it, or not
                 self._find_or_submit(batch)
-        self._is_gathering = True
+        self._is_collecting = True
         try:
             yield
         finally:
-            self._is_gathering = False
+            self._is_collecting = False
 
     def ask(self, request: str, make: Callable[[], dict[str, Any]]) -> BatchedReply:
-        """Return the reply to a request, which is named by its hash; while requests are gathered,
+        """Return the reply to a request, which is named by its hash; while requests are collected,
         put it into a batch unless it is in one.
         """
         with self._lock:
-            if not self._is_gathering:
+            if not self._is_collecting:
                 return self._give(request)
             self._wanted.add(request)
             if self._fault is None and not (self._should_stop() or self._is_known(request)):
-                self._gather(request, make)
-        raise NotAskedError("not asked yet: it is gathered for a batch")
+                self._collect(request, make)
+        raise NotAskedError("not asked yet: it is collected for a batch")
 
     def fetch(self) -> bool:
-        """Submit what was gathered and wait for all batches; return whether to gather once more."""
+        """Submit what was collected and wait for all batches; see `Batches.fetch`."""
         if self._fault is not None:
             raise self._fault
         n_answered = len(self._answered)
@@ -178,11 +178,11 @@ class BatchQueue:
                 "later, or with a lower batch_requests"
             )
         if again:
-            self._report(f"{len(again)} request(s) were not processed, and are asked again")
+            self._notify(f"{len(again)} request(s) were not processed, and are asked again")
         return bool(again)
 
     def close(self) -> None:
-        """Drop what was gathered and not submitted."""
+        """Drop what was collected and not submitted."""
         if self._draft is not None:
             self._draft.file.close()
             self._draft = None
@@ -223,7 +223,7 @@ class BatchQueue:
             return f"gives no reply in a batch: {reply.content}"
         return f"in a batch {self._rules.describe(reply.status, reply.content.encode())}"
 
-    def _gather(self, request: str, make: Callable[[], dict[str, Any]]) -> None:
+    def _collect(self, request: str, make: Callable[[], dict[str, Any]]) -> None:
         try:
             body = make()
         except InfthorError as error:  # of this request alone
@@ -298,7 +298,7 @@ class BatchQueue:
             found = self._service.find(batch, self._known_there)
         if found is not None:
             self._ledger.note_submitted(batch, found)
-            self._report(f"batch {found}: {len(batch.ids)} request(s) found at the server")
+            self._notify(f"batch {found}: {len(batch.ids)} request(s) found at the server")
         elif self._ledger.requests_file(batch.name).is_file():
             self._submit(batch)
         else:  # neither there nor here: its requests are asked anew
@@ -308,7 +308,7 @@ class BatchQueue:
         file = self._ledger.requests_file(batch.name)
         server_id = self._service.submit(batch, file, self._known_there)
         self._ledger.note_submitted(batch, server_id)
-        self._report(f"batch {server_id}: {len(batch.ids)} request(s) submitted")
+        self._notify(f"batch {server_id}: {len(batch.ids)} request(s) submitted")
 
     def _wait(self) -> None:
         """Wait until all batches have ended, or the run is stopped."""
@@ -321,7 +321,7 @@ class BatchQueue:
                     has_ended = self._look_after(batch) or has_ended
                 except NoAnswerError as error:  # the batch goes on whether it is looked at or not
                     if not unreachable:
-                        self._report(f"{error}; the batches are looked after all the same")
+                        self._notify(f"{error}; the batches are looked after all the same")
                     unreachable = True
             if not has_ended:
                 self._rest(pause)
@@ -345,7 +345,7 @@ class BatchQueue:
                     f"{self._rules.where} refuses batch {batch.server_id}: {status.reason}; fix "
                     "it, and run the same command again"
                 )
-            self._report(f"batch {batch.server_id}: {status.reason}")
+            self._notify(f"batch {batch.server_id}: {status.reason}")
             return True
         given = one_each(batch, self._service.replies(batch, status), status)
         replies = [
@@ -358,7 +358,7 @@ class BatchQueue:
         for reply in replies:
             self._take(reply)
         n = sum(reply.is_answered for reply in replies)
-        self._report(
+        self._notify(
             f"batch {batch.server_id}: {n} answered, {len(replies) - n} not"
             + (f" ({status.reason})" if status.reason else "")
         )
@@ -386,7 +386,7 @@ class BatchQueue:
         left = self._unfinished
         n = sum(len(batch.ids) for batch in left)
         if left:
-            self._report(
+            self._notify(
                 f"{len(left)} batch(es) with {n} request(s) go on at the server; the same command "
                 "fetches their replies"
             )

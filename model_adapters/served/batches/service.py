@@ -123,7 +123,7 @@ class BatchService(Protocol):
 
         Raises:
             NoAnswerError: the server cannot be reached.
-            ModelError: it cannot be told yet.
+            ModelError: it is not known yet.
         """
 
     def status(self, batch: Batch) -> BatchStatus:

@@ -1,4 +1,4 @@
-"""Units of recorded frames: what the trained tower tells of them, computed once for all.
+"""Units of recorded frames: what the trained tower sees in them, computed once.
 
 The tower takes most of a step's time, and is not trained any more when the decoder learns to read.
 """
@@ -116,7 +116,7 @@ def _patches(frame: FrameRef, image_processor: Any) -> Tensor:
 def label_units(
     seen: Sequence[SeenFrame], units: Units, loose: NDArray[np.bool_], grid: int, seed: int
 ) -> FrameUnits:
-    """Return the units of frames by what they show, as a tower without mistakes would tell them.
+    """Return the units of frames by what they show, as a tower without mistakes would see them.
 
     What to compare with what is learned in minutes from what frames do show, and not in hours from
     what a tower tells of them. So the decoder reads labels first.

@@ -1,4 +1,4 @@
-"""What the vision tower tells of each part of a frame: a unit for each role and type.
+"""What the vision tower sees in each part of a frame: a unit for each role and type.
 
 The first layer of the tower's merger has these units, and the second one turns them into features.
 So a label has one place: a type can be taken for another by exchanging units, and what is seen is

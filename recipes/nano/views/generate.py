@@ -119,8 +119,8 @@ def generate_views(
     launch: Launch,
     out: Path,
     worker_settings: WorkerSettings,
-    progress: Callable[[bool], None] = lambda _: None,
-    say: Callable[[str], None] = lambda _: None,
+    advance: Callable[[bool], None] = lambda _: None,
+    notify: Callable[[str], None] = lambda _: None,
 ) -> ViewSet:
     """Generate the views that `out` lacks, a file for each room.
 
@@ -129,18 +129,18 @@ def generate_views(
         launch: simulator that each worker starts.
         out: folder of the files; created if it does not exist.
         worker_settings: number and place of the workers.
-        progress: called after each room, with True if it is of an earlier run.
-        say: called with messages about the workers.
+        advance: called after each room, with True if it is of an earlier run.
+        notify: called with messages about the workers.
     """
     out.mkdir(parents=True, exist_ok=True)
     start = partial(SimulatorWorker, partial(Simulator, launch), partial(_views_of_room, out=out))
-    outcomes = run_jobs(start, jobs, worker_settings, say)
+    outcomes = run_jobs(start, jobs, worker_settings, notify)
     result = ViewSet()
 
     def failed(_: int, error: InfthorError) -> _RoomOutcome:
         return _RoomOutcome(failure=str(error))
 
-    for outcome in collect_outcomes(outcomes, failed, progress):
+    for outcome in collect_outcomes(outcomes, failed, advance):
         if outcome.path is None:
             result.failures.append(outcome.failure)
             continue

@@ -159,7 +159,7 @@ def test_frames_as_jpeg_are_told_by_the_set_and_frames_of_one_size_by_hashes(
     runs = [run(tasks="nieh_gt", data=root) for root in data]
     assert most(run_cli("explain", runs[0], runs[1])[1]) == "the question set or its frames"
     _, out, _ = run_cli("explain", runs[0], runs[2])
-    assert most(out) == "frames or words that no setting tells of"
+    assert most(out) == "frames or words that no setting accounts for"
     assert "the content of the frames, or the words, changed" in out
 
 
@@ -178,7 +178,7 @@ def test_other_tokens_and_other_pixels_of_the_same_request_are_told_by_their_has
 
     for name, cause in (("context", "tokens"), ("frames", "pixels")):
         other = edited(run(), tmp_path / name, change(name))
-        assert most(run_cli("explain", run(), other)[1]) == f"{cause} that no setting tells of"
+        assert most(run_cli("explain", run(), other)[1]) == f"{cause} that no setting accounts for"
 
 
 def test_near_ties_alone_have_an_exit_code_of_their_own(run, run_cli, tmp_path):

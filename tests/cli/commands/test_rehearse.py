@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from infthor_eval.cli.rehearsal import gathering
+from infthor_eval.cli.rehearsal import rehearse
 
 from ...helpers.bundled import BUNDLED
 
@@ -14,9 +14,9 @@ from ...helpers.bundled import BUNDLED
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Short contexts, one kind of GPU, and hardly any time for pictures."""
-    monkeypatch.setattr(gathering, "_CONTEXTS", (4096, 8192))
-    monkeypatch.setattr(gathering, "_GIGABYTES", (24, 48, 80))
-    monkeypatch.setattr(gathering, "_SECONDS", 0.05)
+    monkeypatch.setattr(rehearse, "_CONTEXTS", (4096, 8192))
+    monkeypatch.setattr(rehearse, "_GIGABYTES", (24, 48, 80))
+    monkeypatch.setattr(rehearse, "_SECONDS", 0.05)
 
 
 NANO = str(BUNDLED.parents[1] / "models" / "qwen2.5-vl-nano")
@@ -70,7 +70,7 @@ def test_people_read_lines_and_what_is_missing_is_said(
     assert any("a token of a reply: " in line and "no mask" in line for line in lines)
     assert any("which the flash kernel does not take" in line for line in lines)
     assert any("208 trajectories, the longest of 1,223 frames" in line for line in lines)
-    assert any("its context cannot be told" in line for line in lines)
+    assert any("its context is unknown" in line for line in lines)
     assert any(line.startswith("  infthor-eval plan --model hf-vlm ") for line in lines)
 
 

@@ -24,7 +24,7 @@ def test_a_job_prints_rate_time_left_and_what_is_refused(clock):
         jobs = JobBar(progress)
         for second in range(0, 41, 10):
             clock[0] = float(second)
-            jobs.tell(
+            jobs.show(
                 JobProgress("kitchen-1-seed0", 3 * second, 300, "2 task(s) refused, 2 as no plan")
             )
     assert written.getvalue().splitlines() == [
@@ -39,11 +39,11 @@ def test_the_next_job_begins_anew_and_one_may_go_back(clock):
     with progress_bar(PlainConsole(file=written, width=200)) as progress:
         jobs = JobBar(progress)
         clock[0] = 100.0
-        jobs.tell(JobProgress("a", 100, 100))
+        jobs.show(JobProgress("a", 100, 100))
         clock[0] = 110.0
-        jobs.tell(JobProgress("b", 50, 100))
+        jobs.show(JobProgress("b", 50, 100))
         clock[0] = 171.0
-        jobs.tell(JobProgress("b", 20, 100))  # it dropped its last sub-goals
+        jobs.show(JobProgress("b", 20, 100))  # it dropped its last sub-goals
     assert [line.split(",")[0] for line in written.getvalue().splitlines()] == [
         "b: 50 of 100 (50 %)",
         "b: 20 of 100 (20 %)",
@@ -56,7 +56,7 @@ def test_on_a_terminal_a_bar_is_below_that_of_all_jobs(clock):
         bar.PacedBar(progress, "generate", 3)
         jobs = JobBar(progress)
         clock[0] = 2.0
-        jobs.tell(JobProgress("kitchen-1-seed0", 30, 300))
+        jobs.show(JobProgress("kitchen-1-seed0", 30, 300))
         progress.refresh()
         assert [task.description for task in progress.tasks] == [
             "generate",

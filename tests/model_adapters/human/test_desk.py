@@ -104,14 +104,14 @@ def test_who_waits_for_a_change_learns_of_it() -> None:
 def test_it_ends_when_a_page_has_learned_of_it_or_when_there_is_none() -> None:
     desk = Desk()
     desk.close()
-    desk.wait_until_told(60.0, 60.0)  # nobody has asked: returns at once
+    desk.wait_until_informed(60.0, 60.0)  # nobody has asked: returns at once
     with desk.reading():
         pass
-    ending = threading.Thread(target=desk.wait_until_told, args=(0.0, 60.0), daemon=True)
+    ending = threading.Thread(target=desk.wait_until_informed, args=(0.0, 60.0), daemon=True)
     ending.start()
     ending.join(0.05)
     assert ending.is_alive()
-    desk.tell_closed()
+    desk.report_closed()
     ending.join(60.0)
     assert not ending.is_alive()
 
@@ -120,11 +120,11 @@ def test_a_page_that_waits_for_news_is_waited_for_longer_than_one_that_may_be_cl
     desk = Desk()
     with desk.reading():
         desk.close()
-    ending = threading.Thread(target=desk.wait_until_told, args=(60.0, 0.0), daemon=True)
+    ending = threading.Thread(target=desk.wait_until_informed, args=(60.0, 0.0), daemon=True)
     ending.start()
     ending.join(0.05)
     assert ending.is_alive()
-    desk.tell_closed()
+    desk.report_closed()
     ending.join(60.0)
     assert not ending.is_alive()
 
@@ -154,11 +154,11 @@ def test_the_clock_goes_while_a_page_shows_the_question(monkeypatch: pytest.Monk
 def test_what_a_page_tells_of_another_question_is_not_counted() -> None:
     desk = Desk()
     thread, answers = asking(desk)
-    desk.tell_screen(2, "a", shows=True)
+    desk.report_screen(2, "a", shows=True)
     assert desk.question is not None and desk.question.clock.seconds is None
-    desk.tell_screen(1, "a", shows=True)
+    desk.report_screen(1, "a", shows=True)
     desk.give(1, "Fridge", 0)
-    desk.tell_screen(1, "a", shows=False)
+    desk.report_screen(1, "a", shows=False)
     thread.join()
     assert [answer.seconds is not None for answer in answers if isinstance(answer, Answer)] == [
         True

@@ -16,8 +16,8 @@ from infthor_eval.runs import (
     read_header,
     read_run,
 )
-from infthor_eval.runs.journals.gate import RefusedRecordError
 from infthor_eval.runs.journals.journal import Journal, recover, set_aside
+from infthor_eval.runs.journals.record_encoder import RefusedRecordError
 
 
 class Answer(msgspec.Struct, frozen=True, tag_field="type", tag="answer"):

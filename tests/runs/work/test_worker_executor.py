@@ -41,7 +41,7 @@ class Watching:
     def done(self, record, resumed):
         self.seen.append((record.id, resumed))
 
-    def note(self, text):
+    def notify(self, text):
         self.notes.append(text)
 
 

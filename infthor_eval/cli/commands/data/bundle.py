@@ -61,7 +61,7 @@ def command(manifest: Path, out: Path) -> int:
 
 
 def _build_questions(
-    manifest: Manifest, out: Path, progress: Callable[[bool], None]
+    manifest: Manifest, out: Path, advance: Callable[[bool], None]
 ) -> tuple[Manifest, tuple[str, str]]:
     """Build a set of questions; return its manifest, and what is in it and in which proportions."""
     from infthor_eval.generation.bundle import build_bundle
@@ -69,19 +69,19 @@ def _build_questions(
     from infthor_eval.thor.simulator import Simulator
 
     with Simulator(embedded_launch()) as simulator:
-        built, generated = build_bundle(manifest, simulator, out, progress)
+        built, generated = build_bundle(manifest, simulator, out, advance)
     content = f"{len(generated.questions)} questions on {generated.trajectories} trajectories"
     return built, (content, generated.summary_text())
 
 
 def _build_twins(
-    manifest: TwinsManifest, out: Path, progress: Callable[[bool], None]
+    manifest: TwinsManifest, out: Path, advance: Callable[[bool], None]
 ) -> tuple[TwinsManifest, tuple[str, str]]:
     """Build a set of twins; return what `_build_questions` does."""
     from infthor_eval.generation.bundle import build_twins
     from infthor_eval.nieh.scoring import score
 
-    built, numbers = build_twins(manifest, partial(score, scorer="strict"), out, progress)
+    built, numbers = build_twins(manifest, partial(score, scorer="strict"), out, advance)
     content = (
         f"{numbers.pairs} paired questions of {numbers.found} on {numbers.facts} facts of "
         f"{numbers.trajectories} trajectories"

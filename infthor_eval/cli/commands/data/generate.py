@@ -189,7 +189,7 @@ def command(
             worker_settings,
             bar.advance,
             notes.print,
-            JobBar(progress).tell,
+            JobBar(progress).show,
         )
     if as_json:
         import msgspec

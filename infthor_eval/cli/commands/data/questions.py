@@ -93,7 +93,7 @@ def questions(
             further=further,
             published_words=words == "published",
             worker_settings=worker_settings,
-            say=notes.print,
+            notify=notes.print,
             begin=lambda part, n: PacedBar(progress, part, n).advance,
         )
     content = encode_questions(result.questions)
@@ -202,8 +202,8 @@ def twins(
             out,
             settings,
             worker_settings=worker_settings,
-            progress=PacedBar(progress, "twins", len(selection.items)).advance,
-            say=notes.print,
+            advance=PacedBar(progress, "twins", len(selection.items)).advance,
+            notify=notes.print,
         )
     if as_json:
         import msgspec

@@ -134,7 +134,7 @@ def command(
                 form,
                 bar.advance,
                 notes.print,
-                JobBar(progress).tell,
+                JobBar(progress).show,
             )
     if as_json:
         import msgspec

@@ -1,4 +1,4 @@
-"""The gate to a journal: a record that its reader would refuse, or read otherwise, is not written.
+"""Encodes records for a journal, and refuses what its reader would refuse or read otherwise.
 
 A record holds what code and files of others gave: adapters, memories, scorers, judges, servers,
 logs. One line that the reader refuses would cost a run everything else that is in its journal.
@@ -24,15 +24,15 @@ class RefusedRecordError(DataError):
     """A record that a journal cannot hold; the message names the field, and what is wrong."""
 
 
-class Gate(Generic[Payload]):
-    """Turns records of one suite into lines that decode to these very records."""
+class RecordEncoder(Generic[Payload]):
+    """Turns records of one suite into lines, each of which decodes to an equal record."""
 
     def __init__(self, types: RecordTypes[Payload]) -> None:
         """Take the types by which journals of the suite are read."""
         self._decoder = types.decoder()
         self._encoder = msgspec.json.Encoder()
 
-    def line_of(self, record: Any) -> bytes:
+    def encode(self, record: Any) -> bytes:
         """Return the line of a record, header or artifact, without its end.
 
         Raises:

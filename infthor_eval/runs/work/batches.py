@@ -1,25 +1,25 @@
-"""Having all requests of a run answered together, before its units are done one by one."""
+"""Fetching the replies to all requests of a run in batches, before its units are evaluated."""
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from infthor_eval.errors import UsageError
-from infthor_eval.runs.journals.gate import Gate
+from infthor_eval.runs.journals.record_encoder import RecordEncoder
 from infthor_eval.runs.journals.records import Artifact, Unit, UnitRecord, describe_failure
 from infthor_eval.runs.journals.shards import FOLDER
 from infthor_eval.runs.suite import BoundEvaluation, Session, Workload
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.runs.work.group_records import group_records
 from infthor_eval.workers import WorkerSettings
-from model_adapters import Deferring, Subject
+from model_adapters import BatchModel, Subject
 
 _BATCHES = "batches"  # beside the shards of the journal
 
 
 def require_independent(subject: Subject, workload: Workload[Any], workers: WorkerSettings) -> None:
-    """Refuse to ask in batches what is asked reply by reply, or by several workers (UsageError)."""
-    if not (isinstance(subject, Deferring) and subject.defers):
+    """Raise UsageError if requests depend on earlier replies, or if there are workers."""
+    if not (isinstance(subject, BatchModel) and subject.uses_batches):
         return
     if not workload.independent:
         tasks = ", ".join(workload.units_by_task)
@@ -34,36 +34,35 @@ def require_independent(subject: Subject, workload: Workload[Any], workers: Work
 
 
 def fetch_replies(
-    subject: Deferring,
+    subject: BatchModel,
     evaluation: BoundEvaluation[Any, Any],
     session: Session[Any],
-    gate: Gate[Any],
+    encoder: RecordEncoder[Any],
     folder: Path,
-    report: Callable[[str], None],
+    notify: Callable[[str], None],
     should_stop: Callable[[], bool],
 ) -> bool:
-    """Have the requests of all units without a result answered; return whether that was done, and
-    not stopped.
+    """Have the requests of all units without a result answered; return False if it was stopped.
 
-    All units are gone through as if they were done, with a subject that notes what it is asked.
+    All units are evaluated as usual, but the subject only records what it is asked.
 
     Raises:
         InfthorError: the requests cannot be sent, or the replies not be fetched.
     """
-    batches = subject.open_batches(folder / FOLDER / _BATCHES, report, should_stop)
+    batches = subject.open_batches(folder / FOLDER / _BATCHES, notify, should_stop)
     while True:
-        with batches.gathering():
+        with batches.collecting():
             for group in evaluation.workload.groups:
-                for _ in group_records(evaluation, group, _Gathering(session), gate):
-                    pass  # what is noted is with the subject
+                for _ in group_records(evaluation, group, _Collecting(session), encoder):
+                    pass  # the subject keeps the requests
                 if should_stop():
                     break
         if not batches.fetch():
             return not should_stop()
 
 
-class _Gathering:
-    """A session in which units are only gone through: what fails is told when they are done."""
+class _Collecting:
+    """A session that writes nothing: failures are recorded when the units are evaluated."""
 
     def __init__(self, session: Session[Any]) -> None:
         self._session = session
