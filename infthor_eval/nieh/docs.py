@@ -12,7 +12,7 @@ from typing import Any
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.pictures.video import Video
 from infthor_eval.formats.question import PublishedColumns, Question
-from infthor_eval.nieh.contexts import ContextPart, Sample, context_named
+from infthor_eval.nieh.contexts import ContextPart, QuestionVariant, context_named
 from infthor_eval.nieh.contexts.base import RecallSettings
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.frame_ablations import FrameAblation
@@ -23,7 +23,7 @@ Doc = dict[str, Any]
 _PLACEHOLDERS = {FrameRef: "<image>", Video: "<video>"}
 
 
-def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> Doc:
+def doc_of(task_samples: TaskSamples, sample: QuestionVariant, pixels: bool = False) -> Doc:
     """Return the doc of a sample; with `pixels` it has decoded images, for lm-eval's own models."""
     question = sample.question
     return {
@@ -55,7 +55,7 @@ def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> D
     }
 
 
-def sample_of(doc: Doc) -> Sample:
+def sample_of(doc: Doc) -> QuestionVariant:
     """Return the sample of a doc."""
     question = Question(
         traj_id=doc["traj_id"],
@@ -70,7 +70,7 @@ def sample_of(doc: Doc) -> Sample:
         fact=doc["fact"],
         base=doc["base"],
     )
-    return Sample(
+    return QuestionVariant(
         question,
         tuple(doc["frames"]),
         doc["variant"],
@@ -103,7 +103,7 @@ def doc_prompt(doc: Doc) -> str:
     return prompt_of(samples_of([doc]), sample_of(doc))
 
 
-def prompt_of(task_samples: TaskSamples, sample: Sample, *, videos: bool = False) -> str:
+def prompt_of(task_samples: TaskSamples, sample: QuestionVariant, *, videos: bool = False) -> str:
     """Return the text of a sample's request, with placeholders for frames (and videos if any)."""
     context, text = task_samples.request(sample)
     parts = context if videos else as_images(context)

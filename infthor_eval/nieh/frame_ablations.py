@@ -13,7 +13,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.pictures.blank import blank_like
 from infthor_eval.formats.pictures.video import Video
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts import Context, ContextPart, Sample
+from infthor_eval.nieh.contexts import Context, ContextPart, QuestionVariant
 from infthor_eval.nieh.options import BLANK, NO_CLUE, OTHER, SHOWN, check_frames
 from infthor_eval.nieh.other_homes import count_homes, draw_other_home
 
@@ -50,7 +50,7 @@ class FrameAblation:
             )
 
     def apply(
-        self, parts: Sequence[ContextPart], data: NiehSet, context: Context, sample: Sample
+        self, parts: Sequence[ContextPart], data: NiehSet, context: Context, sample: QuestionVariant
     ) -> list[ContextPart]:
         """Return the parts of a request with the frames replaced, or without the clue frames.
 
@@ -84,7 +84,7 @@ class FrameAblation:
             return frozenset()
         return frozenset(data.clue_positions(question))
 
-    def positions(self, data: NiehSet, context: Context, sample: Sample) -> list[int]:
+    def positions(self, data: NiehSet, context: Context, sample: QuestionVariant) -> list[int]:
         """Return where in the trajectory's time order the frames of a request are.
 
         Those that stand for others have the positions of these.
@@ -98,7 +98,7 @@ class FrameAblation:
             return positions
         return [position for position in positions if position not in hidden]
 
-    def true_positions(self, data: NiehSet, context: Context, sample: Sample) -> list[int]:
+    def true_positions(self, data: NiehSet, context: Context, sample: QuestionVariant) -> list[int]:
         """Return the same, of those frames alone that are what the trajectory has there."""
         if self.frames in (BLANK, OTHER):
             return []
@@ -106,7 +106,7 @@ class FrameAblation:
         positions = self.positions(data, context, sample)
         return [position for position in positions if position not in hidden]
 
-    def _positions(self, data: NiehSet, context: Context, sample: Sample) -> list[int]:
+    def _positions(self, data: NiehSet, context: Context, sample: QuestionVariant) -> list[int]:
         """Return where in the trajectory the frames of a sample are, before any is taken out."""
         positions = list(context.positions(data, sample))
         if self.frames == NO_CLUE and len(positions) != len(sample.frames):
@@ -122,7 +122,7 @@ class FrameAblation:
         frames: Sequence[FrameRef],
         positions: Sequence[int],
         data: NiehSet,
-        sample: Sample,
+        sample: QuestionVariant,
     ) -> list[FrameRef | None]:
         """Return frames without the clues: None, or blank where positions or any frame must be
         kept."""
@@ -148,7 +148,7 @@ class FrameAblation:
         return [frames[at] for at in order]
 
     def _frames_elsewhere(
-        self, places: Sequence[int], data: NiehSet, context: Context, sample: Sample
+        self, places: Sequence[int], data: NiehSet, context: Context, sample: QuestionVariant
     ) -> list[FrameRef]:
         """Return another home's frames at the same positions, modulo its length."""
         other = draw_other_home(data, sample.question, self.seed)
@@ -156,7 +156,7 @@ class FrameAblation:
         return [frames[place % len(frames)] for place in places]
 
 
-def _keeps_places(sample: Sample) -> bool:
+def _keeps_places(sample: QuestionVariant) -> bool:
     """Return True where a memory recalls by position: no frame can be taken out."""
     return sample.recall is not None or sample.recalled is not None
 

@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import Any
 
 from infthor_eval.errors import STOPS, DataError, in_one_line
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.docs import Doc, doc_of
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.scoring import SCORERS, STRICT_RULES, scores
@@ -44,7 +44,9 @@ class Metrics:
     process: ProcessResults | None = None
     code: Mapping[str, str] = field(default_factory=dict)
 
-    def scores(self, task_samples: TaskSamples, sample: Sample, reply: str) -> dict[str, float]:
+    def scores(
+        self, task_samples: TaskSamples, sample: QuestionVariant, reply: str
+    ) -> dict[str, float]:
         """Return the metrics of a reply.
 
         Raises:

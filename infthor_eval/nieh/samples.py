@@ -16,7 +16,7 @@ from infthor_eval.nieh.contexts import (
     Context,
     ContextPart,
     ContextSettings,
-    Sample,
+    QuestionVariant,
     check_prompt,
     context_named,
 )
@@ -46,7 +46,7 @@ class TaskSamples:
     data: NiehSet
     context_name: str
     context: Context
-    samples: Sequence[Sample]
+    samples: Sequence[QuestionVariant]
     skipped: Sequence[SkippedQuestion]
     sources: Mapping[str, Any]
     frame_ablation: FrameAblation = field(default_factory=FrameAblation)
@@ -72,7 +72,7 @@ class TaskSamples:
         }
         return tuple(sorted(answers | (question_words - {answer.lower() for answer in answers})))
 
-    def all_frames(self, sample: Sample) -> list[FrameRef]:
+    def all_frames(self, sample: QuestionVariant) -> list[FrameRef]:
         """Return all frames of the trajectory as a memory observes them: ablated, in their order.
 
         Those that one question alone hides are not (`hidden`).
@@ -87,25 +87,25 @@ class TaskSamples:
         ablated = self.frame_ablation.apply(frames, self.data, self.context, sample)
         return [part for part in ablated if isinstance(part, FrameRef)]
 
-    def hidden(self, sample: Sample) -> frozenset[int]:
+    def hidden(self, sample: QuestionVariant) -> frozenset[int]:
         """See `FrameAblation.hidden`."""
         return self.frame_ablation.hidden(self.data, sample.question)
 
-    def positions(self, sample: Sample) -> list[int]:
+    def positions(self, sample: QuestionVariant) -> list[int]:
         """See `FrameAblation.positions`."""
         return self.frame_ablation.positions(self.data, self.context, sample)
 
-    def true_positions(self, sample: Sample) -> list[int]:
+    def true_positions(self, sample: QuestionVariant) -> list[int]:
         """See `FrameAblation.true_positions`."""
         return self.frame_ablation.true_positions(self.data, self.context, sample)
 
-    def request(self, sample: Sample) -> tuple[list[ContextPart], str]:
+    def request(self, sample: QuestionVariant) -> tuple[list[ContextPart], str]:
         """Return the request of a sample: the context, and the text with the question after it."""
         parts, text = self.context.request(self.data, sample, self.prompt)
         return self.frame_ablation.apply(parts, self.data, self.context, sample), text
 
     def stored_request(
-        self, sample: Sample, context: Sequence[ContextPart], text: str
+        self, sample: QuestionVariant, context: Sequence[ContextPart], text: str
     ) -> StoredRequest:
         """Return the request of a sample (`request`) as a journal has it."""
         traj_id = sample.question.traj_id
@@ -180,7 +180,7 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
         for of_question in _by_question(data, context, settings, limit)
         for sample in of_question
     ]
-    samples = [sample for sample in items if isinstance(sample, Sample)]
+    samples = [sample for sample in items if isinstance(sample, QuestionVariant)]
     skipped = [sample for sample in items if isinstance(sample, SkippedQuestion)]
     sources = context.sources(data, settings)
     return TaskSamples(
@@ -188,7 +188,7 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
     )
 
 
-_Items = list[Sample | SkippedQuestion]  # of one question
+_Items = list[QuestionVariant | SkippedQuestion]  # of one question
 
 
 def _by_question(
@@ -199,7 +199,7 @@ def _by_question(
     A limit takes whole pairs of twins, so it may take one question more.
     """
 
-    def skip_unreadable(sample: Sample) -> Sample | SkippedQuestion:
+    def skip_unreadable(sample: QuestionVariant) -> QuestionVariant | SkippedQuestion:
         problem = _find_problem(context.select_frames(data, sample))
         return SkippedQuestion(sample.question, problem, sample.variant) if problem else sample
 
@@ -216,10 +216,10 @@ def _by_question(
             row = data.rows[position]
             items = _samples(context, data, row, settings) if isinstance(row, Question) else [row]
             by_position[position] = [
-                skip_unreadable(sample) if isinstance(sample, Sample) else sample
+                skip_unreadable(sample) if isinstance(sample, QuestionVariant) else sample
                 for sample in items
             ]
-            n_asked += any(isinstance(sample, Sample) for sample in by_position[position])
+            n_asked += any(isinstance(sample, QuestionVariant) for sample in by_position[position])
         if limit is not None and n_asked >= limit:
             break
     return [by_position[position] for position in sorted(by_position)]

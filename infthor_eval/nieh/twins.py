@@ -7,7 +7,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import ObjectState, iter_object_states, read_steps
-from infthor_eval.nieh.contexts.base import Sample
+from infthor_eval.nieh.contexts.base import QuestionVariant
 from infthor_eval.nieh.records import TwinSide
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.storage.digests import seed_of
@@ -19,7 +19,7 @@ def first_world(traj_ids: Iterable[str]) -> str:
     return ordered[seed_of("\n".join(ordered)) % len(ordered)]
 
 
-def twin_side(task_samples: TaskSamples, sample: Sample) -> TwinSide | None:
+def twin_side(task_samples: TaskSamples, sample: QuestionVariant) -> TwinSide | None:
     """Return what a sample's question is paired with; None if it is no twin.
 
     Raises:

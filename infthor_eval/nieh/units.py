@@ -6,7 +6,7 @@ from typing import Any
 
 from msgspec.structs import replace as replace_fields
 
-from infthor_eval.nieh.contexts.base import Sample
+from infthor_eval.nieh.contexts.base import QuestionVariant
 from infthor_eval.nieh.guessing.blind import find_floor, visible_knowledge
 from infthor_eval.nieh.records import BlindGuess, NiehAnswer, ShownClues
 from infthor_eval.nieh.samples import TaskSamples
@@ -26,12 +26,12 @@ class NiehUnit(Unit[NiehAnswer]):
         find_blind: returns what `blind` says to the question, or None.
     """
 
-    sample: Sample
+    sample: QuestionVariant
     find_blind: Callable[[], BlindGuess | None] = field(repr=False, compare=False)
 
     @classmethod
     def of(
-        cls, task: str, task_samples: TaskSamples, sample: Sample, repeat: int = 1
+        cls, task: str, task_samples: TaskSamples, sample: QuestionVariant, repeat: int = 1
     ) -> "NiehUnit":
         """Return the unit of a task's sample, with how much of its evidence is shown."""
         question = sample.question
@@ -62,7 +62,7 @@ class NiehUnit(Unit[NiehAnswer]):
         return replace_fields(payload, blind=self.find_blind())
 
 
-def shown_clues(task_samples: TaskSamples, sample: Sample) -> ShownClues | None:
+def shown_clues(task_samples: TaskSamples, sample: QuestionVariant) -> ShownClues | None:
     """Return the clue frames that a sample shows; None for absences and sets without frames.
 
     Blank frames and those of another home count as what they stand for; hidden ones do not.

@@ -11,7 +11,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.samples import TaskSamples, find_samples
@@ -167,7 +167,9 @@ def question_sequences(
         yield within(sequence, limit)
 
 
-def _sequence(encoder: Encoder, task: TaskSamples, sample: Sample, name: str) -> TrainingSequence:
+def _sequence(
+    encoder: Encoder, task: TaskSamples, sample: QuestionVariant, name: str
+) -> TrainingSequence:
     context, text = task.request(sample)
     if sample.awaits_recall:
         raise UsageError("training has no memory; use another context")

@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any
 
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.guessing.blind import sample_on_clues
 from infthor_eval.nieh.guessing.folds import Fit
 from infthor_eval.nieh.guessing.guessers import Knowledge, NamedGuesser
@@ -24,14 +24,14 @@ def make_question(
     return Question(traj_id, text, tuple(clues), (answer,), **columns)
 
 
-def make_samples_on_clues(*questions: Question) -> list[Sample]:
+def make_samples_on_clues(*questions: Question) -> list[QuestionVariant]:
     """A sample of each question, whose window is its clues."""
     return [sample_on_clues(question) for question in questions]
 
 
 def guess_with(
     rule: Callable[..., Fit],
-    samples: Sequence[Sample],
+    samples: Sequence[QuestionVariant],
     scenes: Mapping[str, str] | None = None,
     **knowledge: Any,
 ) -> list[str]:

@@ -11,7 +11,7 @@ from infthor_eval.formats.outline import read_outline
 from infthor_eval.formats.pictures.video import Video
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.asking.recalling import recall_all
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.other_homes import draw_other_home
 from infthor_eval.nieh.samples import find_samples, open_set
 from infthor_eval.nieh.twins import twin_side
@@ -69,7 +69,7 @@ def test_the_same_picture_at_another_step_is_no_clue(twins):
     assert own[0] == own[1]
     on_one = replace(question, clues=(1,))
     task_samples = find(twins, "no-clue")
-    parts, _ = task_samples.request(Sample(on_one, tuple(range(N_FRAMES))))
+    parts, _ = task_samples.request(QuestionVariant(on_one, tuple(range(N_FRAMES))))
     assert pictures(parts) == [own[0], *own[2:]]
 
 

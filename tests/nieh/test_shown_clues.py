@@ -6,7 +6,7 @@ import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings, Sample
+from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings, QuestionVariant
 from infthor_eval.nieh.records import ShownClues
 from infthor_eval.nieh.samples import TaskSamples, find_samples, open_set
 from infthor_eval.nieh.units import shown_clues
@@ -69,7 +69,7 @@ def test_retrieved_frames_show_the_clues_among_them(make_nieh_set):
         NiehSet(make_nieh_set([question], n_frames=10, size=8)),
         CONTEXTS["clip_retrieval"],
     )
-    retrieved = Sample(question, (1, 4, 7))  # as the retriever gives them, in time order
+    retrieved = QuestionVariant(question, (1, 4, 7))  # as the retriever gives them, in time order
     assert shown_clues(
         TaskSamples(data, "clip_retrieval", context, [], [], {}), retrieved
     ) == clues(2, 3, 2)

@@ -14,7 +14,7 @@ from typing import Any, Protocol, runtime_checkable
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts import ContextPart, Sample
+from infthor_eval.nieh.contexts import ContextPart, QuestionVariant
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.blind import find_blind, sample_on_clues, visible_knowledge
@@ -31,7 +31,7 @@ _RULES = 2  # of `blind` and `random`: with another number earlier replies are n
 class Predict(Protocol):
     """Answers a sample of a set, given what is shown of it."""
 
-    def __call__(self, sample: Sample, shown: Sequence[ContextPart] = (), /) -> str:
+    def __call__(self, sample: QuestionVariant, shown: Sequence[ContextPart] = (), /) -> str:
         """Return the answer."""
 
 
@@ -81,7 +81,7 @@ class Random(BaselineSubject):
         """See `Baseline`; a draw depends on seed and question alone, not on the order of asking."""
         counts_for = _answers_elsewhere(data)
 
-        def predict(sample: Sample, _shown: Sequence[ContextPart] = ()) -> str:
+        def predict(sample: QuestionVariant, _shown: Sequence[ContextPart] = ()) -> str:
             counts = counts_for(sample)
             draw = random.Random(seed_of(f"{self._seed}\n{sample.question.id}"))
             answers = sorted(counts) or [""]
@@ -100,7 +100,7 @@ class _OneOfTwo(BaselineSubject):
         for question in data.questions:
             worlds[question.pair].add(question.traj_id)
 
-        def predict(sample: Sample, shown: Sequence[ContextPart] = ()) -> str:
+        def predict(sample: QuestionVariant, shown: Sequence[ContextPart] = ()) -> str:
             counts = counts_for(sample)
             two = sorted(counts, key=lambda text: (-counts[text], text))[:2] or [""]
             pair = sample.question.pair
@@ -137,7 +137,7 @@ class Hash(_OneOfTwo):
         return bool(seed_of("\n".join([question.text, *frames])) % 2)
 
 
-def _answers_elsewhere(data: NiehSet) -> Callable[[Sample], Counter[str]]:
+def _answers_elsewhere(data: NiehSet) -> Callable[[QuestionVariant], Counter[str]]:
     """Return what counts the answers to a question's type, without those of its own fold."""
     hold_out = held_out([sample_on_clues(question) for question in data.questions])
     seen: dict[str, Counter[str]] = defaultdict(Counter)
@@ -147,7 +147,7 @@ def _answers_elsewhere(data: NiehSet) -> Callable[[Sample], Counter[str]]:
         seen[kind][answer] += 1
         own[kind, hold_out(sample_on_clues(question))][answer] += 1
 
-    def counts_for(sample: Sample) -> Counter[str]:
+    def counts_for(sample: QuestionVariant) -> Counter[str]:
         kind = question_type(sample.question)
         return seen[kind] - own[kind, hold_out(sample)]
 

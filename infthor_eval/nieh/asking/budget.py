@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from infthor_eval.errors import DataError, ModelError
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.task import PreparedTask
 from model_adapters import Model, Part
@@ -83,9 +83,9 @@ def budget_of(prepared: PreparedTask, model: Model) -> Budget:
     )
 
 
-def _longest_questions(samples: Iterable[Sample]) -> list[Sample]:
+def _longest_questions(samples: Iterable[QuestionVariant]) -> list[QuestionVariant]:
     """Return one sample per context: that of its longest question."""
-    longest: dict[tuple[str, tuple[int, ...]], Sample] = {}
+    longest: dict[tuple[str, tuple[int, ...]], QuestionVariant] = {}
     for sample in samples:
         key = sample.question.traj_id, sample.frames
         if key not in longest or len(sample.question.text) > len(longest[key].question.text):
@@ -93,7 +93,7 @@ def _longest_questions(samples: Iterable[Sample]) -> list[Sample]:
     return list(longest.values())
 
 
-def _counts(model: Model, prepared: PreparedTask, samples: Sequence[Sample]) -> list[int]:
+def _counts(model: Model, prepared: PreparedTask, samples: Sequence[QuestionVariant]) -> list[int]:
     counts: list[int] = []
     refusals: list[ModelError] = []
     for sample in samples:

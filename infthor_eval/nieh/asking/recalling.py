@@ -28,7 +28,7 @@ from infthor_eval.memory import (
     pieces_of,
     wrap_memory_errors,
 )
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.contexts.base import RecallSettings
 from infthor_eval.nieh.records import NiehRecall
 from infthor_eval.nieh.samples import TaskSamples
@@ -85,7 +85,7 @@ class Recaller:
             yield
             self._built = None
 
-    def recall(self, sample: Sample) -> NiehRecall:
+    def recall(self, sample: QuestionVariant) -> NiehRecall:
         """Return what is recalled for a sample.
 
         Raises:
@@ -128,7 +128,7 @@ class Recaller:
         self._keep(inputs, result)
         return result
 
-    def _observations(self, sample: Sample) -> tuple[list[Observation], list[str]]:
+    def _observations(self, sample: QuestionVariant) -> tuple[list[Observation], list[str]]:
         """Return what is observed for a sample's question: blank frames where its clues are hidden,
         which keeps the positions of all others."""
         traj_id = sample.question.traj_id
@@ -149,7 +149,9 @@ class Recaller:
             self._identities[settings] = memory_identity(settings.memory, settings.options)
         return self._identities[settings]
 
-    def _fingerprint(self, sample: Sample, settings: RecallSettings, digests: Sequence[str]) -> str:
+    def _fingerprint(
+        self, sample: QuestionVariant, settings: RecallSettings, digests: Sequence[str]
+    ) -> str:
         return fingerprint(
             {
                 "memory": self._identity(settings),
@@ -202,13 +204,13 @@ def _uncounted(write: Write) -> Write:
     return ask
 
 
-def apply_recall(sample: Sample, recall: NiehRecall) -> Sample:
+def apply_recall(sample: QuestionVariant, recall: NiehRecall) -> QuestionVariant:
     """Return a sample with what was recalled for it: these frames and the last one are shown."""
     frames = [number for number in recall.recalled if isinstance(number, int)]
     return replace(sample, frames=(*frames, sample.frames[-1]), recalled=recall.recalled)
 
 
-def recall_all(task_samples: TaskSamples) -> list[Sample]:
+def recall_all(task_samples: TaskSamples) -> list[QuestionVariant]:
     """Return a task's samples, with what their memory recalls, for models that are none of ours.
 
     Raises:
@@ -258,7 +260,7 @@ def _visible(steps: Sequence[Observation], memory: Memory) -> list[Observation]:
     )
 
 
-def _observations(task_samples: TaskSamples, sample: Sample) -> list[Observation]:
+def _observations(task_samples: TaskSamples, sample: QuestionVariant) -> list[Observation]:
     """Return all steps of a sample's trajectory."""
     data = task_samples.data
     traj_id = sample.question.traj_id

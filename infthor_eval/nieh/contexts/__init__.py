@@ -10,7 +10,7 @@ from infthor_eval.nieh.contexts.base import (
     Context,
     ContextPart,
     ContextSettings,
-    Sample,
+    QuestionVariant,
     trajectories_identity,
 )
 from infthor_eval.nieh.contexts.haystack import haystack
@@ -24,7 +24,7 @@ __all__ = [
     "Context",
     "ContextPart",
     "ContextSettings",
-    "Sample",
+    "QuestionVariant",
     "check_prompt",
     "context_named",
 ]

@@ -47,7 +47,7 @@ class RecallSettings:
 
 
 @dataclass(frozen=True)
-class Sample:
+class QuestionVariant:
     """A question in one variant of its context.
 
     Attributes:
@@ -133,7 +133,9 @@ class ContextSettings(NiehSettings):
 
 
 # Functions, not lambdas: contexts are pickled and sent to workers.
-def _only_frames(_data: NiehSet, _sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
+def _only_frames(
+    _data: NiehSet, _sample: QuestionVariant, frames: Sequence[FrameRef]
+) -> list[ContextPart]:
     return list(frames)
 
 
@@ -141,7 +143,7 @@ def _all_frames(data: NiehSet, traj_id: str, _fps: float | None) -> Sequence[Fra
     return data.frames(traj_id)
 
 
-def _frames_of(_data: NiehSet, sample: Sample) -> Sequence[int]:
+def _frames_of(_data: NiehSet, sample: QuestionVariant) -> Sequence[int]:
     return sample.frames
 
 
@@ -169,7 +171,7 @@ class Context:
             settings, as JSON values.
     """
 
-    samples: Callable[[NiehSet, Question, ContextSettings], list[Sample | SkippedQuestion]]
+    samples: Callable[[NiehSet, Question, ContextSettings], list[QuestionVariant | SkippedQuestion]]
     needs_model: bool = False
     intro: str = "Answer the question given the agent's views in time order."
     text_intro: str = (
@@ -177,14 +179,14 @@ class Context:
         "last view (the last image)."
     )
     prompts: tuple[str, ...] = (PUBLISHED_MAIN,)
-    parts: Callable[[NiehSet, Sample, Sequence[FrameRef]], list[ContextPart]] = field(
+    parts: Callable[[NiehSet, QuestionVariant, Sequence[FrameRef]], list[ContextPart]] = field(
         default=_only_frames
     )
     frames: Callable[[NiehSet, str, float | None], Sequence[FrameRef]] = field(default=_all_frames)
-    positions: Callable[[NiehSet, Sample], Sequence[int]] = field(default=_frames_of)
+    positions: Callable[[NiehSet, QuestionVariant], Sequence[int]] = field(default=_frames_of)
     sources: Callable[[NiehSet, ContextSettings], dict[str, Any]] = field(default=_no_sources)
 
-    def select_frames(self, data: NiehSet, sample: Sample) -> list[FrameRef]:
+    def select_frames(self, data: NiehSet, sample: QuestionVariant) -> list[FrameRef]:
         """Return the frames of a sample; none in a set of question files alone."""
         if not data.has_frames:
             return []
@@ -192,7 +194,7 @@ class Context:
         return [frames[position] for position in sample.frames]
 
     def request(
-        self, data: NiehSet, sample: Sample, prompt: str = PUBLISHED_MAIN
+        self, data: NiehSet, sample: QuestionVariant, prompt: str = PUBLISHED_MAIN
     ) -> tuple[list[ContextPart], str]:
         """Return the request of a sample: the context, and the text with the question after it."""
         parts = self.parts(data, sample, self.select_frames(data, sample))

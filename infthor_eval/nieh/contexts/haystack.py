@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.nieh.contexts.base import ContextSettings, Sample
+from infthor_eval.nieh.contexts.base import ContextSettings, QuestionVariant
 
 _K_TOKENS = 1000  # the published kilo-token
 _STEPS = 5  # depths of the published grid
@@ -26,14 +26,14 @@ _OUTSIDE = "the window reaches outside the trajectory"
 
 def haystack(
     data: NiehSet, question: Question, settings: ContextSettings
-) -> list[Sample | SkippedQuestion]:
+) -> list[QuestionVariant | SkippedQuestion]:
     """Return a question on one window per depth."""
     n_all = len(data.frames(question.traj_id))
     n = settings.n_frames(_K_TOKENS)
     if not question.has_evidence:
         return [_anywhere(question, n_all, n, settings.seed)]
     clues = tuple(sorted(set(data.clue_positions(question))))
-    samples: list[Sample | SkippedQuestion] = []
+    samples: list[QuestionVariant | SkippedQuestion] = []
     for depth in settings.depths:
         draw = random.Random(f"{settings.seed}/{question.draw_name}/{n}/{depth:g}")
         window = _window(clues, n_all, n, round(depth * _STEPS), draw)
@@ -41,7 +41,7 @@ def haystack(
         samples.append(
             SkippedQuestion(question, window, variant)
             if isinstance(window, str)
-            else Sample(question, window, variant)
+            else QuestionVariant(question, window, variant)
         )
     return samples
 
@@ -88,9 +88,11 @@ def sampling_pool(clues: Sequence[int], n_all: int, n: int) -> list[int]:
     return [*before, *between, *after]
 
 
-def _anywhere(question: Question, n_all: int, n: int, seed: int) -> Sample | SkippedQuestion:
+def _anywhere(
+    question: Question, n_all: int, n: int, seed: int
+) -> QuestionVariant | SkippedQuestion:
     variant = "no needle"
     if n < 1 or n > n_all:
         return SkippedQuestion(question, _OUTSIDE, variant)
     start = random.Random(f"{seed}/{question.draw_name}/{n}").randrange(n_all - n + 1)
-    return Sample(question, tuple(range(start, start + n)), variant)
+    return QuestionVariant(question, tuple(range(start, start + n)), variant)

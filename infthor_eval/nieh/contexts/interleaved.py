@@ -10,7 +10,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.outline import Outline
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.reading import read_text
-from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
+from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, QuestionVariant
 
 _STATE = " State: "  # text before frames
 _MARK = "<image>"  # the place of a frame in traj.txt
@@ -19,17 +19,17 @@ _ACT = "<|act|>"  # the end of an action there
 
 def interleaved(
     data: NiehSet, question: Question, _settings: ContextSettings
-) -> list[Sample | SkippedQuestion]:
+) -> list[QuestionVariant | SkippedQuestion]:
     """Ask on each task's goal and the frame before it, then every action with its frames."""
     outline = data.outline(question.traj_id)
     if outline is None:
         return [SkippedQuestion(question, data.missing_outline)]
     layout = _layout(outline, data.action_frames(question.traj_id))
-    return [Sample(question, tuple(part for part in layout if isinstance(part, int)))]
+    return [QuestionVariant(question, tuple(part for part in layout if isinstance(part, int)))]
 
 
 def interleaved_parts(
-    data: NiehSet, sample: Sample, frames: Sequence[FrameRef]
+    data: NiehSet, sample: QuestionVariant, frames: Sequence[FrameRef]
 ) -> list[ContextPart]:
     """Return the texts with the frames in their places."""
     outline = data.outline(sample.question.traj_id)
@@ -63,20 +63,20 @@ def _layout(outline: Outline, frames_of: Mapping[int, tuple[int, ...]]) -> Itera
 
 def interleaved_plans(
     data: NiehSet, question: Question, _settings: ContextSettings
-) -> list[Sample | SkippedQuestion]:
+) -> list[QuestionVariant | SkippedQuestion]:
     """Ask on goals, plans, frames and actions in time order; of an action's frames, on the last."""
     n_frames = len(data.frames(question.traj_id))
     done = _actions_before_marks(_sequence_text(data.folder(question.traj_id)))
     n_actions = max(done, default=0)
     if n_actions + 1 == n_frames:
-        return [Sample(question, tuple(done))]
+        return [QuestionVariant(question, tuple(done))]
     after_actions = [0, *(frames[-1] for frames in data.action_frames(question.traj_id).values())]
     if n_actions + 1 != len(after_actions):
         reason = (
             f"traj.txt has {n_actions} actions, which fit neither the frames nor expert_log.json"
         )
         return [SkippedQuestion(question, reason)]
-    return [Sample(question, tuple(after_actions[number] for number in done))]
+    return [QuestionVariant(question, tuple(after_actions[number] for number in done))]
 
 
 def _actions_before_marks(text: str) -> list[int]:
@@ -90,7 +90,9 @@ def _actions_before_marks(text: str) -> list[int]:
     return done
 
 
-def plans_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
+def plans_parts(
+    data: NiehSet, sample: QuestionVariant, frames: Sequence[FrameRef]
+) -> list[ContextPart]:
     """Return the texts of traj.txt with the frames in their places."""
     texts = _sequence_text(data.folder(sample.question.traj_id)).strip().split(_MARK)
     parts = (part for pair in zip_longest(texts, frames) for part in pair)

@@ -12,7 +12,12 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.memory import accepted_options, memory_identity
-from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, RecallSettings, Sample
+from infthor_eval.nieh.contexts.base import (
+    ContextPart,
+    ContextSettings,
+    QuestionVariant,
+    RecallSettings,
+)
 
 # Stands for what will be recalled, in prompts of samples that no model was asked.
 _UNRECALLED = "<memory>"
@@ -21,10 +26,12 @@ _OF_RETRIEVER = ("retriever", "retriever_revision")
 
 def memory(
     data: NiehSet, question: Question, settings: ContextSettings
-) -> list[Sample | SkippedQuestion]:
+) -> list[QuestionVariant | SkippedQuestion]:
     """Ask on what a memory recalls of the frames before the last, and on the last (the view)."""
     return [
-        Sample(question, tuple(range(len(data.frames(question.traj_id)))), recall=_recall(settings))
+        QuestionVariant(
+            question, tuple(range(len(data.frames(question.traj_id)))), recall=_recall(settings)
+        )
     ]
 
 
@@ -34,7 +41,9 @@ def memory_sources(_data: NiehSet, settings: ContextSettings) -> dict[str, Any]:
     return memory_identity(recall.memory, recall.options)
 
 
-def recalled_parts(_data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
+def recalled_parts(
+    _data: NiehSet, sample: QuestionVariant, frames: Sequence[FrameRef]
+) -> list[ContextPart]:
     """Return what was recalled in order (a mark before it is), then the last frame."""
     if sample.recalled is None:
         return [_UNRECALLED, *frames[-1:]]

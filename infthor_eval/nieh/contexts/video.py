@@ -9,12 +9,12 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.pictures.video import FILM_FPS, Video, sample_positions
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
+from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, QuestionVariant
 
 
 def video(
     data: NiehSet, question: Question, settings: ContextSettings
-) -> list[Sample | SkippedQuestion]:
+) -> list[QuestionVariant | SkippedQuestion]:
     """Ask on the trajectory's film, its mp4, at `fps` frames per second (published: 1 and 2).
 
     Where there is no mp4, the frames themselves are the film. The variant names the source, so that
@@ -30,7 +30,7 @@ def video(
             positions = sample_positions(len(data.frames(question.traj_id)), FILM_FPS, settings.fps)
     except DataError as error:
         return [SkippedQuestion(question, str(error), variant)]
-    return [Sample(question, positions, variant, fps=settings.fps)]
+    return [QuestionVariant(question, positions, variant, fps=settings.fps)]
 
 
 def video_frames(data: NiehSet, traj_id: str, fps: float | None) -> Sequence[FrameRef]:
@@ -44,7 +44,7 @@ def video_frames(data: NiehSet, traj_id: str, fps: float | None) -> Sequence[Fra
     )
 
 
-def video_positions(data: NiehSet, sample: Sample) -> Sequence[int]:
+def video_positions(data: NiehSet, sample: QuestionVariant) -> Sequence[int]:
     """Return the frames of the trajectory that the shown ones are."""
     traj_id = sample.question.traj_id
     if sample.fps is None or data.video(traj_id) is None:
@@ -52,7 +52,9 @@ def video_positions(data: NiehSet, sample: Sample) -> Sequence[int]:
     return sample_positions(len(data.frames(traj_id)), FILM_FPS, sample.fps)
 
 
-def video_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
+def video_parts(
+    data: NiehSet, sample: QuestionVariant, frames: Sequence[FrameRef]
+) -> list[ContextPart]:
     """Return the frames as a video, with the rate at which they were really sampled."""
     traj_id = sample.question.traj_id
     if sample.fps is not None and data.video(traj_id) is not None:

@@ -8,7 +8,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
+from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, QuestionVariant
 
 if TYPE_CHECKING:
     from model_adapters.hf.retrieval import Retriever
@@ -18,35 +18,35 @@ _K_TOKENS = 1024  # truncate_head's published kilo-token
 
 def clues(
     data: NiehSet, question: Question, _settings: ContextSettings
-) -> list[Sample | SkippedQuestion]:
+) -> list[QuestionVariant | SkippedQuestion]:
     """Ask on the evidence alone, in time order whatever the file's (the paper's Table 4)."""
     if not data.has_frames:  # baselines need no more than their number
-        return [Sample(question, tuple(sorted(question.clues)))]
-    return [Sample(question, tuple(sorted(data.clue_positions(question))))]
+        return [QuestionVariant(question, tuple(sorted(question.clues)))]
+    return [QuestionVariant(question, tuple(sorted(data.clue_positions(question))))]
 
 
 def trajectory(
     data: NiehSet, question: Question, _settings: ContextSettings
-) -> list[Sample | SkippedQuestion]:
+) -> list[QuestionVariant | SkippedQuestion]:
     """Ask on every frame of the trajectory (published: `full_traj`)."""
-    return [Sample(question, tuple(range(len(data.frames(question.traj_id)))))]
+    return [QuestionVariant(question, tuple(range(len(data.frames(question.traj_id)))))]
 
 
 def truncate_head(
     data: NiehSet, question: Question, settings: ContextSettings
-) -> list[Sample | SkippedQuestion]:
+) -> list[QuestionVariant | SkippedQuestion]:
     """Ask on the last frames that fit (published under the same name); earlier clues are lost.
 
     As published, the last one is always shown, though it be larger than the context.
     """
     n_all = len(data.frames(question.traj_id))
     n_cut = max(0, n_all - max(1, settings.n_frames(_K_TOKENS)))
-    return [Sample(question, tuple(range(n_cut, n_all)), n_cut=n_cut)]
+    return [QuestionVariant(question, tuple(range(n_cut, n_all)), n_cut=n_cut)]
 
 
 def text_state(
     data: NiehSet, question: Question, _settings: ContextSettings
-) -> list[Sample | SkippedQuestion]:
+) -> list[QuestionVariant | SkippedQuestion]:
     """Ask on the last frame, beside the text of the last state (published under the same name)."""
     if not data.states(question.traj_id):
         reason = (
@@ -55,10 +55,12 @@ def text_state(
             else data.missing_outline
         )
         return [SkippedQuestion(question, reason)]
-    return [Sample(question, (len(data.frames(question.traj_id)) - 1,))]
+    return [QuestionVariant(question, (len(data.frames(question.traj_id)) - 1,))]
 
 
-def state_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
+def state_parts(
+    data: NiehSet, sample: QuestionVariant, frames: Sequence[FrameRef]
+) -> list[ContextPart]:
     """Return the text of the last state, then the last frame."""
     states = data.states(sample.question.traj_id)
     return [f" State: {states[max(states)]}; Last agent's view: ", *frames]
@@ -66,7 +68,7 @@ def state_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> li
 
 def clip_retrieval(
     data: NiehSet, question: Question, settings: ContextSettings
-) -> list[Sample | SkippedQuestion]:
+) -> list[QuestionVariant | SkippedQuestion]:
     """Ask on the `top_k` frames most similar to the question, in time order (published, k = 10).
 
     Of equally similar frames the earlier ones are taken; a trajectory of fewer frames is shown
@@ -79,7 +81,9 @@ def clip_retrieval(
         vectors = retriever.frames(data.frames(question.traj_id))
     except DataError as error:
         return [SkippedQuestion(question, str(error))]
-    return [Sample(question, nearest(vectors, retriever.text(question.text), settings.top_k))]
+    return [
+        QuestionVariant(question, nearest(vectors, retriever.text(question.text), settings.top_k))
+    ]
 
 
 def retriever_identity(_data: NiehSet, settings: ContextSettings) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import NOT_JSON
 from infthor_eval.nieh import numbers, scoring
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.guessers import (
     GUESSERS,
@@ -125,6 +125,6 @@ def score_guesses(
     ]
 
 
-def sample_on_clues(question: Question) -> Sample:
+def sample_on_clues(question: Question) -> QuestionVariant:
     """Return the question on its clue frames, by their numbers in the file."""
-    return Sample(question, tuple(sorted(question.clues)))
+    return QuestionVariant(question, tuple(sorted(question.clues)))

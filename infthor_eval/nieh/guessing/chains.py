@@ -14,7 +14,7 @@ import numpy as np
 
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import find_form
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.folds import Fit, Folds, split
 
@@ -27,7 +27,7 @@ _PLACE = 100  # frames that count as one place
 _DIGITS = 9
 
 
-def chains_of_words(sample: Sample) -> list[Chain]:
+def chains_of_words(sample: QuestionVariant) -> list[Chain]:
     """Return chains of words: the leading ones, each later one, alone and after the first two."""
     words = words_of(sample.question)
     later = sorted(set(words[2:]))
@@ -35,13 +35,13 @@ def chains_of_words(sample: Sample) -> list[Chain]:
     return [leading, *([("word", word), ("word", *words[:2], word)] for word in later)]
 
 
-def chains_of_words_and_count(sample: Sample) -> list[Chain]:
+def chains_of_words_and_count(sample: QuestionVariant) -> list[Chain]:
     """Return the chains of words, and one of the number of frames after the question's stem."""
     stem = words_of(sample.question)[:_STEM]
     return [*chains_of_words(sample), [("stem", *stem), ("count", *stem, len(sample.frames))]]
 
 
-def chains_of_words_and_place(sample: Sample) -> list[Chain]:
+def chains_of_words_and_place(sample: QuestionVariant) -> list[Chain]:
     """Return the chains of words, and of the last clue's place and the clues' span."""
     stem = words_of(sample.question)[:_STEM]
     first, last = sample.frames[0], sample.frames[-1]
@@ -56,7 +56,9 @@ def words_of(question: Question) -> list[str]:
 
 
 def guess_by_chains(
-    samples: Sequence[Sample], folds: Folds, chains: Callable[[Sample], list[Chain]]
+    samples: Sequence[QuestionVariant],
+    folds: Folds,
+    chains: Callable[[QuestionVariant], list[Chain]],
 ) -> Fit:
     """Return the guesser by some chains: the likeliest answer (of equals, the first by name)."""
     targets = [doc_target(sample.question) for sample in samples]

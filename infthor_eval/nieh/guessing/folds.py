@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 
 Folds = Sequence[int]  # the fold of each sample
 Fit = Callable[[frozenset[int]], Mapping[int, str]]
@@ -13,20 +13,20 @@ _MOST = 6  # each fold, and each two, are guessed from the others
 
 
 def held_out(
-    samples: Sequence[Sample], scenes: Mapping[str, str] = MappingProxyType({})
-) -> Callable[[Sample], str]:
+    samples: Sequence[QuestionVariant], scenes: Mapping[str, str] = MappingProxyType({})
+) -> Callable[[QuestionVariant], str]:
     """Return what names the samples that one of some is held out with: those on its trajectory, or
     on all twins of it; on its scene, if scenes are given by trajectory; itself, if all are on one.
     """
 
-    def group(sample: Sample) -> str:
+    def group(sample: QuestionVariant) -> str:
         return scenes.get(sample.question.traj_id, sample.question.cluster)
 
     is_alone = len(set(map(group, samples))) == 1
     return (lambda sample: sample.question.draw_name) if is_alone else group
 
 
-def folds_of(samples: Sequence[Sample], scenes: Mapping[str, str]) -> Folds:
+def folds_of(samples: Sequence[QuestionVariant], scenes: Mapping[str, str]) -> Folds:
     """Return the fold of each sample: what is held out together (`held_out`) is dealt by name."""
     groups = list(map(held_out(samples, scenes), samples))
     fold = {group: place % _MOST for place, group in enumerate(sorted(set(groups)))}

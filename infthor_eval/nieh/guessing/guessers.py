@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.chains import (
     chains_of_words,
@@ -50,10 +50,10 @@ class NamedGuesser:
 
     name: str
     knows: Knowledge
-    rule: Callable[[Sequence[Sample], Folds], Fit]
+    rule: Callable[[Sequence[QuestionVariant], Folds], Fit]
 
     def guess(
-        self, samples: Sequence[Sample], scenes: Mapping[str, str] = MappingProxyType({})
+        self, samples: Sequence[QuestionVariant], scenes: Mapping[str, str] = MappingProxyType({})
     ) -> list[str]:
         """Return a guess for each sample of a file (on the clue frames); an empty text for none.
 
@@ -69,7 +69,7 @@ class NamedGuesser:
 
 
 def _guess_constant(
-    samples: Sequence[Sample], folds: Folds, group_of: Callable[[Sample], str]
+    samples: Sequence[QuestionVariant], folds: Folds, group_of: Callable[[QuestionVariant], str]
 ) -> Fit:
     """Guess the constant of a group (`_constant`); of a group without answers that of all."""
     groups = list(map(group_of, samples))
@@ -99,7 +99,9 @@ def _constant(counts: Counter[str], everywhere: Mapping[str, int]) -> str:
     return min(near, key=lambda it: (it.lower() != "yes", -everywhere[it], it), default="")
 
 
-def _choose(samples: Sequence[Sample], folds: Folds, guessers: Sequence[NamedGuesser]) -> Fit:
+def _choose(
+    samples: Sequence[QuestionVariant], folds: Folds, guessers: Sequence[NamedGuesser]
+) -> Fit:
     """Guess each form by the guesser that is chosen on the other folds, by its strict scores there.
 
     For these it is held out from each fold in turn. The first guesser is left for the one that is

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.chains import form_of, words_of
 from infthor_eval.nieh.guessing.clue_facts import ClueFacts
@@ -28,7 +28,7 @@ _ITERATIONS = 1000
 
 
 def guess_by_learning(
-    samples: Sequence[Sample],
+    samples: Sequence[QuestionVariant],
     folds: Folds,
     *,
     number: bool,
@@ -75,7 +75,7 @@ def _learn(features: Any, answers: np.ndarray, unknown: Any) -> Sequence[str]:
 
 
 def _features(
-    sample: Sample, number: bool, place: bool, facts: Sequence[ClueFacts]
+    sample: QuestionVariant, number: bool, place: bool, facts: Sequence[ClueFacts]
 ) -> dict[str, float]:
     """Return features by name, each also crossed with the form of the question."""
     form = form_of(sample.question)[:_FORM]
@@ -93,7 +93,7 @@ def _features(
     }
 
 
-def _place_names(sample: Sample) -> Iterator[str]:
+def _place_names(sample: QuestionVariant) -> Iterator[str]:
     """Yield the places of the first and the last clue, in bins of several sizes, and their span."""
     first, last = sample.frames[0], sample.frames[-1]
     yield f"#span {(last - first).bit_length()}"

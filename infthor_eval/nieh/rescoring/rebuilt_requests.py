@@ -13,7 +13,13 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.asking.recalling import apply_recall
 from infthor_eval.nieh.config import NiehConfig
-from infthor_eval.nieh.contexts import MEMORY, ContextPart, ContextSettings, Sample, context_named
+from infthor_eval.nieh.contexts import (
+    MEMORY,
+    ContextPart,
+    ContextSettings,
+    QuestionVariant,
+    context_named,
+)
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.frame_ablations import FrameAblation
 from infthor_eval.nieh.options import NiehSettings
@@ -76,7 +82,7 @@ class RequestRebuilder:
             raise DataError("made again, it is another request than the one that was sent")
         return RebuiltRequest(context, text)
 
-    def _find_sample(self, record: UnitRecord[NiehAnswer]) -> Sample:
+    def _find_sample(self, record: UnitRecord[NiehAnswer]) -> QuestionVariant:
         question = self._questions.get(record.id)
         if question is None:
             raise DataError("its question is not in the set")
@@ -89,7 +95,9 @@ class RequestRebuilder:
             raise DataError("the set has no such context of its question")
         return sample
 
-    def _variants(self, question: Question, record: UnitRecord[NiehAnswer]) -> Iterator[Sample]:
+    def _variants(
+        self, question: Question, record: UnitRecord[NiehAnswer]
+    ) -> Iterator[QuestionVariant]:
         data = self._samples.data
         name = self._samples.context_name
         if name == _RETRIEVED:  # by a model, which may not be there, and takes minutes
@@ -98,10 +106,10 @@ class RequestRebuilder:
             )
         if name != MEMORY:
             samples = self._context.samples(data, question, self._settings)
-            yield from (sample for sample in samples if isinstance(sample, Sample))
+            yield from (sample for sample in samples if isinstance(sample, QuestionVariant))
         elif record.payload.recall is not None:
             every = tuple(range(len(data.frames(question.traj_id))))
-            yield apply_recall(Sample(question, every), record.payload.recall)
+            yield apply_recall(QuestionVariant(question, every), record.payload.recall)
 
     @cached_property
     def _questions(self) -> Mapping[str, Question]:

@@ -9,7 +9,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.training.encoding import SkippedSequence
 from recipes.nano.reading.events import Happening, read_events
@@ -81,7 +81,7 @@ def read_episodes(folders: Sequence[Path]) -> tuple[list[Episode], list[SkippedS
     for folder in folders:
         samples = find_samples({"data": str(folder), "context": "clues"})
         skipped += (SkippedSequence(one.question.id, one.reason) for one in samples.skipped)
-        by_pair: dict[str, list[Sample]] = defaultdict(list)
+        by_pair: dict[str, list[QuestionVariant]] = defaultdict(list)
         for sample in samples.samples:
             by_pair[sample.question.pair or sample.question.id].append(sample)
         for worlds in by_pair.values():
@@ -94,7 +94,7 @@ def read_episodes(folders: Sequence[Path]) -> tuple[list[Episode], list[SkippedS
 
 
 def _add(
-    episodes: dict[tuple[str, ...], Episode], data: NiehSet, samples: Sequence[Sample]
+    episodes: dict[tuple[str, ...], Episode], data: NiehSet, samples: Sequence[QuestionVariant]
 ) -> None:
     names = tuple(sample.question.traj_id for sample in samples)
     if names not in episodes:

@@ -6,20 +6,22 @@ import pytest
 
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.asking.baselines import BASELINES, Baseline, Blind, Oracle, Random
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.guessing.chains import question_type
 from model_adapters import names
 
 
-def fit(baseline: Baseline, key: list[Sample], context: str = "trajectory") -> Any:
+def fit(baseline: Baseline, key: list[QuestionVariant], context: str = "trajectory") -> Any:
     data: Any = type("_Set", (), {"questions": [sample.question for sample in key]})
     return baseline.fit(data, context)
 
 
 def make_sample(
     text: str, *answers: str, question_type: str | None = None, traj: str = "t", n_frames: int = 1
-) -> Sample:
-    return Sample(Question(traj, text, (0,), answers, question_type), tuple(range(n_frames)))
+) -> QuestionVariant:
+    return QuestionVariant(
+        Question(traj, text, (0,), answers, question_type), tuple(range(n_frames))
+    )
 
 
 KEY = [
@@ -33,7 +35,9 @@ KEY = [
 ]
 
 
-def predict_all(baseline: Baseline, key: list[Sample], context: str = "trajectory") -> list[str]:
+def predict_all(
+    baseline: Baseline, key: list[QuestionVariant], context: str = "trajectory"
+) -> list[str]:
     predict = fit(baseline, key, context)
     return [predict(sample) for sample in key]
 
@@ -83,7 +87,7 @@ def test_blind_on_one_trajectory_learns_from_the_other_questions() -> None:
 def test_the_number_of_clue_frames_is_known_where_they_are_shown_alone() -> None:
     text = "How many times did you move the mug?"
     key = [
-        Sample(Question(f"t{t}", text, tuple(range(n)), (str(n),)), (0,))
+        QuestionVariant(Question(f"t{t}", text, tuple(range(n)), (str(n),)), (0,))
         for t in range(3)
         for n in (1, 2, 3)
     ]
@@ -116,7 +120,7 @@ def test_random_on_one_trajectory_draws_no_answer_of_the_question_itself() -> No
 def test_random_is_the_same_for_a_seed_and_differs_between_seeds() -> None:
     key = [make_sample(f"Is number {i} here?", "yes" if i % 2 else "no") for i in range(40)]
 
-    def answers(seed: int, order: list[Sample]) -> dict[str, str]:
+    def answers(seed: int, order: list[QuestionVariant]) -> dict[str, str]:
         predict = fit(Random(seed), order)
         return {sample.question.id: predict(sample) for sample in order}
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import SkippedQuestion
-from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings, Sample
+from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings, QuestionVariant
 from infthor_eval.nieh.contexts.haystack import sampling_pool
 from infthor_eval.settings import read
 
@@ -62,9 +62,9 @@ def test_one_clue_gives_the_published_windows_on_a_thousand_random_cases():
         ours = windows(n_frames, [clue], ctx_size=ctx_size, tokens_per_frame=tokens)
         theirs = published(n_frames, clue, ctx_size, tokens)
         assert [
-            list(sample.frames) if isinstance(sample, Sample) else None for sample in ours
+            list(sample.frames) if isinstance(sample, QuestionVariant) else None for sample in ours
         ] == theirs
-        assert all(clue in sample.frames for sample in ours if isinstance(sample, Sample))
+        assert all(clue in sample.frames for sample in ours if isinstance(sample, QuestionVariant))
         assert [sample.variant for sample in ours] == [f"depth={depth:g}" for depth in DEPTHS]
         compared += sum(window is not None for window in theirs)
     assert compared > 500
@@ -80,7 +80,7 @@ def test_several_clues_give_the_published_windows():
         sample = windows(case["frames"], case["clues"], **sizes)[case["depth"]]
         clues, frames = (
             set(case["clues"]),
-            list(sample.frames) if isinstance(sample, Sample) else [],
+            list(sample.frames) if isinstance(sample, QuestionVariant) else [],
         )
         if case["drawn"]:
             assert sampling_pool(case["clues"], case["frames"], n) == case["pool"]
@@ -145,7 +145,7 @@ IN_A_ROW = [
 @pytest.mark.parametrize(("n_frames", "clues", "n", "expected"), IN_A_ROW)
 def test_clues_in_a_row_have_the_published_windows(n_frames, clues, n, expected):
     samples = windows(n_frames, clues, ctx_size=n, tokens_per_frame=1000)
-    frames = [sample.frames if isinstance(sample, Sample) else None for sample in samples]
+    frames = [sample.frames if isinstance(sample, QuestionVariant) else None for sample in samples]
     assert frames == [window and tuple(window) for window in expected]
 
 
@@ -224,7 +224,7 @@ def test_a_kilo_token_is_the_published_one_unless_told_otherwise():
         question = make_question(clues=(999,))
         settings = ContextSettings(ctx_size=8, tokens_per_frame=121, **settings)
         samples = CONTEXTS[context].samples(Frames(1000), question, settings)
-        return next(len(sample.frames) for sample in samples if isinstance(sample, Sample))
+        return next(len(sample.frames) for sample in samples if isinstance(sample, QuestionVariant))
 
     assert n_frames("truncate_head") == 8 * 1024 // 121
     assert n_frames("truncate_head", k_tokens=1000) == 8000 // 121

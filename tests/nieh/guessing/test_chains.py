@@ -4,7 +4,7 @@ import tracemalloc
 
 import pytest
 
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.guessing.chains import (
     chains_of_words,
     chains_of_words_and_count,
@@ -81,7 +81,7 @@ def test_own_answers_are_taken_away_before_counting():
     elsewhere."""
     key = [("t", "a", "x")] * 5 + [("u", "a", "y"), ("u", "b", "x"), ("v", "b", "x")]
     samples = [
-        Sample(make_question(traj, text, answer, (number,)), (1,))
+        QuestionVariant(make_question(traj, text, answer, (number,)), (1,))
         for number, (traj, text, answer) in enumerate(key)
     ]
     chains = chain_of(lambda sample: sample.question.text)
