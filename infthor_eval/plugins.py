@@ -39,12 +39,8 @@ class PluginTable:
         return {point.name: point for point in entry_points(group=self.group)}
 
     def load(self, name: str, protocol: type) -> Any:
-        """Import the class of a name; one of another package must have the members of the protocol.
-
-        Raises:
-            UsageError: there is no such name, or another package's class cannot be imported or
-                lacks a member.
-        """
+        """Import the class of a name; one of another package must have the members of the
+        protocol."""
         if name in self.built_in:  # first: no package can change what a built-in name means
             return import_target(self.built_in[name])
         point = self.entry_points().get(name)

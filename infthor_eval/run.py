@@ -149,7 +149,7 @@ class Run:
     def requests(self, record: UnitRecord[Any]) -> Sequence[StoredRequest]:
         """Return the request of a record, behind those that it continues; none where the journal
         does not have them all."""
-        return self._log[1].requests_before(record.request) or ()
+        return (record.request and self._log[1].requests_before(record.request)) or ()
 
     @cached_property
     def usage(self) -> Usage:

@@ -97,11 +97,7 @@ def suite_names() -> tuple[str, ...]:
 
 
 def find_suite(name: str) -> "Suite[Any, Any]":
-    """Return the suite of a name.
-
-    Raises:
-        UsageError: there is none, or that of another package cannot be imported or is incomplete.
-    """
+    """Return the suite of a name."""
     from infthor_eval.runs import Suite
 
     suite = _SUITES.load(name, Suite)
@@ -113,11 +109,7 @@ def find_suite(name: str) -> "Suite[Any, Any]":
 
 
 def find_presenter(name: str) -> "Presenter":
-    """Return the presenter of a suite.
-
-    Raises:
-        UsageError: that of another package cannot be imported or is incomplete.
-    """
+    """Return the presenter of a suite."""
     if name in _PRESENTERS.names:
         from infthor_eval.report.presenter import Presenter
 
@@ -136,31 +128,19 @@ def find_presenter(name: str) -> "Presenter":
 
 
 def find_request_adapter(name: str) -> "RequestAdapter[Any, Any]":
-    """Return the adapter through which lm-eval's requests reach a suite.
-
-    Raises:
-        UsageError: there is none, or that of another package cannot be imported or is incomplete.
-    """
+    """Return the adapter through which lm-eval's requests reach a suite."""
     from infthor_eval.harness.requests import RequestAdapter
 
     return _REQUESTS.load(name, RequestAdapter)()
 
 
 def options_class(name: str) -> type:
-    """Return the dataclass of a suite's options.
-
-    Raises:
-        UsageError: the suite of another package cannot be imported or is incomplete.
-    """
+    """Return the dataclass of a suite's options."""
     return import_target(_BUILT_IN[name].options) if name in _BUILT_IN else find_suite(name).options
 
 
 def suite_code(name: str) -> dict[str, Any]:
-    """Return another package's suite's package, version and source digest; {} for a built-in.
-
-    Raises:
-        ModelError: its source cannot be read.
-    """
+    """Return another package's suite's package, version and source digest; {} for a built-in."""
     from model_adapters.adapter_identity import package_identity
 
     return {} if name in _BUILT_IN else package_identity(_SUITES.entry_points()[name])

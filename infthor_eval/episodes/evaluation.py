@@ -70,12 +70,7 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
         request: TaskRequest[Options],
         read_task: Callable[[TaskFile, TaskRequest[Options]], K],
     ) -> None:
-        """Read the tasks and their trajectories.
-
-        Raises:
-            UsageError: a task has no trajectories or no episodes, or an option does not fit.
-            DataError: a task file is malformed, or none of its trajectories can be used.
-        """
+        """Read the tasks and their trajectories."""
         self.seed = request.seed
         self.options = request.options
         self.tasks: Mapping[str, K] = {

@@ -47,12 +47,8 @@ class RecordedTrajectory(Generic[R, P]):
 def records_of_trajectory(
     run: RecordedRun[P, Any], tasks: Collection[str], trajectory: str | None
 ) -> tuple[str, tuple[UnitRecord[P], ...]]:
-    """Return a trajectory's name (None: the only one) and its records in some tasks, in time order.
-
-    Raises:
-        UsageError: there is no such trajectory, or none is given and there are several.
-        DataError: the run has no record yet.
-    """
+    """Return a trajectory's name (None: the only one) and its records in some tasks, in time
+    order."""
     by_trajectory = run.by_trajectory(tasks)
     if not by_trajectory:
         raise DataError(f"{run.label}: the run has no record of an episode yet; continue it first")
@@ -74,10 +70,6 @@ def restore_trajectory(
     Args:
         data: file or folder of the trajectories; None for the set in the package.
         scenes: folder of recorded floor plans, for the embedded simulator.
-
-    Raises:
-        UsageError: there is no set in the package, and `data` is not given or does not exist.
-        DataError: the trajectory is not among them, or differs from the run's.
     """
     task = recorded.records[0].task
     config = recorded.run.config.tasks[task]
@@ -132,12 +124,7 @@ class EpisodeReplay(ABC, Generic[P, F]):
         """Describe a step of an episode."""
 
     def frames(self, records: Sequence[UnitRecord[P]]) -> Iterator[F]:
-        """Replay some episodes and yield their frames: the start of each, then one per step.
-
-        Raises:
-            DataError: an episode cannot be restored here.
-            SimulatorError: the simulator fails.
-        """
+        """Replay some episodes and yield their frames: the start of each, then one per step."""
         for record in records:
             if record.payload.attempted:
                 yield from self._replay(record)

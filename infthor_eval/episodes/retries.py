@@ -25,10 +25,6 @@ def with_retries(
     Returns:
         The result, and the faults on the way: errors of the simulator, and restarts that it
         survived itself.
-
-    Raises:
-        SceneError: the simulator has no such scene; a retry would end the same way.
-        SimulatorError: it failed every time.
     """
     faults: list[str] = []
     while True:

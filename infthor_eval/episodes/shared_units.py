@@ -34,9 +34,6 @@ def shared_tasks(runs: Sequence[RecordedRun[Any, Any]], chosen: Sequence[str] | 
     """Return the names of the tasks that all runs (at least one) have, in the first run's order.
 
     If some are chosen, return these.
-
-    Raises:
-        UsageError: there is no shared task, or a chosen one is not shared.
     """
     first = runs[0]
     tasks_of_runs = [run.config.tasks.keys() for run in runs]
@@ -68,9 +65,6 @@ def shared_units(
     Args:
         excluded: description of episodes that some run excludes, for a note.
         differences: notes on how the runs differ; whether the simulators do is added.
-
-    Raises:
-        DataError: the runs share no trajectory.
     """
     units = [run.by_trajectory(tasks) for run in runs]
     digests = [run.digests(tasks) for run in runs]
@@ -152,9 +146,6 @@ def only_name(what: str, option: str, name: str | None, known: Sequence[str]) ->
         option: option that gives it.
         name: the name, None if it is not given.
         known: names that the run has.
-
-    Raises:
-        UsageError: the run has nothing of that name, or no name is given and there are several.
     """
     if name is None and len(known) > 1:
         raise UsageError(

@@ -16,9 +16,6 @@ def task_settings(file: TaskFile, kind: type[T]) -> T:
 
     Args:
         kind: dataclass of all settings, with defaults.
-
-    Raises:
-        DataError: a setting is unknown, or has a value that is not allowed.
     """
     raw = file.settings["dataset_kwargs"]
     if not isinstance(raw, Mapping):

@@ -29,12 +29,7 @@ class EpisodeTask(ABC, Generic[S, T]):
         settings: S,
         read: Callable[[TrajectorySource], T],
     ) -> None:
-        """Find the trajectories of a task file.
-
-        Raises:
-            UsageError: there are no trajectories.
-            DataError: none of them can be used.
-        """
+        """Find the trajectories of a task file."""
         self.file = file
         self.name = file.name
         self.settings = settings

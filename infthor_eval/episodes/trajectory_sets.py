@@ -56,10 +56,6 @@ def find_trajectories(
         bundled: name of a set in the package, which is used instead of `data`; None for no such
             set.
         read: reads one trajectory; raises DataError if it cannot be used.
-
-    Raises:
-        UsageError: neither is given, or there is no such file or folder.
-        DataError: there is no trajectory that can be used, or two have one name.
     """
     if bundled is None and data is None:
         raise UsageError(
@@ -103,10 +99,6 @@ def find_recorded_trajectory(
         digest: digest of its file, as the run recorded it.
         data: file or folder of the trajectories; None for the set in the package.
         bundled: name of that set in the task's settings, if there is one.
-
-    Raises:
-        UsageError: there is no set in the package, and `data` is not given or does not exist.
-        DataError: the trajectory is not among them, or differs from the run's.
     """
     if data is None and bundled is None:
         raise UsageError(

@@ -44,11 +44,7 @@ Document = dict[str, Any]
 
 
 def write(runs: Sequence[Run], request: ExportRequest) -> Written:
-    """Write runs; the same run gives files of the same names.
-
-    Raises:
-        DataError: a run has no unit that counts, two have one config, or a file cannot be written.
-    """
+    """Write runs; the same run gives files of the same names."""
     paths: list[Path] = []
     notes: list[str] = []
     for run in runs:

@@ -33,12 +33,7 @@ _DESCRIPTION = (
 
 
 def write(runs: Sequence[Run], request: ExportRequest) -> Written:
-    """Write the results of runs, and the list of their tasks.
-
-    Raises:
-        UsageError: the data set's name on the hub is not given.
-        DataError: a run has no unit that counts, or a file cannot be written.
-    """
+    """Write the results of runs, and the list of their tasks."""
     if request.dataset is None:
         raise UsageError("--format hf-eval-results: results name their data set; give --dataset")
     paths: dict[Path, None] = {}

@@ -42,11 +42,8 @@ Document = dict[str, Any]
 
 
 def write(runs: Sequence[Run], request: ExportRequest) -> Written:
-    """Write a log for each task of runs that has a unit that counts; the same run, the same names.
-
-    Raises:
-        DataError: a run has no such task, or a file cannot be written.
-    """
+    """Write a log for each task of runs that has a unit that counts; the same run, the same
+    names."""
     paths: list[Path] = []
     notes: list[str] = []
     for run in runs:

@@ -61,9 +61,6 @@ def export(outcome: RunOutcome) -> Path:
 
     Returns:
         The folder with both.
-
-    Raises:
-        DataError: they cannot be written.
     """
     converted = convert_run(outcome)
     folder = outcome.folder / FOLDER / file_name(converted.model)

@@ -19,11 +19,7 @@ _NO_PLACE = (
 
 
 def write(runs: Sequence[Run], request: ExportRequest) -> Written:
-    """Copy the files that runs wrote at their ends into `<out>/<model>/`.
-
-    Raises:
-        DataError: a run has none, or older ones than its journal; or they cannot be copied.
-    """
+    """Copy the files that runs wrote at their ends into `<out>/<model>/`."""
     paths = []
     notes = []
     for run in runs:

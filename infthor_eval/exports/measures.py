@@ -98,11 +98,7 @@ def scored(run: Run, task: str) -> list[Record]:
 
 
 def find_measures(run: Run) -> dict[str, list[Measure]]:
-    """Return the metrics of each task with a unit that has a score, the primary one first.
-
-    Raises:
-        DataError: there is no such task.
-    """
+    """Return the metrics of each task with a unit that has a score, the primary one first."""
     found = {task: measures for task in run.tasks if (measures := _measures_of(run, task))}
     if not found:
         raise DataError(f"{run.folder}: no unit of it has a score; leave it out, or run it again")

@@ -47,9 +47,6 @@ def find_writer(
     Args:
         name: name of the format, one of `FORMATS`.
         options: the fields of the request that are given.
-
-    Raises:
-        UsageError: an option changes nothing in this format.
     """
     for option in options:
         if option not in _TAKES[name]:

@@ -52,11 +52,7 @@ class ModelFacts:
 
 
 def require_one_model(headers: Sequence[RunHeader[Any]]) -> None:
-    """Check that runs are of one model, as `--model-id` names all of them.
-
-    Raises:
-        UsageError: names the first of another model.
-    """
+    """Check that runs are of one model, as `--model-id` names all of them."""
     for header in headers:
         if _id(header.config.model, header.name) != _id(headers[0].config.model, headers[0].name):
             raise UsageError(

@@ -63,11 +63,6 @@ class InfthorLM(LM):
             max_batch_size: lm-eval's; ignored.
             device: lm-eval's; passed on to models that take one, unless it is lm-eval's default.
             options: the model's options.
-
-        Raises:
-            UsageError: an unknown name or option, or a baseline, which needs the answer key that
-                lm-eval does not give.
-            ModelError: the model cannot be loaded.
         """
         super().__init__()
         if adapter in baseline_suites():
@@ -105,12 +100,7 @@ class InfthorLM(LM):
         return {"model_source": NAME, "model_name": self._model.name}
 
     def generate_until(self, requests: Sequence[Instance]) -> list[str]:
-        """Return a response per request; empty without an answer (the journal has the reason).
-
-        Raises:
-            UsageError: the model lacks what a suite needs.
-            ModelError: a request is of no task of a suite.
-        """
+        """Return a response per request; empty without an answer (the journal has the reason)."""
         numbers_of: dict[tuple[str, str], list[int]] = {}
         for number, request in enumerate(requests):
             numbers_of.setdefault(_suite_and_task(request), []).append(number)

@@ -40,11 +40,6 @@ def dataset(**config: Any) -> dict[str, Any]:
 
     Args:
         config: see `find_samples`; whatever else lm-eval passes to every task is ignored.
-
-    Raises:
-        UsageError: nothing can be asked, a memory would have to ask the model, or as in
-            `find_samples`.
-        DataError: the set cannot be read.
     """
     from datasets import Dataset
 

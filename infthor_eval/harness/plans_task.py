@@ -26,10 +26,6 @@ def dataset(**config: Any) -> dict[str, Any]:
 
     Args:
         config: settings of the task, and lm-eval's metadata: `data`, and options of the suite.
-
-    Raises:
-        UsageError: the model is not ours, or there are no trajectories.
-        DataError: no trajectory can be read.
     """
     from datasets import Dataset
 

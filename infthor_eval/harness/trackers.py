@@ -32,22 +32,14 @@ class Trackers:
         trackio_args: Arguments | None = None,
         hf_hub_log_args: Arguments | None = None,
     ) -> None:
-        """Check the arguments of `wandb.init`, `trackio.init`, `EvaluationTracker`; None if unused.
-
-        Raises:
-            UsageError: a package or a token is missing, or an argument is not known.
-        """
+        """Check the arguments of `wandb.init`, `trackio.init`, `EvaluationTracker`; None if
+        unused."""
         self._wandb = _init_arguments("wandb", wandb_args)
         self._trackio = _init_arguments("trackio", trackio_args)
         self._hub = _hub_arguments(hf_hub_log_args)
 
     def send(self, outcome: RunOutcome) -> None:
-        """Send a run to all trackers.
-
-        Raises:
-            DataError: a tracker refused it; the run's own files are complete, and the same command
-                sends them again.
-        """
+        """Send a run to all trackers."""
         trackers: dict[str, tuple[Callable[[Exported, str], None], Any]] = {
             "Weights & Biases": (self._to_wandb, self._wandb),
             "trackio": (self._to_trackio, self._trackio),

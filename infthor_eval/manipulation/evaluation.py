@@ -183,15 +183,7 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
         self._seed = f"{seed}/{trajectory.traj_id}"
 
     def run(self, task: ManipulationTask, episode: ArmEpisode) -> EpisodeResult[ArmRecord]:
-        """Run an episode.
-
-        Raises:
-            InfeasibleError: this simulator refuses an action of the expert before it, or cannot
-                restore its start.
-            DataError: a frame cannot be written or read.
-            ModelError: the policy fails.
-            SimulatorError: the simulator fails.
-        """
+        """Run an episode."""
         start = self._states.before(episode)
         with self._frames() as frames:
             environment = self.environment

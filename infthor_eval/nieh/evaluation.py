@@ -53,13 +53,7 @@ class NiehEvaluation:
     """NIEH set up for a run; see `infthor_eval.runs.Evaluation`."""
 
     def __init__(self, request: TaskRequest[NiehOptions]) -> None:
-        """Read the tasks and their sets.
-
-        Raises:
-            UsageError: a task without its data or with nothing that can be asked, a retriever that
-                cannot be loaded, or an option that has no effect on any of the tasks.
-            DataError: a task file or a set is not valid.
-        """
+        """Read the tasks and their sets."""
         self._options = request.options
         self._tasks = [NiehTask(file, request) for file in request.tasks]
         _refuse_empty([task.task_samples for task in self._tasks], self._tasks)

@@ -38,11 +38,7 @@ class FrameAblation:
         check_frames(self.frames)
 
     def check(self, data: NiehSet) -> None:
-        """Check that a set allows the ablation.
-
-        Raises:
-            UsageError: the set has no other home.
-        """
+        """Check that a set allows the ablation."""
         if self.frames == OTHER and count_homes(data) < 2:
             raise UsageError(
                 f"--frames other: {data.root} has questions on one trajectory only; give another "
@@ -52,12 +48,7 @@ class FrameAblation:
     def apply(
         self, parts: Sequence[ContextPart], data: NiehSet, context: Context, sample: QuestionVariant
     ) -> list[ContextPart]:
-        """Return the parts of a request with the frames replaced, or without the clue frames.
-
-        Raises:
-            DataError: the other home cannot be read, or it is not known which frames of a film are
-                clues.
-        """
+        """Return the parts of a request with the frames replaced, or without the clue frames."""
         frames = [frame for part in parts for frame in _frames_in(part)]
         if self.frames == SHOWN or not frames:
             return list(parts)
@@ -88,9 +79,6 @@ class FrameAblation:
         """Return where in the trajectory's time order the frames of a request are.
 
         Those that stand for others have the positions of these.
-
-        Raises:
-            DataError: it is not known which frames of a film are clues.
         """
         positions = self._positions(data, context, sample)
         hidden = self.hidden(data, sample.question)

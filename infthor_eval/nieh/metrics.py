@@ -47,11 +47,7 @@ class Metrics:
     def scores(
         self, task_samples: TaskSamples, sample: QuestionVariant, reply: str
     ) -> dict[str, float]:
-        """Return the metrics of a reply.
-
-        Raises:
-            MetricError: the task's own function raises an exception, or its result lacks a metric.
-        """
+        """Return the metrics of a reply."""
         if self.process is None:
             by_scorer = scores(reply, sample.question.answers)
             return {name: by_scorer[name] for name in self.names}
@@ -64,12 +60,7 @@ PUBLISHED = Metrics(SCORERS, code={"strict": STRICT_RULES})
 
 
 def metrics_of(task: TaskFile) -> Metrics:
-    """Return the metrics of a task file.
-
-    Raises:
-        DataError: its function cannot be imported, or a metric is not averaged, is better when
-            lower, or is none of our scorers where these score.
-    """
+    """Return the metrics of a task file."""
     name = task.settings["process_results"]
     listed = task.settings.get("metric_list") or []
     if name in _OURS:

@@ -180,9 +180,5 @@ class NiehOptions(NiehSettings, MemoryOptions):
 
 
 def check_frames(frames: str) -> None:
-    """Check the name of a frame ablation.
-
-    Raises:
-        UsageError: there is no such ablation; the message has those that there are.
-    """
+    """Check the name of a frame ablation."""
     NiehOptions(frames=frames)

@@ -31,9 +31,6 @@ def draw_other_home(data: NiehSet, question: Question, seed: int) -> str:
     It is drawn for the trajectory, or the base of twins, so that its questions share what is shown.
     It is one of any other kind if the set has no further home of that kind (`without_alike`), or
     does not tell the kind.
-
-    Raises:
-        DataError: a trajectory's file cannot be read.
     """
     homes = _homes(data)
     others = [name for name, home in homes.items() if home.cluster != question.cluster]
@@ -42,11 +39,7 @@ def draw_other_home(data: NiehSet, question: Question, seed: int) -> str:
 
 
 def without_alike(data: NiehSet, questions: Sequence[Question]) -> tuple[str, ...]:
-    """Return the trajectories of questions that are the only ones of their kind of room, sorted.
-
-    Raises:
-        DataError: a trajectory's file cannot be read.
-    """
+    """Return the trajectories of questions that are the only ones of their kind of room, sorted."""
     homes = _homes(data)
     asked = sorted({question.traj_id for question in questions})
     return tuple(name for name in asked if homes[name].room and not _alike(homes, name))

@@ -65,9 +65,6 @@ class OwnScorer:
         Args:
             records: the records.
             reserved: names that are no metric's of its own.
-
-        Raises:
-            UsageError: a metric has a reserved name.
         """
         names: tuple[str, ...] = ()
         by_unit: dict[UnitKey, dict[str, float] | MetricError] = {}
@@ -101,12 +98,7 @@ class OwnScorer:
 
 
 def find_scorer(name: str) -> OwnScorer:
-    """Return the scorer FILE.py:NAME, or an entry point `infthor_eval.scorers` of that name.
-
-    Raises:
-        UsageError: there is none of this name, or it cannot be called.
-        ModelError: the file does not define it or cannot be imported, or its source cannot be read.
-    """
+    """Return the scorer FILE.py:NAME, or an entry point `infthor_eval.scorers` of that name."""
     if names_a_file(name):
         scorer = OwnScorer(
             name_in_file(name), load_from_file(name, "function"), file_identity(name)

@@ -76,9 +76,6 @@ class TaskSamples:
         """Return all frames of the trajectory as a memory observes them: ablated, in their order.
 
         Those that one question alone hides are not (`hidden`).
-
-        Raises:
-            DataError: the trajectory cannot be read.
         """
         frames = self.data.frames(sample.question.traj_id)
         # The shown ones are shuffled, once they are recalled.
@@ -139,10 +136,6 @@ def find_set(
             it.
         bundled: name of a set that comes with the package, which goes before `data`.
         trajectories: folder of the set's trajectories; None if they are in the set.
-
-    Raises:
-        UsageError: there is no such set.
-        DataError: it cannot be read.
     """
     if bundled:
         return open_set(str(packaged_folder(f"sets/{bundled}")), trajectories)
@@ -162,11 +155,6 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
             (the clue frames, if none is named), arguments of `find_set`, and settings of the
             context (`infthor_eval.nieh.contexts.ContextSettings`).
         limit: number of questions, chosen evenly from all trajectories by the seed; None for all.
-
-    Raises:
-        UsageError: there is no set, the context is unknown, lacks a setting or is asked in other
-            words, or the set does not allow the ablation.
-        DataError: the set cannot be read.
     """
     name = config.get("context", DEFAULT_CONTEXT)
     context = context_named(name)

@@ -63,12 +63,7 @@ class NiehTask:
     """
 
     def __init__(self, file: TaskFile, request: TaskRequest[NiehOptions]) -> None:
-        """Check the file and find its samples, unless they depend on the model.
-
-        Raises:
-            UsageError: a setting does not fit, or there is no set.
-            DataError: the file or the set is not valid.
-        """
+        """Check the file and find its samples, unless they depend on the model."""
         file.require(*_NEEDED)
         check_task_file(file)
         self.name = file.name
@@ -159,12 +154,7 @@ class NiehTask:
 
 
 def check_task_file(file: TaskFile) -> None:
-    """Check `dataset_kwargs`, so that no setting is without effect, as a misspelt one would be.
-
-    Raises:
-        DataError: names the file and the setting.
-        UsageError: likewise.
-    """
+    """Check `dataset_kwargs`, so that no setting is without effect, as a misspelt one would be."""
     file.require("dataset_kwargs")
     location = f"{file.path}: dataset_kwargs"
     raw = file.settings["dataset_kwargs"]
@@ -210,11 +200,7 @@ def _check_context(name: str, settings: ContextSettings, location: str) -> None:
 
 
 def _context_of(options: NiehOptions) -> dict[str, Any]:
-    """Return the settings of a run's context, for a task that leaves it open.
-
-    Raises:
-        UsageError: there is no such context, or its size is missing.
-    """
+    """Return the settings of a run's context, for a task that leaves it open."""
     name = options.context or DEFAULT_CONTEXT
     if name not in CONTEXTS:
         raise unknown_name("context", name, CONTEXTS)

@@ -20,11 +20,7 @@ def first_world(traj_ids: Iterable[str]) -> str:
 
 
 def twin_side(task_samples: TaskSamples, sample: QuestionVariant) -> TwinSide | None:
-    """Return what a sample's question is paired with; None if it is no twin.
-
-    Raises:
-        DataError: the set has no other question of the pair, or no pair of its worlds.
-    """
+    """Return what a sample's question is paired with; None if it is no twin."""
     if not sample.question.pair:
         return None
     shown = task_samples.positions(sample)
@@ -40,9 +36,6 @@ def twin_of_reply(
         data: its set.
         question: the question.
         shown: positions of the frames that were shown; None if they are not known.
-
-    Raises:
-        DataError: as `twin_side`.
     """
     return _side(data, question, shown, shown) if question.pair else None
 

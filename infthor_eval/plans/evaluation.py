@@ -47,11 +47,7 @@ class PlansEvaluation(EpisodeEvaluation[PlansOptions, PlansTask, PlanUnit]):
         return PlansConfig(**self._shared_config, constrained=self.options.constrained)
 
     def bind(self, subject: Subject) -> "BoundPlans":
-        """See `infthor_eval.runs.Evaluation.bind`.
-
-        Raises:
-            UsageError: the model cannot decode as its tasks want it.
-        """
+        """See `infthor_eval.runs.Evaluation.bind`."""
         if isinstance(subject, Model):
             _refuse_incapable(subject, self.options, self.tasks.values())
         return BoundPlans(self, actor_factory(subject, self.trajectories))

@@ -74,11 +74,7 @@ class Plan:
 
 
 def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
-    """Return the tasks of a trajectory, in time order; ALFRED's demonstrations have one.
-
-    Raises:
-        DataError: a task has no goal, or its sub-goals are missing.
-    """
+    """Return the tasks of a trajectory, in time order; ALFRED's demonstrations have one."""
     n_high = len(trajectory.plan.high_pddl)
     if not trajectory.sub_trajs:
         single = _single_task(trajectory)
@@ -97,12 +93,7 @@ def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
 
 
 def plans_of(trajectory: Trajectory, words: Words) -> list[Plan]:
-    """Return a trajectory's plans in order; a sub-goal without action (ALFRED's last) is none.
-
-    Raises:
-        DataError: a task has no goal, a sub-goal is of an unknown kind or cannot be said in these
-            words, or actions belong to no sub-goal.
-    """
+    """Return a trajectory's plans in order; a sub-goal without action (ALFRED's last) is none."""
     tasks = tasks_of(trajectory)
     spans = _spans(trajectory)
     final = len(tasks) - 1 if trajectory.long_horizon_task is not None else None

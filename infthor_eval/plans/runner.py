@@ -80,27 +80,13 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         self._seed = f"{seed}/{task.name}/{trajectory.traj_id}"
 
     def prepare(self, plans: Sequence[Plan]) -> None:
-        """Have the expert pass plans that follow each other without a reset, as far as it can.
-
-        Raises:
-            SceneError: the simulator has no such scene.
-            SimulatorError: the simulator fails.
-        """
+        """Have the expert pass plans that follow each other without a reset, as far as it can."""
         with suppress(ExpertRefusedError):
             for plan in plans:
                 self.environment.expert_actions(plan.index)
 
     def run(self, plan: Plan, *, goes_on: bool = False) -> EpisodeResult[PlanRecord]:
-        """Run a plan from its true start, or from where the plan before has left the world.
-
-        Raises:
-            InfeasibleError: this simulator refuses an action of the expert before the plan's end,
-                or lacks an object of the plan.
-            DataError: a frame cannot be written or read.
-            ModelError: the model fails.
-            SceneError: the simulator has no such scene.
-            SimulatorError: the simulator fails.
-        """
+        """Run a plan from its true start, or from where the plan before has left the world."""
         environment = self.environment
         begin = environment.go_on if goes_on else environment.reset
         observation, info = begin(plan.index)
@@ -147,10 +133,6 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
 
         The expert's actions are replayed nevertheless: an infeasible plan is excluded for every
         subject, attempted or not, so that all have the same denominator.
-
-        Raises:
-            InfeasibleError: as `run`.
-            SimulatorError: as `run`.
         """
         self.environment.expert_actions(plan.index)
         record = plan_record(self._trajectory, plan)

@@ -32,11 +32,7 @@ class PlanTarget:
 
 
 def target_of(plan: Plan, grounding: Grounding, view: SimulatorView) -> PlanTarget:
-    """Return a recorded plan's target at its start; GotoLocation's is of `PlanEnvironment`.
-
-    Raises:
-        InfeasibleError: the scene has no object for an id.
-    """
+    """Return a recorded plan's target at its start; GotoLocation's is of `PlanEnvironment`."""
     return PlanTarget(
         plan.kind,
         _here(plan.object_id, grounding, view),

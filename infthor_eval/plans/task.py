@@ -80,12 +80,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
     """
 
     def __init__(self, file: TaskFile, request: TaskRequest[PlansOptions]) -> None:
-        """Check the file and find its trajectories.
-
-        Raises:
-            UsageError: a setting does not fit, or no trajectory has such plans.
-            DataError: the file is malformed, or none of its trajectories can be used.
-        """
+        """Check the file and find its trajectories."""
         file.require("dataset_kwargs", "generation_kwargs")
         self._options = request.options
         settings = with_options(task_settings(file, PlanTaskSettings), self._options)

@@ -61,10 +61,6 @@ def wrap_metric_errors(problem: str) -> Iterator[None]:
 
     Args:
         problem: the function and the question that it fails on.
-
-    Raises:
-        MetricError: the function raises an exception, or takes longer than
-            `limits.SCORER_SECONDS`.
     """
     try:
         with limit_by(SCORER_SECONDS, problem, MetricError):
@@ -104,11 +100,7 @@ class Request(Generic[Payload]):
         raise NotImplementedError
 
     def scored(self, payload: Payload, answer: str) -> Payload:
-        """Return a payload with the scores of the answer.
-
-        Raises:
-            MetricError: the metrics fail on it.
-        """
+        """Return a payload with the scores of the answer."""
         raise NotImplementedError
 
     @property
@@ -267,11 +259,8 @@ def answer_requests(
 def request_fingerprint(
     context: Sequence[Part], text: str, answers: Sequence[Answer], decoding: Mapping[str, Any]
 ) -> str:
-    """Return the hash of a request: context with the frames' content, text, gold answers, decoding.
-
-    Raises:
-        DataError: a frame cannot be read.
-    """
+    """Return the hash of a request: context with the frames' content, text, gold answers,
+    decoding."""
     contents = [_content(part) for part in context]
     return fingerprint(
         {"context": contents, "text": text, "answers": list(answers), "decoding": decoding}

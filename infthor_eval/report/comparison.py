@@ -53,11 +53,7 @@ class Comparison:
 def compare(
     suite: Suite, presenter: Presenter, first: Iterable[Record], second: Iterable[Record]
 ) -> list[Comparison]:
-    """Compare the records of two runs of a suite on the units that both have a result of.
-
-    Raises:
-        DataError: there is no such unit.
-    """
+    """Compare the records of two runs of a suite on the units that both have a result of."""
     firsts = _by_unit(first)
     seconds = _by_unit(second)
     shared = [key for key in firsts if key in seconds]

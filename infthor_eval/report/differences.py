@@ -145,9 +145,6 @@ def compare_questions(first: Run, second: Run) -> Compared:
 
     A task and variant (a depth) is compared with that of its name; a run's only one with the only
     one of the other run, whatever its name.
-
-    Raises:
-        DataError: no question has a result in both.
     """
     runs = (first, second)
     pairs = list(_pairs(runs))

@@ -224,12 +224,7 @@ class Explanation:
 
 
 def explain_runs(first: Run, second: Run) -> Explanation:
-    """Explain why two runs of one suite differ.
-
-    Raises:
-        UsageError: the runs are not of replies to questions.
-        DataError: no question has a result in both.
-    """
+    """Explain why two runs of one suite differ."""
     if not first.presenter.compares_scorers:
         raise UsageError(
             f"{first.folder} is a run of {first.suite.name}, which has no replies to compare; use "

@@ -210,9 +210,6 @@ def save_figure(draw: Callable[[], Figure], folder: Path, name: str) -> list[Pat
         draw: draws the figure; called with the style in effect.
         folder: folder of the files.
         name: name of the files, without suffix.
-
-    Raises:
-        DataError: a file cannot be written.
     """
     with _in_style():
         figure = draw()

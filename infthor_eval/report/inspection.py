@@ -19,9 +19,6 @@ def write_inspection_page(path: Path, items: Sequence[JudgedQuestion], data: Nie
 
     In a browser a person decides about them and saves the decisions as CSV. Frames are linked from
     the set, not copied.
-
-    Raises:
-        DataError: it cannot be written.
     """
     values = {
         "items": [_describe(judged, data, path.parent) for judged in items],

@@ -27,10 +27,6 @@ def build_figure(
         name: name of the figure.
         request: which task and panels.
         notify: called with each bad line of a journal.
-
-    Raises:
-        UsageError: there is no such figure, it is not of these runs, or it has panels of its own.
-        DataError: a run cannot be read.
     """
     owners = {suite: find_presenter(suite).figures for suite in suite_names()}
     if not any(name in figures for figures in owners.values()):

@@ -81,9 +81,6 @@ def compare_sides(
         runs: the runs, of one suite.
         sides: their sides.
         against: place of the run that all others are compared with; None for each with each.
-
-    Raises:
-        DataError: no two sides share a question.
     """
     suite = runs[0].suite
     presenter = runs[0].presenter

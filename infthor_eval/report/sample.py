@@ -218,11 +218,7 @@ class Sample:
 
 
 def find_samples(runs: Sequence[Run], name: str, data: Path | None = None) -> list[Sample]:
-    """Return the samples of a name in runs: an id, or a whole key with variant and repetition.
-
-    Raises:
-        UsageError: there is none.
-    """
+    """Return the samples of a name in runs: an id, or a whole key with variant and repetition."""
     found = [
         Sample(run, record, data)
         for run in runs

@@ -19,12 +19,7 @@ _DIGITS = ".16G"  # as XlsxWriter writes numbers; the greatest floats become inf
 
 
 def prepare_spreadsheet(path: Path) -> Path:
-    """Check, before the work starts, that a spreadsheet can be written; create its folder.
-
-    Raises:
-        DataError: the path cannot be written to.
-        UsageError: the extra `xlsx` is not installed.
-    """
+    """Check, before the work starts, that a spreadsheet can be written; create its folder."""
     if find_spec("xlsxwriter") is None:
         raise UsageError("a spreadsheet needs XlsxWriter; pip install 'infthor-eval[xlsx]'")
     return prepare_file(path, "--xlsx")
@@ -34,9 +29,6 @@ def write_spreadsheet(path: Path, tables: Sequence[Table]) -> None:
     """Write tables into a prepared file, a sheet each.
 
     Numbers are numbers there, and no text is taken for a formula or a link. Notes stand below.
-
-    Raises:
-        DataError: it cannot be written.
     """
     from xlsxwriter import Workbook
 

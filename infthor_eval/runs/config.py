@@ -143,11 +143,7 @@ def _plain_text(value: Any) -> str:
 
 
 def require_tasks(config: RunConfig[Any], run: str) -> None:
-    """Check that a config has tasks; that of a journal of another harness's requests has none.
-
-    Raises:
-        DataError: names the run.
-    """
+    """Check that a config has tasks; that of a journal of another harness's requests has none."""
     if not config.tasks:
         raise DataError(
             f"{run}: not the config of a run of {config.suite or 'a suite'} (it has no tasks); run "

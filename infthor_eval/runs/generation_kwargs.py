@@ -24,9 +24,6 @@ def decoding_of(settings: Mapping[str, Any], seed: int, task: str) -> Decoding:
         settings: `generation_kwargs` of a task, or of a request of lm-eval's.
         seed: seed of the sampling.
         task: name of the task, for messages.
-
-    Raises:
-        UsageError: a setting is unknown, or contradicts another.
     """
     if not isinstance(settings, Mapping):
         raise UsageError(

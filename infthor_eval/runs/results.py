@@ -53,31 +53,21 @@ def write_run_files(
     n_missing: int,
     usage: Usage,
 ) -> None:
-    """Write results, scores and usage of a run; see the functions below for each.
-
-    Raises:
-        DataError: a file cannot be written.
-    """
+    """Write results, scores and usage of a run; see the functions below for each."""
     write_results(folder, results_document(run, suite, n_missing, usage))
     write_scores(folder, suite, records)
     write_usage(folder, records, usage)
 
 
 def write_results(folder: Path, document: dict[str, Any]) -> None:
-    """Write `results.json` (`results_document`) into a run's folder; equal runs give equal bytes.
-
-    Raises:
-        DataError: the file cannot be written.
-    """
+    """Write `results.json` (`results_document`) into a run's folder; equal runs give equal
+    bytes."""
     write_document(folder / RESULTS, document)
 
 
 def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRecord[Any]]) -> None:
-    """Write every unit's scores to `scores.jsonl`, an object a line; equal runs give equal bytes.
-
-    Raises:
-        DataError: the file cannot be written.
-    """
+    """Write every unit's scores to `scores.jsonl`, an object a line; equal runs give equal
+    bytes."""
     rows = (
         {
             "task": record.task,
@@ -97,11 +87,7 @@ def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRec
 
 
 def write_usage(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) -> None:
-    """Write requests, tokens, time and cost, which differ from run to run, to `usage.json`.
-
-    Raises:
-        DataError: the file cannot be written.
-    """
+    """Write requests, tokens, time and cost, which differ from run to run, to `usage.json`."""
     document = {
         "requests": usage.requests,
         "read": usage.context,
@@ -115,11 +101,7 @@ def write_usage(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) 
 
 
 def write_document(path: Path, document: Any) -> None:
-    """Write a JSON file into a run's folder, its keys sorted; equal documents give equal bytes.
-
-    Raises:
-        DataError: the file cannot be written.
-    """
+    """Write a JSON file into a run's folder, its keys sorted; equal documents give equal bytes."""
     with _atomic_file(path) as partial:
         encoded = msgspec.json.encode(document, order="sorted")
         partial.write_bytes(msgspec.json.format(encoded, indent=2) + b"\n")

@@ -61,9 +61,6 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
 
     Returns:
         Exit code: 1 if a measured sample failed, else 0.
-
-    Raises:
-        ModelError: every measured sample failed.
     """
     with progress_bar(NOTES) as progress, prints_as_notes():
         bar = progress.add_task(f"{request.label}: measuring", total=None)

@@ -26,9 +26,6 @@ def take_options(context: click.Context, given: Mapping[str, Any], source: str) 
         context: context of the command, before its arguments are parsed.
         given: the options; several values are a list, those of `model_args` a mapping.
         source: where they are from, for messages.
-
-    Raises:
-        UsageError: an option is unknown, or its value is not valid.
     """
     params = (param for param in context.command.params if param.expose_value)
     known = {_long_name(param): param for param in params}

@@ -36,11 +36,7 @@ class ShowOptions:
 
     @classmethod
     def from_click(cls, params: Mapping[str, Any]) -> "ShowOptions":
-        """Return the options among the parameters of a command, which adds --quiet itself.
-
-        Raises:
-            UsageError: --json with --format or --full.
-        """
+        """Return the options among the parameters of a command, which adds --quiet itself."""
         if params["as_json"] and (params["format"] is not None or params["full"]):
             raise UsageError("--json holds everything; leave out --format and --full")
         output_format = "json" if params["as_json"] else params["format"]

@@ -57,11 +57,6 @@ def rehearse(
         tasks: names of tasks and groups.
         data: folder of the set; None for the published one where it was downloaded, else for the
             published numbers.
-
-    Raises:
-        UsageError: a name or an option is unknown, or the model has no checkpoint.
-        ModelError: the model cannot be run on shapes.
-        DataError: the folder is no set.
     """
     files = Catalog.find_installed().expand(tasks)
     options = read_options(model, texts)

@@ -62,9 +62,6 @@ def budget_of(prepared: PreparedTask, model: Model) -> Budget:
 
     Questions in one context differ by a few words, so each context is counted once, with its
     longest question.
-
-    Raises:
-        ModelError: the model can take none of the requests, whatever their length.
     """
     capabilities = model.capabilities
     limit = capabilities.max_tokens

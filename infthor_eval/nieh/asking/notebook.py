@@ -20,12 +20,8 @@ class Notebook:
         self._session = session
 
     def write(self, parts: Sequence[str | FrameRef], max_new_tokens: int) -> str:
-        """Return what the model writes when given texts and frames (`infthor_eval.memory.Write`).
-
-        Raises:
-            DataError: a frame cannot be read.
-            ModelError: the model cannot take the request.
-        """
+        """Return what the model writes when given texts and frames
+        (`infthor_eval.memory.Write`)."""
         decoding = Decoding(max_new_tokens=max_new_tokens)
         content = [[part.digest] if isinstance(part, FrameRef) else part for part in parts]
         inputs = fingerprint({"parts": content, "decoding": decoding.document()})

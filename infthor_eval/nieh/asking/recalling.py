@@ -86,14 +86,7 @@ class Recaller:
             self._built = None
 
     def recall(self, sample: QuestionVariant) -> NiehRecall:
-        """Return what is recalled for a sample.
-
-        Raises:
-            DataError: a frame or the trajectory's metadata cannot be read.
-            ModelError: the model under test cannot write what the memory asks for, or the memory
-                recalls what it may not: beyond its budget, or what it has not observed.
-            UserCodeError: the memory fails.
-        """
+        """Return what is recalled for a sample."""
         settings = sample.recall
         question = sample.question
         if settings is None:
@@ -211,11 +204,7 @@ def apply_recall(sample: QuestionVariant, recall: NiehRecall) -> QuestionVariant
 
 
 def recall_all(task_samples: TaskSamples) -> list[QuestionVariant]:
-    """Return a task's samples, with what their memory recalls, for models that are none of ours.
-
-    Raises:
-        UsageError: the memory asks the model under test, or recalling fails.
-    """
+    """Return a task's samples, with what their memory recalls, for models that are none of ours."""
     if not any(sample.awaits_recall for sample in task_samples.samples):
         return list(task_samples.samples)
     kept: dict[str, NiehRecall] = {}
@@ -237,12 +226,7 @@ def recall_all(task_samples: TaskSamples) -> list[QuestionVariant]:
 
 
 def asks_model(task_samples: TaskSamples) -> bool:
-    """Return whether a memory of a task asks the model under test.
-
-    Raises:
-        UsageError: a memory cannot be opened.
-        UserCodeError: it fails.
-    """
+    """Return whether a memory of a task asks the model under test."""
     waiting = [sample.recall for sample in task_samples.samples if sample.awaits_recall]
     return any(
         open_memory(settings.memory, settings.options).capabilities.writes

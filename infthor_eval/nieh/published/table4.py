@@ -20,11 +20,7 @@ _NOTES = (
 
 
 def table4(data: NiehSet) -> Table:
-    """Return Table 4 as the set's own scores give it, each row above the printed one.
-
-    Raises:
-        DataError: the set has no questions with the scores of a model.
-    """
+    """Return Table 4 as the set's own scores give it, each row above the printed one."""
     published = next(table for table in published_tables("nieh") if table.title == _TITLE)
     rows = []
     misprints = []
@@ -58,11 +54,7 @@ def table4(data: NiehSet) -> Table:
 
 
 def derive_row(data: NiehSet, row: PublishedRow) -> dict[str, MeanEstimate]:
-    """Return a row's mean scores by column, from 0 to 1 (the published scorer can exceed 1).
-
-    Raises:
-        DataError: a question lacks the score, or no question is in a column.
-    """
+    """Return a row's mean scores by column, from 0 to 1 (the published scorer can exceed 1)."""
     chosen: dict[str, list[Question]] = {name: [] for name in CLUE_COLUMNS}
     for question in data.questions:
         if question.clue_column in chosen:

@@ -136,12 +136,7 @@ class Judge:
         seed: int,
         prompt: str = YES_NO,
     ) -> Self:
-        """Load the judge of a model's name.
-
-        Raises:
-            UsageError: there is no such model or option, or it cannot answer in words.
-            ModelError: it cannot be loaded.
-        """
+        """Load the judge of a model's name."""
         if not is_known(name):
             raise unknown_name("model", name, names())
         check_options(name, options)
@@ -166,11 +161,8 @@ class Judge:
         return {"label": self.name, **self._identity, **settings}
 
     def verdict(self, record: Record, session: Session[NiehAnswer]) -> float | None:
-        """Return the judge's score, 0 to 1; None if it gives none. The session's verdict is reused.
-
-        Raises:
-            ModelError: the judge cannot be asked.
-        """
+        """Return the judge's score, 0 to 1; None if it gives none. The session's verdict is
+        reused."""
         payload = record.payload
         response = response_of(payload.reply or "", payload.answers)
         text = self._form.text(payload.question, payload.answers, response)

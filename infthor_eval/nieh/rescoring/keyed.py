@@ -14,11 +14,7 @@ from infthor_eval.runs import UnitRecord
 
 
 def with_key(source: Source, key: AnswerKey) -> Source:
-    """Return a run on the public part as one on the set with the answers, not yet scored.
-
-    Raises:
-        DataError: it is a run on another set.
-    """
+    """Return a run on the public part as one on the set with the answers, not yet scored."""
     tasks = source.header.config.tasks
     for name, task in tasks.items():
         if task.data != key.public:
@@ -57,9 +53,6 @@ def keyed_payload(
         public_id: id of that question.
         key: the key.
         shown: positions of the shown frames; None if they are not known.
-
-    Raises:
-        DataError: the key has no such question.
     """
     question = key.question(public_id)
     return replace(

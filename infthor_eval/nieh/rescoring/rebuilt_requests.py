@@ -48,11 +48,7 @@ class RequestRebuilder:
     """Makes the requests of one task of a stored run again."""
 
     def __init__(self, header: RunHeader[NiehConfig], task: str, data: NiehSet) -> None:
-        """Take the run's header, the name of the task, and its set, unchanged since the run.
-
-        Raises:
-            UsageError: a setting of the task is not valid.
-        """
+        """Take the run's header, the name of the task, and its set, unchanged since the run."""
         config = header.config.tasks[task]
         kept = config_values(NiehSettings()).keys() | {"seed"}
         of_run = {name: getattr(header.config, name) for name in kept}
@@ -66,11 +62,7 @@ class RequestRebuilder:
         self._shows_images = config.film == "images"
 
     def rebuild(self, record: UnitRecord[NiehAnswer]) -> RebuiltRequest:
-        """Return the request of a record.
-
-        Raises:
-            DataError: it cannot be made again, or not exactly; the message says why.
-        """
+        """Return the request of a record."""
         sample = self._find_sample(record)
         parts, text = self._samples.request(sample)
         context = tuple(as_images(parts) if self._shows_images else parts)

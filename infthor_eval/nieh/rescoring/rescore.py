@@ -144,10 +144,6 @@ class Rescoring:
         Args:
             output: folder above those of runs.
             track: see `judge_replies`.
-
-        Raises:
-            UsageError: another process writes the run.
-            DataError: something cannot be written.
         """
         records: list[Record] = []
         judgements: list[Judgement] = []
@@ -209,12 +205,7 @@ class Rescoring:
 
 
 def read_source(folder: Path, notify: Notify | None = None) -> Source:
-    """Read the run in a folder; `notify` is called with each bad line, see `read_run`.
-
-    Raises:
-        UsageError: it is a run of another suite.
-        DataError: there is no journal, or one with a bad line, or of another format.
-    """
+    """Read the run in a folder; `notify` is called with each bad line, see `read_run`."""
     header = read_header(folder)
     if header.suite != NiehSuite.name:
         raise UsageError(
@@ -228,11 +219,8 @@ def read_source(folder: Path, notify: Notify | None = None) -> Source:
 def score_again(
     source: Source, scorer: OwnScorer | None = None, judge: Judge | None = None
 ) -> Rescoring:
-    """Set up a run with both scorers' scores today, and those of an own scorer and a judge if any.
-
-    Raises:
-        UsageError: the own scorer calls a metric as one of ours is called.
-    """
+    """Set up a run with both scorers' scores today, and those of an own scorer and a judge if
+    any."""
     own = scorer.score_all(source.replied, (*SCORERS, JUDGED)) if scorer else None
     return Rescoring(source, scorer, own, judge)
 

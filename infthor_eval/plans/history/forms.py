@@ -147,9 +147,6 @@ def history_named(text: str, memory: MemoryChoice) -> History:
         text: "full", "published", "goals", "plans", "last:N" (N tokens), "text", "retrieved:K" or
             "frames:K" (K frames), or "memory".
         memory: the options of memories.
-
-    Raises:
-        UsageError: there is no such history, or an option is given that it does not use.
     """
     kind, _, number = text.partition(":")
     size = int(number) if number.isdecimal() else 0

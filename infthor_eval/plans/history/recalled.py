@@ -44,9 +44,6 @@ class RecalledHistory:
             options: options of its class, sorted pairs.
             budget: most tokens of what it recalls; None for its own limit.
             blank: whether it observes blank frames.
-
-        Raises:
-            UsageError: there is no such memory, or it needs a model that writes.
         """
         self._name = name
         self._options = options
@@ -73,14 +70,7 @@ class RecalledHistory:
         return [*recalled, goal_part(past.goal), past.present.before, plan_part(past.present.plan)]
 
     def choose(self, past: Past, count: CountTokens) -> list[Part]:
-        """Return what is recalled, in order.
-
-        Raises:
-            DataError: a frame cannot be read, or the trajectory lacks what a privileged memory
-                needs.
-            ModelError: there is a budget and the model counts no tokens, or the memory exceeds it.
-            UserCodeError: the memory fails.
-        """
+        """Return what is recalled, in order."""
         if self._privileged and not past.logs:
             raise DataError(
                 f"the trajectory has no log of what is in view, which the memory {self._name} needs"
@@ -142,11 +132,7 @@ class MemoryChoice:
     blank: bool = False
 
     def open(self) -> RecalledHistory:
-        """Open the memory.
-
-        Raises:
-            UsageError: none is named, or it cannot be opened.
-        """
+        """Open the memory."""
         if self.name is None:
             raise UsageError(
                 "--history memory: give --memory NAME; `infthor-eval ls memories` lists them"
@@ -162,11 +148,7 @@ class MemoryChoice:
         return RecalledHistory(self.name, tuple(sorted(options.items())), budget, self.blank)
 
     def refuse(self, history: str) -> None:
-        """Refuse options of memories with another history.
-
-        Raises:
-            UsageError: there is one.
-        """
+        """Refuse options of memories with another history."""
         typed = {"--memory": self.name, "--memory-args": self.options, "--budget": self.budget}
         for option, value in typed.items():
             if value is not None:

@@ -49,12 +49,7 @@ class RetrievedFrames:
         ]
 
     def choose(self, past: Past, count: CountTokens) -> list[Part]:
-        """Return the frames in the file's order, 336x336 pixels.
-
-        Raises:
-            DataError: the file names none for this action, or a frame that is not known or not yet
-                taken; or a frame cannot be read or written.
-        """
+        """Return the frames in the file's order, 336x336 pixels."""
         frames = [step.frame for step in past.observations()]
         if past.trajectory is None:
             raise DataError("the trajectory's file is not known, which --history retrieved:K reads")
@@ -63,22 +58,14 @@ class RetrievedFrames:
 
 
 def require_retrieved(trajectories: Iterable[Trajectory], task: str) -> None:
-    """Check that some trajectory names retrieved frames; `task` is for the message.
-
-    Raises:
-        DataError: none does.
-    """
+    """Check that some trajectory names retrieved frames; `task` is for the message."""
     if not any(trajectory.retrieved_image for trajectory in trajectories):
         missing = "no trajectory there has retrieved_image, which --history retrieved:K shows"
         raise DataError(f"{task}: {missing}; take --history frames:K, or the published test files")
 
 
 def retrieved_steps(trajectory: Trajectory, action: int, k: int) -> Sequence[int]:
-    """Return the frames that a file names before an action: 0 is the first, n + 1 after n.
-
-    Raises:
-        DataError: it names none, or one that is not known or is taken after the action.
-    """
+    """Return the frames that a file names before an action: 0 is the first, n + 1 after n."""
     entry = f'trajectory {trajectory.traj_id}: retrieved_image["{action}"]["top{k}"]'
     names = _names(trajectory.retrieved_image, action, k, entry)
     steps = _steps_of_images(trajectory)
@@ -115,11 +102,7 @@ def _steps_of_images(trajectory: Trajectory) -> Mapping[str, int]:
 
 
 def _resized(frame: FrameRef) -> FrameRef:
-    """Return a frame in the published size, in a file beside it, which ends with the episode.
-
-    Raises:
-        DataError: it cannot be read or written.
-    """
+    """Return a frame in the published size, in a file beside it, which ends with the episode."""
     path = frame.path.with_name(f"{Path(frame.name).stem}-{_SIDE}.png")
     if not path.is_file():
         image = frame.load().resize((_SIDE, _SIDE), resample=Image.Resampling.LANCZOS)

@@ -82,11 +82,7 @@ class _FrameMemory:
 
 
 def final_form(history: History, name: str) -> FinalForm:
-    """Return the form of a value of `--history`, given what it stands for elsewhere.
-
-    Raises:
-        UsageError: the published scripts have no such form.
-    """
+    """Return the form of a value of `--history`, given what it stands for elsewhere."""
     if name in ("full", "published"):
         return FinalForm(system_prompt("goals"), GoalHistory(), ends=(ACT,))
     if isinstance(history, StateInWords):

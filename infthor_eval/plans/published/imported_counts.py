@@ -47,12 +47,7 @@ class ImportedCounts:
 
 
 def import_counts(log: PlanLog, model: str | None = None) -> ImportedCounts:
-    """Return the run that a log holds; `model` names it, None for the published log's model.
-
-    Raises:
-        UsageError: the log names no model and none is given.
-        DataError: the log has no plan that can be imported.
-    """
+    """Return the run that a log holds; `model` names it, None for the published log's model."""
     name = model or log.model
     if name is None:
         raise UsageError(f"{log.path}: its name has no model; give one with --model")

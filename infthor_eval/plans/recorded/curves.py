@@ -45,10 +45,6 @@ def plan_curves(runs: Sequence[PlansRun], task: str | None = None) -> RewardCurv
     """Compute the curves of runs (at least one) of a task (None: the only one they share).
 
     See `compute_curves`. Plans that a run excludes are left out of all of them.
-
-    Raises:
-        UsageError: they share no task or several, or their reward rules differ.
-        DataError: they share no trajectory, or a journal is damaged.
     """
     return compute_curves(runs, shared_plans(runs, task), FACETS, _functions, _count)
 

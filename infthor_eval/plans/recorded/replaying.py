@@ -62,12 +62,7 @@ class RecordedPlans(RecordedTrajectory[PlansRun, PlanRecord]):
 
 
 def recorded_plans(run: PlansRun, task: str | None, trajectory: str | None) -> RecordedPlans:
-    """Find a run's records of a trajectory in a task; None for the only one.
-
-    Raises:
-        UsageError: there is no such task or trajectory, or none is given and there are several.
-        DataError: it is not a run of plans, or has no record yet.
-    """
+    """Find a run's records of a trajectory in a task; None for the only one."""
     tasks = [only_name("task", "--task", task, list(run.config.tasks))]
     return RecordedPlans(run, *records_of_trajectory(run, tasks, trajectory))
 

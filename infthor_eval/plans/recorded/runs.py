@@ -31,12 +31,8 @@ class PlansRun(RecordedRun[PlanRecord, PlansConfig]):
 
 
 def shared_plans(runs: Sequence[PlansRun], task: str | None) -> SharedUnits[PlanRecord]:
-    """Find a task's plans (None: the only shared one) in trajectories that all runs have in full.
-
-    Raises:
-        UsageError: they share no task or several, or their reward rules differ.
-        DataError: they share no trajectory, or one is not a run of plans.
-    """
+    """Find a task's plans (None: the only shared one) in trajectories that all runs have in
+    full."""
     shared = shared_tasks(runs, None if task is None else [task])
     if len(shared) > 1:
         raise UsageError(

@@ -81,9 +81,6 @@ def croissant(facts: SetFacts, about: About) -> dict[str, Any]:
     """Return a Croissant file as JSON values.
 
     Paths are relative to the file, which belongs beside the set's own.
-
-    Raises:
-        DataError: a file of questions cannot be read.
     """
     url = about.url or "."
     document = {

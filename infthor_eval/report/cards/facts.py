@@ -137,11 +137,7 @@ class SetFacts:
 
 
 def read_facts(root: Path) -> SetFacts:
-    """Count what is in a set.
-
-    Raises:
-        DataError: the folder is no set, or none of its questions can be asked.
-    """
+    """Count what is in a set."""
     data = NiehSet(root)
     if not data.questions:
         raise DataError(f"{root}: no question can be asked; fix the set, or give another")

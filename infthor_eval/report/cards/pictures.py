@@ -23,9 +23,6 @@ def draw_example(data: NiehSet, path: Path) -> str | None:
 
     Returns:
         A caption with question and answers; None if no question has frames to show.
-
-    Raises:
-        DataError: a frame cannot be read.
     """
     shown = _example(data)
     if not shown:

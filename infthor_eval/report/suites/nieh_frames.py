@@ -174,11 +174,7 @@ def _picture_key(frame: FrameRef) -> str:
 
 
 def _read_frame_facts(folder: Path) -> Sequence[FrameFacts]:
-    """Return what the log of a trajectory's folder says of each frame, in time order.
-
-    Raises:
-        DataError: the log cannot be read.
-    """
+    """Return what the log of a trajectory's folder says of each frame, in time order."""
     return [_facts(step) for step in sorted(read_steps(folder), key=lambda step: step.img_idx)]
 
 
@@ -254,11 +250,7 @@ class RequestFrames:
         self._rebuilders = {task: _rebuilder(run, task, sets) for task in run.tasks}
 
     def __call__(self, record: Record) -> list[FrameRef]:
-        """Return the frames of a record's request, those of films too.
-
-        Raises:
-            DataError: the request cannot be made again, or not exactly.
-        """
+        """Return the frames of a record's request, those of films too."""
         rebuilder = self._rebuilders[record.task]
         if isinstance(rebuilder, str):
             raise DataError(rebuilder)

@@ -35,11 +35,7 @@ def pairs_section(runs: Sequence[Run]) -> Section | None:
 
 
 def build_pairs_figure(runs: Sequence[Run], request: FigureRequest) -> FigureResult:
-    """Return the memory curves of a task as one figure, a panel each.
-
-    Raises:
-        UsageError: the runs have no pairs, or none in the task, or several tasks have some.
-    """
+    """Return the memory curves of a task as one figure, a panel each."""
     tasks = _tasks(runs)
     if request.task is None and len(tasks) > 1:
         raise UsageError(f"--figure pairs: give --task, one of {', '.join(tasks)}")

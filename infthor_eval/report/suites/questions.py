@@ -97,11 +97,7 @@ class QuestionsPresenter(PlainPresenter):
 
 
 def _questions(run: Run, task: str) -> dict[str, Question]:
-    """Return the questions of a task as its run asked them, by id.
-
-    Raises:
-        DataError: they are others today, or there are none.
-    """
+    """Return the questions of a task as its run asked them, by id."""
     config = run.header.config.tasks[task]
     assert isinstance(run.suite, QuestionSuite)  # nobody else gets this presenter
     try:

@@ -57,11 +57,8 @@ def one_panel(curves: RewardCurves) -> list[Panels]:
 
 
 def read_panels(path: Path, curves: RewardCurves) -> list[Panels]:
-    """Read panels from a YAML file: titles, each with a list of runs by their names in the table.
-
-    Raises:
-        DataError: it cannot be read, is of another form, or names a run that is not there.
-    """
+    """Read panels from a YAML file: titles, each with a list of runs by their names in the
+    table."""
     fix = "write titles, each with a list of runs (docs/figures.md)"
     panels = read_yaml(path, fix)
     if not isinstance(panels, dict) or not panels:

@@ -49,11 +49,8 @@ class PageRequest:
 def build_page(
     runs: Sequence[Run], request: PageRequest, progress: PageProgress | None = None
 ) -> Page:
-    """Build the page of some runs, of one suite or of several; `progress` observes what takes long.
-
-    Raises:
-        DataError: a run's header is not one of its suite.
-    """
+    """Build the page of some runs, of one suite or of several; `progress` observes what takes
+    long."""
     progress = progress or Silent()
     by_suite: dict[str, list[Run]] = {}
     progress.begin(_SUMMARIES, len(runs))

@@ -73,9 +73,6 @@ def write_index(
         out: the folder.
         request: options of the runs' pages. Of more than ten runs no page has pictures.
         progress: observes the pages.
-
-    Raises:
-        DataError: a page cannot be written.
     """
     pages = prepare_folder(out / "runs")
     jobs, unread = _plan(folders, pages)

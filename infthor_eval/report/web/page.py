@@ -132,11 +132,7 @@ class Page:
 
 
 def write_page(page: Page, path: Path) -> int:
-    """Write the page into a file and return its size in bytes; equal pages are equal bytes.
-
-    Raises:
-        DataError: it cannot be written.
-    """
+    """Write the page into a file and return its size in bytes; equal pages are equal bytes."""
     values = {
         "page": page,
         "data": [_embedded(page, name, value) for name, value in _data(page).items()],

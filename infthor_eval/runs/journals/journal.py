@@ -71,10 +71,6 @@ class Journal(Generic[Payload]):
         """Open or create a worker's shard in the run's folder, and read all others.
 
         Another process has `wait_s` seconds to release the shard.
-
-        Raises:
-            UsageError: another process is writing the shard, or it cannot be written.
-            DataError: a shard is no journal's, has a bad line, or belongs to another run.
         """
         path = run / FOLDER / _SHARD.format(worker)
         try:
@@ -142,9 +138,6 @@ class Journal(Generic[Payload]):
             worker: number of the worker.
             record: the record.
             request: the request that it names, if no record before it did.
-
-        Raises:
-            DataError: it cannot be written.
         """
         if not (self._path.parent / _SHARD.format(worker)).exists():
             if request is not None:
@@ -163,12 +156,7 @@ class Journal(Generic[Payload]):
         return self._log.units.get(record.key) is record
 
     def append(self, record: UnitRecord[Payload]) -> UnitRecord[Payload]:
-        """Write a record to disk before returning it with the number of its attempt.
-
-        Raises:
-            RefusedRecordError: a reader would refuse it; nothing is written.
-            DataError: it cannot be written, or the shard was deleted or replaced.
-        """
+        """Write a record to disk before returning it with the number of its attempt."""
         self.check_file()
         earlier = self._log.units.get(record.key)
         if earlier is not None:
@@ -187,12 +175,7 @@ class Journal(Generic[Payload]):
         return [self._log.artifacts[key] for key in sorted(self._log.artifacts)]
 
     def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
-        """Cache an artifact; it is on disk when this returns.
-
-        Raises:
-            RefusedRecordError: a reader would refuse it; nothing is written.
-            DataError: it cannot be written.
-        """
+        """Cache an artifact; it is on disk when this returns."""
         record: ArtifactRecord[Any] = ArtifactRecord(
             fingerprint=fingerprint, payload=artifact, usage=usage
         )
@@ -225,11 +208,7 @@ class Journal(Generic[Payload]):
             os.fsync(self._file.fileno())
 
     def check_file(self) -> None:
-        """Check that the shard is still at its path: what is written to a deleted file is lost.
-
-        Raises:
-            DataError: it was deleted or replaced.
-        """
+        """Check that the shard is still at its path: what is written to a deleted file is lost."""
         try:
             is_same = os.path.samestat(self._path.stat(), os.fstat(self._file.fileno()))
         except OSError:
@@ -259,10 +238,6 @@ def recover(run: Path, header: RunHeader, types: RecordTypes[Any]) -> int:
     """Move the bad lines of a run's shards to a file beside them: their units are tried again.
 
     The header replaces a bad first line. Returns the number of bad lines.
-
-    Raises:
-        UsageError: another process is writing a shard.
-        DataError: a shard is of another format.
     """
     return sum(_recover_shard(path, header, types) for path in find_shards(run))
 
@@ -298,11 +273,7 @@ def _is_good(line: bytes, decoder: Decoder, header: RunHeader, is_first: bool) -
 
 
 def set_aside(run: Path) -> None:
-    """Rename the journal of a run, so that the run restarts and nothing is lost.
-
-    Raises:
-        UsageError: another process is writing it.
-    """
+    """Rename the journal of a run, so that the run restarts and nothing is lost."""
     if not (run / FOLDER).exists():
         return
     with ExitStack() as locks:  # of all shards, until the folder has its new name

@@ -33,11 +33,7 @@ class RecordEncoder(Generic[Payload]):
         self._encoder = msgspec.json.Encoder()
 
     def encode(self, record: Any) -> bytes:
-        """Return the line of a record, header or artifact, without its end.
-
-        Raises:
-            RefusedRecordError: it has a value that JSON, its type or a limit does not allow.
-        """
+        """Return the line of a record, header or artifact, without its end."""
         try:
             line = self._encoder.encode(record)
             decoded = self._decoder.decode(line)

@@ -140,11 +140,8 @@ def read_run(
 def read_run_log(
     run: Path, types: RecordTypes[Payload], notify: Notify | None = None
 ) -> tuple[RunHeader, RunLog[Payload]]:
-    """Read the header of the run in a folder, and the contents of all its shards; see `read_run`.
-
-    Raises:
-        DataError: there is no journal, or one with a bad line, of another format or suite.
-    """
+    """Read the header of the run in a folder, and the contents of all its shards; see
+    `read_run`."""
     any_header = read_header(run)  # or says that there is no journal
     log = read_shards(run, types, notify)
     return log.header or any_header, log
@@ -182,9 +179,6 @@ def read_states(run: Path, notify: Notify | None = None) -> dict[UnitKey, State]
     Args:
         run: the folder.
         notify: see `read_run`.
-
-    Raises:
-        DataError: a line is bad.
     """
     decoder = msgspec.json.Decoder(_UnitOutcome | _AnyArtifact | _AnyHeader)
     latest: dict[UnitKey, _UnitOutcome] = {}
@@ -202,11 +196,7 @@ def read_states(run: Path, notify: Notify | None = None) -> dict[UnitKey, State]
 
 
 def find_shards(run: Path) -> list[Path]:
-    """Return the files of a run's shards.
-
-    Raises:
-        DataError: a shard is not a file.
-    """
+    """Return the files of a run's shards."""
     shards = sorted((run / FOLDER).glob("worker-*.jsonl"))
     for path in shards:
         require_file(path, "take it out of the run's folder")
@@ -225,11 +215,7 @@ def last_change(folder: Path) -> datetime:
 def read_shards(
     run: Path, types: RecordTypes[Payload], notify: Notify | None = None
 ) -> RunLog[Payload]:
-    """Read all shards of a run, see `read_run`; an empty log if there is none.
-
-    Raises:
-        DataError: a shard has a bad line, is of another format, or of another run than the others.
-    """
+    """Read all shards of a run, see `read_run`; an empty log if there is none."""
     log: RunLog[Payload] = RunLog()
     for path in find_shards(run):
         read_shard(path, types, log, notify)
@@ -273,11 +259,7 @@ def _naming(path: Path, number: int) -> AbstractContextManager[None]:
 def parse_record(
     path: Path, number: int, line: bytes, decoder: Decoder, header: RunHeader[Any]
 ) -> UnitRecord[Any] | ArtifactRecord[Any]:
-    """Return the record in a line of a shard; `number` is the line's, from 1.
-
-    Raises:
-        DataError: the line is bad, a header, or of a task that the shard's header lacks.
-    """
+    """Return the record in a line of a shard; `number` is the line's, from 1."""
     with _naming(path, number):
         record: UnitRecord[Any] | ArtifactRecord[Any] | RunHeader = decoder.decode(line)
     if isinstance(record, RunHeader):
@@ -307,11 +289,7 @@ class _AnyFormat(msgspec.Struct):
 
 
 def check_format(path: Path, line: bytes) -> None:
-    """Refuse a shard whose first line is a header of another format; any other line passes.
-
-    Raises:
-        DataError: names both formats, and what to do.
-    """
+    """Refuse a shard whose first line is a header of another format; any other line passes."""
     try:
         version = msgspec.json.decode(line, type=_AnyFormat).format
     except NOT_JSON:
@@ -327,11 +305,8 @@ _ANY_SUITE: RecordTypes[Any] = RecordTypes(unit=Any)  # configs of tasks as JSON
 
 
 def parse_header(path: Path, line: bytes, types: RecordTypes[Any] | None = None) -> RunHeader[Any]:
-    """Return the header in the first line of a shard; with the config of a suite given its types.
-
-    Raises:
-        DataError: the line is no header, or that of another format or suite.
-    """
+    """Return the header in the first line of a shard; with the config of a suite given its
+    types."""
     check_format(path, line)
     with wrap_errors(f"{path}, line 1: not the first line of a journal", _HINT, catch=NOT_JSON):
         header = _ANY_SUITE.header_decoder().decode(line)

@@ -55,11 +55,7 @@ class StoredTracebacks:
     """The tracebacks of a stored run."""
 
     def __init__(self, journal: Path) -> None:
-        """Read the file in the journal's folder; a run without one has none.
-
-        Raises:
-            DataError: it cannot be read.
-        """
+        """Read the file in the journal's folder; a run without one has none."""
         path = journal / _NAME
         # A process that was killed can have left half a character.
         text = read_bytes(path, _HINT).decode("utf-8", "replace") if path.exists() else ""

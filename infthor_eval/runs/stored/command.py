@@ -53,11 +53,7 @@ class StoredCommand:
 
 
 def write_command(folder: Path, request: RunRequest) -> None:
-    """Write `run.yaml` into a run's folder.
-
-    Raises:
-        DataError: the file cannot be written.
-    """
+    """Write `run.yaml` into a run's folder."""
     path = folder / _FILE
     text = _HEAD + yaml.safe_dump(_options_of(request), sort_keys=False, allow_unicode=True)
     with (
@@ -81,11 +77,7 @@ def read_stored_command(run_folder: Path) -> StoredCommand | None:
 
 
 def read_options(path: Path) -> dict[str, Any]:
-    """Read the options in a file as they are written; their names are not checked.
-
-    Raises:
-        DataError: the file cannot be read, or is no mapping of names.
-    """
+    """Read the options in a file as they are written; their names are not checked."""
     options = read_yaml(path, _HINT)
     if not isinstance(options, dict) or not all(isinstance(name, str) for name in options):
         raise DataError(f"{path}: holds no options; {_HINT}")

@@ -33,9 +33,6 @@ def label_runs(
         runs: folder and header of each run.
         ignore: options that the tables show anyway.
         by_task: whether runs of other tasks have other labels, too; frames are no part of these.
-
-    Raises:
-        DataError: the `run.yaml` of a run is not valid.
     """
     labels = _label_by_options(runs, ignore)
     return _label_by_task(labels, runs) if by_task else labels

@@ -35,11 +35,7 @@ class Results(msgspec.Struct, frozen=True):
 
 
 def read_results(folder: Path) -> Results | None:
-    """Read `results.json` of a run; None if there is none yet.
-
-    Raises:
-        DataError: the file is not valid.
-    """
+    """Read `results.json` of a run; None if there is none yet."""
     path = folder / RESULTS
     hint = "run the same command again"
     if not path.is_file():
@@ -49,11 +45,7 @@ def read_results(folder: Path) -> Results | None:
 
 
 def run_folders(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
-    """Yield the folders of runs at and below a folder, at most `depth` levels deep.
-
-    Raises:
-        DataError: a folder cannot be searched.
-    """
+    """Yield the folders of runs at and below a folder, at most `depth` levels deep."""
     if (folder / FOLDER).is_dir() or (folder / RESULTS).is_file():
         yield folder
     elif depth:

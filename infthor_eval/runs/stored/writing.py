@@ -39,10 +39,6 @@ def store_run(
         suite: suite of the run.
         make_records: returns all its records, given the session of its journal.
         n_missing: number of its units without a record.
-
-    Raises:
-        UsageError: another process writes the run.
-        DataError: the journal has a bad line, or something cannot be written.
     """
     folder = run_folder(output, header, header.config.tasks)
     with Journal(folder, header, suite.records) as journal:

@@ -45,9 +45,6 @@ def fetch_replies(
     """Have the requests of all units without a result answered; return False if it was stopped.
 
     All units are evaluated as usual, but the subject only records what it is asked.
-
-    Raises:
-        InfthorError: the requests cannot be sent, or the replies not be fetched.
     """
     batches = subject.open_batches(folder / FOLDER / _BATCHES, notify, should_stop)
     while True:

@@ -32,11 +32,7 @@ class BoundRun(Generic[SuiteUnit, Payload]):
     owns_subject: bool = True
 
     def close(self) -> None:
-        """Release the evaluation, then the subject, if it was loaded for this run.
-
-        Raises:
-            UserCodeError: one of them fails; both were tried.
-        """
+        """Release the evaluation, then the subject, if it was loaded for this run."""
         with ExitStack() as stack:
             if self.owns_subject:
                 stack.callback(self.subject.close)
@@ -49,13 +45,7 @@ class BoundRun(Generic[SuiteUnit, Payload]):
 def bind_run(
     run: PreparedRun[SuiteUnit, Payload], loaded: Subject | None = None
 ) -> BoundRun[SuiteUnit, Payload]:
-    """Load the subject of a run, unless it is given, and find its work.
-
-    Raises:
-        UsageError: the suite cannot evaluate the subject, or there is nothing to evaluate.
-        ModelError: the subject cannot be loaded, or can take none of the units.
-        DataError: the data do not match their format.
-    """
+    """Load the subject of a run, unless it is given, and find its work."""
     subject = _load_subject(run) if loaded is None else loaded
     with ExitStack() as stack:  # released only if anything below raises
         if loaded is None:

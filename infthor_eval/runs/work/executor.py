@@ -54,11 +54,7 @@ class LocalExecutor(Generic[SuiteUnit, Payload]):
     """The executor of this process."""
 
     def __init__(self, run: PreparedRun[SuiteUnit, Payload], notify: Callable[[str], None]) -> None:
-        """Load the subject and find the work; `notify` is called for each batch.
-
-        Raises:
-            InfthorError: see `bind_run`.
-        """
+        """Load the subject and find the work; `notify` is called for each batch."""
         self._notify = notify
         self._bound = bind_run(run)
         self._encoder = RecordEncoder(run.suite.records)

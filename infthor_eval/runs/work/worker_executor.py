@@ -160,10 +160,6 @@ class WorkerPoolExecutor(Generic[SuiteUnit, Payload]):
     def __init__(self, run: PreparedRun[SuiteUnit, Payload], notify: Callable[[str], None]) -> None:
         """Start the workers and wait for the first; `notify` is called when one is lost or cannot
         be started.
-
-        Raises:
-            UsageError: there is no such cluster.
-            InfthorError: no worker can be started; the reason of the last one.
         """
         self._notify = notify
         self._expected: RunConfig[Any] | None = None

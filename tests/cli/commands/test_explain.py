@@ -70,8 +70,10 @@ def edited(folder: Path, to: Path, edit: Callable[[list[dict[str, Any]]], None])
     shutil.copytree(folder, to)
     path = to / "journal" / "worker-0.jsonl"
     lines = [json.loads(line) for line in path.read_text().splitlines()]
+    requests = [line for line in lines if line["type"] == "artifact"]
+    lines = [line for line in lines if line not in requests]
     edit(lines)
-    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    path.write_text("".join(json.dumps(line) + "\n" for line in (*lines, *requests)))
     return to
 
 
