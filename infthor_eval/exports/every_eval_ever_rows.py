@@ -7,8 +7,8 @@ from typing import Any
 
 from infthor_eval.exports.measures import Measure, Scored, counted
 from infthor_eval.exports.samples import ACT, describe_result, facts_of, payload_of
+from infthor_eval.report.descriptions import StepRow
 from infthor_eval.report.sample import Sample
-from infthor_eval.report.web.samples import StepRow
 from infthor_eval.run import Run
 from infthor_eval.runs import StoredFrames, UnitRecord
 from infthor_eval.runs.stored.labels import with_frames

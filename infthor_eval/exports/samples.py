@@ -4,9 +4,8 @@ import msgspec
 
 from infthor_eval.exports.gaps import task_config
 from infthor_eval.reasons import count_reasons
-from infthor_eval.report.presenter import THOUGHT
+from infthor_eval.report.descriptions import THOUGHT, StepRow
 from infthor_eval.report.sample import Sample
-from infthor_eval.report.web.samples import StepRow
 from infthor_eval.run import Run
 
 ACT = "act"  # the tool that an agent's or an arm's steps are calls of

@@ -12,7 +12,8 @@ from typing import Any
 
 from infthor_eval.errors import DataError
 from infthor_eval.report.causes import Effect
-from infthor_eval.report.presenter import THOUGHT, ReplyTokens
+from infthor_eval.report.descriptions import THOUGHT
+from infthor_eval.report.presenter import ReplyTokens
 from infthor_eval.report.same_questions import Side, find_sides
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord

@@ -9,8 +9,8 @@ from typing import Any
 import msgspec
 
 from infthor_eval.report.charts import Chart
+from infthor_eval.report.descriptions import Description, StepRow
 from infthor_eval.report.presenter import (
-    Description,
     Figure,
     FindFrames,
     GroupScore,
@@ -19,7 +19,6 @@ from infthor_eval.report.presenter import (
     Timelines,
 )
 from infthor_eval.report.sample_columns import SampleColumn
-from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run

@@ -14,8 +14,9 @@ from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.report.charts import Chart
+from infthor_eval.report.descriptions import Description, StepRow
 from infthor_eval.report.sample_columns import SampleColumn
-from infthor_eval.report.web.samples import FrameFacts, StepRow, Timeline
+from infthor_eval.report.web.samples import FrameFacts, Timeline
 from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
@@ -29,24 +30,7 @@ Record = UnitRecord[Any]
 # Of twins, in any suite.
 NET_PAIRS = "net pairs"
 PAIRS_FINDING = "has {} net pairs"
-THOUGHT = "thought"  # name of the detail of a record that a model thought before its reply
 FindFrames = Callable[[Record], Sequence[FrameRef]]
-
-
-class Description(NamedTuple):
-    """A sample in words.
-
-    Attributes:
-        title: the question or the instruction.
-        target: the gold answers or the goal.
-        kind: type of the question or the episode, for the page's filter; empty for none.
-        clues: number of clues in words, for the page's filter; empty for none.
-    """
-
-    title: str
-    target: str = ""
-    kind: str = ""
-    clues: str = ""
 
 
 class ReplyTokens(NamedTuple):

@@ -14,9 +14,8 @@ from typing import Any
 
 from infthor_eval.errors import DataError, unknown_name
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.report.presenter import THOUGHT, Description
+from infthor_eval.report.descriptions import THOUGHT, Description, StepRow
 from infthor_eval.report.runs import choose_evenly
-from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run, open_runs
 from infthor_eval.runs import StoredFrames, StoredRequest, UnitRecord

@@ -17,9 +17,9 @@ from infthor_eval.manipulation.recorded.runs import ArmRun, label_by_radius
 from infthor_eval.manipulation.records import ArmRecord, ArmStep
 from infthor_eval.rates import format_percent
 from infthor_eval.report.charts import Chart, Class, Panels, Series, point_of
+from infthor_eval.report.descriptions import Description, StepRow
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
-    Description,
     EpisodeSelection,
     Figure,
     FigureRequest,
@@ -42,7 +42,6 @@ from infthor_eval.report.suites.reward_curves import (
     figure_section,
     trajectories_text,
 )
-from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Section
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord

@@ -14,12 +14,11 @@ from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.pairs import PAIR_BOUNDS
 from infthor_eval.report.charts import Chart
+from infthor_eval.report.descriptions import THOUGHT, Description
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
     NET_PAIRS,
     PAIRS_FINDING,
-    THOUGHT,
-    Description,
     Figure,
     FigureRequest,
     FigureResult,

@@ -17,11 +17,11 @@ from infthor_eval.plans.records import PlanRecord
 from infthor_eval.plans.summary import PlansSummary
 from infthor_eval.plans.twins.results import score_pairs
 from infthor_eval.report.charts import Chart
+from infthor_eval.report.descriptions import Description, StepRow
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
     NET_PAIRS,
     PAIRS_FINDING,
-    Description,
     EpisodeSelection,
     Figure,
     FigureRequest,
@@ -37,7 +37,6 @@ from infthor_eval.report.suites.reward_curves import (
     curves_result,
     figure_section,
 )
-from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Section
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord

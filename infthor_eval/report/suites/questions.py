@@ -14,8 +14,9 @@ from infthor_eval.questions.suite import (
     digest_of_questions,
 )
 from infthor_eval.report.charts import Chart, class_series, counted_classes
+from infthor_eval.report.descriptions import THOUGHT, Description
 from infthor_eval.report.plain import PlainPresenter
-from infthor_eval.report.presenter import THOUGHT, Description, FindFrames, Timelines
+from infthor_eval.report.presenter import FindFrames, Timelines
 from infthor_eval.report.web.samples import Timeline, TimelineFrame
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run

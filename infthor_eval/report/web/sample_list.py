@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 
+from infthor_eval.report.descriptions import StepRow
 from infthor_eval.report.runs import records_by_unit
 from infthor_eval.report.sample import Sample
 from infthor_eval.report.web.replays import EpisodePictures, EpisodeReplays
@@ -15,9 +17,9 @@ from infthor_eval.report.web.samples import (
     FrameFacts,
     Numbered,
     PageSample,
+    PageStep,
     Prompt,
     SampleResult,
-    StepRow,
     Timeline,
 )
 from infthor_eval.report.web.thumbnails import ThumbnailStore
@@ -166,10 +168,10 @@ def _result(source: _Source, record: Record, pictures: EpisodePictures) -> Sampl
     )
 
 
-def _with_pictures(steps: Sequence[StepRow], frames: Sequence[int | None]) -> tuple[StepRow, ...]:
+def _with_pictures(steps: Sequence[StepRow], frames: Sequence[int | None]) -> tuple[PageStep, ...]:
     """The first frame is the start; an episode that ends early in the replay has fewer frames than
     steps."""
     return tuple(
-        msgspec.structs.replace(step, picture=frames[number]) if number < len(frames) else step
-        for number, step in enumerate(steps, 1)
+        PageStep(**msgspec.structs.asdict(step), picture=picture)
+        for step, picture in zip_longest(steps, frames[1 : len(steps) + 1])
     )

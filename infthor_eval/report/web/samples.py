@@ -5,6 +5,7 @@ from typing import Generic, TypeVar
 
 import msgspec
 
+from infthor_eval.report.descriptions import StepRow
 from infthor_eval.runs import StoredFrames
 
 T = TypeVar("T", bound=Hashable)
@@ -114,23 +115,9 @@ class Prompt(msgspec.Struct, frozen=True, omit_defaults=True):
     note: str = ""
 
 
-class StepRow(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A step of an episode.
+class PageStep(StepRow, frozen=True, omit_defaults=True):
+    """A step of an episode on the page; `picture` is the number of the frame after it."""
 
-    Attributes:
-        action: the action in words; empty if the reply held none that could be tried.
-        reply: the model's reply, if it is not the action.
-        error: what was wrong with the action.
-        reward: reward of the step; None if steps have none.
-        note: further numbers, in words.
-        picture: number of the thumbnail of the frame after the step.
-    """
-
-    action: str = ""
-    reply: str = ""
-    error: str = ""
-    reward: float | None = None
-    note: str = ""
     picture: int | None = None
 
 
@@ -165,7 +152,7 @@ class SampleResult(msgspec.Struct, frozen=True, omit_defaults=True):
     seconds: float = 0.0
     tokens: tuple[int | None, int | None, int | None] = (None, None, None)
     details: Mapping[str, str] = {}
-    steps: tuple[StepRow, ...] = ()
+    steps: tuple[PageStep, ...] = ()
     start: int | None = None
     map: int | None = None
     note: str = ""
