@@ -15,6 +15,8 @@ from infthor_eval.memory import Observation, Query, TrajectoryFacts, open_memory
 from infthor_eval.nieh.asking.recalling import recall_all
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 from infthor_eval.nieh.samples import find_samples
+from infthor_eval.report.sample import Sample
+from infthor_eval.run import Run
 from infthor_eval.settings import read
 from model_adapters.hf.retrieval import open_retriever
 
@@ -230,3 +232,18 @@ def test_so_many_frames_cannot_be():
         for value in (0, -1, 2.5, "ten"):
             with pytest.raises(DataError, match=f"{name} is .*whole number|Expected `int`.*{name}"):
                 read(ContextSettings, {name: value})
+
+
+def test_which_frames_were_retrieved_is_known_without_model_and_set(noise, clip, tmp_path, run_cli):
+    root = noise(14)
+    shown = frames_of("clip_retrieval", root, retriever=str(clip))
+    words = ("--model", "oracle", "--tasks", "nieh_clip_retrieval", "--retriever", clip)
+    assert run_cli(*words, "--data", root, "--limit", "1", "--out", tmp_path / "out")[0] == 0
+    shutil.rmtree(root)
+    (folder,) = (tmp_path / "out").glob("*/*")
+    run = Run.open(folder)
+    (request,) = (Sample(run, record).request for record in run.records)
+    places = [at for first, last in request.shown for at in range(first, last + 1)]
+    assert len(places) == len(shown) == 10
+    _, out, _ = run_cli("show", folder, "--question", run.records[0].id)
+    assert f"\nQuestion: {run.records[0].payload.question}" in out
