@@ -10,6 +10,7 @@ from infthor_eval.runs import (
     RecordTypes,
     RunConfig,
     RunHeader,
+    StoredRequest,
     Tokens,
     UnitKey,
     UnitRecord,
@@ -18,6 +19,7 @@ from infthor_eval.runs import (
 )
 from infthor_eval.runs.journals.journal import Journal, recover, set_aside
 from infthor_eval.runs.journals.record_encoder import RefusedRecordError
+from infthor_eval.runs.journals.shards import read_run_log
 
 
 class Answer(msgspec.Struct, frozen=True, tag_field="type", tag="answer"):
@@ -281,14 +283,29 @@ def test_an_artifact_is_known_as_soon_as_it_is_cached(tmp_path):
 def test_a_worker_s_record_is_written_here_only_where_its_shard_cannot_be_seen(tmp_path):
     with opened(tmp_path) as driver:
         before = shard(tmp_path).read_bytes()
-        driver.add_from(7, record("unseen"), None)
-        assert shard(tmp_path).read_bytes().count(b"\n") == before.count(b"\n") + 1
+        sent = StoredRequest(("Where is it?",))
+        driver.add_from(7, record("unseen", request=sent.fingerprint), sent)
+        assert shard(tmp_path).read_bytes().count(b"\n") == before.count(b"\n") + 2
         with opened(tmp_path, worker=1) as worker:
             worker.append(record("seen"))
         driver.add_from(1, record("seen"), None)
-        assert shard(tmp_path).read_bytes().count(b"\n") == before.count(b"\n") + 1
+        assert shard(tmp_path).read_bytes().count(b"\n") == before.count(b"\n") + 2
         assert {known.id for known in driver.records} == {"unseen", "seen"}
-    assert len(read_run(tmp_path, TYPES)[1]) == 2
+    _, log = read_run_log(tmp_path, TYPES)
+    assert [len(log.requests_before(it.request) or ()) for it in log.records] == [0, 1]
+
+
+def test_what_a_request_continues_comes_before_it_and_may_not_be_missing_or_a_circle(tmp_path):
+    first = StoredRequest(("a",))
+    with opened(tmp_path) as journal:
+        journal.cache_artifact("first", first)
+        journal.cache_artifact("second", StoredRequest(("b",), after="first"))
+        journal.cache_artifact("lost", StoredRequest(("c",), after="nowhere"))
+        journal.cache_artifact("self", StoredRequest(("e",), after="self"))
+    _, log = read_run_log(tmp_path, TYPES)
+    assert log.requests_before("second") == [first, StoredRequest(("b",), after="first")]
+    assert log.requests_before("lost") is None
+    assert log.requests_before("self") == [StoredRequest(("e",), after="self")]
 
 
 def test_what_a_lost_worker_wrote_is_read_again(tmp_path):
