@@ -57,8 +57,9 @@ def own_pictures(root, name):
 # -- no-clue
 
 
-def test_the_clues_of_both_worlds_are_taken_out_on_both_sides(twins):
-    for name, seen in by_world(find(twins, "no-clue")).items():
+@pytest.mark.parametrize("context", ["trajectory", "video"])
+def test_the_clues_of_both_worlds_are_taken_out_on_both_sides(twins, context):
+    for name, seen in by_world(find(twins, "no-clue", context, fps=10)).items():
         own = own_pictures(twins, name)
         assert seen == [own[at] for at in range(N_FRAMES) if at not in CLUES]
 
@@ -76,13 +77,6 @@ def test_the_same_picture_at_another_step_is_no_clue(twins):
 def test_clues_are_blank_where_nothing_else_is_shown(twins):
     seen = by_world(find(twins, "no-clue", "clues"))
     assert seen == dict.fromkeys(seen, ["8x8.png"] * len(CLUES))
-
-
-def test_a_film_loses_its_clues(twins):
-    task_samples = find(twins, "no-clue", "video", fps=10)
-    seen = by_world(task_samples)
-    own = own_pictures(twins, "0-one")
-    assert seen["0-one"] == [own[at] for at in range(N_FRAMES) if at not in CLUES]
 
 
 def test_a_film_on_disk_loses_the_clues_among_its_sampled_frames(make_nieh_set, write_video):

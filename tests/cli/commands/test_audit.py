@@ -18,21 +18,13 @@ def leaking(n=40):
     return [*questions, *(Question(t, text, (1,), (answer,)) for t, text, answer in fair)]
 
 
-def test_a_set_is_audited_beside_a_run(make_nieh_set, tmp_path, run_cli):
+def test_a_set_is_audited_beside_a_run(make_nieh_set, run_cli, evaluate):
     data = make_nieh_set(leaking(24), size=8)
-    assert (
-        run_cli(
-            "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path / "out"
-        )[0]
-        == 0
-    )
-    (folder,) = (tmp_path / "out" / "oracle").iterdir()
-    code, out, _ = run_cli("audit", data, folder)
+    code, out, _ = run_cli("audit", data, evaluate(data=data))
     assert code == 0
     text = " ".join(out.split())
-    assert (
-        "Is there any {} in this room? (24 questions): words gets 100.0 % without a frame." in text
-    )
+    told = "Is there any {} in this room? (24 questions): words gets 100.0 % without a frame."
+    assert told in text
     assert "100.0 (solved)" in text
 
 

@@ -118,19 +118,12 @@ def test_logs_of_one_mode_on_two_files_are_one_run(data, tmp_path, run_cli):
     single, multi = tmp_path / LOG, tmp_path / f"eval_{MULTI}_Some-VL-7B_full_traj.log"
     single.write_text("\n".join(map(json.dumps, ROWS)))
     multi.write_text(json.dumps(row(0, "no", 1.0, OTHERS)))
-    assert (
-        run_cli("import-replies", single, multi, "--data", data, "--out", tmp_path / "out")[0] == 0
-    )
+    logs = ("import-replies", single, multi, "--data", data, "--out", tmp_path / "out")
+    assert run_cli(*logs)[0] == 0
     (folder,) = (tmp_path / "out" / "Some-VL-7B").iterdir()
-    by_clues = json.loads((folder / "results.json").read_text())["summary"]["tasks"]["nieh_full"][
-        "by_clues"
-    ]
-    assert {name: by_clues[name]["n"] for name in ("1", "2", ">=3", "total")} == {
-        "1": 4,
-        "2": 1,
-        ">=3": 0,
-        "total": 5,
-    }
+    summary = json.loads((folder / "results.json").read_text())["summary"]
+    by_clues = summary["tasks"]["nieh_full"]["by_clues"]
+    assert [by_clues[name]["n"] for name in ("1", "2", ">=3", "total")] == [4, 1, 0, 5]
 
 
 def test_two_logs_on_the_same_questions_count_them_once(data, tmp_path, run_cli):
@@ -144,21 +137,22 @@ def test_two_logs_on_the_same_questions_count_them_once(data, tmp_path, run_cli)
 
 
 @pytest.mark.parametrize(
-    ("more", "task", "setting"),
+    ("more", "task", "name", "value"),
     [
         (
             {"eval_mode": "truncate_head", "ctx_size_k": 64},
             "nieh_truncate_head_64k",
-            ("ctx_size", 64.0),
+            "ctx_size",
+            64.0,
         ),
-        ({"eval_mode": "clip_retrieval", "n_imgs": 20}, "nieh_clip_retrieval", ("top_k", 20)),
-        ({"eval_mode": "video"}, "nieh_video", ("context", "video")),
+        ({"eval_mode": "clip_retrieval", "n_imgs": 20}, "nieh_clip_retrieval", "top_k", 20),
+        ({"eval_mode": "video"}, "nieh_video", "context", "video"),
     ],
 )
-def test_the_mode_is_part_of_the_run(import_log, more, task, setting):
+def test_the_mode_is_part_of_the_run(import_log, more, task, name, value):
     _, _, (header, _) = import_log([{**one, **more} for one in ROWS])
     assert list(header.config.tasks) == [task]
-    assert header.config.tasks[task].dataset_kwargs[setting[0]] == setting[1]
+    assert header.config.tasks[task].dataset_kwargs[name] == value
 
 
 def test_half_a_log_is_a_run_with_the_rest_missing(import_log, tmp_path):
@@ -179,10 +173,7 @@ BAD = {
     "swapped": ({**ROWS[1], "qidx": 3}, "answers another question than row 3"),
     "another answer": ({**ROWS[1], "gt_answer": ["No"]}, "answers another question than row 1"),
     "beyond the end": ({**ROWS[1], "qidx": 4}, "answers question 4; the file has 4"),
-    "before the start": (
-        {**ROWS[1], "qidx": -1},
-        "is not a reply (Expected `int` >= 0",
-    ),
+    "before the start": ({**ROWS[1], "qidx": -1}, "is not a reply (Expected `int` >= 0"),
     "the same again": (ROWS[0], "answers qsingle0 again; the first reply is kept"),
     "too long": (
         {**ROWS[1], "llm_response": "yes " * 2_500_000},
@@ -206,27 +197,25 @@ def test_a_row_that_does_not_fit_is_counted_and_named(import_log, bad):
 
 
 @pytest.mark.parametrize(
-    ("content", "name", "options", "reason"),
+    ("content", "name", "reason"),
     [
         (
             [{**one, "traj_id": "x"} for one in ROWS],
             LOG,
-            (),
             "no row answers a question of this set (answers another",
         ),
-        ([], LOG, (), "no row answers a question of this set (it is empty)"),
-        (ROWS, "replies.log", (), "replies.log: its name has no model; give one with --model"),
+        ([], LOG, "no row answers a question of this set (it is empty)"),
+        (ROWS, "replies.log", "replies.log: its name has no model; give one with --model"),
         (
             [{**ROWS[0], "eval_mode": "dreams"}],
             LOG,
-            (),
             "the mode 'dreams' is unknown; there are full_traj, truncate_head",
         ),
-        (b"\x1f\x8b broken", f"{LOG}.gz", (), "cannot be read after line 0"),
+        (b"\x1f\x8b broken", f"{LOG}.gz", "cannot be read after line 0"),
     ],
 )
-def test_a_log_that_cannot_be_imported_is_one_line(import_log, content, name, options, reason):
-    code, output, read = import_log(content, name, *options)
+def test_a_log_that_cannot_be_imported_is_one_line(import_log, content, name, reason):
+    code, output, read = import_log(content, name)
     assert (code, read, output.count("\n")) == (2, None, 1)
     assert reason in output
 
@@ -244,14 +233,9 @@ def test_replies_in_any_language_are_scored(import_log):
 
 
 def test_the_neutral_form(import_log):
+    counted = {"n_context_tokens": 9, "n_reply_tokens": 2, "seconds": 1.5}
     rows = [
-        {
-            "question_id": "qsingle0",
-            "reply": "SideTable",
-            "n_context_tokens": 9,
-            "n_reply_tokens": 2,
-            "seconds": 1.5,
-        },
+        {"question_id": "qsingle0", "reply": "SideTable", **counted},
         {"question_id": "qmulti4", "reply": "no"},
         {"question_id": "q?", "reply": "no"},
     ]

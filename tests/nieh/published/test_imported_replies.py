@@ -167,47 +167,26 @@ def test_the_name_of_a_log_of_videos_tells_their_rate(imported, name, task, sett
 
 # 123 tokens a frame, 144 a pair of frames of a film; the prompt's own words, and a word of the
 # question each.
-WORDS = {"published-logs": 60 + 5, "published-main": 52 + 5}
-FILM = 54 + 5
+LOGS, MAIN = ("published-logs", 60 + 5), ("published-main", 52 + 5)
+FILM = {"eval_mode": "video", "ctx_n_tokens": 290 + 54 + 5}
 END = {"eval_mode": "truncate_head", "ctx_size_k": 32, "n_imgs": 270}
 
 
 @pytest.mark.parametrize(
     ("name", "row_of", "task", "prompt"),
     [
-        (
-            "full_traj",
-            {"n_imgs": 10, "ctx_n_tokens": 1230 + WORDS["published-logs"]},
-            "full",
-            "published-logs",
-        ),
-        (
-            "full_traj_x",
-            {**END, "ctx_n_tokens": 270 * 123 + WORDS["published-logs"]},
-            "last_32k",
-            "published-logs",
-        ),
-        (
-            "full_traj_video_fps2",
-            {"eval_mode": "video", "ctx_n_tokens": 290 + FILM},
-            "video_2fps",
-            "published-main",
-        ),
+        ("full_traj", {"n_imgs": 10, "ctx_n_tokens": 1230 + LOGS[1]}, "nieh_published_full", LOGS),
+        # Frames asked about in the words of main are no published row.
+        ("full_traj", {"n_imgs": 10, "ctx_n_tokens": 1230 + MAIN[1]}, "nieh_full", MAIN),
+        ("full_traj_x", {**END, "ctx_n_tokens": 33210 + LOGS[1]}, "nieh_published_last_32k", LOGS),
+        ("full_traj_video_fps2", FILM, "nieh_published_video_2fps", MAIN),
     ],
 )
 def test_a_log_that_tells_its_prompt_is_the_task_of_its_published_row(
     imported, name, row_of, task, prompt
 ):
     (run,) = imported(**{name: [row(0, **row_of)]})
-    assert (run.task, run.settings["prompt"]) == (f"nieh_published_{task}", prompt)
-
-
-def test_frames_asked_about_in_the_words_of_main_are_no_published_row(imported):
-    (run,) = imported(full_traj=[row(0, n_imgs=10, ctx_n_tokens=1230 + WORDS["published-main"])])
-    assert (run.task, run.settings) == (
-        "nieh_full",
-        {"context": "trajectory", "prompt": "published-main"},
-    )
+    assert (run.task, run.settings["prompt"]) == (task, prompt[0])
 
 
 def test_records_have_what_blind_says_that_suits_the_mode(imported, monkeypatch):

@@ -11,7 +11,6 @@ from ai2thor._quality_settings import QUALITY_SETTINGS
 
 from infthor_eval.cli import main
 from infthor_eval.cli.commands.data.replay import QUALITIES, parse_form
-from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import read_questions
 
 from ....helpers.command_line import option_words
@@ -260,8 +259,3 @@ def test_bathrooms_are_left_out_of_test_sets(tmp_path, run_cli):
     code, _, err = run_cli("generate", "--scene", "bathroom-1", "--test-set", "--out", tmp_path)
     assert code == 2
     assert "bathrooms are left out" in err
-
-
-def test_a_replayed_set_is_an_nieh_set(made_folder):
-    shutil.rmtree(made_folder / "set/metadata/.nothing", ignore_errors=True)
-    assert NiehSet(made_folder / "set")

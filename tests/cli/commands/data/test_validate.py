@@ -1,5 +1,6 @@
 import csv
 import json
+from functools import partial
 
 import pytest
 
@@ -8,8 +9,9 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.asking.baselines import BASELINES
 from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.storage.folders import packaged_folder
-from model_adapters import Capabilities
 
+from ....helpers.baselines import ScriptedBaseline
+from ....helpers.command_line import option_words
 from ....helpers.questions import make_question
 
 # Of known skill: which answers each scripted model gets right.
@@ -30,35 +32,19 @@ QUESTIONS = [
 ]
 
 
-class Scripted:
-    """A baseline of that skill."""
-
-    capabilities = Capabilities(counts_tokens=False, token_ids=False)
-
-    def __init__(self, name):
-        self.name = name
-
-    def identity(self):
-        return {}
-
-    def close(self):
-        pass
-
-    def fit(self, _data, _context):
-        return self.answer
-
-    def answer(self, sample, _shown=()):
-        question = sample.question
-        if self.name == "half" and SKILLS["half"](question):
-            return str(question.answers[0])
-        return (
-            ", ".join(question.answers) if SKILLS[self.name](question) else "<script>wrong</script>"
-        )
+def reply_of(name, question):
+    """The reply of a model of that skill."""
+    if name == "half" and SKILLS["half"](question):
+        return str(question.answers[0])
+    return ", ".join(question.answers) if SKILLS[name](question) else "<script>wrong</script>"
 
 
 @pytest.fixture
 def data(make_nieh_set, monkeypatch):
-    scripted = {name: lambda seed, name=name: Scripted(name) for name in SKILLS}
+    scripted = {
+        name: lambda _, name=name: ScriptedBaseline(name, partial(reply_of, name))
+        for name in SKILLS
+    }
     monkeypatch.setattr(NiehSuite, "baselines", {**BASELINES, **scripted})
     return make_nieh_set(QUESTIONS, size=56)
 
@@ -84,12 +70,8 @@ def test_questions_that_one_model_answers_are_kept_and_the_rest_is_rejected_or_i
     assert next(line for line in printed.splitlines() if line.startswith("  yes")).split()[3:9] == [
         *("100.00", "(1)", "100.00", "(1)", "-", "100.00")
     ]
-    assert (
-        run_cli("--model", "oracle", "--tasks", "nieh_gt", "--data", out, "--out", tmp_path / "o")[
-            0
-        ]
-        == 0
-    )
+    words = option_words(model="oracle", tasks="nieh_gt", data=out, out=tmp_path / "o")
+    assert run_cli(*words)[0] == 0
 
 
 def test_the_bundled_set_keeps_exactly_what_a_model_of_four_can_answer(data, tmp_path, run_cli):
