@@ -59,12 +59,9 @@ def test_the_overview_has_commands_in_groups(run_cli):
     assert headings[-1] == "Options of a run (`infthor-eval run --help` has all)"
     assert "  --model MODEL,... " in out
     assert "--check-equality" not in out
-    assert (
-        out.index("compare")
-        > out.index("Look at results:")
-        > out.index("  plan ")
-        > out.index("Evaluate:")
-    )
+    parts = ("Evaluate:", "  plan ", "Look at results:", "compare")
+    assert sorted(parts, key=out.index) == list(parts)
+    assert run_cli("--version")[1].startswith("infthor-eval, version ")
 
 
 def test_the_options_of_a_run_are_by_suite(run_cli):

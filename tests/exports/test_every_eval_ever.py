@@ -107,23 +107,16 @@ def test_numbers_of_the_summary_and_their_intervals(questions_run, export):
         assert told["score"] == pytest.approx(summary["nieh_gt"]["pairs"][name]["mean"])
     config = results["nieh_gt/net_pairs"]["metric_config"]
     assert (config["min_score"], config["max_score"]) == (-1.0, 1.0)
-    strict = summary["nieh_gt"]["by_clues"]["total"]["scores"]["strict"]
-    details = results["nieh_gt/strict"]["score_details"]
-    interval = details["uncertainty"]["confidence_interval"]
-    assert (details["score"], interval["lower"], interval["upper"]) == (
-        strict["mean"],
-        strict["low"],
-        strict["high"],
-    )
-    above = summary["nieh_gt"]["above_blind"]["strict"]
-    details = results["nieh_gt/strict, above blind"]["score_details"]
-    # None where all trajectories have the same mean.
-    interval = details["uncertainty"].get("confidence_interval", {"lower": None, "upper": None})
-    assert (details["score"], interval["lower"], interval["upper"]) == (
-        above["mean"],
-        above["low"],
-        above["high"],
-    )
+    scored = {
+        "nieh_gt/strict": summary["nieh_gt"]["by_clues"]["total"]["scores"]["strict"],
+        # Without ends where all trajectories have the same mean.
+        "nieh_gt/strict, above blind": summary["nieh_gt"]["above_blind"]["strict"],
+    }
+    for name, rate in scored.items():
+        details = results[name]["score_details"]
+        interval = details["uncertainty"].get("confidence_interval", {})
+        found = (details["score"], interval.get("lower"), interval.get("upper"))
+        assert found == (rate["mean"], rate["low"], rate["high"])
     config = results["nieh_gt/reference"]["metric_config"]
     assert (config["min_score"], config["max_score"]) == (0.0, "Infinity")
 

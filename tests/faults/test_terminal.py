@@ -56,9 +56,8 @@ def test_what_is_said_of_a_skipped_question_is_text(make_nieh_set, tmp_path, run
     (data / "qa_set_more.csv").write_text(
         f"traj_id,question,gt_img_idx,answer\n{extra},q,[1],['a']\n"
     )
-    code, out, err = run_cli(
-        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path / "out"
-    )
+    words = option_words(model="oracle", tasks="nieh_gt", data=data, out=tmp_path / "out")
+    code, out, err = run_cli(*words)
     assert code == 0
     assert _as_shown(extra) in err
     assert _is_clean(out + err)
@@ -66,11 +65,8 @@ def test_what_is_said_of_a_skipped_question_is_text(make_nieh_set, tmp_path, run
 
 @pytest.mark.parametrize("name", NASTY)
 def test_an_error_is_text(tmp_path, run_cli, name):
-    code, out, err = run_cli(
-        *option_words(
-            model="oracle", tasks="nieh_gt", data=tmp_path / NASTY[name].replace("/", "|")
-        )
-    )
+    data = tmp_path / NASTY[name].replace("/", "|")
+    code, out, err = run_cli(*option_words(model="oracle", tasks="nieh_gt", data=data))
     assert (code, out) == (2, "")
     assert _is_clean(err)
     assert len(err.splitlines()) == 1
@@ -80,9 +76,8 @@ def test_an_error_is_text(tmp_path, run_cli, name):
 def test_a_folder_of_results_is_text(make_nieh_set, tmp_path, run_cli, name):
     data = make_nieh_set(size=56)
     output = tmp_path / NASTY[name].replace("/", "|")
-    code, out, err = run_cli(
-        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--out", output
-    )
+    words = option_words(model="oracle", tasks="nieh_gt", data=data, out=output)
+    code, out, err = run_cli(*words)
     assert code == 0, err
     assert _as_shown(output.name) in out
     assert _is_clean(out + err)
@@ -103,8 +98,7 @@ def test_ls_shows_names_as_text(tmp_path, run_cli, task_files, name):
 def test_a_name_that_is_no_unicode_ends_nothing(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set([make_question(clues=(1,))], size=56)
     output = tmp_path / "\udcff"
-    code, out, err = run_cli(
-        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--out", output
-    )
+    words = option_words(model="oracle", tasks="nieh_gt", data=data, out=output)
+    code, out, err = run_cli(*words)
     assert code == 0, err
     assert "\\udcff" in out

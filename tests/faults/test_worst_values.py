@@ -198,18 +198,9 @@ def own(tmp_path: Path) -> str:
 def test_an_adapter_gives_the_worst_replies(own, run_cli, tmp_path) -> None:
     n_units = 126
     for start in range(0, N_PAIRS, n_units):
-        code, _, err = run_cli(
-            *(
-                "run",
-                "--model",
-                own,
-                "--model-args",
-                f"start={start}",
-                "--out",
-                tmp_path / "out",
-            ),
-            *("--tasks", "nieh_mini_gt", "--name", f"from{start}", "--quiet"),
-        )
+        model = ("--model", own, "--model-args", f"start={start}", "--out", tmp_path / "out")
+        words = ("--tasks", "nieh_mini_gt", "--name", f"from{start}", "--quiet")
+        code, _, err = run_cli("run", *model, *words)
         assert code == 1
         assert "Traceback" not in err
         (folder,) = (tmp_path / "out" / f"from{start}").iterdir()

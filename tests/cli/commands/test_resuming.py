@@ -93,65 +93,49 @@ def test_the_journal_of_an_active_run_is_left_alone(ask, tmp_path, option):
     assert len(replies(folder)) == 5
 
 
-def test_a_bad_line_in_a_journal_is_named_and_recovered_from(ask, tmp_path):
+HALF = b'{"type":"unit","task":"nieh_gt"}\n'
+# What is done to the lines of a journal, where it is said to be bad, and how many units it costs.
+BAD_JOURNALS = {
+    "bad lines": (
+        lambda lines: [*lines[:2], lines[2][:40] + b"\x00\n", lines[3], HALF, lines[5]],
+        "line 3: not a line of a journal",
+        2,
+    ),
+    "no first line": (
+        lambda lines: [b"no header\n", *lines[1:]],
+        "line 1: not the first line of a journal",
+        0,
+    ),
+    "two journals": (
+        lambda lines: lines * 2,
+        "line 7: a second header in the middle of the records",
+        0,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD_JOURNALS)
+def test_a_bad_line_in_a_journal_is_named_and_recovered_from(ask, tmp_path, name):
+    damage, expected, n_lost = BAD_JOURNALS[name]
     ask()
     path = find_one(tmp_path / "out", "worker-0.jsonl")
     before, lines = replies(path.parents[1]), path.read_bytes().splitlines(keepends=True)
     assert len(lines) == 6
-    lines[2] = lines[2][:40] + b"\x00\n"
-    lines[4] = b'{"type":"unit","task":"nieh_gt"}\n'
-    path.write_bytes(b"".join(lines))
-
-    code, out, err = ask()
-    assert (code, out) == (2, "")
-    (line,) = [line for line in err.splitlines() if line.startswith("infthor-eval: ")]
-    assert f"{path}, line 3: not a line of a journal" in line
-    assert "--recover" in line
-    assert "Traceback" not in err
-    assert path.read_bytes() == b"".join(lines)
+    damaged = damage(lines)
+    bad = [line for line in damaged if line not in lines] or lines[:1]  # a second header
+    path.write_bytes(b"".join(damaged))
+    assert_refused(ask(), f"{path}, {expected}", "--recover", after_notes=True)
+    assert path.read_bytes() == b"".join(damaged)
 
     code, _, err = ask("--recover")
     assert code == 0
-    assert (
-        "qwen2.5-vl-tiny: 2 bad line(s) of the journal set aside; those samples are tried again"
-        in err
-    )
-    assert "2 evaluated now, 3 resumed from the journal" in err
+    told = "bad line(s) of the journal set aside; those samples are tried again"
+    assert f"qwen2.5-vl-tiny: {len(bad)} {told}" in err
+    assert f"{n_lost} evaluated now, {5 - n_lost} resumed from the journal" in err
     assert replies(path.parents[1]) == before
-    assert (path.parent / "bad_lines.txt").read_bytes() == lines[2] + lines[4]
+    assert (path.parent / "bad_lines.txt").read_bytes() == b"".join(bad)
     code, _, err = ask("--recover")
     assert "bad line" not in err
-    assert "0 evaluated now, 5 resumed from the journal" in err
-
-
-def test_a_journal_without_its_first_line_is_recovered_from(ask, tmp_path):
-    ask()
-    path = find_one(tmp_path / "out", "worker-0.jsonl")
-    before, lines = replies(path.parents[1]), path.read_bytes().splitlines(keepends=True)
-    path.write_bytes(b"no header\n" + b"".join(lines[1:]))
-    code, out, err = ask()
-    assert (code, out) == (2, "")
-    assert f"{path}, line 1: not the first line of a journal" in err
-    assert "--recover" in err
-    code, _, err = ask("--recover")
-    assert code == 0
-    assert "1 bad line(s) of the journal set aside" in err
-    assert "0 evaluated now, 5 resumed from the journal" in err
-    assert replies(path.parents[1]) == before
-
-
-def test_two_journals_in_one_file_are_named_and_recovered_from(ask, tmp_path):
-    ask(model="oracle")
-    path = find_one(tmp_path / "out", "worker-0.jsonl")
-    content = path.read_bytes()
-    path.write_bytes(2 * content)
-    code, out, err = ask(model="oracle")
-    assert (code, out) == (2, "")
-    assert f"{path}, line 7: a second header in the middle of the records" in err
-    assert "Traceback" not in err
-    code, _, err = ask("--recover", model="oracle")
-    assert code == 0
-    assert "oracle: 1 bad line(s) of the journal set aside" in err
     assert "0 evaluated now, 5 resumed from the journal" in err
 
 

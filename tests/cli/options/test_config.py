@@ -29,13 +29,9 @@ def config(make_nieh_set, tmp_path):
 
     def config(**changes: object) -> Path:
         path = tmp_path / "typed.yaml"
-        options = {
-            "model": "oracle",
-            "tasks": ["nieh_gt"],
-            "data": str(data),
-            "out": str(tmp_path / "out"),
-        }
-        path.write_text(yaml.safe_dump({**options, **changes}))
+        options = {"model": "oracle", "tasks": ["nieh_gt"], "data": str(data)}
+        options |= {"out": str(tmp_path / "out"), **changes}
+        path.write_text(yaml.safe_dump(options))
         return path
 
     return config
@@ -102,6 +98,7 @@ BAD = {
         "typed.yaml: model_args: --model-args: 'a' is not of the form key=value",
     ),
     "frames": ({"frames": "none"}, "--frames none: give one of shown, blank"),
+    "no frames": ({"frames": ","}, "--frames is empty; give a name"),
     "unknown model option": (
         {"model": "qwen2.5-vl-tiny", "model_args": {"dtpe": "x"}},
         "did you mean dtype?",
@@ -142,16 +139,13 @@ def requests():
 def test_threads_are_for_models_that_compute_here(config, requests):
     file = config()
     models = "oracle,qwen2.5-vl-tiny,qwen2.5-vl-tiny:threads=3,openai:model=m"
-    run_requests = requests("--config", file, "--model", models, "--threads", 2)
-    assert [request.model_options.get("threads") for request in run_requests] == [
-        None,
-        "2",
-        "3",
-        None,
+    threads = [
+        request.model_options.get("threads")
+        for request in requests("--config", file, "--model", models, "--threads", 2)
     ]
-    (request,) = requests(
-        "--config", file, "--model", "qwen2.5-vl", "--engine", "vllm", "--threads", 2
-    )
+    assert threads == [None, "2", "3", None]
+    in_vllm = ("--model", "qwen2.5-vl", "--engine", "vllm", "--threads", 2)
+    (request,) = requests("--config", file, *in_vllm)
     assert request.model_options == {"threads": "2"}
     with pytest.raises(UsageError, match="--threads 2: oracle takes no threads"):
         requests("--config", file, "--threads", 2)

@@ -64,12 +64,12 @@ def test_a_missing_retriever_ends_in_one_line(data, tmp_path, run_cli, monkeypat
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_OFFLINE", True)
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
     arguments = ["--model", "oracle", "--data", data, "--out", tmp_path / "out"]
-    for tasks, options, expected in (
-        ("nieh_clip_retrieval", (), "and give --retriever DIR"),
+    for tasks, options, *expected in (
+        ("nieh_clip_retrieval", (), "not in the local cache", "and give --retriever DIR"),
         ("nieh_memory_frames", ("--retriever", "./nowhere"), "there is no such folder"),
         ("nieh_gt", ("--retriever", "./nowhere"), "no context of nieh_gt retrieves frames"),
     ):
-        assert_refused(run_cli(*arguments, "--tasks", tasks, *options), expected)
+        assert_refused(run_cli(*arguments, "--tasks", tasks, *options), *expected)
     assert not (tmp_path / "out").exists()
 
 
@@ -99,27 +99,13 @@ def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run
         "can be asked (the trajectory's JSON is not in metadata/; give its folder with "
         "--trajectories)" in err
     )
+    elsewhere = "no such folder; give the folder of the trajectories with --traj"
     for tasks, trajectories, expected in (
         ("nieh_gt", folder, "no context of nieh_gt tells of the trajectory"),
-        (
-            "nieh_interleaved",
-            tmp_path / "no",
-            "no such folder; give the folder of the trajectories with --traj",
-        ),
+        ("nieh_interleaved", tmp_path / "no", elsewhere),
     ):
-        assert_refused(
-            run_cli(
-                "--model",
-                "oracle",
-                "--tasks",
-                tasks,
-                "--data",
-                data,
-                "--trajectories",
-                trajectories,
-            ),
-            expected,
-        )
+        words = option_words(model="oracle", tasks=tasks, data=data, trajectories=trajectories)
+        assert_refused(run_cli(*words), expected)
 
 
 def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(
@@ -133,14 +119,10 @@ def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(
     assert code == 0, err
     assert "nieh_video: 3 sample(s) skipped: " in err
     assert "traj_b_10fps.mp4: not a video that OpenCV can decode" in err
-    results = json.loads(find_one(out, "results.json").read_text())["summary"]["tasks"][
-        "nieh_video"
-    ]
-    assert (results["n"], results["skipped"]["n"], list(results["by_variant"])) == (
-        3,
-        3,
-        ["source=mp4"],
-    )
+    summary = json.loads(find_one(out, "results.json").read_text())["summary"]
+    task = summary["tasks"]["nieh_video"]
+    assert (task["n"], task["skipped"]["n"]) == (3, 3)
+    assert list(task["by_variant"]) == ["source=mp4"]
     assert [len(doc["frames"]) for doc in docs(out, "nieh_video")] == [4] * 3
     assert "; the film is given as a video" in err
     (metadata / "traj_b" / "traj_b_10fps.mp4").unlink()

@@ -28,6 +28,17 @@ def nieh_runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 
 @pytest.fixture(scope="session")
+def page(make_page: Callable[..., Page], nieh_runs: list[Path]) -> Page:
+    """The page of those runs, with the frames of the set."""
+    return make_page(*nieh_runs, data=packaged_folder("sets/nieh_mini"))
+
+
+def changed(page: Page, **changes: Any) -> Page:
+    """The same page with other parts."""
+    return page.__class__(**(vars(page) | changes))
+
+
+@pytest.fixture(scope="session")
 def make_page() -> Callable[..., Page]:
     """The page of runs in some folders."""
 

@@ -4,18 +4,8 @@ import msgspec
 import pytest
 
 from infthor_eval.report.web.samples import Timeline, TimelineFrame
-from infthor_eval.storage.folders import packaged_folder
 
-DATA = packaged_folder("sets/nieh_mini")
-
-
-@pytest.fixture(scope="module")
-def page(make_page, nieh_runs):
-    return make_page(*nieh_runs, data=DATA)
-
-
-def changed(page, **changes):
-    return page.__class__(**(vars(page) | changes))
+from .conftest import changed
 
 
 def count(tab):

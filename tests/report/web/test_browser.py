@@ -6,16 +6,7 @@ from urllib.parse import parse_qs, quote
 import msgspec
 import pytest
 
-from infthor_eval.storage.folders import packaged_folder
-
-from .conftest import HOSTILE
-
-DATA = packaged_folder("sets/nieh_mini")
-
-
-@pytest.fixture(scope="module")
-def page(make_page, nieh_runs):
-    return make_page(*nieh_runs, data=DATA)
+from .conftest import HOSTILE, changed
 
 
 def count(tab):
@@ -115,7 +106,7 @@ def test_a_run_without_the_task_of_a_sample_is_not_listed_and_one_that_stopped_b
         for at, task in enumerate(("a", "a", "b"))
     )
     samples = [first, only(second, 0), only(third, 1)]
-    tab = open_page(page.__class__(**(vars(page) | {"samples": samples}))).tab
+    tab = open_page(changed(page, samples=samples)).tab
     listed = []
     for _ in samples:
         rows = tab.locator("#sample .results tbody tr")
@@ -311,9 +302,7 @@ def test_hostile_text_stays_text(page, open_page):
     runs = [
         page.runs[0].__class__(HOSTILE, ((HOSTILE, HOSTILE),), HOSTILE, HOSTILE) for _ in page.runs
     ]
-    opened = open_page(
-        page.__class__(**(vars(page) | {"samples": [hostile], "runs": runs, "title": HOSTILE}))
-    )
+    opened = open_page(changed(page, samples=[hostile], runs=runs, title=HOSTILE))
     assert opened.tab.locator("#sample h3").inner_text().startswith("</script><img")
     assert opened.tab.evaluate("window.hacked") is None
     assert opened.tab.locator("#sample img[onerror], #list img, main img[src=x]").count() == 0
@@ -330,7 +319,7 @@ def test_an_episode_has_its_steps_and_its_map(make_page, scripted_run, scripted_
 
 
 def test_of_many_samples_only_those_in_view_are_elements(page, open_page):
-    many = page.__class__(**(vars(page) | {"samples": list(page.samples) * 10}))
+    many = changed(page, samples=list(page.samples) * 10)
     opened = open_page(many)
     tab, last = opened.tab, len(many.samples) - 1
     assert 1 < tab.locator(".item").count() < 50

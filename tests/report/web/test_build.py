@@ -7,7 +7,6 @@ from copy import copy
 from itertools import pairwise
 
 import msgspec
-import pytest
 
 from infthor_eval.nieh.samples import open_set
 from infthor_eval.report.svg import draw
@@ -34,11 +33,6 @@ def replace_simulator(runs, simulator):
         other.own_header = other.header = header
         replaced.append(other)
     return replaced
-
-
-@pytest.fixture(scope="module")
-def page(make_page, nieh_runs):
-    return make_page(*nieh_runs, data=DATA)
 
 
 def test_every_sample_of_every_run_is_there_with_its_frames(page, nieh_runs):
@@ -167,12 +161,8 @@ def test_the_footer_names_the_embedded_simulator_only_where_it_was_used(page, ma
 
 def test_plans_have_their_steps_and_what_was_seen(make_page, scripted_run, scripted_data):
     page = make_page(scripted_run, data=scripted_data, episodes=3)
-    assert {section.key for section in page.sections} >= {
-        "results",
-        "plans",
-        "rewards-infthor_plans",
-        "cost",
-    }
+    keys = {section.key for section in page.sections}
+    assert keys >= {"results", "plans", "rewards-infthor_plans", "cost"}
     seen = [sample for sample in page.samples if sample.results[0].map is not None]
     assert len(seen) == 3
     for sample in seen:
@@ -198,9 +188,5 @@ def test_what_takes_long_is_counted_to_its_end(nieh_runs, scripted_run, scripted
 
     runs = open_runs([*nieh_runs, scripted_run])
     build_page(runs, PageRequest(episodes=1), Watching())
-    assert set(begun) == {
-        "runs summarised",
-        "frames read",
-        "episodes replayed",
-    }
+    assert set(begun) == {"runs summarised", "frames read", "episodes replayed"}
     assert counted == begun

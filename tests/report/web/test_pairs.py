@@ -39,12 +39,8 @@ def place_of(page, label):
 
 
 def test_a_pair_is_one_sample_and_right_if_both_replies_are(page):
-    assert [sample.id for sample in page.samples] == [
-        "swap-1/1",
-        "swap-1/2",
-        "swap-2/1",
-        "swap-2/2",
-    ]
+    pairs = [f"swap-{base}/{number}" for base in (1, 2) for number in (1, 2)]
+    assert [sample.id for sample in page.samples] == pairs
     oracle, blind = (place_of(page, label) for label in ("oracle", "blind"))
     for sample in page.samples:
         assert len(sample.members) == 2

@@ -4,21 +4,15 @@ import json
 import shutil
 
 import msgspec
-import pytest
 
 from infthor_eval.runs import UnitKey
 from infthor_eval.runs.journals.shards import find_shards
 from infthor_eval.runs.journals.tracebacks import TracebackFile
 from infthor_eval.storage.folders import packaged_folder
 
-from .conftest import HOSTILE
+from .conftest import HOSTILE, changed
 
 DATA = packaged_folder("sets/nieh_mini")
-
-
-@pytest.fixture(scope="module")
-def page(make_page, nieh_runs):
-    return make_page(*nieh_runs, data=DATA)
 
 
 def test_equal_prompts_are_there_once_and_none_is_guessed(page):
@@ -86,10 +80,8 @@ def test_clues_that_a_context_left_out_are_marked(page, open_page):
             "clue, not shown",
         ),
     ):
-        changed = msgspec.structs.replace(sample, results=results)
-        opened = open_page(
-            page.__class__(**(vars(page) | {"samples": [changed], "prompts": [*page.prompts, cut]}))
-        )
+        results_changed = msgspec.structs.replace(sample, results=results)
+        opened = open_page(changed(page, samples=[results_changed], prompts=[*page.prompts, cut]))
         assert (
             opened.tab.locator("#sample > .frames .clue figcaption").inner_text()
             == f"{clue.index} {caption}"
@@ -106,7 +98,7 @@ def test_evidence_and_blind_stand_beside_the_reply(page, open_page):
         for it in page.samples
         if "blind" in it.results[0].details and "clue frames shown" in it.results[0].details
     )
-    tab = open_page(page.__class__(**(vars(page) | {"samples": [sample]}))).tab
+    tab = open_page(changed(page, samples=[sample])).tab
     text = tab.locator("#sample .details").first.inner_text()
     assert "clue frames shown" in text
     assert "strict" in sample.results[0].details["blind"]
