@@ -10,7 +10,7 @@ from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.runs import UnitRecord
 
-from ..helpers.command_line import CliRunner, option_words
+from ..helpers.command_line import CliRunner, option_words, read_success
 from ..helpers.journals import write_journal
 from ..helpers.nieh_runs import make_config, make_header
 from .commands.rescored import REPLIES
@@ -22,8 +22,7 @@ def evaluate(tmp_path: Path, run_cli: CliRunner) -> Callable[..., Path]:
 
     def evaluate(model: str = "oracle", tasks: str = "nieh_gt", **options: object) -> Path:
         out = tmp_path / "evaluated"
-        code, _, err = run_cli(*option_words(model=model, tasks=tasks, out=out, **options))
-        assert code == 0, err
+        read_success(run_cli(*option_words(model=model, tasks=tasks, out=out, **options)))
         return max((out / model).iterdir(), key=lambda folder: folder.stat().st_mtime_ns)
 
     return evaluate

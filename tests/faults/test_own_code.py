@@ -17,6 +17,7 @@ from infthor_eval.storage.files import file_name
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
 from model_adapters.policies.parity import load_policy
 
+from ..helpers.command_line import read_success
 from ..helpers.journals import write_journal
 from ..helpers.nieh_runs import make_config, make_header, make_record
 from ..model_adapters.policies.servers import policy_answers, serve
@@ -338,8 +339,7 @@ def test_a_line_of_an_older_version_is_named_and_the_rest_is_shown(stored, run_c
         ("rescore", stored, "--out", tmp_path / "out"),
     )
     for command in commands:
-        code, _, err = run_cli(*command)
-        assert code == 0, err
+        _, err = read_success(run_cli(*command))
         assert f"left out: {path}, line 2: not a line of a journal" in "".join(err.split("\n"))
     assert [record.id for record in read_run(stored, RECORDS, lambda _: None)[1]] == ["q1"]
 

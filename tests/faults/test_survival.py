@@ -15,7 +15,7 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 from infthor_eval.runs.journals.journal import Journal
 
-from ..helpers.command_line import assert_refused, option_words
+from ..helpers.command_line import assert_refused, option_words, read_success
 
 
 def test_a_run_whose_folder_is_deleted_does_not_end_well(
@@ -53,8 +53,7 @@ def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(
     assert (code, out) == (2, "")
     assert "cannot be written (No space left on device); make room" in err
     assert "Traceback" not in err
-    code, _, err = run_cli(*arguments, "--out", tmp_path / "out")
-    assert code == 0
+    read_success(run_cli(*arguments, "--out", tmp_path / "out"))
     (journal,) = (tmp_path / "out").rglob("journal")
     assert len(read_run(journal.parent, RECORDS)[1]) == 5
 

@@ -11,10 +11,8 @@ from infthor_eval.nieh.samples import find_samples
 from infthor_eval.nieh.twins import first_world, twin_side
 from infthor_eval.runs import read_run
 
-from ..helpers.command_line import run_cli
+from ..helpers.command_line import read_success
 from ..helpers.twin_sets import CLUES, DIFFERING, write_twin_set
-
-__all__ = ["run_cli"]
 
 
 @pytest.fixture(scope="module")
@@ -64,10 +62,9 @@ def test_windows_are_the_same_in_both_worlds(twins):
 def test_the_oracle_has_all_pairs_and_blind_none(twins, tmp_path, run_cli):
     for model, expected in (("oracle", 1.0), ("blind", 0.0)):
         out = tmp_path / model
-        code, printed, _ = run_cli(
-            "run", "--model", model, "--tasks", "nieh_twins", "--data", twins, "--out", out
+        printed, _ = read_success(
+            run_cli("run", "--model", model, "--tasks", "nieh_twins", "--data", twins, "--out", out)
         )
-        assert code == 0
         assert "Twins: net pairs, %" in printed
         found = results(out)
         assert found["primary_metrics"]["nieh_twins"]["mean"] == expected
@@ -124,8 +121,7 @@ def test_a_metric_of_ones_own_scores_the_reply_in_the_other_world_too(
         "process_results: !function own.measure\nmetric_list: [{metric: begins}]\n"
     )
     words = ("run", "--model", "flip", "--tasks", "own_twins", "--data", twins)
-    code, _, err = run_cli(*words, "--output", tmp_path / "out")
-    assert code == 0, err
+    read_success(run_cli(*words, "--output", tmp_path / "out"))
     pairs = results(tmp_path / "out")["summary"]["tasks"]["own_twins"]["pairs"]
     (folder,) = (path.parent for path in tmp_path.rglob("results.json"))
     for side in (record.payload for record in read_run(folder, RECORDS)[1]):

@@ -12,6 +12,7 @@ from infthor_eval.cli.commands.doctor import Check
 from infthor_eval.formats.question import Question
 
 from ...helpers.bundled import BUNDLED
+from ...helpers.command_line import read_success
 from ...helpers.questions import make_question
 
 TOKEN = "hf_of_nobody_0123456789"
@@ -59,8 +60,7 @@ def test_several_gpus_are_for_several_workers_or_one_model_that_is_split(
 
 
 def test_people_read_lines(run_cli):
-    code, out, _ = run_cli("doctor")
-    assert code == 0
+    out, _ = read_success(run_cli("doctor"))
     assert any(line.startswith("ok       Python: 3.") for line in out.splitlines())
     assert "`infthor-eval fetch nieh`" in out
 

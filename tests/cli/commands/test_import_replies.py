@@ -2,19 +2,18 @@
 
 import gzip
 import json
-from pathlib import Path
 
 import pytest
-from msgspec.structs import replace
 
-from infthor_eval.formats.qa_csv import read_questions, write_questions
+from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import PublishedColumns, Question
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 
+from ...helpers.published import PUBLISHED_SETS, needs_published_sets
+
 SINGLE, MULTI = "qa_set_nieh_single_clue", "qa_set_nsieh_multi_clue"
 LOG = f"eval_{SINGLE}_Some-VL-7B_full_traj.log"
-PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
 
 
 def question(file, number, text, answer, clues=(1,)):
@@ -136,25 +135,6 @@ def test_two_logs_on_the_same_questions_count_them_once(data, tmp_path, run_cli)
     assert (code, "2 replies imported, 3 of 5 questions without one" in err) == (0, True)
 
 
-@pytest.mark.parametrize(
-    ("more", "task", "name", "value"),
-    [
-        (
-            {"eval_mode": "truncate_head", "ctx_size_k": 64},
-            "nieh_truncate_head_64k",
-            "ctx_size",
-            64.0,
-        ),
-        ({"eval_mode": "clip_retrieval", "n_imgs": 20}, "nieh_clip_retrieval", "top_k", 20),
-        ({"eval_mode": "video"}, "nieh_video", "context", "video"),
-    ],
-)
-def test_the_mode_is_part_of_the_run(import_log, more, task, name, value):
-    _, _, (header, _) = import_log([{**one, **more} for one in ROWS])
-    assert list(header.config.tasks) == [task]
-    assert header.config.tasks[task].dataset_kwargs[name] == value
-
-
 def test_half_a_log_is_a_run_with_the_rest_missing(import_log, tmp_path):
     code, output, read = import_log([ROWS[0], json.dumps(ROWS[1])[:60]])
     assert code == 1
@@ -250,26 +230,10 @@ def test_the_neutral_form(import_log):
     assert (records[1].tokens.context, records[1].tokens.reply, records[1].seconds) == (9, 2, 1.5)
 
 
-def test_samples_of_lm_eval(make_nieh_set, tmp_path, run_cli):
-    """What our own run exports in lm-eval's files comes back with the same scores."""
-    data, out = make_nieh_set(size=56), tmp_path / "out"
-    assert run_cli("--model", "blind", "--tasks", "nieh_gt", "--data", data, "--out", out)[0] == 0
-    (samples,) = out.rglob("samples_nieh_gt_*.jsonl")
-    words = ("import-replies", samples, "--data", data, "--model", "again", "--out", out)
-    assert run_cli(*words)[0] == 0
-    first, again = (
-        read_run(next((out / name).iterdir()), RECORDS)[1] for name in ("blind", "again")
-    )
-    assert len(again) == len(read_questions(next(data.glob("qa_set*.csv"))))
-    # The samples do not say which frames were shown.
-    payloads = {record.id: replace(record.payload, shown_clues=None) for record in first}
-    assert payloads == {record.id: record.payload for record in again}
-
-
-@pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published logs are not at ../shared/data")
+@needs_published_sets
 def test_every_published_reply_has_its_logged_score(tmp_path, run_cli):
-    logs = sorted((PUBLISHED / "replies").glob("*.log.gz"))
-    code, _, err = run_cli("import-replies", *logs, "--data", PUBLISHED, "--out", tmp_path)
+    logs = sorted((PUBLISHED_SETS / "replies").glob("*.log.gz"))
+    code, _, err = run_cli("import-replies", *logs, "--data", PUBLISHED_SETS, "--out", tmp_path)
     assert (code, "not imported" in err, "scored otherwise" in err) == (0, False, False)
     assert err.count("the prompt it was asked with: published-logs\n") == 3
     means = {}

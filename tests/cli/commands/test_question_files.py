@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -10,8 +9,8 @@ from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import PublishedColumns, Question
 
 from ...helpers.command_line import assert_refused, option_words
+from ...helpers.published import PUBLISHED_SETS, needs_published_sets
 
-PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
 FILES = ("qa_set_nieh_single_clue.csv", "qa_set_nsieh_multi_clue.csv")
 
 
@@ -85,16 +84,14 @@ def test_table4_is_printed_from_the_files_scores(tmp_path, run_cli):
     )
 
 
-@pytest.mark.skipif(
-    not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data"
-)
+@needs_published_sets
 @pytest.mark.parametrize(
     ("file", "n", "reference", "strict"),
     [(FILES[0], 829, 75.64, 75.69), (FILES[1], 474, 70.66, 70.67)],
 )
 def test_who_sees_nothing_scores_this_on_the_published_files(evaluate, file, n, reference, strict):
     oracle, blind = (
-        by_clues_of(evaluate(model, data=PUBLISHED / file))["total"]
+        by_clues_of(evaluate(model, data=PUBLISHED_SETS / file))["total"]
         for model in ("oracle", "blind")
     )
     assert (oracle["n"], oracle["scores"]["strict"]["mean"]) == (n, 1.0)

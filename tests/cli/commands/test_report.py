@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from ...helpers.command_line import assert_refused, option_words
+from ...helpers.command_line import assert_refused, option_words, read_success
 from ...helpers.journals import write_run
 from ...helpers.plan_runs import make_plan_record, make_planner_run, make_plans_run
 
@@ -92,12 +92,13 @@ def test_replays_are_counted_with_the_time_left_also_where_there_is_no_terminal(
     scripted_run, scripted_data, tmp_path, run_cli, monkeypatch
 ):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
-    code, out, err = run_cli(
-        "report",
-        scripted_run,
-        *option_words(data=scripted_data, episodes=3, out=tmp_path / "report.html"),
+    out, err = read_success(
+        run_cli(
+            "report",
+            scripted_run,
+            *option_words(data=scripted_data, episodes=3, out=tmp_path / "report.html"),
+        )
     )
-    assert code == 0
     assert "12 samples, " in out
     first, second = err.splitlines()  # the third is the last: the page's size follows
     pattern = r"episodes replayed: {} of 3 \({} %\), .* left, .*; scripted, bedroom-1-seed7"
@@ -127,8 +128,7 @@ def test_a_folder_of_runs_becomes_an_index_with_a_page_for_each(folders, tmp_pat
     broken.mkdir(parents=True)
     (broken / "worker-0.jsonl").write_text("no header\n")
     out = tmp_path / "index"
-    code, output, err = run_cli("report", tmp_path / "results", "--out", out)
-    assert code == 0
+    output, err = read_success(run_cli("report", tmp_path / "results", "--out", out))
     assert re.fullmatch(r"3 runs, [\d.]+ MB: .*index.html", output.strip().replace("\n", ""))
     assert f"{broken.parent}: not read: " in err
     index = (out / "index.html").read_text()

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from tests.helpers.command_line import assert_refused, option_words
+from tests.helpers.command_line import assert_refused, option_words, read_success
 
 
 @pytest.fixture
@@ -18,8 +18,7 @@ def ran(make_nieh_set, tmp_path, run_cli):
     arguments = option_words(model="oracle,blind", tasks="nieh", data=data, out=tmp_path / "out")
 
     def ran(*options):
-        code, out, err = run_cli(*arguments, *options)
-        assert code == 0, err
+        out, _ = read_success(run_cli(*arguments, *options))
         folders = [next((tmp_path / "out" / model).iterdir()) for model in ("oracle", "blind")]
         return folders, out
 
@@ -97,8 +96,7 @@ def test_why_units_failed_is_said_again_and_of_several_runs_with_the_folder(tmp_
     code, _, printed = run_cli(*words, "--out", tmp_path / "out")
     assert code == 1
     dead, blind = (next((tmp_path / "out" / name).iterdir()) for name in ("answer", "blind"))
-    code, _, err = run_cli("show", dead)
-    assert code == 0
+    _, err = read_success(run_cli("show", dead))
     assert err.startswith("nieh_mini_gt: 2 sample(s) failed, in no score: answer fails")
     assert err in printed
     assert run_cli("show", dead, blind)[2] == f"{dead}: {err}"
@@ -124,21 +122,18 @@ def test_a_killed_run_is_listed_without_results_and_a_broken_line_is_named(ran, 
     (oracle / "results.json").unlink()
     journal = blind / "journal" / "worker-0.jsonl"
     journal.write_bytes(journal.read_bytes() + b"no record\n")
-    code, out, err = run_cli("ls", "runs", tmp_path)
-    assert code == 0
+    out, err = read_success(run_cli("ls", "runs", tmp_path))
     (row,) = [line.split() for line in out.splitlines() if line.split()[:1] == ["oracle"]]
     assert row[1:5] == ["nieh", "10", "0", "0"]  # the journal's header has their number
     assert f"left out: {journal}, line " in err.replace("\n", "")
 
 
 def test_a_folder_without_runs_says_how_to_make_one(run_cli, tmp_path):
-    code, out, _ = run_cli("ls", "runs", tmp_path)
-    assert code == 0
+    out, _ = read_success(run_cli("ls", "runs", tmp_path))
     assert "`infthor-eval --model MODEL --tasks TASKS` starts one" in out
     assert_refused(run_cli("ls", "runs", tmp_path / "no"), "no: no such folder")
 
 
 def test_bare_ls_says_what_can_be_listed(run_cli):
-    code, out, _ = run_cli("ls")
-    assert code == 0
+    out, _ = read_success(run_cli("ls"))
     assert all(name in out for name in ("models", "tasks", "scenes", "runs"))

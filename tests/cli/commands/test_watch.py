@@ -11,7 +11,7 @@ from infthor_eval.plans.records import RECORDS
 from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.runs import read_run
 
-from ...helpers.command_line import assert_refused, option_words, read_remarks
+from ...helpers.command_line import assert_refused, option_words, read_remarks, read_success
 from ...helpers.journals import write_journal
 from ...helpers.trajectories import FORK, cut_trajectory
 from ...helpers.trajectories import MUG as NAME
@@ -43,10 +43,11 @@ def test_two_plans_become_an_mp4(scripted_run, scripted_data, tmp_path, run_cli)
 
 def test_a_gif_is_as_long_as_its_plans(scripted_run, scripted_data, tmp_path, run_cli):
     out = tmp_path / "watched.gif"
-    code, _, _ = run_cli(
-        "watch", scripted_run, "--plans", 2, "--data", scripted_data, "--out", out, "--fps", 5
+    read_success(
+        run_cli(
+            "watch", scripted_run, "--plans", 2, "--data", scripted_data, "--out", out, "--fps", 5
+        )
     )
-    assert code == 0
     with Image.open(out) as gif:
         assert gif.size == SIZE
         durations = []

@@ -16,7 +16,7 @@ from infthor_eval.cli.options.run import RunOptions, expand_suite_options, run_o
 from infthor_eval.cli.options.values import ModelList
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import RunRequest, Suite, read_stored_command
-from tests.helpers.command_line import assert_refused
+from tests.helpers.command_line import assert_refused, read_success
 from tests.helpers.files import find_one
 
 KEY = "sk-of-nobody-0123456789"
@@ -39,10 +39,9 @@ def config(make_nieh_set, tmp_path):
 
 @pytest.mark.parametrize("words", [("run", "--config"), ("--config",)])
 def test_a_run_by_a_file_and_the_command_line_overrides_it(config, tmp_path, run_cli, words):
-    code, _, err = run_cli(*words, config(limit=2))
-    assert code == 0, err
+    _, err = read_success(run_cli(*words, config(limit=2)))
     assert "oracle: 2 evaluated now" in err
-    code, _, err = run_cli(*words, config(limit=2), "--limit", 3, "--model", "blind")
+    _, _, err = run_cli(*words, config(limit=2), "--limit", 3, "--model", "blind")
     assert "blind: 3 evaluated now" in err
 
 
@@ -57,8 +56,7 @@ def test_the_file_of_a_run_resumes_that_run(config, tmp_path, run_cli, monkeypat
     monkeypatch.chdir("/")
     before = [(path.parent / "results.json").read_bytes() for path in left]
     for path in left:
-        code, _, err = run_cli("--config", path)
-        assert code == 0
+        _, err = read_success(run_cli("--config", path))
         assert "mine: 0 evaluated now, 4 resumed" in err
     assert sorted((tmp_path / "out" / "mine").rglob("run.yaml")) == left
     assert [(path.parent / "results.json").read_bytes() for path in left] == before
@@ -72,8 +70,7 @@ def test_the_command_of_the_file_is_the_run(config, run_cli):
 
 
 def test_several_workers_write_it_too(config, tmp_path, run_cli):
-    code, _, err = run_cli("--config", config(workers=2))
-    assert code == 0, err
+    read_success(run_cli("--config", config(workers=2)))
     assert yaml.safe_load(find_one(tmp_path / "out", "run.yaml").read_text())["workers"] == 2
 
 

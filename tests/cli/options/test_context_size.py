@@ -8,7 +8,7 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
-from ...helpers.command_line import assert_refused, option_words
+from ...helpers.command_line import assert_refused, option_words, read_success
 from ...helpers.files import find_one
 from ...helpers.journals import read_records
 from ...helpers.questions import make_question
@@ -48,8 +48,7 @@ def test_a_kilo_token_has_the_default_or_the_given_value(
     data = make_nieh_set(ONE, n_frames=80, size=56)
     tasks = ["nieh_haystack_8k", "nieh_truncate_head_8k"]
     arguments = option_words(model="oracle", tasks=",".join(tasks), data=data, out=tmp_path / "out")
-    code, _, err = run_cli(*arguments, *options)
-    assert code == 0, err
+    read_success(run_cli(*arguments, *options))
     # A baseline is counted as Qwen2.5-VL: 121 tokens a frame.
     assert [set(n_frames(tmp_path / "out", task)) for task in tasks] == [{haystack}, {truncated}]
 
@@ -59,8 +58,7 @@ def test_the_tokens_of_a_frame_can_be_given(make_nieh_set, tmp_path, run_cli, mo
     data, out = make_nieh_set(ONE, n_frames=80, size=56), tmp_path / "out"
     tasks = ["nieh_haystack_8k", "nieh_truncate_head_8k"]
     arguments = ["--model", model, "--tasks", ",".join(tasks), "--data", data, "--out", out]
-    code, _, err = run_cli(*arguments, "--tokens-per-frame", 390)
-    assert code == 0, err
+    read_success(run_cli(*arguments, "--tokens-per-frame", 390))
     assert [set(n_frames(out, task)) for task in tasks] == [{8000 // 390}, {8192 // 390}]
     (folder,) = (path.parent for path in out.rglob("journal"))
     assert read_run(folder, RECORDS)[0].config.tokens_per_frame == 390
@@ -101,8 +99,7 @@ def test_what_fits_only_with_rope_is_reported_with_both_limits(
         model="qwen2.5-vl", model_args=f"pretrained={short},device=cpu", tasks="nieh"
     )
     arguments += ["--data", data, "--out", tmp_path / "out"]
-    code, _, err = run_cli(*arguments, "--rope", "yarn:4")
-    assert code == 0, err
+    _, err = read_success(run_cli(*arguments, "--rope", "yarn:4"))
     assert line_of(err, "nieh_gt:").endswith("(limit 6,000, 1,500 before its extension): fits")
     full = line_of(err, "nieh_full:")
     assert full.endswith(": 2 of 2 contexts extended: longer than the model takes without rope")
@@ -140,8 +137,7 @@ def test_a_context_that_is_cut_to_its_size_is_reported_as_truncated(
     metadata = data / "metadata" / "u" / "metadata.json"
     metadata.write_text(json.dumps(json.loads(metadata.read_text())[:60]))
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_truncate_head_8k", "--data", data]
-    code, _, err = run_cli(*arguments, "--out", tmp_path / "out")
-    assert code == 0, err
+    _, err = read_success(run_cli(*arguments, "--out", tmp_path / "out"))
     line = line_of(err, "nieh_truncate_head_8k: 2 contexts")
     assert line.endswith(
         "(limit 128,000): 1 of 2 contexts truncated: frames cut off to keep the context's size"

@@ -2,7 +2,6 @@
 of videos."""
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -15,8 +14,9 @@ from infthor_eval.nieh.published.imported_replies import import_logs
 from infthor_eval.nieh.records import BlindGuess, ShownClues
 from infthor_eval.nieh.results.summary import summarise
 
+from ...helpers.published import PUBLISHED_SETS, needs_published_sets
+
 SINGLE, MULTI = "qa_set_nieh_single_clue", "qa_set_nsieh_multi_clue"
-PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
 QUESTIONS = [
     Question(
         f"t{number // 2}",
@@ -84,6 +84,7 @@ def test_the_end_of_a_trajectory_tells_its_length_and_what_was_shown(imported):
     end = {"eval_mode": "truncate_head", "ctx_size_k": 1, "n_imgs": 5}
     rows = [row(number, **end, selected_img_indices=[6, 7, 8, 9]) for number in range(3)]
     (run,) = imported(full_traj_truncate_head_1K=rows)
+    assert run.settings["ctx_size"] == 1
     assert (run.task, shown_clues_of(run)) == (
         "nieh_truncate_head_1k",
         {"q0": (0, 1, 6), "q1": (1, 1, 1), "q2": (1, 2, 3)},
@@ -116,6 +117,7 @@ def test_lengths_serve_the_logs_of_other_modes(imported):
     alone = imported(full_traj_clip_retrieval=retrieved)
     assert [shown_clues_of(run) for run in alone] == [{"q0": (1, 1, None), "q1": None, "q2": None}]
     run, _ = imported(full_traj_clip_retrieval=retrieved, full_traj=[row(1, n_imgs=10)])
+    assert run.settings["top_k"] == 2
     assert (run.task, shown_clues_of(run)) == (
         "nieh_clip_retrieval",
         {"q0": (1, 1, 6), "q1": None, "q2": None},
@@ -197,11 +199,11 @@ def test_records_have_what_blind_says_that_suits_the_mode(imported, monkeypatch)
     assert {record.id: record.payload.blind for record in run.records} == {"q0": blind, "q1": None}
 
 
-@pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published logs are not at ../shared/data")
+@needs_published_sets
 def test_published_replies_at_32k_by_shown_clues():
     logs, data = (
-        sorted((PUBLISHED / "replies").glob("*truncate_head_32K.log.gz")),
-        NiehSet(PUBLISHED),
+        sorted((PUBLISHED_SETS / "replies").glob("*truncate_head_32K.log.gz")),
+        NiehSet(PUBLISHED_SETS),
     )
     (run,) = import_logs(logs, data)
     ((_, task),) = summarise(run.header(data).config, run.records).tasks.items()

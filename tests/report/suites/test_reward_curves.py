@@ -18,7 +18,7 @@ from infthor_eval.report.suites.reward_curves import (
 )
 from infthor_eval.runs import read_run
 
-from ...helpers.command_line import option_words
+from ...helpers.command_line import option_words, read_success
 from ...helpers.journals import write_run
 from ...helpers.plan_runs import make_plan_record, make_planner_run, make_plans_run
 from ...helpers.trajectories import CANDLE, cut_trajectory, write_trajectories
@@ -234,12 +234,12 @@ def test_the_six_panels_are_drawn_from_runs_of_tiny_models(tmp_path, run_cli, mo
         ("--model", "planner", *task_options),
         *(_options_of_model(name, *task_options) for name in NAMES),
     ):
-        code, _, err = run_cli(*words)
-        assert code == 0, f"{words}\n{err}"
-    code, output, _ = run_cli(
-        "report", *sorted(Path("results").glob("*/*")), "--figure", "7", "--panels", EXAMPLE
+        read_success(run_cli(*words))
+    output, _ = read_success(
+        run_cli(
+            "report", *sorted(Path("results").glob("*/*")), "--figure", "7", "--panels", EXAMPLE
+        )
     )
-    assert code == 0
     assert "in no panel" not in output
     assert {line.split()[0] for line in output.splitlines() if line.split()} >= {*NAMES, "planner"}
     words = read_texts(Path("results/figures/figure7.svg"))

@@ -1,7 +1,5 @@
 """What stands on the page of real runs."""
 
-import json
-import shutil
 from collections import Counter
 from copy import copy
 from itertools import pairwise
@@ -130,26 +128,6 @@ def test_without_its_set_or_with_another_one_there_are_no_frames_and_it_is_said(
     haystack = [sample for sample in page.samples if sample.task != "nieh_mini_gt"]
     assert haystack
     assert all(sample.timeline is None for sample in haystack)
-
-
-def test_a_run_that_was_stopped_and_has_failures_says_so(make_page, nieh_runs, tmp_path):
-    copy = tmp_path / "stopped"
-    shutil.copytree(nieh_runs[0], copy)
-    (journal,) = (copy / "journal").glob("*.jsonl")
-    lines = journal.read_text().splitlines()
-    record = json.loads(lines[1])
-    record["failure"] = "the frame is gone"
-    record["payload"].pop("reply", None)
-    record["payload"].pop("scores", None)
-    journal.write_text("\n".join([lines[0], json.dumps(record), *lines[2:-3]]) + "\n")
-    results = json.loads((copy / "results.json").read_text())
-    (copy / "results.json").write_text(json.dumps(results | {"n_missing": 3}))
-    page = make_page(copy)
-    (table,) = next(section.tables for section in page.sections if section.key == "left-out")
-    facts = {row.cells[2]: row.cells[3:] for row in table.rows}
-    assert facts["failed"] == ("1", "the frame is gone")
-    assert facts["not asked"][0] == "3"
-    assert sum(sample.results[0].outcome == "failed" for sample in page.samples) == 1
 
 
 def test_the_footer_names_the_embedded_simulator_only_where_it_was_used(page, make_page, nieh_runs):

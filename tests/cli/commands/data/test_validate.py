@@ -11,7 +11,7 @@ from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.storage.folders import packaged_folder
 
 from ....helpers.baselines import ScriptedBaseline
-from ....helpers.command_line import option_words
+from ....helpers.command_line import option_words, read_success
 from ....helpers.questions import make_question
 
 # Of known skill: which answers each scripted model gets right.
@@ -57,8 +57,7 @@ def test_questions_that_one_model_answers_are_kept_and_the_rest_is_rejected_or_i
     data, tmp_path, run_cli
 ):
     out = tmp_path / "validated"
-    code, printed, err = run_cli("validate", data, "--model", "yes,none", "--out", out)
-    assert code == 0, err
+    printed, _ = read_success(run_cli("validate", data, "--model", "yes,none", "--out", out))
     assert kept(out) == ["Is there a mug?", "Was it there?"]
     rejected = [json.loads(line) for line in (out / "rejected.jsonl").read_text().splitlines()]
     assert [item["question"] for item in rejected] == ["What is <b>it</b>?"]
@@ -80,8 +79,9 @@ def test_the_bundled_set_keeps_exactly_what_a_model_of_four_can_answer(data, tmp
         tmp_path / "validated",
         ("yes", "counter", "places", "none"),
     )
-    code, printed, err = run_cli("validate", bundled, "--model", ",".join(models), "--out", out)
-    assert code == 0, err
+    printed, _ = read_success(
+        run_cli("validate", bundled, "--model", ",".join(models), "--out", out)
+    )
     questions = [
         item for path in sorted(bundled.glob("qa_set*.csv")) for item in read_questions(path)
     ]
@@ -125,8 +125,7 @@ def test_decisions_are_applied(data, tmp_path, run_cli):
     decisions.write_text(
         "question_id,decision\n" + "".join(f"{row['question_id']},{c}\n" for row, c in choices)
     )
-    code, printed, err = run_cli(*arguments, "--decisions", decisions)
-    assert code == 0
+    printed, err = read_success(run_cli(*arguments, "--decisions", decisions))
     assert kept(out) == ["Is there a mug?", "What is <b>it</b>?", "Was it there?"]
     assert "3 kept, 1 rejected, 1 to inspect" in printed
     assert "0 evaluated now, 5 resumed" in err
