@@ -69,14 +69,6 @@ FILES = [
         "own.yaml: generation_kwargs is 5; it is a mapping of settings",
     ),
     (CLUES + "}\ngeneration_kwargs: [until]", "it is a mapping of settings"),
-    (
-        CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, until: 5}",
-        "it is a text or a list of texts",
-    ),
-    (
-        CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, until: {a: 1}}",
-        "it is a text or a list of texts",
-    ),
     (CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, 7: 1}", "not"),
     (CLUES + "}\ndescription: 2020-01-01", "holds what JSON cannot"),
     (CLUES + "}\ndescription: !!binary aGk=", "holds what JSON cannot"),

@@ -8,7 +8,12 @@ import pytest
 from infthor_eval.cli import main
 
 __all__ = [
-    *("CliRunner", "assert_refused", "option_words", "read_remarks", "read_success", "run_cli"),
+    "CliRunner",
+    "assert_refused",
+    "option_words",
+    "read_remarks",
+    "read_success",
+    "run_cli",
     "runner_of",
 ]
 

@@ -61,6 +61,8 @@ def test_another_seed_draws_other_replies_from_the_same_weights(prepare_run, sam
         ("do_sample: false, temperature: 0.7", "temperature 0.7 without do_sample has no effect"),
         ("do_sample: true, temperature: 0.0", "do_sample with temperature 0 contradict each other"),
         ("num_beams: 4", "num_beams is not known; there are until, max_gen_toks"),
+        ("until: 5", "until is 5; it is a text or a list of texts"),
+        ("until: {a: 1}", "until is {'a': 1}; it is a text or a list of texts"),
         ("until: [7]", r"until is \[7\]; it is a text or a list of texts"),
         ("do_sample: 'no'", "do_sample is 'no'; it is true or false"),
         ("temperature: -1.0", "temperature must be 0"),

@@ -62,16 +62,22 @@ def test_further_forms_are_refused_in_the_published_words(make_nieh_set, tmp_pat
     assert not (tmp_path / "a.csv").exists()
 
 
-def test_table4_is_printed_from_the_files_scores(tmp_path, run_cli):
-    matches = tuple((f"match{n}", 0.5) for n in range(1, 5))
-    for file, name, n_clues in (("single", FILES[0], (1,)), ("multi", FILES[1], (2, 4))):
+def write_published(folder, score, single, multi):
+    """Writes both files of the published form: a row for each tuple of clues, so scored."""
+    matches = tuple((f"match{number}", score) for number in (1, 2, 3, 4))
+    for name, kind, of_rows in zip(FILES, ("single", "multi"), (single, multi), strict=True):
         questions = [
-            Question(f"{file}{n}", "Was Box open?", tuple(range(n)), ("Yes",),
-                     published=PublishedColumns(
-                file, f"{file}{n}_q1", 1, (0,), matches))
-            for n in n_clues
+            Question(
+                f"t{number}", f"Is there a mug {number}?", clues, ("yes",),
+                published=PublishedColumns(kind, f"{kind}{number}", matches=matches),
+            )
+            for number, clues in enumerate(of_rows)
         ]  # fmt: skip
-        write_questions(tmp_path / name, questions)
+        write_questions(folder / name, questions)
+
+
+def test_table4_is_printed_from_the_files_scores(tmp_path, run_cli):
+    write_published(tmp_path, 0.5, [(0,)], [(0, 1), (0, 1, 2, 3)])
     code, out, err = run_cli("table", "4", tmp_path)
     assert (code, err) == (0, "")
     assert [line.split()[-6:] for line in out.splitlines() if "match3" in line] == [
@@ -104,17 +110,7 @@ def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_fi
 ):
     """One of two files of the published form has a bad row; whatever counts rows counts it, and
     goes on."""
-    scores = tuple((f"match{number}", 1.0) for number in (1, 2, 3, 4))
-    for name, clues_of_rows in zip(FILES, ([(1,), (2,), (3,)], [(1, 2), (1, 2, 3)]), strict=True):
-        kind = "single" if "single" in name else "multi"
-        questions = [
-            Question(
-                f"t{number}", f"Is there a mug {number}?", clues, ("yes",),
-                published=PublishedColumns(kind, f"{kind}{number}", matches=scores),
-            )
-            for number, clues in enumerate(clues_of_rows)
-        ]  # fmt: skip
-        write_questions(tmp_path / name, questions)
+    write_published(tmp_path, 1.0, [(1,), (2,), (3,)], [(1, 2), (1, 2, 3)])
     path = tmp_path / FILES[0]
     path.write_text(
         path.read_text().replace("t1,Is there a mug 1?,[2],['yes']", "t1,Is there a mug 1?,[2],")

@@ -90,16 +90,9 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(
     arguments = option_words(model="oracle", data=make_nieh_set(size=56), out=tmp_path / "out")
     out, _ = read_success(run_cli(*arguments, "--tasks", "nieh_gt,nieh_own", "--full"))
     rows = [line.split() for line in out.splitlines()]
-    assert [row[2] for row in rows if row[:2] == ["oracle", "nieh_own"] and len(row) > 7] == [
-        "letters"
-    ]
+    (own,) = [row for row in rows if row[:2] == ["oracle", "nieh_own"] and len(row) > 7]
     # By clues: 3, 2 and 2 letters of 20; 10; 10.
-    assert next(row for row in rows if row[1:3] == ["nieh_own", "letters"])[3:10:2] == [
-        "11.67",
-        "50.00",
-        "50.00",
-        "27.00",
-    ]
+    assert (own[2], own[3:10:2]) == ("letters", ["11.67", "50.00", "50.00", "27.00"])
     assert ["oracle", "nieh_gt", "strict", *FULL_MARKS] in rows
     samples = find_one(tmp_path / "out", "samples_nieh_own_*.jsonl").read_text().splitlines()
     assert [json.loads(line)["letters"] for line in samples] == [0.15, 0.5, 0.5, 0.1, 0.1]

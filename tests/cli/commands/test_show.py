@@ -79,14 +79,10 @@ def test_all_tables_of_csv_have_numbers_in_their_columns_of_numbers(ran):
             ), (name, cells)
 
 
-def test_json_with_format_or_full_is_refused(run_cli, tmp_path):
+def test_json_with_full_and_a_folder_without_a_run_are_refused(run_cli, tmp_path):
     assert_refused(run_cli("show", tmp_path, "--json", "--full"), "--json holds everything")
-
-
-def test_a_folder_without_a_run_is_named(run_cli, tmp_path):
-    assert_refused(
-        run_cli("show", tmp_path), f"{tmp_path}: no journal in it; give the folder of a run"
-    )
+    expected = f"{tmp_path}: no journal in it; give the folder of a run"
+    assert_refused(run_cli("show", tmp_path), expected)
 
 
 def test_why_units_failed_is_said_again_and_of_several_runs_with_the_folder(tmp_path, run_cli):

@@ -64,7 +64,9 @@ def test_the_file_of_a_run_resumes_that_run(config, tmp_path, run_cli, monkeypat
 
 def test_the_command_of_the_file_is_the_run(config, run_cli):
     run_cli("--config", config(limit=2, frames="blank"))
-    command = read_stored_command(find_one(config().parent / "out", "run.yaml").parent)
+    folder = find_one(config().parent / "out", "run.yaml").parent
+    assert "typed.yaml" not in (folder / "results.json").read_text()
+    command = read_stored_command(folder)
     _, _, err = run_cli(*shlex.split(command.line)[1:])
     assert "oracle: 0 evaluated now, 2 resumed" in err
 
@@ -213,11 +215,6 @@ def test_models_as_typed_come_back(models):
 )
 def test_invalid_lists_of_models_are_refused(run_cli, typed, expected):
     assert_refused(run_cli("--model", typed, "--tasks", "nieh_gt"), expected)
-
-
-def test_results_do_not_name_the_file(config, tmp_path, run_cli):
-    run_cli("--config", config(limit=1))
-    assert "typed.yaml" not in find_one(tmp_path / "out", "results.json").read_text()
 
 
 def test_a_suites_option_without_a_default_must_be_given(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,64 +6,46 @@ import pytest
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.runs import execute
-from model_adapters import Capabilities, Reply
+from model_adapters import Capabilities, Reply, Transcript
+from tests.model_adapters.toy_adapter import Toy
 
 from ..watching import Watcher, replies
 
 TINY = "qwen2.5-vl-tiny"
 
 
-class Recorder:
+class Recorder(Toy):
     """A scripted model that keeps what it was asked."""
 
-    name = "recorder"
-    capabilities = Capabilities(token_ids=False)
+    name, capabilities = "recorder", Capabilities(token_ids=False)
 
     def __init__(self):
         self.requests = []
-
-    def identity(self):
-        return {}
 
     def tokens_per_frame(self, frame):
         return 100
 
     def conversation(self):
-        return Talk(self)
-
-    def close(self):
-        pass
+        return RecordedTalk(self)
 
 
-class Talk:
+class RecordedTalk(Transcript):
     def __init__(self, model):
-        self.model, self.parts = model, []
+        super().__init__()
+        self.model = model
 
     @property
     def n_tokens(self):
-        return len(self.parts)
+        return sum(len(turn.parts) for turn in self.turns)
 
-    def append(self, *parts, role="user"):
-        assert role == "user"
-        self.parts += parts
-
-    def mark(self):
-        return len(self.parts)
-
-    def rewind(self, mark):
-        del self.parts[mark:]
-
-    def replies(self, continuations, decoding):
+    def reply(self, decoding):
         assert (decoding.max_new_tokens, decoding.greedy, decoding.stop) == (50, True, ())
-        return [self.reply_to([*self.parts, *parts]) for parts in continuations]
-
-    def reply_to(self, parts):
-        self.model.requests.append(parts)
-        for part in parts[:-1]:
-            part.load()
-        return Reply(
-            "first line\nmug", n_reply_tokens=2, n_context_tokens=len(parts), n_cached_tokens=0
-        )
+        ((*frames, text),) = (turn.parts for turn in self.turns)
+        self.model.requests.append([*frames, text])
+        for frame in frames:
+            frame.load()
+        n_tokens = {"n_reply_tokens": 2, "n_context_tokens": len(frames) + 1, "n_cached_tokens": 0}
+        return Reply("first line\nmug", **n_tokens)
 
 
 @pytest.fixture

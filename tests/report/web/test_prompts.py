@@ -51,17 +51,15 @@ def test_a_run_without_requests_says_that_they_are_not_known(
     assert tab.locator("details.prompt pre").count() == 0
 
 
-def test_the_whole_prompt_unfolds_with_its_frames_in_their_places(page, open_page):
-    opened = open_page(page)
-    opened.tab.select_option("#task", "nieh_mini_gt")
+def test_the_whole_prompt_unfolds_with_its_frames_in_their_places(page, tab):
+    tab.select_option("#task", "nieh_mini_gt")
     sample = next(it for it in page.samples if it.task == "nieh_mini_gt")
-    opened.tab.locator("details.prompt summary").click()
-    text = opened.tab.locator("details.prompt").inner_text()
+    tab.locator("details.prompt summary").click()
+    text = tab.locator("details.prompt").inner_text()
     clues = [frame.index for frame in sample.timeline.frames if frame.is_clue]
     assert f"⟦{len(clues)} × frames: " in text
     assert f"Question: {sample.title}" in text
     assert "a baseline is not sent it" in text
-    assert opened.errors == []
 
 
 def test_clues_that_a_context_left_out_are_marked(page, open_page):
@@ -122,16 +120,14 @@ def test_tracebacks_of_failures_unfold_as_text(make_page, nieh_runs, tmp_path, o
         record["payload"].pop("scores", None)
     journal.write_text("\n".join(map(json.dumps, records)) + "\n")
     page = make_page(copy, data=DATA)
+    tab = open_page(page).tab
     (text,) = page.tracebacks  # of both: the second one's says that it is as for the first
     assert text.endswith(f"ZeroDivisionError: {HOSTILE}")
-    opened = open_page(page)
-    opened.tab.select_option("#outcome", "failed")
+    tab.select_option("#outcome", "failed")
     for _ in at:
-        opened.tab.click("details.traceback summary")
+        tab.click("details.traceback summary")
         assert (
-            "ZeroDivisionError: </script><img"
-            in opened.tab.locator("details.traceback pre").inner_text()
+            "ZeroDivisionError: </script><img" in tab.locator("details.traceback pre").inner_text()
         )
-        opened.tab.keyboard.press("j")
-    assert opened.tab.evaluate("window.hacked") is None
-    assert opened.errors == []
+        tab.keyboard.press("j")
+    assert tab.evaluate("window.hacked") is None
