@@ -4,7 +4,6 @@ import importlib
 import os
 import pkgutil
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,8 @@ import pytest
 from infthor_eval import suites
 from infthor_eval.cli import commands
 from infthor_eval.cli.main import _NAMES, _infthor_eval
+
+from ..helpers.processes import run_python
 
 ROOT = Path(__file__).parents[2]
 HEAVY = {"torch", "transformers", "numpy", "scipy", "ai2thor", "lm_eval", "datasets", "matplotlib"}
@@ -30,14 +31,7 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}), file=sys.stderr
 
 def run(program: str, typed: str, **options: Any) -> "subprocess.CompletedProcess[str]":
     """What a program does with the words that are typed."""
-    done = subprocess.run(
-        [sys.executable, "-c", program, *typed.split()],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=600,
-        **options,
-    )
+    done = run_python(program, *typed.split(), **options)
     assert done.returncode == 0, done.stderr
     return done
 

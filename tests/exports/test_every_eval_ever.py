@@ -10,7 +10,7 @@ import pytest
 
 from infthor_eval.runs.journals.shards import find_shards
 
-from ..helpers.command_line import read_success
+from ..helpers.command_line import assert_refused, read_success
 from .conftest import SCHEMAS, primary_metrics
 
 SUITES = ("nieh", "plans", "manipulation")
@@ -199,6 +199,7 @@ def test_the_model_as_others_know_it(questions_run, export):
 
 def test_runs_of_two_models_have_no_one_name(questions_run, arm_run, run_cli, tmp_path):
     words = ("--format", "every-eval-ever", "--out", tmp_path, "--model-id", "a/b")
-    code, _, err = run_cli("export", questions_run, arm_run, *words)
-    assert (code, err.count("\n")) == (2, 1)
-    assert "--model-id: names one model, and arms is another than random" in err
+    assert_refused(
+        run_cli("export", questions_run, arm_run, *words),
+        "--model-id: names one model, and arms is another than random",
+    )

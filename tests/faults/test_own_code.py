@@ -2,8 +2,6 @@
 
 import json
 import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,6 +18,7 @@ from model_adapters.policies.parity import load_policy
 from ..helpers.command_line import read_success
 from ..helpers.journals import write_journal
 from ..helpers.nieh_runs import make_config, make_header, make_record
+from ..helpers.processes import run_python
 from ..model_adapters.policies.servers import policy_answers, serve
 
 MODEL = """
@@ -134,13 +133,8 @@ def test_a_thread_that_is_left_does_not_keep_the_process(rescored_by, is_daemon)
         f"    threading.Thread(target=time.sleep, args=(9**9,), daemon={is_daemon}).start()\n"
         "    return 1.0\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", "from infthor_eval.cli import main; main()", *map(str, words)],
-        env={**os.environ, OWN_CODE_SECONDS.name: "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    program = "from infthor_eval.cli import main; main()"
+    done = run_python(program, *words, env={**os.environ, OWN_CODE_SECONDS.name: "1"})
     assert done.returncode == 0, done.stderr
     assert "100.00" in done.stdout
     assert ("your own code left a thread that runs on" in done.stderr) is not is_daemon

@@ -16,6 +16,7 @@ from infthor_eval.runs import read_run
 from infthor_eval.runs.journals.journal import Journal
 
 from ..helpers.command_line import assert_refused, option_words, read_success
+from ..helpers.processes import run_python
 
 
 def test_a_run_whose_folder_is_deleted_does_not_end_well(
@@ -29,9 +30,11 @@ def test_a_run_whose_folder_is_deleted_does_not_end_well(
 
     monkeypatch.setattr(Journal, "append", append_and_delete)
     arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56)]
-    code, out, err = run_cli(*arguments, "--out", tmp_path / "out")
-    assert (code, out) == (2, "")
-    assert "was deleted or replaced while the run wrote it" in err
+    assert_refused(
+        run_cli(*arguments, "--out", tmp_path / "out"),
+        "was deleted or replaced while the run wrote it",
+        after_notes=True,
+    )
 
 
 def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(
@@ -130,13 +133,7 @@ def test_ctrl_c_during_the_imports_is_one_line(tmp_path):
     program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
     program += "from infthor_eval.cli import main; main()"
     root = Path(__file__).parents[2]
-    done = subprocess.run(
-        [sys.executable, "-c", program, "--version"],
-        env=os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{root}"},
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
+    env = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{root}"}
+    done = run_python(program, "--version", env=env)
     assert (done.returncode, done.stdout) == (130, "")
     assert done.stderr == "infthor-eval: stopped; run the same command to continue\n"

@@ -5,7 +5,6 @@ import json
 import pytest
 
 from infthor_eval.errors import DataError
-from infthor_eval.nieh.asking.baselines import Oracle
 from infthor_eval.nieh.metrics import PUBLISHED, metrics_of
 from infthor_eval.runs import Catalog, execute
 
@@ -171,15 +170,3 @@ def test_of_our_scorers_a_task_has_those_that_it_lists(own):
         match="letters is none of our scorers, reference, strict; name its process_results",
     ):
         metrics_of(task())
-
-
-def test_baselines_are_measured_by_the_files_function_too(prepare_run, own):
-    own(
-        "def measure(doc, results):\n"
-        "    return {'letters': results[0] == doc['question'], 'plain': True}\n"
-    )
-    (summary,) = execute(
-        prepare_run(Oracle.name, tasks=("nieh_own",))
-    ).summary.summary.tasks.values()
-    assert summary.by_clues["total"].scores["letters"].mean == 0.0
-    assert summary.by_clues["total"].scores["plain"].mean == 1.0

@@ -7,7 +7,7 @@ import pytest
 from infthor_eval.formats.question import Question
 from model_adapters import Reply
 from model_adapters.built_in import BUILT_IN, BuiltIn
-from tests.helpers.command_line import option_words, read_success
+from tests.helpers.command_line import assert_refused, option_words, read_success
 from tests.model_adapters.toy_adapter import Talk, Toy
 
 QUESTIONS = tuple(
@@ -78,8 +78,11 @@ def test_thoughts_have_a_budget_of_their_own(make_nieh_set, tmp_path, run_cli):
     assert run_cli(*arguments, "--max-thinking-tokens", 1000)[0] == 0
     assert {limit for limit, _ in LIMITS} == {1050}
     assert "0 evaluated now" not in run_cli(*arguments)[2]  # another run
-    code, _, err = run_cli(*arguments, "--max-thinking-tokens", 0)
-    assert code == 2 and "--max-thinking-tokens 0: give a whole number from 1" in err
+    assert_refused(
+        run_cli(*arguments, "--max-thinking-tokens", 0),
+        "--max-thinking-tokens 0: give a whole number from 1",
+        after_notes=True,
+    )
 
 
 def test_a_stop_string_ends_the_answer_and_not_the_thoughts(

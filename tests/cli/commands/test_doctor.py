@@ -12,7 +12,7 @@ from infthor_eval.cli.commands.doctor import Check
 from infthor_eval.formats.question import Question
 
 from ...helpers.bundled import BUNDLED
-from ...helpers.command_line import read_success
+from ...helpers.command_line import assert_refused, read_success
 from ...helpers.questions import make_question
 
 TOKEN = "hf_of_nobody_0123456789"
@@ -151,9 +151,5 @@ def test_question_files_alone_have_no_frames(run_cli, tmp_path):
 
 
 def test_what_is_no_set_is_one_line(run_cli, tmp_path):
-    code, _, err = run_cli("doctor", "--data", str(tmp_path))
-    assert code == 2
-    assert err.count("\n") == 1 and "qa_set" in err
-    code, _, err = run_cli("doctor", "--trajectories", str(tmp_path))
-    assert code == 2
-    assert "--data" in err
+    assert_refused(run_cli("doctor", "--data", str(tmp_path)), "qa_set")
+    assert_refused(run_cli("doctor", "--trajectories", str(tmp_path)), "--data", after_notes=True)

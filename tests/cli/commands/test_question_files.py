@@ -68,7 +68,7 @@ def write_published(folder, score, single, multi):
     for name, kind, of_rows in zip(FILES, ("single", "multi"), (single, multi), strict=True):
         questions = [
             Question(
-                f"t{number}", f"Is there a mug {number}?", clues, ("yes",),
+                f"{kind}{number}", f"Is there a mug {number}?", clues, ("yes",),
                 published=PublishedColumns(kind, f"{kind}{number}", matches=matches),
             )
             for number, clues in enumerate(of_rows)
@@ -112,9 +112,7 @@ def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_fi
     goes on."""
     write_published(tmp_path, 1.0, [(1,), (2,), (3,)], [(1, 2), (1, 2, 3)])
     path = tmp_path / FILES[0]
-    path.write_text(
-        path.read_text().replace("t1,Is there a mug 1?,[2],['yes']", "t1,Is there a mug 1?,[2],")
-    )
+    path.write_text(path.read_text().replace("mug 1?,[2],['yes']", "mug 1?,[2],"))
     log = tmp_path / "log.jsonl"
     log.write_text(
         "".join(json.dumps({"question_id": f"single{n}", "reply": "yes"}) + "\n" for n in range(3))

@@ -198,15 +198,7 @@ def test_what_does_not_fit_says_why():
     assert reasons(100, [1], 0.5) == {"no frame fits the window"}
 
 
-def test_a_kilo_token_is_the_published_one_unless_told_otherwise():
-    def n_frames(context, **settings):
-        question = make_question(clues=(999,))
-        settings = ContextSettings(ctx_size=8, tokens_per_frame=121, **settings)
-        samples = CONTEXTS[context].samples(Frames(1000), question, settings)
-        return next(len(sample.frames) for sample in samples if isinstance(sample, QuestionVariant))
-
-    assert n_frames("truncate_head") == 8 * 1024 // 121
-    assert n_frames("truncate_head", k_tokens=1000) == 8000 // 121
+def test_a_window_without_its_sizes_is_refused():
     with pytest.raises(UsageError, match="needs tokens_per_frame"):
         windows(10, [1], ctx_size=8)
     with pytest.raises(UsageError, match="needs its size"):

@@ -170,8 +170,7 @@ def test_an_address_is_followed_on_the_open_page_and_past_filters(page, tab):
 
 
 def test_the_link_of_a_sample_is_copied(page, open_page):
-    opened = open_page(page, permissions=["clipboard-read", "clipboard-write"])
-    tab = opened.tab
+    tab = open_page(page, permissions=["clipboard-read", "clipboard-write"]).tab
     tab.keyboard.press("j")
     tab.click("button.link")
     tab.wait_for_function("document.querySelector('button.link').textContent === 'copied'")
@@ -302,8 +301,7 @@ def test_an_episode_has_its_steps_and_its_map(make_page, scripted_run, scripted_
 
 def test_of_many_samples_only_those_in_view_are_elements(page, open_page):
     many = changed(page, samples=list(page.samples) * 10)
-    opened = open_page(many)
-    tab, last = opened.tab, len(many.samples) - 1
+    tab, last = open_page(many).tab, len(many.samples) - 1
     assert 1 < tab.locator(".item").count() < 50
     tab.locator("#list").evaluate("it => it.scrollTo(0, it.scrollHeight)")
     tab.locator(f'.item[data-place="{last}"]').click()

@@ -13,7 +13,7 @@ from infthor_eval.cli import main
 from infthor_eval.cli.commands.data.replay import QUALITIES, parse_form
 from infthor_eval.formats.qa_csv import read_questions
 
-from ....helpers.command_line import option_words, read_success
+from ....helpers.command_line import assert_refused, option_words, read_success
 from ....infthor_sim.test_houses import furnished_house
 
 _FEW = ("--per-trajectory", 5)
@@ -91,9 +91,9 @@ def test_a_file_that_is_no_house_is_one_line(tmp_path, run_cli, content, message
     path = tmp_path / "house.json"
     if content is not None:
         path.write_text(content)
-    code, _, err = run_cli("generate", "--scene", path, "--out", tmp_path / "data")
-    assert (code, err.count("\n")) == (2, 1)
-    assert f"{path}: {message}" in err
+    assert_refused(
+        run_cli("generate", "--scene", path, "--out", tmp_path / "data"), f"{path}: {message}"
+    )
     assert not (tmp_path / "data").exists()
 
 
@@ -152,9 +152,9 @@ def test_replay_writes_what_the_published_renderer_writes(made_folder, tmp_path,
     ],
 )
 def test_options_of_the_two_forms_are_not_mixed(options, words, tmp_path, run_cli):
-    code, _, err = run_cli("replay", "file.json", "--out", tmp_path, *options)
-    assert code == 2
-    assert words in err
+    assert_refused(
+        run_cli("replay", "file.json", "--out", tmp_path, *options), words, after_notes=True
+    )
 
 
 def test_unitys_rendering_qualities_are_those_of_ai2thor():
@@ -255,6 +255,5 @@ def test_a_set_of_another_version_is_neither_continued_nor_evaluated(
 
 
 def test_bathrooms_are_left_out_of_test_sets(tmp_path, run_cli):
-    code, _, err = run_cli("generate", "--scene", "bathroom-1", "--test-set", "--out", tmp_path)
-    assert code == 2
-    assert "bathrooms are left out" in err
+    ended = run_cli("generate", "--scene", "bathroom-1", "--test-set", "--out", tmp_path)
+    assert_refused(ended, "bathrooms are left out", after_notes=True)

@@ -11,7 +11,7 @@ from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.storage.folders import packaged_folder
 
 from ....helpers.baselines import ScriptedBaseline
-from ....helpers.command_line import option_words, read_success
+from ....helpers.command_line import assert_refused, option_words, read_success
 from ....helpers.questions import make_question
 
 # Of known skill: which answers each scripted model gets right.
@@ -142,11 +142,10 @@ def test_decisions_are_applied(data, tmp_path, run_cli):
 def test_decisions_that_do_not_fit_are_refused(data, tmp_path, run_cli, content, expected):
     decisions = tmp_path / "decisions.csv"
     decisions.write_text(content)
-    code, _, err = run_cli(
+    ended = run_cli(
         "validate", data, "--model", "none", "--out", tmp_path / "v", "--decisions", decisions
     )
-    assert code == 2
-    assert expected in err
+    assert_refused(ended, expected, after_notes=True)
     assert not (tmp_path / "v" / "qa_set_validated.csv").exists()
 
 
@@ -157,6 +156,5 @@ def test_the_published_filter_keeps_what_is_answered_in_part(data, tmp_path, run
     code, out, _ = run_cli(*words, str(tmp_path / "published"), "--published")
     assert (code, "1 kept" in out) == (0, True)
     assert kept(tmp_path / "published") == ["Which two?"]
-    code, _, err = run_cli(*words, str(tmp_path / "both"), "--published", "--scorer", "strict")
-    assert code == 2
-    assert "--scorer strict" in err
+    ended = run_cli(*words, str(tmp_path / "both"), "--published", "--scorer", "strict")
+    assert_refused(ended, "--scorer strict", after_notes=True)
