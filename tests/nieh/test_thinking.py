@@ -49,9 +49,8 @@ def answers_of(output):
 
 def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(QUESTIONS, size=56)
-    read_success(
-        run_cli("--model", "toy", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path / "out")
-    )
+    words = option_words(model="toy", tasks="nieh_gt", data=data, out=tmp_path / "out")
+    read_success(run_cli(*words))
     answers = answers_of(tmp_path / "out")
     assert {question: payload.get("thinking") for question, payload in answers.items()} == {
         "What first?": "a cup? no",

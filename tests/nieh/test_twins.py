@@ -62,9 +62,8 @@ def test_windows_are_the_same_in_both_worlds(twins):
 def test_the_oracle_has_all_pairs_and_blind_none(twins, tmp_path, run_cli):
     for model, expected in (("oracle", 1.0), ("blind", 0.0)):
         out = tmp_path / model
-        printed, _ = read_success(
-            run_cli("run", "--model", model, "--tasks", "nieh_twins", "--data", twins, "--out", out)
-        )
+        words = option_words(model=model, tasks="nieh_twins", data=twins, out=out)
+        printed, _ = read_success(run_cli(*words))
         assert "Twins: net pairs, %" in printed
         found = results(out)
         assert found["primary_metrics"]["nieh_twins"]["mean"] == expected

@@ -10,7 +10,7 @@ from infthor_eval.formats.question import PublishedColumns, Question
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 
-from ...helpers.published import PUBLISHED_SETS, needs_published_sets
+from ...helpers.published import PUBLISHED_SETS, make_log_row, needs_published_sets
 
 SINGLE, MULTI = "qa_set_nieh_single_clue", "qa_set_nsieh_multi_clue"
 LOG = f"eval_{SINGLE}_Some-VL-7B_full_traj.log"
@@ -48,15 +48,8 @@ def data(tmp_path):
 
 def row(number, reply, score, questions=QUESTIONS, **more):
     """A row as the published scripts write it."""
-    question = questions[number]
-    published = {
-        "qidx": number,
-        "traj_id": question.traj_id,
-        "question": question.text,
-        "gt_img_idx": list(question.clues),
-    }
-    published |= {"ctx_size_k": 32, "n_imgs": 6, "ctx_n_tokens": 726, "llm_response": reply}
-    return published | {"gt_answer": list(question.answers), "score": score} | more
+    sizes = {"ctx_size_k": 32, "n_imgs": 6, "ctx_n_tokens": 726, "score": score}
+    return make_log_row(number, questions[number], reply, **(sizes | more))
 
 
 ROWS = [row(number, reply, float(number != 2)) for number, reply in enumerate(REPLIES)]

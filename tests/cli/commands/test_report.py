@@ -92,13 +92,8 @@ def test_replays_are_counted_with_the_time_left_also_where_there_is_no_terminal(
     scripted_run, scripted_data, tmp_path, run_cli, monkeypatch
 ):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
-    out, err = read_success(
-        run_cli(
-            "report",
-            scripted_run,
-            *option_words(data=scripted_data, episodes=3, out=tmp_path / "report.html"),
-        )
-    )
+    words = option_words(data=scripted_data, episodes=3, out=tmp_path / "report.html")
+    out, err = read_success(run_cli("report", scripted_run, *words))
     assert "12 samples, " in out
     first, second = err.splitlines()  # the third is the last: the page's size follows
     pattern = r"episodes replayed: {} of 3 \({} %\), .* left, .*; scripted, bedroom-1-seed7"

@@ -43,11 +43,8 @@ def test_two_plans_become_an_mp4(scripted_run, scripted_data, tmp_path, run_cli)
 
 def test_a_gif_is_as_long_as_its_plans(scripted_run, scripted_data, tmp_path, run_cli):
     out = tmp_path / "watched.gif"
-    read_success(
-        run_cli(
-            "watch", scripted_run, "--plans", 2, "--data", scripted_data, "--out", out, "--fps", 5
-        )
-    )
+    words = option_words(plans=2, data=scripted_data, out=out, fps=5)
+    read_success(run_cli("watch", scripted_run, *words))
     with Image.open(out) as gif:
         assert gif.size == SIZE
         durations = []

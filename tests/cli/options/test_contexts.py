@@ -140,11 +140,8 @@ def test_a_film_is_a_video_where_a_family_takes_it_and_the_run_says_so(
     data, tmp_path, run_cli, model, film, placeholder, expected
 ):
     out = tmp_path / "out"
-    _, err = read_success(
-        run_cli(
-            "--model", model, "--tasks", "nieh_video", "--data", data, "--out", out, "--limit", 1
-        )
-    )
+    words = option_words(model=model, tasks="nieh_video", data=data, out=out, limit=1)
+    _, err = read_success(run_cli(*words))
     assert expected in err
     (folder,) = {path.parent for path in out.rglob("results.json")}
     assert read_header(folder).config.tasks["nieh_video"]["film"] == film

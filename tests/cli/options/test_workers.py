@@ -35,9 +35,8 @@ def test_two_workers_have_the_results_of_one_process(run_cli, make_nieh_set, tmp
     )
     words = ("--model", model, "--tasks", task, "--data", data)
     for workers in (1, 2):
-        output, _ = read_success(
-            run_cli(*words, "--out", tmp_path / str(workers), "--workers", workers)
-        )
+        more = ("--out", tmp_path / str(workers), "--workers", workers)
+        output, _ = read_success(run_cli(*words, *more))
         assert model in output
     one, two = tmp_path / "1", tmp_path / "2"
     assert results(one) == results(two)

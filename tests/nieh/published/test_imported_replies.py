@@ -14,7 +14,7 @@ from infthor_eval.nieh.published.imported_replies import import_logs
 from infthor_eval.nieh.records import BlindGuess, ShownClues
 from infthor_eval.nieh.results.summary import summarise
 
-from ...helpers.published import PUBLISHED_SETS, needs_published_sets
+from ...helpers.published import PUBLISHED_SETS, make_log_row, needs_published_sets
 
 SINGLE, MULTI = "qa_set_nieh_single_clue", "qa_set_nsieh_multi_clue"
 QUESTIONS = [
@@ -52,14 +52,7 @@ def imported(tmp_path):
 
 
 def row(number, **more):
-    question = QUESTIONS[number]
-    about = {
-        "qidx": number,
-        "traj_id": question.traj_id,
-        "question": question.text,
-        "gt_img_idx": list(question.clues),
-    }
-    return about | {"gt_answer": list(question.answers), "llm_response": "bed"} | more
+    return make_log_row(number, QUESTIONS[number], **({"reply": "bed"} | more))
 
 
 def shown_clues_of(run):
@@ -100,7 +93,7 @@ def test_the_end_of_a_trajectory_tells_its_length_and_what_was_shown(imported):
     ],
 )
 def test_thoughts_and_marks_are_no_part_of_an_answer(imported, said, thinking):
-    (run,) = imported(full_traj=[row(0, llm_response=said)])
+    (run,) = imported(full_traj=[row(0, reply=said)])
     (record,) = run.records
     assert record.payload.reply.lower() == "bed"
     assert record.payload.thinking == thinking

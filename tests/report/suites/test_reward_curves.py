@@ -235,11 +235,8 @@ def test_the_six_panels_are_drawn_from_runs_of_tiny_models(tmp_path, run_cli, mo
         *(_options_of_model(name, *task_options) for name in NAMES),
     ):
         read_success(run_cli(*words))
-    output, _ = read_success(
-        run_cli(
-            "report", *sorted(Path("results").glob("*/*")), "--figure", "7", "--panels", EXAMPLE
-        )
-    )
+    runs = sorted(Path("results").glob("*/*"))
+    output, _ = read_success(run_cli("report", *runs, "--figure", "7", "--panels", EXAMPLE))
     assert "in no panel" not in output
     assert {line.split()[0] for line in output.splitlines() if line.split()} >= {*NAMES, "planner"}
     words = read_texts(Path("results/figures/figure7.svg"))
