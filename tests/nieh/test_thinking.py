@@ -43,7 +43,8 @@ def installed(monkeypatch):
 
 def answers_of(output):
     (shard,) = output.rglob("worker-0.jsonl")
-    payloads = [json.loads(line)["payload"] for line in shard.read_text().splitlines()[1:]]
+    lines = [json.loads(line) for line in shard.read_text().splitlines()]
+    payloads = [line["payload"] for line in lines if line["type"] == "unit"]
     return {payload["question"]: payload for payload in payloads}
 
 

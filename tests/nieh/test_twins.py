@@ -11,7 +11,7 @@ from infthor_eval.nieh.samples import find_samples
 from infthor_eval.nieh.twins import first_world, twin_side
 from infthor_eval.runs import read_run
 
-from ..helpers.command_line import assert_refused, read_success
+from ..helpers.command_line import assert_refused, option_words, read_success
 from ..helpers.twin_sets import CLUES, DIFFERING, write_twin_set
 
 
