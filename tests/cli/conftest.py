@@ -10,9 +10,22 @@ from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.runs import UnitRecord
 
+from ..helpers.command_line import CliRunner, option_words, read_success
 from ..helpers.journals import write_journal
 from ..helpers.nieh_runs import make_config, make_header
 from .commands.rescored import REPLIES
+
+
+@pytest.fixture
+def evaluate(tmp_path: Path, run_cli: CliRunner) -> Callable[..., Path]:
+    """Runs a model; returns the folder of its run."""
+
+    def evaluate(model: str = "oracle", tasks: str = "nieh_gt", **options: object) -> Path:
+        out = tmp_path / "evaluated"
+        read_success(run_cli(*option_words(model=model, tasks=tasks, out=out, **options)))
+        return max((out / model).iterdir(), key=lambda folder: folder.stat().st_mtime_ns)
+
+    return evaluate
 
 
 @pytest.fixture
@@ -39,7 +52,7 @@ def source(tmp_path: Path) -> Callable[..., Path]:
 
 @pytest.fixture
 def rescore(
-    tmp_path: Path, run_cli: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, run_cli: CliRunner, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., tuple[int, str, Path | None]]:
     """Scores a run again; returns exit code, what was said, and the folder of the new run."""
     monkeypatch.chdir(tmp_path)

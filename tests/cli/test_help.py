@@ -12,6 +12,8 @@ from infthor_board.cli import _infthor_board
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
 from infthor_eval.cli.main import _infthor_eval
 
+from ..helpers.command_line import read_success
+
 GROUPS = ("Evaluate", "Look at results", "Make data", "Own models", "Tools")
 
 
@@ -51,25 +53,20 @@ def test_help_begins_with_an_example_that_the_command_takes(context, monkeypatch
 
 
 def test_the_overview_has_commands_in_groups(run_cli):
-    code, out, _ = run_cli("--help")
-    assert code == 0
+    out, _ = read_success(run_cli("--help"))
     assert out.startswith("Example:\n  infthor-eval --model ")
     headings = re.findall(r"^(\w[^:\n]*):$", out, re.MULTILINE)
     assert headings[:-1] == ["Example", *GROUPS, "Options"]
     assert headings[-1] == "Options of a run (`infthor-eval run --help` has all)"
     assert "  --model MODEL,... " in out
     assert "--check-equality" not in out
-    assert (
-        out.index("compare")
-        > out.index("Look at results:")
-        > out.index("  plan ")
-        > out.index("Evaluate:")
-    )
+    parts = ("Evaluate:", "  plan ", "Look at results:", "compare")
+    assert sorted(parts, key=out.index) == list(parts)
+    assert run_cli("--version")[1].startswith("infthor-eval, version ")
 
 
 def test_the_options_of_a_run_are_by_suite(run_cli):
-    code, out, _ = run_cli("run", "--help")
-    assert code == 0
+    out, _ = read_success(run_cli("run", "--help"))
     headings = re.findall(r"^(Options.*):$", out, re.MULTILINE)
     assert headings[0] == "Options"
     assert {"Options of nieh", "Options of plans", "Options of manipulation"} <= set(headings)

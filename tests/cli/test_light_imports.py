@@ -4,8 +4,8 @@ import importlib
 import os
 import pkgutil
 import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
@@ -13,6 +13,8 @@ import pytest
 from infthor_eval import suites
 from infthor_eval.cli import commands
 from infthor_eval.cli.main import _NAMES, _infthor_eval
+
+from ..helpers.processes import run_python
 
 ROOT = Path(__file__).parents[2]
 HEAVY = {"torch", "transformers", "numpy", "scipy", "ai2thor", "lm_eval", "datasets", "matplotlib"}
@@ -27,28 +29,19 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}), file=sys.stderr
 """
 
 
-@pytest.mark.parametrize(
-    "typed",
-    [
-        "--help",
-        "run --help",
-        "ls",
-        "ls models",
-        "ls tasks",
-        "ls scenes",
-        "ls runs tests",
-        "--version",
-    ],
-)
-def test_listings_and_help_are_printed_at_once(typed: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *typed.split()],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=600,
-    )
+def run(program: str, typed: str, **options: Any) -> "subprocess.CompletedProcess[str]":
+    """What a program does with the words that are typed."""
+    done = run_python(program, *typed.split(), **options)
     assert done.returncode == 0, done.stderr
+    return done
+
+
+LISTINGS = ["ls", "ls models", "ls tasks", "ls scenes", "ls runs tests"]
+
+
+@pytest.mark.parametrize("typed", ["--help", "run --help", "--version", *LISTINGS])
+def test_listings_and_help_are_printed_at_once(typed: str) -> None:
+    done = run(PROGRAM, typed)
     assert done.stdout
     assert not HEAVY & set(done.stderr.splitlines()[-1].split())
 
@@ -69,27 +62,9 @@ main(sys.argv[1:])
 """
 AFTER_THE_QUESTIONS = {"lm_eval", "scipy.special"}  # for the results
 OF_OTHERS = {
-    *(
-        "ai2thor",
-        "cv2",
-        "datasets",
-        "matplotlib",
-        "networkx",
-        "numba",
-        "openai",
-        "pandas",
-        "peft",
-        "ray",
-        "sklearn",
-    ),
-    *(
-        "scipy.optimize",
-        "scipy.stats",
-        "torchvision",
-        "vllm",
-        "infthor_eval.report.figures",
-        "infthor_eval.report.web",
-    ),
+    *("ai2thor", "cv2", "datasets", "matplotlib", "networkx", "numba", "openai", "pandas", "peft"),
+    *("ray", "sklearn", "scipy.optimize", "scipy.stats", "torchvision", "vllm"),
+    *("infthor_eval.report.figures", "infthor_eval.report.web"),
 }
 OF_MODELS = {"torch", "transformers", "tokenizers", "accelerate", "safetensors", "huggingface_hub"}
 
@@ -107,16 +82,8 @@ OF_MODELS = {"torch", "transformers", "tokenizers", "accelerate", "safetensors",
 def test_the_first_question_is_asked_without_what_it_does_not_need(
     model: str, not_needed: set[str], tmp_path: Path
 ) -> None:
-    typed = ["--model", model, "--tasks", "nieh_mini", "--limit", "1", "--out", str(tmp_path)]
-    done = subprocess.run(
-        [sys.executable, "-c", FIRST_QUESTION, *typed],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=600,
-    )
-    assert done.returncode == 0, done.stderr
-    loaded = set(done.stdout.split())
+    typed = f"--model {model} --tasks nieh_mini --limit 1 --out {tmp_path}"
+    loaded = set(run(FIRST_QUESTION, typed).stdout.split())
     assert "infthor_eval.nieh.asking.answering" in loaded
     assert sorted(not_needed & loaded) == []
 
@@ -139,15 +106,8 @@ def test_making_data_loads_nothing_of_runs(typed: str, tmp_path: Path) -> None:
         "except SystemExit:\n"
         "    print(*(name for name in sys.modules if name.startswith('infthor_eval')))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code, *typed.split()],
-        capture_output=True,
-        text=True,
-        check=True,
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )
-    loaded = done.stdout.split()
+    loaded = run(code, typed, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    loaded = loaded.stdout.split()
     assert "infthor_eval.cli.commands.data." + typed.split(maxsplit=1)[0] in loaded
     assert not [
         name for name in loaded if name.startswith(("infthor_eval.runs", "infthor_eval.nieh"))

@@ -8,7 +8,7 @@ import pytest
 
 from infthor_eval.cli import main
 from tests.helpers.arm_runs import make_arm_run, make_episode_record
-from tests.helpers.command_line import option_words
+from tests.helpers.command_line import option_words, read_success
 from tests.helpers.journals import write_run
 from tests.helpers.twin_sets import write_twin_set
 
@@ -62,8 +62,7 @@ def export(tmp_path: Path, run_cli: Callable[..., tuple[int, str, str]]) -> Call
 
     def export(run: Path, file_format: str, *options: object) -> Path:
         out = tmp_path / "exported"
-        code, _, err = run_cli("export", run, "--format", file_format, "--out", out, *options)
-        assert code == 0, err
+        read_success(run_cli("export", run, "--format", file_format, "--out", out, *options))
         return out
 
     return export

@@ -50,10 +50,7 @@ def test_notes_say_what_is_not_whole(arm_run, export):
     ("words", "reason"),
     [
         ((), "--format hf-eval-results: results name their data set; give --dataset"),
-        (
-            ("--frames",),
-            "--frames: has no place in hf-eval-results; leave it out",
-        ),
+        (("--frames",), "--frames: has no place in hf-eval-results; leave it out"),
         (("--dataset", "mine"), "--dataset 'mine': is not OWNER/NAME"),
         (("--dataset", "a/b", "--model-id", "/c"), "--model-id '/c': is not OWNER/NAME"),
     ],

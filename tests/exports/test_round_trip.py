@@ -11,6 +11,7 @@ import pytest
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 from infthor_eval.runs.journals.shards import find_shards
+from tests.helpers.command_line import assert_refused
 
 FORMATS = ("every-eval-ever", "inspect", "lm-eval")
 ZSTANDARD = 93
@@ -136,45 +137,40 @@ def test_episodes_are_no_replies(scripted_run, export, twin_set, run_cli, tmp_pa
     for file_format in ("every-eval-ever", "inspect"):
         samples = samples_of(export(scripted_run, file_format))
         words = ("--data", twin_set, "--out", tmp_path / "out")
-        code, out, err = run_cli("import-replies", samples, *words)
-        assert (code, out, err.count("\n")) == (2, "", 1)
-        assert "no row answers a question of this set" in err
+        assert_refused(
+            run_cli("import-replies", samples, *words), "no row answers a question of this set"
+        )
         shutil.rmtree(tmp_path / "exported")
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "reason"),
-    [
-        ("run.eval", b"not a zip", "not a log of inspect_ai (File is not a zip file)"),
-        ("run.eval", b"", "not a log of inspect_ai"),
-        ("results.yaml", b"- value: 3\n", "has results, and no replies"),
-    ],
-)
-def test_a_file_without_replies_is_one_line(twin_set, run_cli, tmp_path, name, content, reason):
-    (tmp_path / name).write_bytes(content)
-    words = ("--data", twin_set, "--out", tmp_path / "out", "--model", "me")
-    code, out, err = run_cli("import-replies", tmp_path / name, *words)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert reason in err
-
-
-def test_an_encrypted_log_is_one_line(questions_run, export, twin_set, run_cli, tmp_path):
-    path = samples_of(export(questions_run, "inspect"))
+def encrypt(path):
     content = bytearray(path.read_bytes())
     at = content.find(b"PK\x01\x02")
     while at >= 0:
         content[at + 8] |= 1
         at = content.find(b"PK\x01\x02", at + 4)
     path.write_bytes(content)
-    code, _, err = run_cli("import-replies", path, "--data", twin_set, "--out", tmp_path / "out")
-    assert (code, err.count("\n")) == (2, 1)
-    assert "is encrypted" in err
 
 
-def test_a_log_without_a_header_is_one_line(twin_set, run_cli, tmp_path):
-    with zipfile.ZipFile(tmp_path / "run.eval", "w") as archive:
+def leave_no_header(path):
+    with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("samples/a_epoch_1.json", "{}")
-    words = ("--data", twin_set, "--out", tmp_path / "out")
-    code, _, err = run_cli("import-replies", tmp_path / "run.eval", *words)
-    assert (code, err.count("\n")) == (2, 1)
-    assert "has no header.json" in err
+
+
+@pytest.mark.parametrize(
+    ("suffix", "damage", "reason"),
+    [
+        ("eval", lambda it: it.write_bytes(b"no"), "not a log of inspect_ai (File is not a zip "),
+        ("eval", lambda it: it.write_bytes(b""), "not a log of inspect_ai"),
+        ("yaml", lambda it: it.write_text("- value: 3\n"), "has results, and no replies"),
+        ("eval", encrypt, "is encrypted"),
+        ("eval", leave_no_header, "has no header.json"),
+    ],
+)
+def test_a_file_without_replies_is_one_line(
+    questions_run, export, twin_set, run_cli, tmp_path, suffix, damage, reason
+):
+    path = samples_of(export(questions_run, "inspect")).rename(tmp_path / f"run.{suffix}")
+    damage(path)
+    words = ("--data", twin_set, "--out", tmp_path / "out", "--model", "me")
+    assert_refused(run_cli("import-replies", path, *words), reason)

@@ -1,7 +1,6 @@
 """Checkpoints that somebody damaged, or made up: one line, before any question, and no code of
 theirs runs."""
 
-import json
 import os
 import pickle
 import shutil
@@ -14,6 +13,7 @@ from safetensors.torch import load_file, save_file
 from infthor_eval.errors import ModelError
 from model_adapters import load
 
+from ..helpers.files import edit_json
 from ..helpers.refusals import assert_raises_one_line
 from ..model_adapters.checkpoints import save
 
@@ -25,12 +25,8 @@ def whole(tmp_path_factory):
     return folder
 
 
-def _edit(name, **changes):
-    def edit(folder):
-        path = folder / name
-        path.write_text(json.dumps(json.loads(path.read_text()) | changes))
-
-    return edit
+def _generation(**changes):
+    return edit_json("generation_config.json", **changes)
 
 
 def _content(name, content):
@@ -74,103 +70,81 @@ def _pipe(folder):
     os.mkfifo(folder / "model.safetensors")
 
 
-REFUSES = "the chat template refuses"
+REFUSES, LOADED = "the chat template refuses", "cannot be loaded"
 DEEP = b"[" * 200_000
+CONTENTS = {
+    "weights are text": ("model.safetensors", b"text"),
+    "weights are empty": ("model.safetensors", b""),
+    "config is empty": ("config.json", b""),
+    "config is a list": ("config.json", b"[]"),
+    "config is deep": ("config.json", DEEP),
+    "config is no UTF-8": ("config.json", b'{"a": "\xff"}'),
+    "config without a type": ("config.json", b"{}"),
+    "tokenizer is empty": ("tokenizer.json", b""),
+    "tokenizer is deep": ("tokenizer.json", DEEP),
+    "tokenizer is of another form": ("tokenizer.json", b'{"version": "1.0", "model": 5}'),
+    "image processor is a list": ("preprocessor_config.json", b"[]"),
+    "template is no UTF-8": ("chat_template.jinja", b"\xff"),
+}
+CONFIGS = {
+    "config with a text for a number": {"text_config": {"hidden_size": "many"}},
+    "config with no layers": {"text_config": {"num_hidden_layers": -1}},
+    "config with a list for a part": {"vision_config": [1]},
+}
+ENDLESS = "{% for i in range(99999) %}{% for j in range(99999) %}{% endfor %}{% endfor %}"
+DOUBLES = (
+    "{% set a = namespace(t='x') %}{% for i in range(40) %}{% set a.t = a.t ~ a.t %}{% endfor %}"
+)
+LIMIT = "set INFTHOR_EVAL_MAX_TEMPLATE_"
+TEMPLATES = {
+    "template is broken": ("{% for %}", REFUSES),
+    "template divides by nothing": ("{{ 1 / 0 }}", REFUSES),
+    "template takes what is not there": ("{{ messages[99].content.x }}", REFUSES),
+    "template raises": ("{{ raise_exception('no') }}", REFUSES),
+    "template reaches for Python": ("{{ ''.__class__.__mro__ }}", "the chat template"),
+    "template counts to a milliard": ("{% for i in range(10**9) %}{% endfor %}", REFUSES),
+    "template calls itself": ("{% macro m() %}{{ m() }}{% endmacro %}{{ m() }}", REFUSES),
+    "template without end": (ENDLESS, f"{LIMIT}SECONDS to more than 1"),
+    "template repeats a text": ("{{ 'x' * 10**10 }}", f"{LIMIT}MB to more than 512"),
+    "template repeats a list": (
+        "{{ (messages * 10**9) | length }}",
+        f"{LIMIT}MB to more than 512",
+    ),
+    "template fills a line": ("{{ 'x' | center(10**10) }}", f"{LIMIT}MB to more than 512"),
+    "template doubles a text": (DOUBLES, f"{LIMIT}MB to more than 512"),
+    "template writes without end": (
+        "{% for i in range(99999) %}{{ 'x' * 10**5 }}{% endfor %}",
+        f"{LIMIT}MB to more than 512",
+    ),
+    "template makes a text of twenty million": (
+        "{% for i in range(2000) %}{{ 'x' * 10**4 }}{% endfor %}",
+        f"{LIMIT}CHARACTERS to more than 16000000",
+    ),
+}
 DAMAGES = {
-    "a pickle that runs code": (_pickled, "cannot be loaded"),
-    "a pickle": (_legacy_pickle, "cannot be loaded"),
+    **{name: (_content(*file), LOADED) for name, file in CONTENTS.items()},
+    **{name: (edit_json("config.json", **changes), LOADED) for name, changes in CONFIGS.items()},
+    **{name: (_template(text), expected) for name, (text, expected) in TEMPLATES.items()},
+    "a pickle that runs code": (_pickled, LOADED),
+    "a pickle": (_legacy_pickle, LOADED),
     "weights are a pipe": (_pipe, "is a pipe or a device, not a file"),
-    "no weights": (_without("model.safetensors"), "cannot be loaded"),
-    "weights are text": (_content("model.safetensors", b"text"), "cannot be loaded"),
-    "weights are empty": (_content("model.safetensors", b""), "cannot be loaded"),
+    "no weights": (_without("model.safetensors"), LOADED),
     "weights of another shape": (
         _weights(lambda weights: {name: tensor.new_zeros(3) for name, tensor in weights.items()}),
-        "cannot be loaded",
+        LOADED,
     ),
     "weights that are missing": (
         _weights(lambda weights: dict(list(weights.items())[:3])),
         "lacks",
     ),
-    "config is empty": (_content("config.json", b""), "cannot be loaded"),
-    "config is a list": (_content("config.json", b"[]"), "cannot be loaded"),
-    "config is deep": (_content("config.json", DEEP), "cannot be loaded"),
-    "config is no UTF-8": (_content("config.json", b'{"a": "\xff"}'), "cannot be loaded"),
-    "config without a type": (_content("config.json", b"{}"), "cannot be loaded"),
-    "config with a text for a number": (
-        _edit("config.json", text_config={"hidden_size": "many"}),
-        "cannot be loaded",
-    ),
-    "config with no layers": (
-        _edit("config.json", text_config={"num_hidden_layers": -1}),
-        "cannot be loaded",
-    ),
-    "config with a list for a part": (_edit("config.json", vision_config=[1]), "cannot be loaded"),
-    "tokenizer is empty": (_content("tokenizer.json", b""), "cannot be loaded"),
-    "tokenizer is deep": (_content("tokenizer.json", DEEP), "cannot be loaded"),
-    "tokenizer is of another form": (
-        _content("tokenizer.json", b'{"version": "1.0", "model": 5}'),
-        "cannot be loaded",
-    ),
-    "image processor is a list": (_content("preprocessor_config.json", b"[]"), "cannot be loaded"),
-    "image processor with texts": (_edit("preprocessor_config.json", patch_size="x"), ""),
-    "image processor with no patch": (_edit("preprocessor_config.json", patch_size=0), ""),
+    "image processor with texts": (edit_json("preprocessor_config.json", patch_size="x"), ""),
+    "image processor with no patch": (edit_json("preprocessor_config.json", patch_size=0), ""),
     "generation is a list": (_content("generation_config.json", b"[1]"), ""),
-    "end is a text": (_edit("generation_config.json", eos_token_id="end"), "eos_token_id is"),
-    "end is a list of texts": (
-        _edit("generation_config.json", eos_token_id=["end"]),
-        "eos_token_id is",
-    ),
-    "end is a fraction": (_edit("generation_config.json", eos_token_id=1.5), "eos_token_id is"),
-    "penalty is a text": (_edit("generation_config.json", repetition_penalty="x"), ""),
-    "penalty is nothing": (
-        _edit("generation_config.json", repetition_penalty=0.0),
-        "repetition_penalty",
-    ),
-    "template is broken": (_template("{% for %}"), REFUSES),
-    "template divides by nothing": (_template("{{ 1 / 0 }}"), REFUSES),
-    "template takes what is not there": (_template("{{ messages[99].content.x }}"), REFUSES),
-    "template raises": (_template("{{ raise_exception('no') }}"), REFUSES),
-    "template reaches for Python": (_template("{{ ''.__class__.__mro__ }}"), "the chat template"),
-    "template counts to a milliard": (
-        _template("{% for i in range(10**9) %}{% endfor %}"),
-        REFUSES,
-    ),
-    "template calls itself": (
-        _template("{% macro m() %}{{ m() }}{% endmacro %}{{ m() }}"),
-        REFUSES,
-    ),
-    "template without end": (
-        _template("{% for i in range(99999) %}{% for j in range(99999) %}{% endfor %}{% endfor %}"),
-        "set INFTHOR_EVAL_MAX_TEMPLATE_SECONDS to more than 1",
-    ),
-    "template repeats a text": (
-        _template("{{ 'x' * 10**10 }}"),
-        "set INFTHOR_EVAL_MAX_TEMPLATE_MB to more than 512",
-    ),
-    "template repeats a list": (
-        _template("{{ (messages * 10**9) | length }}"),
-        "set INFTHOR_EVAL_MAX_TEMPLATE_MB to more than 512",
-    ),
-    "template fills a line": (
-        _template("{{ 'x' | center(10**10) }}"),
-        "set INFTHOR_EVAL_MAX_TEMPLATE_MB to more than 512",
-    ),
-    "template doubles a text": (
-        _template(
-            "{% set a = namespace(t='x') %}{% for i in range(40) %}{% set a.t = a.t ~ a.t %}{% "
-            "endfor %}"
-        ),
-        "set INFTHOR_EVAL_MAX_TEMPLATE_MB to more than 512",
-    ),
-    "template writes without end": (
-        _template("{% for i in range(99999) %}{{ 'x' * 10**5 }}{% endfor %}"),
-        "set INFTHOR_EVAL_MAX_TEMPLATE_MB to more than 512",
-    ),
-    "template makes a text of twenty million": (
-        _template("{% for i in range(2000) %}{{ 'x' * 10**4 }}{% endfor %}"),
-        "set INFTHOR_EVAL_MAX_TEMPLATE_CHARACTERS to more than 16000000",
-    ),
-    "template is no UTF-8": (_content("chat_template.jinja", b"\xff"), "cannot be loaded"),
+    "end is a text": (_generation(eos_token_id="end"), "eos_token_id is"),
+    "end is a list of texts": (_generation(eos_token_id=["end"]), "eos_token_id is"),
+    "end is a fraction": (_generation(eos_token_id=1.5), "eos_token_id is"),
+    "penalty is a text": (_generation(repetition_penalty="x"), ""),
+    "penalty is nothing": (_generation(repetition_penalty=0.0), "repetition_penalty"),
     "template of old is a list": (
         lambda folder: (
             _without("chat_template.jinja")(folder),
@@ -209,7 +183,6 @@ def test_a_damaged_checkpoint(whole, tmp_path, monkeypatch, name):
 def test_a_template_without_end_is_stopped_in_any_thread(whole, tmp_path, monkeypatch):
     monkeypatch.setenv("INFTHOR_EVAL_MAX_TEMPLATE_SECONDS", "1")
     folder = shutil.copytree(whole, tmp_path / "endless")
-    loops = "{% for i in range(99999) %}{% for j in range(99999) %}{% endfor %}{% endfor %}"
     failures = []
 
     def ask():
@@ -221,7 +194,7 @@ def test_a_template_without_end_is_stopped_in_any_thread(whole, tmp_path, monkey
         except ModelError as error:
             failures.append(str(error))
 
-    _template(loops)(folder)
+    _template(ENDLESS)(folder)
     thread = threading.Thread(target=ask, daemon=True)
     thread.start()
     thread.join(60.0)

@@ -19,6 +19,7 @@ TINY = [
     "--model-args",
 ]
 GENERATE = ["generate", "--scene", "kitchen-1", "--min-steps", 1]
+VALIDATE = ["validate", "SET", "--model", "oracle", "--out", "OUT"]
 MANIFEST = {"name": "x", "trajectories": [{"scene": "kitchen-1", "seed": 0, "min_steps": 1}]}
 
 
@@ -123,16 +124,7 @@ TYPED = [
     (["run", *RUN, "--out", "OUT", "--seed", "1", "--seed=2"], "--seed is given twice"),
     (["scenes", "show", "kitchen-1", "--size", "64", "--size", "65"], "--size is given twice"),
     (["questions", "SET", "--out", "a.csv", "--out", "b.csv"], "--out is given twice"),
-    (
-        [
-            "validate",
-            "SET",
-            *option_words(model="oracle", out="OUT", scorer="strict"),
-            "--scorer",
-            "strict",
-        ],
-        "--scorer",
-    ),
+    ([*VALIDATE, "--scorer", "strict", "--scorer", "strict"], "--scorer"),
     (["questions", "SET", "--out", "a.csv", "--min-share", "nan"], "is not a number"),
     (
         [*GENERATE, "--out", "OUT", "--count", "1000000000"],
@@ -165,11 +157,8 @@ TYPED = [
     ([*TINY, "max_pixels=-5"], "max_pixels=-5 is not between"),
     ([*TINY, f"min_pixels={10**12}"], "is not between 1 and"),
     ([*TINY, "min_pixels=40000000"], "min_pixels is 40000000 and max_pixels"),
-    (["validate", "SET", "--model", "oracle", "--out", "SET"], "is the set itself"),
-    (
-        ["validate", "SET", "--model", "oracle", "--out", "OUT", "--decisions", "file"],
-        "no column question_id",
-    ),
+    ([*VALIDATE[:-1], "SET"], "is the set itself"),
+    ([*VALIDATE, "--decisions", "file"], "no column question_id"),
     (
         ["validate", "SET", "--model", "oracle,a:x=1,x=1", "--out", "OUT"],
         "--model a: 'x' is given twice",
@@ -195,10 +184,6 @@ TYPED = [
         "or download",
     ),
     (
-        [*RUN[:-1], "nowhere", "--out", "OUT"],
-        "nowhere: no such folder; give the folder of an NIEH set, or download",
-    ),
-    (
         [*RUN, "--out", "OUT", "--prompt", "mine"],
         "'mine' is not one of 'published-main', 'published-logs'",
     ),
@@ -210,10 +195,6 @@ TYPED = [
     (
         [*PUBLISHED, "--prompt", "published-main"],
         "no task of nieh_published_full leaves its words open; leave it out, or ask nieh_full",
-    ),
-    (
-        ["rescore", "OUT", "--judge-prompt", "published"],
-        "--judge-prompt is how a judge is asked; give one with --judge",
     ),
 ]
 

@@ -65,17 +65,10 @@ def place(tmp_path):
     return place
 
 
+@pytest.mark.parametrize("make", [os.mkfifo, lambda path: path.symlink_to("/dev/null")])
 @pytest.mark.parametrize("reader", READERS)
-def test_a_pipe_is_not_waited_for(place, tmp_path, reader):
-    os.mkfifo(place(reader))
-    assert_raises_one_line(
-        lambda: READERS[reader][1](tmp_path), "is a pipe or a device, not a file"
-    )
-
-
-@pytest.mark.parametrize("reader", READERS)
-def test_a_device_is_no_file(place, tmp_path, reader):
-    place(reader).symlink_to("/dev/null")
+def test_a_pipe_and_a_device_are_no_files(place, tmp_path, reader, make):
+    make(place(reader))
     assert_raises_one_line(
         lambda: READERS[reader][1](tmp_path), "is a pipe or a device, not a file"
     )
@@ -103,7 +96,23 @@ def _bomb() -> bytes:
     return packed.getvalue()
 
 
+UNMATCHED = "an entry that no reply can match"
+# By what follows the names of the four columns.
+QUESTIONS = {
+    ",note\nt,q,[1],['a'],\"open\nt,q,[2],['b'],x\n": "not a UTF-8 CSV file",
+    ",note\nt,q,[1],['a'],\"open\nt,q,[2],['b'],closed\"\n": "note has several lines",
+    ",answer\nt,q,[1],['a'],['b']\n": "column 'answer' is there twice",
+    "\nt,q,[1],['a'],more\n": "has 5 cells for 4 columns",
+    "\nt,q,[1],['']\n": UNMATCHED,
+    "\nt,q,[1],[' ']\n": UNMATCHED,
+    "\nt,q,[1],[1e999]\n": UNMATCHED,
+    f"\nt,q,[1],[{10**30}]\n": UNMATCHED,
+    "\nt,q,[1],['\\ud800']\n": UNMATCHED,
+    "\nt,\"q\"x,[1],['a']\n": "not a UTF-8 CSV file",
+}
+ONE_SCENE = b'"trajectories": [{"scene": "a", "seed": 0, "min_steps": 1}]}'
 CONTENTS = [
+    *(("questions", (ONE_ROW + rest).encode(), reason) for rest, reason in QUESTIONS.items()),
     ("step log", DEEP, "not valid JSON"),
     ("set.json", DEEP, "not valid JSON"),
     ("trajectory", DEEP, "not a trajectory"),
@@ -128,51 +137,13 @@ CONTENTS = [
     ("archive", gzip.compress(os.urandom(9000))[:-600], "damaged archive"),
     ("archive", gzip.compress(os.urandom(9000))[:4000] + b"\x55" * 4000, "damaged archive"),
     ("archive", NO_DEFLATE, "damaged archive"),
-    (
-        "questions",
-        (ONE_ROW + ",note\nt,q,[1],['a'],\"open\nt,q,[2],['b'],x\n").encode(),
-        "not a UTF-8 CSV file",
-    ),
-    (
-        "questions",
-        (ONE_ROW + ",note\nt,q,[1],['a'],\"open\nt,q,[2],['b'],closed\"\n").encode(),
-        "note has several lines",
-    ),
-    (
-        "questions",
-        (ONE_ROW + ",answer\nt,q,[1],['a'],['b']\n").encode(),
-        "column 'answer' is there twice",
-    ),
-    ("questions", (ONE_ROW + "\nt,q,[1],['a'],more\n").encode(), "has 5 cells for 4 columns"),
-    ("questions", (ONE_ROW + "\nt,q,[1],['']\n").encode(), "an entry that no reply can match"),
-    ("questions", (ONE_ROW + "\nt,q,[1],[' ']\n").encode(), "an entry that no reply can match"),
-    ("questions", (ONE_ROW + "\nt,q,[1],[1e999]\n").encode(), "an entry that no reply can match"),
-    (
-        "questions",
-        (ONE_ROW + f"\nt,q,[1],[{10**30}]\n").encode(),
-        "an entry that no reply can match",
-    ),
-    (
-        "questions",
-        (ONE_ROW + "\nt,q,[1],['\\ud800']\n").encode(),
-        "an entry that no reply can match",
-    ),
-    ("questions", (ONE_ROW + "\nt,\"q\"x,[1],['a']\n").encode(), "not a UTF-8 CSV file"),
     ("decisions", b"question_id,decision\na,keep\na,drop\n", "has another decision above"),
     ("decisions", b"question_id,decision,decision\na,keep,drop\n", "is there twice"),
     ("decisions", b"question_id,decision\na,keep,drop\n", "has 3 cells for 2 columns"),
     ("decisions", b'question_id,decision\n"a,keep\n', "not a UTF-8 CSV file"),
-    (
-        "manifest",
-        b'{"name": "../x", "trajectories": [{"scene": "a", "seed": 0, "min_steps": 1}]}',
-        "documented form",
-    ),
+    ("manifest", b'{"name": "../x", ' + ONE_SCENE, "documented form"),
     ("manifest", b'{"name": "x", "trajectories": []}', "documented form"),
-    (
-        "manifest",
-        b'{"name": "x", "colors": 0, "trajectories": [{"scene": "a", "seed": 0, "min_steps": 1}]}',
-        "documented form",
-    ),
+    ("manifest", b'{"name": "x", "colors": 0, ' + ONE_SCENE, "documented form"),
 ]
 
 

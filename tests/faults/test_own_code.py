@@ -2,8 +2,6 @@
 
 import json
 import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,8 +15,10 @@ from infthor_eval.storage.files import file_name
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
 from model_adapters.policies.parity import load_policy
 
+from ..helpers.command_line import read_success
 from ..helpers.journals import write_journal
 from ..helpers.nieh_runs import make_config, make_header, make_record
+from ..helpers.processes import run_python
 from ..model_adapters.policies.servers import policy_answers, serve
 
 MODEL = """
@@ -81,6 +81,19 @@ def run_own(tmp_path: Path, run_cli: Run) -> Run:
     return run_own
 
 
+@pytest.fixture
+def rescored_by(tmp_path: Path) -> Callable[[str], tuple[object, ...]]:
+    """Writes a scorer `own` and a run; gives the words that score the run by it."""
+
+    def rescored_by(source: str) -> tuple[object, ...]:
+        scorer, run = tmp_path / "mine.py", tmp_path / "run"
+        scorer.write_text(source)
+        write_journal(run, make_header(make_config()), [make_record(0, "mug")], RECORDS)
+        return "rescore", run, "--scorer", f"{scorer}:own", "--output", tmp_path / "out"
+
+    return rescored_by
+
+
 @pytest.mark.parametrize("statement", RAISES)
 def test_an_adapter_that_ends_the_program_fails_its_unit_alone(run_own, tmp_path, statement):
     code, out, err = run_own(reply=f"if n_replies == 2: {statement}")
@@ -93,48 +106,35 @@ def test_an_adapter_that_ends_the_program_fails_its_unit_alone(run_own, tmp_path
     assert "nieh_mini_gt" in out
 
 
-def test_a_scorer_that_ends_the_process_fails_its_sample_alone(tmp_path, run_cli):
-    scorer = tmp_path / "mine.py"
-    scorer.write_text("import os\ndef end(reply, answers): os._exit(0)\n")
-    write_journal(tmp_path / "run", make_header(make_config()), [make_record(0, "mug")], RECORDS)
-    run = ("rescore", tmp_path / "run", "--scorer", f"{scorer}:end", "--output", tmp_path / "out")
-    code, _, err = run_cli(*run)
+@pytest.mark.parametrize("statement", ["os._exit(0)", "raise SystemExit(0)"])
+def test_a_scorer_that_ends_the_program_fails_its_sample_alone(run_cli, rescored_by, statement):
+    code, _, err = run_cli(*rescored_by(f"import os\ndef own(reply, answers): {statement}\n"))
     assert code == 1
-    assert "end fails: SystemExit in own_code.py" in err
-    assert "os._exit(0)" in err
+    assert "1 sample(s) failed" in err
+    assert "own fails: SystemExit in " in err
+    assert statement.startswith("raise") or ("own_code.py" in err and statement in err)
 
 
-def test_a_forked_process_ends_as_it_wants(tmp_path, run_cli):
-    scorer = tmp_path / "mine.py"
-    scorer.write_text(
+def test_a_forked_process_ends_as_it_wants(run_cli, rescored_by):
+    words = rescored_by(
         "import multiprocessing\nfork = multiprocessing.get_context('fork')\n"
-        "def fine(reply, answers):\n"
+        "def own(reply, answers):\n"
         "    child = fork.Process(target=int)\n    child.start()\n    child.join()\n"
         "    return 1.0 - child.exitcode\n"
     )
-    write_journal(tmp_path / "run", make_header(make_config()), [make_record(0, "mug")], RECORDS)
-    run = ("rescore", tmp_path / "run", "--scorer", f"{scorer}:fine", "--output", tmp_path / "out")
-    code, out, err = run_cli(*run)
-    assert (code, "fine" in out) == (0, True), err
+    code, out, err = run_cli(*words)
+    assert (code, "own" in out) == (0, True), err
 
 
 @pytest.mark.parametrize("is_daemon", [False, True])
-def test_a_thread_that_is_left_does_not_keep_the_process(tmp_path, is_daemon):
-    scorer = tmp_path / "mine.py"
-    scorer.write_text(
-        "import threading, time\ndef leave(reply, answers):\n"
+def test_a_thread_that_is_left_does_not_keep_the_process(rescored_by, is_daemon):
+    words = rescored_by(
+        "import threading, time\ndef own(reply, answers):\n"
         f"    threading.Thread(target=time.sleep, args=(9**9,), daemon={is_daemon}).start()\n"
         "    return 1.0\n"
     )
-    write_journal(tmp_path / "run", make_header(make_config()), [make_record(0, "mug")], RECORDS)
-    run = ("rescore", tmp_path / "run", "--scorer", f"{scorer}:leave", "--output", tmp_path / "out")
-    done = subprocess.run(
-        [sys.executable, "-c", "from infthor_eval.cli import main; main()", *map(str, run)],
-        env={**os.environ, OWN_CODE_SECONDS.name: "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    program = "from infthor_eval.cli import main; main()"
+    done = run_python(program, *words, env={**os.environ, OWN_CODE_SECONDS.name: "1"})
     assert done.returncode == 0, done.stderr
     assert "100.00" in done.stdout
     assert ("your own code left a thread that runs on" in done.stderr) is not is_daemon
@@ -167,14 +167,8 @@ def test_a_close_that_does_not_end_is_one_line_below_the_results(run_own, monkey
     [
         ("run", "--tasks", "nieh_mini_gt", "--limit", 1, "--model"),
         ("run", "--model", "blind", "--tasks", "nieh_mini_memory", "--budget", 200, "--memory"),
-        (
-            "check",
-            "adapter",
-        ),
-        (
-            "check",
-            "memory",
-        ),
+        ("check", "adapter"),
+        ("check", "memory"),
         ("check", "parity", "--reference-url", "http://127.0.0.1:9"),
     ],
     ids=lambda typed: typed[-1],
@@ -313,14 +307,6 @@ def stored(tmp_path: Path) -> Path:
     )
 
 
-def test_a_scorer_that_ends_the_program_fails_its_reply_alone(stored, run_cli, tmp_path):
-    (tmp_path / "own.py").write_text("def measure(reply, answers):\n    raise SystemExit(0)\n")
-    scorer = f"{tmp_path / 'own.py'}:measure"
-    code, _, err = run_cli("rescore", stored, "--scorer", scorer, "--out", tmp_path / "out")
-    assert code == 1
-    assert "2 sample(s) failed" in err
-
-
 # -- what comes from elsewhere
 
 
@@ -347,8 +333,7 @@ def test_a_line_of_an_older_version_is_named_and_the_rest_is_shown(stored, run_c
         ("rescore", stored, "--out", tmp_path / "out"),
     )
     for command in commands:
-        code, _, err = run_cli(*command)
-        assert code == 0, err
+        _, err = read_success(run_cli(*command))
         assert f"left out: {path}, line 2: not a line of a journal" in "".join(err.split("\n"))
     assert [record.id for record in read_run(stored, RECORDS, lambda _: None)[1]] == ["q1"]
 

@@ -15,7 +15,8 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 from infthor_eval.runs.journals.journal import Journal
 
-from ..helpers.command_line import assert_refused, option_words
+from ..helpers.command_line import assert_refused, option_words, read_success
+from ..helpers.processes import run_python
 
 
 def test_a_run_whose_folder_is_deleted_does_not_end_well(
@@ -29,9 +30,11 @@ def test_a_run_whose_folder_is_deleted_does_not_end_well(
 
     monkeypatch.setattr(Journal, "append", append_and_delete)
     arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56)]
-    code, out, err = run_cli(*arguments, "--out", tmp_path / "out")
-    assert (code, out) == (2, "")
-    assert "was deleted or replaced while the run wrote it" in err
+    assert_refused(
+        run_cli(*arguments, "--out", tmp_path / "out"),
+        "was deleted or replaced while the run wrote it",
+        after_notes=True,
+    )
 
 
 def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(
@@ -53,8 +56,7 @@ def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(
     assert (code, out) == (2, "")
     assert "cannot be written (No space left on device); make room" in err
     assert "Traceback" not in err
-    code, _, err = run_cli(*arguments, "--out", tmp_path / "out")
-    assert code == 0
+    read_success(run_cli(*arguments, "--out", tmp_path / "out"))
     (journal,) = (tmp_path / "out").rglob("journal")
     assert len(read_run(journal.parent, RECORDS)[1]) == 5
 
@@ -131,13 +133,7 @@ def test_ctrl_c_during_the_imports_is_one_line(tmp_path):
     program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
     program += "from infthor_eval.cli import main; main()"
     root = Path(__file__).parents[2]
-    done = subprocess.run(
-        [sys.executable, "-c", program, "--version"],
-        env=os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{root}"},
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
+    env = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{root}"}
+    done = run_python(program, "--version", env=env)
     assert (done.returncode, done.stdout) == (130, "")
     assert done.stderr == "infthor-eval: stopped; run the same command to continue\n"

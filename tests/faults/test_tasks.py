@@ -14,33 +14,35 @@ BOMB = "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
     f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]\n" for n in range(1, 9)
 )
 
+SETTINGS = {
+    "ctx_size: two": "ctx_size is 'two'; it is a number of kilo-tokens above 0",
+    "ctx_size: -8": "ctx_size is -8; it is a number of kilo-tokens above 0",
+    "depths: 0.2": "depths is 0.2; it is a list of numbers from 0 to 1",
+    "depths: [a]": "depths is ['a']; it is a list of numbers from 0 to 1",
+    "depths: [2]": "depths is [2]; it is a list of numbers from 0 to 1",
+    "depths: []": "depths is []; it is a list of numbers from 0 to 1",
+    "top_k: true": "top_k is True; it is a whole number from 1",
+    "top_k: 0": "top_k is 0; it is a whole number from 1",
+    "top_k: ten": "top_k is 'ten'; it is a whole number from 1",
+    "budget: 0": "budget is 0; it is a whole number of tokens from 1",
+    "budget: -1": "budget is -1; it is a whole number of tokens from 1",
+    "budget: 2.5": "budget is 2.5; it is a whole number of tokens from 1",
+    "k_tokens: 1023": "k_tokens is 1023; it is 1000 or 1024",
+    "seed: x": "seed is 'x'; it is a whole number",
+    "frames: grey": "frames is 'grey'; it is one of shown, blank, shuffled, other",
+    "prompt: mine": "prompt is 'mine'; it is published-main or published-logs",
+    "retriever: 5": "retriever is 5; it is a text",
+    "bundled: 5": "bundled is 5; it is a name",
+    "bundled: no": "bundled is False; it is a name",
+    "bundled: none": "bundled is 'none': the installation lacks its data folder",
+}
 FILES = [
+    *((f"{CLUES}, {text}}}", f"{SETTING} {reason}") for text, reason in SETTINGS.items()),
     (CLUES + ", depthz: [0.2]}", "depthz is not known; did you mean depths?"),
     (CLUES + ", top-k: 3}", "top-k is not known; did you mean top_k?"),
     (HEAD + "dataset_kwargs: {contxt: clues}", "contxt is not known; did you mean context?"),
     (CLUES + ", 5: 3}", "not"),
-    (
-        CLUES + ", ctx_size: two}",
-        f"{SETTING} ctx_size is 'two'; it is a number of kilo-tokens above 0",
-    ),
-    (CLUES + ", ctx_size: -8}", f"{SETTING} ctx_size is -8; it is a number of kilo-tokens above 0"),
     (CLUES + ", ctx_size: .nan}", "holds what JSON cannot"),
-    (CLUES + ", depths: 0.2}", f"{SETTING} depths is 0.2; it is a list of numbers from 0 to 1"),
-    (CLUES + ", depths: [a]}", f"{SETTING} depths is ['a']; it is a list of numbers from 0 to 1"),
-    (CLUES + ", depths: [2]}", f"{SETTING} depths is [2]; it is a list of numbers from 0 to 1"),
-    (CLUES + ", depths: []}", f"{SETTING} depths is []; it is a list of numbers from 0 to 1"),
-    (CLUES + ", top_k: true}", f"{SETTING} top_k is True; it is a whole number from 1"),
-    (CLUES + ", budget: 0}", f"{SETTING} budget is 0; it is a whole number of tokens from 1"),
-    (CLUES + ", k_tokens: 1023}", f"{SETTING} k_tokens is 1023; it is 1000 or 1024"),
-    (CLUES + ", seed: x}", f"{SETTING} seed is 'x'; it is a whole number"),
-    (
-        CLUES + ", frames: grey}",
-        f"{SETTING} frames is 'grey'; it is one of shown, blank, shuffled, other",
-    ),
-    (
-        CLUES + ", prompt: mine}",
-        f"{SETTING} prompt is 'mine'; it is published-main or published-logs",
-    ),
     (
         HEAD + "dataset_kwargs: {context: video, prompt: published-logs}",
         f"{SETTING} prompt published-logs: the context video is asked in words of its own; it is "
@@ -49,13 +51,6 @@ FILES = [
     (
         CLUES + "}\nmetric_list: [{metric: exact}]",
         "metric_list: exact is none of our scorers, reference, strict",
-    ),
-    (CLUES + ", retriever: 5}", f"{SETTING} retriever is 5; it is a text"),
-    (CLUES + ", bundled: 5}", f"{SETTING} bundled is 5; it is a name"),
-    (CLUES + ", bundled: no}", f"{SETTING} bundled is False; it is a name"),
-    (
-        CLUES + ", bundled: none}",
-        f"{SETTING} bundled is 'none': the installation lacks its data folder",
     ),
     (
         HEAD + "dataset_kwargs: {context: clue}",
@@ -74,14 +69,6 @@ FILES = [
         "own.yaml: generation_kwargs is 5; it is a mapping of settings",
     ),
     (CLUES + "}\ngeneration_kwargs: [until]", "it is a mapping of settings"),
-    (
-        CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, until: 5}",
-        "it is a text or a list of texts",
-    ),
-    (
-        CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, until: {a: 1}}",
-        "it is a text or a list of texts",
-    ),
     (CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, 7: 1}", "not"),
     (CLUES + "}\ndescription: 2020-01-01", "holds what JSON cannot"),
     (CLUES + "}\ndescription: !!binary aGk=", "holds what JSON cannot"),

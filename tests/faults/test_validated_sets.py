@@ -7,8 +7,8 @@ import pytest
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.asking.baselines import BASELINES
 from infthor_eval.nieh.suite import NiehSuite
-from model_adapters import Capabilities
 
+from ..helpers.baselines import ScriptedBaseline
 from ..helpers.command_line import assert_refused
 
 ASKED = [
@@ -18,32 +18,18 @@ ASKED = [
 ]
 
 
-class Silent:
-    """A model that answers nothing right."""
-
-    name = "silent"
-    capabilities = Capabilities(counts_tokens=False, token_ids=False)
-    n_asked = 0
-
-    def identity(self):
-        return {}
-
-    def close(self):
-        pass
-
-    def fit(self, _data, _context):
-        return self.answer
-
-    def answer(self, _sample, _shown=()):
-        Silent.n_asked += 1
-        return "=1+1"
+@pytest.fixture
+def asked(monkeypatch):
+    """The questions that the model `silent` was asked; it answers nothing right."""
+    asked = []
+    silent = ScriptedBaseline("silent", lambda question: asked.append(question) or "=1+1")
+    monkeypatch.setattr(NiehSuite, "baselines", {**BASELINES, "silent": lambda _: silent})
+    return asked
 
 
 @pytest.fixture
-def validate(make_nieh_set, tmp_path, run_cli, monkeypatch):
-    """Validates a set of one trajectory with a model that answers nothing right."""
-    monkeypatch.setattr(NiehSuite, "baselines", {**BASELINES, "silent": lambda _: Silent()})
-    monkeypatch.setattr(Silent, "n_asked", 0)
+def validate(make_nieh_set, tmp_path, run_cli, asked):
+    """Validates a set of one trajectory with that model."""
     data = make_nieh_set(ASKED, size=56)
 
     def validate(*options, data=data):
@@ -96,19 +82,19 @@ def test_no_cell_of_the_list_is_a_formula_and_the_list_reads_back(validate, tmp_
     assert validate("--decisions", filled)[0] == 0
 
 
-def test_a_damaged_list_is_told_before_a_model_is_asked(validate, tmp_path):
+def test_a_damaged_list_is_told_before_a_model_is_asked(validate, tmp_path, asked):
     (tmp_path / "v").mkdir()
     (tmp_path / "v" / "inspection.csv").write_text('question_id,decision\n"a,keep\n')
     assert_refused(validate(), "inspection.csv: not a UTF-8 CSV file")
-    assert Silent.n_asked == 0
+    assert asked == []
 
 
-def test_decisions_on_another_set_are_told_before_a_model_is_asked(validate, tmp_path):
+def test_decisions_on_another_set_are_told_before_a_model_is_asked(validate, tmp_path, asked):
     (tmp_path / "d.csv").write_text("question_id,decision\nother/1,keep\n")
     assert_refused(
         validate("--decisions", tmp_path / "d.csv"), "about other/1, which is not in the set"
     )
-    assert Silent.n_asked == 0
+    assert asked == []
 
 
 def test_the_frames_of_another_set_are_no_place(validate, make_nieh_set, tmp_path):

@@ -16,6 +16,7 @@ from infthor_eval.runs import RunRequest, TaskRequest, execute, prepare, read_ru
 from infthor_eval.runs.journals.record_encoder import RecordEncoder, RefusedRecordError
 from infthor_eval.suites import find_suite
 
+from ..helpers.command_line import read_success
 from ..helpers.nieh_runs import make_record
 from ..helpers.spoiled import SUITES, WORST, fields_of, replace_field
 from ..helpers.toy_suite import Prepared
@@ -72,8 +73,7 @@ def read_in_every_way(run_cli: Callable[..., tuple[int, str, str]], folder: Path
     commands.append(("report", folder, "--out", folder.parent / "page.html"))
     commands.append(("ls", "runs", folder.parent))
     for command in commands:
-        code, _, err = run_cli(*command)
-        assert code == 0, (command, err[-500:])
+        _, err = read_success(run_cli(*command))
         assert "left out" not in err
 
 
@@ -198,18 +198,9 @@ def own(tmp_path: Path) -> str:
 def test_an_adapter_gives_the_worst_replies(own, run_cli, tmp_path) -> None:
     n_units = 126
     for start in range(0, N_PAIRS, n_units):
-        code, _, err = run_cli(
-            *(
-                "run",
-                "--model",
-                own,
-                "--model-args",
-                f"start={start}",
-                "--out",
-                tmp_path / "out",
-            ),
-            *("--tasks", "nieh_mini_gt", "--name", f"from{start}", "--quiet"),
-        )
+        model = ("--model", own, "--model-args", f"start={start}", "--out", tmp_path / "out")
+        words = ("--tasks", "nieh_mini_gt", "--name", f"from{start}", "--quiet")
+        code, _, err = run_cli("run", *model, *words)
         assert code == 1
         assert "Traceback" not in err
         (folder,) = (tmp_path / "out" / f"from{start}").iterdir()
@@ -217,8 +208,7 @@ def test_an_adapter_gives_the_worst_replies(own, run_cli, tmp_path) -> None:
         n_failed = sum(record.failure is not None for record in records)
         assert 0 < n_failed < len(records) == n_units
     read_in_every_way(run_cli, folder)
-    code, _, err = run_cli("rescore", folder, "--out", tmp_path / "rescored")
-    assert code == 0, err
+    read_success(run_cli("rescore", folder, "--out", tmp_path / "rescored"))
 
 
 @pytest.fixture

@@ -7,7 +7,15 @@ import pytest
 
 from infthor_eval.cli import main
 
-__all__ = ["CliRunner", "assert_refused", "option_words", "read_remarks", "run_cli", "runner_of"]
+__all__ = [
+    "CliRunner",
+    "assert_refused",
+    "option_words",
+    "read_remarks",
+    "read_success",
+    "run_cli",
+    "runner_of",
+]
 
 CliRunner = Callable[..., tuple[int, str, str]]
 
@@ -74,3 +82,10 @@ def assert_refused(
     assert not any(note.startswith(f"{program}: ") for note in notes)
     for words in expected:
         assert words in line
+
+
+def read_success(ended: tuple[int, str, str]) -> tuple[str, str]:
+    """The standard output and standard error of a command that has ended well."""
+    code, output, error_text = ended
+    assert code == 0, error_text
+    return output, error_text

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import psutil
 
@@ -11,7 +12,7 @@ from infthor_eval.runs import Silent, UnitRecord
 
 from .waiting import PATIENCE_S
 
-__all__ = ["ChildCounter", "cli_words", "find_children", "finish", "start_cli"]
+__all__ = ["ChildCounter", "cli_words", "find_children", "finish", "run_python", "start_cli"]
 
 _ROOT = Path(__file__).parents[2]
 
@@ -38,6 +39,18 @@ def finish(process: "subprocess.Popen[str]") -> str:
     _, error_text = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, error_text
     return error_text
+
+
+def run_python(program: str, *words: object, **options: Any) -> "subprocess.CompletedProcess[str]":
+    """Run a program in a process of its own to its end; both of its outputs are kept."""
+    return subprocess.run(
+        [sys.executable, "-c", program, *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=PATIENCE_S,
+        **options,
+    )
 
 
 def find_children() -> set[int]:

@@ -28,25 +28,17 @@ def sampling(task_files):
 def test_a_temperature_in_the_task_file_samples_and_the_seed_decides_what(
     prepare_run, sampling, tmp_path
 ):
-    def reply_with(settings, seed=0, folder="out"):
+    def reply_with(settings, folder="out"):
         sampling(settings)
-        return replies(
-            execute(prepare_run(TINY, tasks=("nieh_gt",), seed=seed, output=tmp_path / folder))
-        )
+        return replies(execute(prepare_run(TINY, tasks=("nieh_gt",), output=tmp_path / folder)))
 
+    drawing = "max_gen_toks: 12, do_sample: true, temperature: 2.0"
     greedy = reply_with("max_gen_toks: 12, do_sample: false, temperature: 0.0")
-    drawn = reply_with("max_gen_toks: 12, do_sample: true, temperature: 2.0")
+    drawn = reply_with(drawing)
     assert drawn != greedy
-    assert (
-        reply_with("max_gen_toks: 12, do_sample: true, temperature: 2.0", folder="again") == drawn
-    )
+    assert reply_with(drawing, folder="again") == drawn
     assert reply_with("max_gen_toks: 12, temperature: 2.0", folder="without the word") == drawn
-    assert (
-        reply_with(
-            "max_gen_toks: 12, do_sample: true, temperature: 2.0, top_p: 0.000001", folder="top"
-        )
-        == greedy
-    )
+    assert reply_with(f"{drawing}, top_p: 0.000001", folder="top") == greedy
 
 
 def test_another_seed_draws_other_replies_from_the_same_weights(prepare_run, sampling, tmp_path):
@@ -69,6 +61,8 @@ def test_another_seed_draws_other_replies_from_the_same_weights(prepare_run, sam
         ("do_sample: false, temperature: 0.7", "temperature 0.7 without do_sample has no effect"),
         ("do_sample: true, temperature: 0.0", "do_sample with temperature 0 contradict each other"),
         ("num_beams: 4", "num_beams is not known; there are until, max_gen_toks"),
+        ("until: 5", "until is 5; it is a text or a list of texts"),
+        ("until: {a: 1}", "until is {'a': 1}; it is a text or a list of texts"),
         ("until: [7]", r"until is \[7\]; it is a text or a list of texts"),
         ("do_sample: 'no'", "do_sample is 'no'; it is true or false"),
         ("temperature: -1.0", "temperature must be 0"),

@@ -4,12 +4,8 @@ import itertools
 import json
 from collections import Counter
 
-import pytest
-
 from infthor_eval.cli.options.run import RunOptions
 from infthor_eval.cli.options.values import ModelSpec
-from infthor_eval.errors import UsageError
-from infthor_eval.exports.lm_eval import export
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh import samples
@@ -28,21 +24,13 @@ def cells(outcome):
     return {name: task.by_clues for name, task in outcome.summary.summary.tasks.items()}
 
 
-def test_oracle_is_right_everywhere_and_lm_eval_agrees(prepare_run):
+def test_oracle_is_right_everywhere(prepare_run):
     outcome = execute(prepare_run())
     assert Counter(record.task for record in outcome.records) == {"nieh_gt": 5, "nieh_full": 5}
     assert all(
         record.payload.reply == ", ".join(map(str, record.payload.answers))
         for record in outcome.records
     )
-    export(outcome)
-    (results,) = outcome.folder.glob("lm_eval/*/results_*.json")
-    measured = json.loads(results.read_text())["results"]
-    assert {task: measured[task]["strict,none"] for task in measured} == {
-        "nieh_gt": 1.0,
-        "nieh_full": 1.0,
-    }
-    assert len(list(outcome.folder.glob("lm_eval/*/samples_nieh_*.jsonl"))) == 2
 
 
 def test_blind_with_one_trajectory_is_said_to_be_no_measure_and_nothing_is_above_it(
@@ -75,15 +63,10 @@ def test_runs_of_one_command_read_a_set_once_and_the_next_command_anew(data, tmp
 def test_the_same_command_goes_on_and_another_starts_anew(prepare_run):
     watchers = Watcher(), Watcher()
     first, again = (execute(prepare_run(), watcher) for watcher in watchers)
-    assert [(len(watcher.evaluated), len(watcher.resumed)) for watcher in watchers] == [
-        (10, 0),
-        (0, 10),
-    ]
-    assert (again.folder, again.summary, again.records) == (
-        first.folder,
-        first.summary,
-        first.records,
-    )
+    done = [(len(watcher.evaluated), len(watcher.resumed)) for watcher in watchers]
+    assert done == [(10, 0), (0, 10)]
+    assert (again.folder, again.summary) == (first.folder, first.summary)
+    assert again.records == first.records
     for changes in ({"seed": 1}, {"limit": 1}, {"tasks": ("nieh_gt",)}, {"model": "blind"}):
         assert execute(prepare_run(**changes)).folder != first.folder
     assert read_run(first.folder, RECORDS) == (first.summary.header, first.records)
@@ -93,15 +76,8 @@ def test_the_results_file_says_what_the_summary_says(prepare_run):
     outcome = execute(prepare_run(name="mine"))
     document = json.loads((outcome.folder / "results.json").read_text())
     assert outcome.folder.parent.name == "mine"
-    assert document.keys() == {
-        "suite",
-        "name",
-        "config",
-        "n_missing",
-        "units",
-        "primary_metrics",
-        "summary",
-        "usage",
+    assert set(document) == {
+        *("suite", "name", "config", "n_missing", "units", "primary_metrics", "summary", "usage")
     }
     assert (document["suite"], document["name"]) == ("nieh", "mine")
     assert document["config"] == outcome.summary.header.config.document
@@ -134,14 +110,6 @@ def test_a_frame_that_is_no_image_has_the_samples_that_need_it_skipped(prepare_r
         "nieh_gt": 1,
         "nieh_full": 2,
     }
-
-
-def test_a_task_without_its_data_or_without_a_question_is_refused(prepare_run, make_nieh_set):
-    with pytest.raises(UsageError, match="give its folder with --data"):
-        prepare_run(data=None)
-    empty = make_nieh_set([make_question(clues=(99,))], name="empty")
-    with pytest.raises(UsageError, match=r"can be asked \(clue 99 is outside trajectory t"):
-        prepare_run(data=empty)
 
 
 def test_the_tiny_model_runs_through_and_shares_prefixes(prepare_run):

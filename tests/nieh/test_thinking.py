@@ -7,7 +7,7 @@ import pytest
 from infthor_eval.formats.question import Question
 from model_adapters import Reply
 from model_adapters.built_in import BUILT_IN, BuiltIn
-from tests.helpers.command_line import option_words
+from tests.helpers.command_line import assert_refused, option_words, read_success
 from tests.model_adapters.toy_adapter import Talk, Toy
 
 QUESTIONS = tuple(
@@ -50,10 +50,8 @@ def answers_of(output):
 
 def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(QUESTIONS, size=56)
-    code, _, err = run_cli(
-        "--model", "toy", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path / "out"
-    )
-    assert code == 0, err
+    words = option_words(model="toy", tasks="nieh_gt", data=data, out=tmp_path / "out")
+    read_success(run_cli(*words))
     answers = answers_of(tmp_path / "out")
     assert {question: payload.get("thinking") for question, payload in answers.items()} == {
         "What first?": "a cup? no",
@@ -80,8 +78,11 @@ def test_thoughts_have_a_budget_of_their_own(make_nieh_set, tmp_path, run_cli):
     assert run_cli(*arguments, "--max-thinking-tokens", 1000)[0] == 0
     assert {limit for limit, _ in LIMITS} == {1050}
     assert "0 evaluated now" not in run_cli(*arguments)[2]  # another run
-    code, _, err = run_cli(*arguments, "--max-thinking-tokens", 0)
-    assert code == 2 and "--max-thinking-tokens 0: give a whole number from 1" in err
+    assert_refused(
+        run_cli(*arguments, "--max-thinking-tokens", 0),
+        "--max-thinking-tokens 0: give a whole number from 1",
+        after_notes=True,
+    )
 
 
 def test_a_stop_string_ends_the_answer_and_not_the_thoughts(
@@ -97,7 +98,6 @@ def test_a_stop_string_ends_the_answer_and_not_the_thoughts(
     arguments = option_words(
         model="toy", tasks="own", include_path=tmp_path, data=data, out=tmp_path / "out"
     )
-    code, _, err = run_cli(*arguments, "--max-thinking-tokens", 100)
-    assert code == 0, err
+    read_success(run_cli(*arguments, "--max-thinking-tokens", 100))
     assert LIMITS == [(120, ())]
     assert answers_of(tmp_path / "out")["What first?"]["reply"] == "mug"

@@ -11,10 +11,8 @@ from infthor_eval.nieh.samples import find_samples
 from infthor_eval.nieh.twins import first_world, twin_side
 from infthor_eval.runs import read_run
 
-from ..helpers.command_line import run_cli
+from ..helpers.command_line import assert_refused, option_words, read_success
 from ..helpers.twin_sets import CLUES, DIFFERING, write_twin_set
-
-__all__ = ["run_cli"]
 
 
 @pytest.fixture(scope="module")
@@ -64,10 +62,8 @@ def test_windows_are_the_same_in_both_worlds(twins):
 def test_the_oracle_has_all_pairs_and_blind_none(twins, tmp_path, run_cli):
     for model, expected in (("oracle", 1.0), ("blind", 0.0)):
         out = tmp_path / model
-        code, printed, _ = run_cli(
-            "run", "--model", model, "--tasks", "nieh_twins", "--data", twins, "--out", out
-        )
-        assert code == 0
+        words = option_words(model=model, tasks="nieh_twins", data=twins, out=out)
+        printed, _ = read_success(run_cli(*words))
         assert "Twins: net pairs, %" in printed
         found = results(out)
         assert found["primary_metrics"]["nieh_twins"]["mean"] == expected
@@ -124,8 +120,7 @@ def test_a_metric_of_ones_own_scores_the_reply_in_the_other_world_too(
         "process_results: !function own.measure\nmetric_list: [{metric: begins}]\n"
     )
     words = ("run", "--model", "flip", "--tasks", "own_twins", "--data", twins)
-    code, _, err = run_cli(*words, "--output", tmp_path / "out")
-    assert code == 0, err
+    read_success(run_cli(*words, "--output", tmp_path / "out"))
     pairs = results(tmp_path / "out")["summary"]["tasks"]["own_twins"]["pairs"]
     (folder,) = (path.parent for path in tmp_path.rglob("results.json"))
     for side in (record.payload for record in read_run(folder, RECORDS)[1]):
@@ -156,18 +151,13 @@ def test_a_run_with_each_context(twins, tmp_path, run_cli):
 )
 def test_contexts_that_cannot_be(twins, tmp_path, run_cli, options, problem):
     words = ("run", "--model", "oracle", "--data", twins, "--out", tmp_path)
-    code, _, err = run_cli(*words, *options)
-    assert code == 2
-    assert problem in err
-    assert len(err.strip().splitlines()) == 1
+    assert_refused(run_cli(*words, *options), problem)
 
 
 def test_a_set_without_its_pairs_is_named(twins, tmp_path, run_cli):
     (tmp_path / "qa_set_twins.csv").write_bytes((twins / "qa_set_twins.csv").read_bytes())
     words = ("run", "--model", "oracle", "--tasks", "nieh_twins", "--out", tmp_path / "out")
-    code, _, err = run_cli(*words, "--data", tmp_path)
-    assert code == 2
-    assert "twins.jsonl" in err
+    assert_refused(run_cli(*words, "--data", tmp_path), "twins.jsonl", after_notes=True)
 
 
 def test_the_metrics_of_lm_eval_are_the_same(twins):

@@ -1,32 +1,29 @@
 """The filter of cross-validation, against the scores in the published question files."""
 
-from pathlib import Path
-
 import pytest
 
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.nieh.validation import JudgedQuestion, Verdicts, judge_scores
 
-SETS = Path(__file__).parents[3] / "shared" / "data" / "published_sets"
+from ..helpers.published import PUBLISHED_SETS, needs_published_sets
 
 
 def filtered(file: str, *, partial_credit: bool) -> Verdicts:
-    path = SETS / file
-    if not path.exists():
-        pytest.skip("the published question files are not at ../shared/data/published_sets")
     verdicts = Verdicts()
-    for question in read_questions(path):
+    for question in read_questions(PUBLISHED_SETS / file):
         right = judge_scores(dict(question.published.matches), partial_credit=partial_credit)
         verdicts.add(JudgedQuestion(question, {}, right))
     return verdicts
 
 
+@needs_published_sets
 @pytest.mark.parametrize(("partial_credit", "kept"), [(True, 829), (False, 809)])
 def test_the_published_filter_keeps_every_published_question_with_one_clue(partial_credit, kept):
     verdicts = filtered("qa_set_nieh_single_clue.csv", partial_credit=partial_credit)
     assert len(verdicts.kept) == kept
 
 
+@needs_published_sets
 def test_of_those_with_several_clues_people_kept_four_that_no_model_answers():
     verdicts = filtered("qa_set_nsieh_multi_clue.csv", partial_credit=True)
     assert (len(verdicts.kept), len(verdicts.to_inspect), len(verdicts.rejected)) == (470, 4, 0)

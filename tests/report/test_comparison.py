@@ -59,11 +59,9 @@ def test_runs_are_compared_above_blind_on_the_questions_that_have_it():
     plain, above = comparisons["strict"], comparisons[ABOVE]
     assert (plain.first, plain.second, plain.difference.estimate.n) == (4 / 6, 4 / 6, 6)
     # From 2 of 4 right to 3 of 4: (0.5 - 0.5) / 0.5 = 0 and (0.75 - 0.5) / 0.5 = 0.5.
-    assert (above.first, above.second, above.difference.estimate.n) == (0.0, 0.5, 4)
-    assert (above.difference.estimate.mean, above.difference.estimate.n_clusters) == (
-        pytest.approx(0.5),
-        2,
-    )
+    estimate = above.difference.estimate
+    assert (above.first, above.second, estimate.n, estimate.n_clusters) == (0.0, 0.5, 4, 2)
+    assert estimate.mean == pytest.approx(0.5)
     assert above.is_share
     row = comparison_table(comparisons.values(), "a", "b").rows[-1].cells
     assert row[:6] == ("nieh_gt", ABOVE, "%", "0.00", "50.00", "+50.00")
@@ -74,10 +72,8 @@ def test_a_question_that_only_one_run_has_it_for_is_not_compared_in_it():
     first = [make_guessed_record(0, "mug"), make_guessed_record(1, "mug"), make_record(2, "mug")]
     second = [make_guessed_record(0, "cup"), make_record(1, "cup"), make_guessed_record(2, "cup")]
     comparisons = compared(first, second)
-    assert (
-        comparisons["strict"].difference.estimate.n,
-        comparisons[ABOVE].difference.estimate.n,
-    ) == (3, 1)
+    counted = [comparisons[metric].difference.estimate.n for metric in ("strict", ABOVE)]
+    assert counted == [3, 1]
     assert (comparisons[ABOVE].first, comparisons[ABOVE].second) == (1.0, -1.0)
     assert ABOVE not in compared(first[:2], [make_record(0, "mug"), make_record(1, "mug")])
     assert ABOVE not in compared(first, second, PlainPresenter())
@@ -102,19 +98,12 @@ def test_a_question_without_a_reply_in_one_run_is_not_compared():
 
 
 def test_units_that_one_run_alone_has_are_counted_and_without_a_shared_one_there_is_an_error():
-    comparisons = compared(
-        [make_guessed_record(0, "mug"), make_guessed_record(1, "mug")],
-        [
-            make_guessed_record(1, "mug"),
-            make_guessed_record(2, "mug"),
-            make_guessed_record(3, "mug"),
-        ],
+    first, second = (
+        [make_guessed_record(number, "mug") for number in numbers]
+        for numbers in ((0, 1), (1, 2, 3))
     )
-    assert {metric: one.n_unshared for metric, one in comparisons.items()} == {
-        "reference": 3,
-        "strict": 3,
-        ABOVE: 3,
-    }
+    unshared = {metric: one.n_unshared for metric, one in compared(first, second).items()}
+    assert unshared == {"reference": 3, "strict": 3, ABOVE: 3}
     with pytest.raises(DataError, match="share no unit of the same task"):
         compared([make_record(0, "mug")], [make_record(1, "mug")])
 
@@ -141,10 +130,7 @@ def test_runs_are_compared_on_pairs_of_twins_clustered_by_what_they_were_made_of
     ]
     pairs = comparisons["net_pairs"]
     assert (pairs.first, pairs.second) == (0.0, 0.75)  # the first exchanges the worlds of one pair
-    assert (comparisons["pair_accuracy"].first, comparisons["pairs_exchanged"].first) == (
-        0.25,
-        0.25,
-    )
+    assert comparisons["pair_accuracy"].first == comparisons["pairs_exchanged"].first == 0.25
     assert (pairs.difference.estimate.n, pairs.difference.estimate.n_clusters) == (4, 3)
     assert pairs.difference.estimate.mean == pytest.approx(0.75)
     assert (pairs.is_share, pairs.n_unshared, pairs.drawing) == (True, 0, None)

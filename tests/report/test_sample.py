@@ -8,7 +8,7 @@ import pytest
 import infthor_eval
 from infthor_eval.errors import UsageError
 from infthor_eval.nieh.records import RECORDS
-from tests.helpers.command_line import option_words
+from tests.helpers.command_line import option_words, read_success
 from tests.helpers.journals import write_journal
 from tests.helpers.nieh_runs import make_config, make_header, make_record
 
@@ -57,8 +57,7 @@ def test_a_name_that_no_sample_has_is_refused(folder: Path) -> None:
 
 def test_printed_it_is_what_the_command_prints(folder: Path, run_cli) -> None:
     answered, _ = names_of(folder)
-    code, out, _ = run_cli("show", folder, "--question", answered)
-    assert code == 0
+    out, _ = read_success(run_cli("show", folder, "--question", answered))
     assert out.rstrip("\n") == repr(infthor_eval.load_sample(folder, answered))
 
 

@@ -123,6 +123,7 @@ def test_the_page_with_its_tables_charts_and_samples(planted: Path, whole: Path,
     assert "m (incomplete)" in results.lead and "(4 of 8 answered)" in results.lead
     left_out = next(section for section in page.sections if section.key == "left-out").tables[0]
     assert [row.cells[2] for row in left_out.rows] == ["failed", "not asked", "not asked"]
+    assert left_out.rows[0].cells[3:] == ("1", "the server is down")
     first_run = [sample.results[0] for sample in page.samples]
     outcomes = [None if result is None else result.outcome for result in first_run]
     assert outcomes == ["wrong", *["right"] * 3, "failed", "not asked", None, None]

@@ -6,6 +6,7 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 
 from ...helpers.nieh_runs import make_record
+from ...helpers.printed import read_rows
 
 REPLIES = (
     make_record(0, "Sofa", ("Sofa",)),
@@ -31,11 +32,7 @@ def read_report(folder):
     return json.loads((folder / "rescored.json").read_text())
 
 
-def read_row(output, *beginning):
+def read_row(output, beginning):
     """The rest of the row of a printed table that begins like this."""
-    (cells,) = [
-        line.split()
-        for line in output.splitlines()
-        if line.split()[: len(beginning)] == list(beginning)
-    ]
-    return cells[len(beginning) :]
+    (row,) = [row for row in read_rows(output) if row.startswith(f"{beginning} ")]
+    return row.removeprefix(f"{beginning} ")

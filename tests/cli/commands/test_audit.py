@@ -2,7 +2,7 @@
 
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question
-from tests.helpers.command_line import assert_refused
+from tests.helpers.command_line import assert_refused, read_success
 
 
 def leaking(n=40):
@@ -18,28 +18,18 @@ def leaking(n=40):
     return [*questions, *(Question(t, text, (1,), (answer,)) for t, text, answer in fair)]
 
 
-def test_a_set_is_audited_beside_a_run(make_nieh_set, tmp_path, run_cli):
+def test_a_set_is_audited_beside_a_run(make_nieh_set, run_cli, evaluate):
     data = make_nieh_set(leaking(24), size=8)
-    assert (
-        run_cli(
-            "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path / "out"
-        )[0]
-        == 0
-    )
-    (folder,) = (tmp_path / "out" / "oracle").iterdir()
-    code, out, _ = run_cli("audit", data, folder)
-    assert code == 0
+    out, _ = read_success(run_cli("audit", data, evaluate(data=data)))
     text = " ".join(out.split())
-    assert (
-        "Is there any {} in this room? (24 questions): words gets 100.0 % without a frame." in text
-    )
+    told = "Is there any {} in this room? (24 questions): words gets 100.0 % without a frame."
+    assert told in text
     assert "100.0 (solved)" in text
 
 
 def test_the_balanced_part_is_written(make_nieh_set, tmp_path, run_cli):
     data, part = make_nieh_set(leaking(), size=8), tmp_path / "qa_set_part.csv"
-    code, _, err = run_cli("audit", data, "--balanced", part)
-    assert code == 0
+    _, err = read_success(run_cli("audit", data, "--balanced", part))
     kept = read_questions(part)
     assert f"{part}: {len(kept)} of" in err
     assert sum("thing" in question.text for question in kept) > sum(

@@ -1,6 +1,5 @@
 """Models that cannot be run, or that fail during a run: one line each, and the exit code."""
 
-import json
 import shutil
 
 import pytest
@@ -12,16 +11,18 @@ from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 
 from ...conftest import QUESTIONS
 from ...helpers.command_line import option_words
+from ...helpers.files import edit_json
 from ...helpers.journals import read_records
 from ...model_adapters.checkpoints import save
+
+QWEN, LLAVA = "qwen2.5-vl", "hf-vlm"
 
 
 @pytest.fixture(scope="module")
 def checkpoints(tmp_path_factory):
     root = tmp_path_factory.mktemp("checkpoints")
-    save("qwen2.5-vl", root / "qwen")
-    save("llava", root / "llava")
-    LlamaConfig(vocab_size=10).save_pretrained(root / "text")
+    save("qwen2.5-vl", root / QWEN)
+    save("llava", root / LLAVA)
     return root
 
 
@@ -41,10 +42,8 @@ def ask(make_nieh_set, tmp_path, run_cli):
     return ask
 
 
-def _edit(folder, name, **changes):
-    """Change top-level settings of one of a checkpoint's files."""
-    path = folder / name
-    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+def _text_only(folder):
+    LlamaConfig(vocab_size=10).save_pretrained(folder)
 
 
 def _without_slot(folder):
@@ -52,72 +51,32 @@ def _without_slot(folder):
     template.write_text(template.read_text().replace("<|image_pad|>", "").replace("<image>", ""))
 
 
+_other_size = edit_json("processor_config.json", patch_size=28)
 BROKEN = {
-    "text only": (
-        "hf-vlm",
-        "text",
-        lambda folder: None,
-        {},
-        "is a llama checkpoint, which has no vision",
-    ),
-    "text only, by a family": (
-        "qwen2.5-vl",
-        "text",
-        lambda folder: None,
-        {},
-        "is a llama checkpoint, not qwen2_5_vl",
-    ),
+    "text only": (LLAVA, _text_only, "is a llama checkpoint, which has no vision"),
+    "text only, by a family": (QWEN, _text_only, "is a llama checkpoint, not qwen2_5_vl"),
     "merged patches": (
-        "qwen2.5-vl",
-        "qwen",
-        lambda folder: _edit(folder, "preprocessor_config.json", merge_size=4),
-        {},
+        QWEN,
+        edit_json("preprocessor_config.json", merge_size=4),
         "the processor makes 25 image tokens of one frame and the model 100 features; they do not "
         "belong",
     ),
     "patches": (
-        "qwen2.5-vl",
-        "qwen",
-        lambda folder: _edit(folder, "preprocessor_config.json", patch_size=20),
-        {},
+        QWEN,
+        edit_json("preprocessor_config.json", patch_size=20),
         "the model fails on what the processor makes of a frame",
     ),
-    "number of tokens": (
-        "hf-vlm",
-        "llava",
-        lambda folder: _edit(folder, "processor_config.json", patch_size=28),
-        {},
-        "do they belong to one checkpoint?",
-    ),
+    "number of tokens": (LLAVA, _other_size, "do they belong to one checkpoint?"),
     "number of tokens, without sharing": (
-        "hf-vlm",
-        "llava",
-        lambda folder: _edit(folder, "processor_config.json", patch_size=28),
-        {"share_prefix": "false"},
+        LLAVA,
+        _other_size,
         "the model fails on what the processor makes of a frame (Image features and image tokens "
         "do not match",
+        {"share_prefix": "false"},
     ),
-    "image token": (
-        "qwen2.5-vl",
-        "qwen",
-        lambda folder: _edit(folder, "config.json", image_token_id=7),
-        {},
-        "0 image placeholders for",
-    ),
-    "template without a slot": (
-        "qwen2.5-vl",
-        "qwen",
-        _without_slot,
-        {},
-        "the template must show every frame",
-    ),
-    "template without a slot, hf-vlm": (
-        "hf-vlm",
-        "llava",
-        _without_slot,
-        {},
-        "the template must show every frame",
-    ),
+    "image token": (QWEN, edit_json("config.json", image_token_id=7), "0 image placeholders for"),
+    "template without a slot": (QWEN, _without_slot, "the template must show every frame"),
+    "template without a slot, hf-vlm": (LLAVA, _without_slot, "the template must show every frame"),
 }
 
 
@@ -125,10 +84,10 @@ BROKEN = {
 def test_a_checkpoint_that_cannot_work_is_one_line_before_any_question(
     checkpoints, tmp_path, ask, name
 ):
-    model, checkpoint, damage, model_args, expected = BROKEN[name]
-    folder = shutil.copytree(checkpoints / checkpoint, tmp_path / "checkpoint")
+    model, damage, expected, *options = BROKEN[name]
+    folder = shutil.copytree(checkpoints / model, tmp_path / "checkpoint")
     damage(folder)
-    code, out, err = ask(model, folder, **model_args)
+    code, out, err = ask(model, folder, **dict(*options))
     (line,) = [line for line in err.splitlines() if line.startswith("infthor-eval: ")]
     assert expected in line
     assert (code, out) == (2, "")

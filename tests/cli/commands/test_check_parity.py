@@ -8,6 +8,7 @@ from PIL import Image
 
 from model_adapters.policies.parity import load_policy
 
+from ...helpers.command_line import assert_refused, read_success
 from ...model_adapters.policies.servers import policy_answers, serve
 
 Run = Callable[..., tuple[int, str, str]]
@@ -20,8 +21,7 @@ def url() -> Iterator[str]:
 
 
 def test_equal_policies_end_with_0(run_cli: Run, url: str) -> None:
-    code, out, _ = run_cli("check", "parity", "openvla-tiny", "--reference-url", url)
-    assert code == 0
+    out, _ = read_success(run_cli("check", "parity", "openvla-tiny", "--reference-url", url))
     assert "openvla-tiny and its reference" in out
     assert "counts as equal: equal." in out
     assert out.count("pick up the") == 2
@@ -62,7 +62,4 @@ def test_different_policies_end_with_1(run_cli: Run, tmp_path: Path) -> None:
     ],
 )
 def test_misuse_is_one_line(run_cli: Run, words: tuple[str, ...], expected: str) -> None:
-    code, out, err = run_cli("check", "parity", *words)
-    assert (code, out) == (2, "")
-    assert expected in err
-    assert "Traceback" not in err
+    assert_refused(run_cli("check", "parity", *words), expected, after_notes=True)

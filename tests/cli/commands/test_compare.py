@@ -8,15 +8,15 @@ from msgspec.structs import replace
 from infthor_eval.plans.records import StepRecord
 
 from ...conftest import QUESTIONS
-from ...helpers.command_line import assert_refused, option_words
+from ...helpers.command_line import assert_refused, read_success
 from ...helpers.journals import write_run
 from ...helpers.plan_runs import make_plan_record, make_plans_run
+from ...helpers.printed import read_rows
 
 
-def test_two_runs_are_compared_question_by_question(make_nieh_set, tmp_path, run_cli):
+def test_two_runs_are_compared_question_by_question(make_nieh_set, run_cli, evaluate):
     data = make_nieh_set(size=56)
-    run_cli("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path)
-    (oracle,), (blind,) = (list((tmp_path / name).iterdir()) for name in ("oracle", "blind"))
+    oracle, blind = (evaluate(model, data=data) for model in ("oracle", "blind"))
     code, out, _ = run_cli("compare", blind, oracle)
     rows = [line.split() for line in out.splitlines()]
     assert code == 0
@@ -31,12 +31,10 @@ def test_two_runs_are_compared_question_by_question(make_nieh_set, tmp_path, run
 
 
 def test_runs_without_a_shared_unit_and_folders_without_a_run_are_refused(
-    make_nieh_set, tmp_path, run_cli
+    make_nieh_set, tmp_path, run_cli, evaluate
 ):
     data = make_nieh_set(size=56)
-    for task in ("nieh_gt", "nieh_full"):
-        run_cli("--model", "oracle", "--tasks", task, "--data", data, "--out", tmp_path)
-    folders = sorted((tmp_path / "oracle").iterdir())
+    folders = [evaluate(tasks=task, data=data) for task in ("nieh_gt", "nieh_full")]
     assert_refused(run_cli("compare", *folders), "share no unit of the same task")
     assert_refused(
         run_cli("compare", tmp_path, folders[0]),
@@ -44,14 +42,10 @@ def test_runs_without_a_shared_unit_and_folders_without_a_run_are_refused(
     )
 
 
-def test_a_run_of_an_earlier_version_is_refused_in_one_line(make_nieh_set, tmp_path, run_cli):
-    run_cli(
-        *option_words(
-            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "out"
-        )
-    )
-    (ours,) = (tmp_path / "out" / "oracle").iterdir()
-    old = tmp_path / "old"
+def test_a_run_of_an_earlier_version_is_refused_in_one_line(
+    make_nieh_set, tmp_path, run_cli, evaluate
+):
+    ours, old = evaluate(data=make_nieh_set(size=56)), tmp_path / "old"
     old.mkdir()
     (old / "journal.jsonl").write_text(
         json.dumps({"format": 1, "identity": {"model": {"name": "oracle"}}}) + "\n"
@@ -83,65 +77,33 @@ def test_rewards_are_points_and_shares_are_percent(tmp_path, run_cli):
     ]
     code, out, err = run_cli("compare", *folders)
     assert (code, err) == (0, "")
-    rows = {
-        line.split()[1]: line.split()[2:]
-        for line in out.splitlines()
-        if line.split()[:1] == ["infthor_plans"]
-    }
-    assert rows["success"][:4] == ["%", "0.00", "100.00", "+100.00"]
-    assert rows["reward"] == [
-        "points",
-        "2.20",
-        "4.40",
-        "+2.20",
-        "[+2.20,",
-        "+2.20]",
-        "<",
-        "0.0001",
-        "4",
-        "0",
-    ]
+    rows = read_rows(out)
+    assert any(row.startswith("infthor_plans success % 0.00 100.00 +100.00 ") for row in rows)
+    assert "infthor_plans reward points 2.20 4.40 +2.20 [+2.20, +2.20] < 0.0001 4 0" in rows
 
 
 def test_runs_of_one_name_are_told_apart_by_the_options_that_differ(
-    make_nieh_set, tmp_path, run_cli
+    make_nieh_set, run_cli, evaluate
 ):
     data = make_nieh_set(size=56)
-    for seed in (0, 1):
-        arguments = option_words(
-            model="random", tasks="nieh_gt", data=data, out=tmp_path, seed=seed
-        )
-        assert run_cli(*arguments)[0] == 0
-    folders = sorted(
-        (tmp_path / "random").iterdir(),
-        key=lambda folder: "seed: 1" in (folder / "run.yaml").read_text(),
-    )
-    code, out, _ = run_cli("compare", *folders)
-    assert code == 0
+    folders = [evaluate("random", data=data, seed=seed) for seed in (0, 1)]
+    out, _ = read_success(run_cli("compare", *folders))
     assert "random (seed=1) against random (seed=0)" in " ".join(out.split())
     assert "first: random (seed=0); second: random (seed=1)" in " ".join(out.split())
 
 
-def test_blank_frames_are_part_of_the_name(make_nieh_set, tmp_path, run_cli):
-    words = option_words(
-        tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path, frames="shown,blank"
-    )
-    assert run_cli("--model", "oracle", *words)[0] == 0
-    folders = sorted(
-        (tmp_path / "oracle").iterdir(),
-        key=lambda folder: "frames: blank" in (folder / "run.yaml").read_text(),
-    )
+def test_blank_frames_are_part_of_the_name(make_nieh_set, run_cli, evaluate):
+    data = make_nieh_set(size=56)
+    folders = [evaluate(data=data, frames=frames) for frames in ("shown", "blank")]
     assert "oracle, blank frames against oracle" in run_cli("compare", *folders)[1]
 
 
 def test_runs_of_other_tasks_are_compared_on_the_questions_that_they_share(
-    make_nieh_set, tmp_path, run_cli
+    make_nieh_set, run_cli, evaluate
 ):
     data = make_nieh_set(size=56)
-    for model, task in (("oracle", "nieh_gt"), ("blind", "nieh_full"), ("oracle", "nieh_full")):
-        run_cli("--model", model, "--tasks", task, "--data", data, "--out", tmp_path)
-    (blind,) = (tmp_path / "blind").iterdir()
-    folders = sorted((tmp_path / "oracle").iterdir())
+    folders = [evaluate(tasks=task, data=data) for task in ("nieh_gt", "nieh_full")]
+    blind = evaluate("blind", "nieh_full", data=data)
     code, out, _ = run_cli("compare", *folders, blind, "--same-questions")
     rows = [line.split() for line in out.splitlines() if " strict " in line and "guess" not in line]
     assert (code, len(rows)) == (0, 3)
@@ -155,12 +117,10 @@ def test_runs_of_other_tasks_are_compared_on_the_questions_that_they_share(
     assert ends and max(map(abs, ends)) <= 100
 
 
-def test_questions_of_other_words_are_not_the_same(make_nieh_set, tmp_path, run_cli):
+def test_questions_of_other_words_are_not_the_same(make_nieh_set, run_cli, evaluate):
     others = [dataclasses.replace(it, text=f"{it.text} Now?") for it in QUESTIONS]
-    folders = []
-    for name, questions in (("one", QUESTIONS), ("two", others)):
-        data = make_nieh_set(questions, size=56, name=name)
-        out = tmp_path / f"runs-{name}"
-        run_cli("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--out", out)
-        folders += (out / "oracle").iterdir()
+    folders = [
+        evaluate(data=make_nieh_set(questions, size=56, name=name))
+        for name, questions in (("one", QUESTIONS), ("two", others))
+    ]
     assert_refused(run_cli("compare", *folders, "--same-questions"), "share no question")

@@ -12,6 +12,7 @@ from infthor_eval.cli.commands.doctor import Check
 from infthor_eval.formats.question import Question
 
 from ...helpers.bundled import BUNDLED
+from ...helpers.command_line import assert_refused, read_success
 from ...helpers.questions import make_question
 
 TOKEN = "hf_of_nobody_0123456789"
@@ -30,30 +31,15 @@ def test_everything_is_checked_and_what_is_missing_has_a_hint(run_cli, monkeypat
     code, out, err = run_cli("doctor", "--json")
     assert (code, err) == (0, "")
     by_name = {check["name"]: check for check in json.loads(out)}
-    assert {
-        "Python",
-        "torch",
-        "memory",
-        "embedded simulator",
-        "AI2-THOR",
-        "display",
-        "hub token",
-        "hub",
-    } <= set(by_name)
-    assert {
-        "disk, here",
-        "disk, cache",
-        "NIEH data",
+    assert set(by_name) >= {
+        *("Python", "torch", "memory", "embedded simulator", "AI2-THOR", "display", "hub token"),
+        *("hub", "disk, here", "disk, cache", "NIEH data"),
         *(f"extra {name}" for name in checks._EXTRAS),
-    } <= set(by_name)
+    }
     assert all(check["hint"] for check in by_name.values() if check["state"] != "ok")
     assert by_name["hub"]["detail"].endswith("cannot be reached (no answer in 0.1 s)")
-    assert by_name["hub token"] == {
-        "name": "hub token",
-        "state": "ok",
-        "detail": "stored",
-        "hint": "",
-    }
+    token = {"name": "hub token", "state": "ok", "detail": "stored", "hint": ""}
+    assert by_name["hub token"] == token
     assert "fetch nieh" in by_name["NIEH data"]["hint"]
     assert TOKEN not in out
 
@@ -74,8 +60,7 @@ def test_several_gpus_are_for_several_workers_or_one_model_that_is_split(
 
 
 def test_people_read_lines(run_cli):
-    code, out, _ = run_cli("doctor")
-    assert code == 0
+    out, _ = read_success(run_cli("doctor"))
     assert any(line.startswith("ok       Python: 3.") for line in out.splitlines())
     assert "`infthor-eval fetch nieh`" in out
 
@@ -166,9 +151,5 @@ def test_question_files_alone_have_no_frames(run_cli, tmp_path):
 
 
 def test_what_is_no_set_is_one_line(run_cli, tmp_path):
-    code, _, err = run_cli("doctor", "--data", str(tmp_path))
-    assert code == 2
-    assert err.count("\n") == 1 and "qa_set" in err
-    code, _, err = run_cli("doctor", "--trajectories", str(tmp_path))
-    assert code == 2
-    assert "--data" in err
+    assert_refused(run_cli("doctor", "--data", str(tmp_path)), "qa_set")
+    assert_refused(run_cli("doctor", "--trajectories", str(tmp_path)), "--data", after_notes=True)

@@ -16,7 +16,7 @@ from PIL import Image
 from infthor_eval.cli import main
 from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
-from ...helpers.command_line import assert_refused, option_words
+from ...helpers.command_line import assert_refused, option_words, read_success
 from ...helpers.journals import write_run
 from ...helpers.nieh_runs import make_record
 from ...helpers.plan_runs import make_plan_record, make_plans_run
@@ -298,11 +298,9 @@ def test_what_is_not_recorded_is_said_to_be_so(run, run_cli, tmp_path):
 
 
 def test_equal_runs_are_equal_also_with_settings_that_make_no_difference(run, run_cli):
-    code, out, _ = run_cli("explain", run(), run())
-    assert code == 0
+    out, _ = read_success(run_cli("explain", run(), run()))
     assert out.splitlines()[2] == "Equal: replies and scores of 3 questions."
-    code, out, _ = run_cli("explain", run(), run(model_args="batch_size=1"))
-    assert code == 0
+    out, _ = read_success(run_cli("explain", run(), run(model_args="batch_size=1")))
     assert "Settings differ, and made no difference: other settings of the model." in out
 
 

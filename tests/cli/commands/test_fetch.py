@@ -6,7 +6,7 @@ import pytest
 
 from infthor_eval.nieh.published.hub_data import NIEH_REPOSITORY
 
-from ...helpers.command_line import assert_refused
+from ...helpers.command_line import assert_refused, read_success
 from ...helpers.hub import serve_hub
 
 
@@ -28,14 +28,14 @@ def hub(make_nieh_set, tmp_path, monkeypatch):
 
 def test_fetched_data_are_found_by_the_task_and_not_fetched_again(hub, tmp_path, run_cli):
     endpoint, handler = hub
-    code, out, err = run_cli("fetch", "nieh", "--endpoint", endpoint)
-    assert code == 0, err
+    out, _ = read_success(run_cli("fetch", "nieh", "--endpoint", endpoint))
     assert "nieh: 5 questions" in out
     assert list((tmp_path / "cache").rglob("metadata.tar")) == []
     handler.status = 500
     assert run_cli("fetch", "nieh", "--endpoint", endpoint)[0] == 0
-    code, out, _ = run_cli("--model", "oracle", "--tasks", "nieh_gt", "--out", tmp_path / "out")
-    assert code == 0
+    out, _ = read_success(
+        run_cli("--model", "oracle", "--tasks", "nieh_gt", "--out", tmp_path / "out")
+    )
     assert "100.00" in out
 
 
@@ -64,7 +64,6 @@ def test_an_archive_that_points_elsewhere_is_refused(hub, tmp_path, run_cli):
     with tarfile.open(tmp_path / "evil.tar", "w") as tar:
         tar.add(tmp_path / "metadata.tar", "../evil")
     handler.files["metadata.tar"] = (tmp_path / "evil.tar").read_bytes()
-    code, _, err = run_cli("fetch", "nieh", "--endpoint", endpoint, "--out", tmp_path / "d")
-    assert code == 2
-    assert "points outside" in err
+    ended = run_cli("fetch", "nieh", "--endpoint", endpoint, "--out", tmp_path / "d")
+    assert_refused(ended, "points outside", after_notes=True)
     assert not (tmp_path / "d" / "metadata").exists()

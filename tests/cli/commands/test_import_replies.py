@@ -2,19 +2,18 @@
 
 import gzip
 import json
-from pathlib import Path
 
 import pytest
-from msgspec.structs import replace
 
-from infthor_eval.formats.qa_csv import read_questions, write_questions
+from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import PublishedColumns, Question
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 
+from ...helpers.published import PUBLISHED_SETS, make_log_row, needs_published_sets
+
 SINGLE, MULTI = "qa_set_nieh_single_clue", "qa_set_nsieh_multi_clue"
 LOG = f"eval_{SINGLE}_Some-VL-7B_full_traj.log"
-PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
 
 
 def question(file, number, text, answer, clues=(1,)):
@@ -49,15 +48,8 @@ def data(tmp_path):
 
 def row(number, reply, score, questions=QUESTIONS, **more):
     """A row as the published scripts write it."""
-    question = questions[number]
-    published = {
-        "qidx": number,
-        "traj_id": question.traj_id,
-        "question": question.text,
-        "gt_img_idx": list(question.clues),
-    }
-    published |= {"ctx_size_k": 32, "n_imgs": 6, "ctx_n_tokens": 726, "llm_response": reply}
-    return published | {"gt_answer": list(question.answers), "score": score} | more
+    sizes = {"ctx_size_k": 32, "n_imgs": 6, "ctx_n_tokens": 726, "score": score}
+    return make_log_row(number, questions[number], reply, **(sizes | more))
 
 
 ROWS = [row(number, reply, float(number != 2)) for number, reply in enumerate(REPLIES)]
@@ -118,19 +110,12 @@ def test_logs_of_one_mode_on_two_files_are_one_run(data, tmp_path, run_cli):
     single, multi = tmp_path / LOG, tmp_path / f"eval_{MULTI}_Some-VL-7B_full_traj.log"
     single.write_text("\n".join(map(json.dumps, ROWS)))
     multi.write_text(json.dumps(row(0, "no", 1.0, OTHERS)))
-    assert (
-        run_cli("import-replies", single, multi, "--data", data, "--out", tmp_path / "out")[0] == 0
-    )
+    logs = ("import-replies", single, multi, "--data", data, "--out", tmp_path / "out")
+    assert run_cli(*logs)[0] == 0
     (folder,) = (tmp_path / "out" / "Some-VL-7B").iterdir()
-    by_clues = json.loads((folder / "results.json").read_text())["summary"]["tasks"]["nieh_full"][
-        "by_clues"
-    ]
-    assert {name: by_clues[name]["n"] for name in ("1", "2", ">=3", "total")} == {
-        "1": 4,
-        "2": 1,
-        ">=3": 0,
-        "total": 5,
-    }
+    summary = json.loads((folder / "results.json").read_text())["summary"]
+    by_clues = summary["tasks"]["nieh_full"]["by_clues"]
+    assert [by_clues[name]["n"] for name in ("1", "2", ">=3", "total")] == [4, 1, 0, 5]
 
 
 def test_two_logs_on_the_same_questions_count_them_once(data, tmp_path, run_cli):
@@ -141,24 +126,6 @@ def test_two_logs_on_the_same_questions_count_them_once(data, tmp_path, run_cli)
         "import-replies", *logs, "--model", "me", "--data", data, "--out", tmp_path / "out"
     )
     assert (code, "2 replies imported, 3 of 5 questions without one" in err) == (0, True)
-
-
-@pytest.mark.parametrize(
-    ("more", "task", "setting"),
-    [
-        (
-            {"eval_mode": "truncate_head", "ctx_size_k": 64},
-            "nieh_truncate_head_64k",
-            ("ctx_size", 64.0),
-        ),
-        ({"eval_mode": "clip_retrieval", "n_imgs": 20}, "nieh_clip_retrieval", ("top_k", 20)),
-        ({"eval_mode": "video"}, "nieh_video", ("context", "video")),
-    ],
-)
-def test_the_mode_is_part_of_the_run(import_log, more, task, setting):
-    _, _, (header, _) = import_log([{**one, **more} for one in ROWS])
-    assert list(header.config.tasks) == [task]
-    assert header.config.tasks[task].dataset_kwargs[setting[0]] == setting[1]
 
 
 def test_half_a_log_is_a_run_with_the_rest_missing(import_log, tmp_path):
@@ -179,10 +146,7 @@ BAD = {
     "swapped": ({**ROWS[1], "qidx": 3}, "answers another question than row 3"),
     "another answer": ({**ROWS[1], "gt_answer": ["No"]}, "answers another question than row 1"),
     "beyond the end": ({**ROWS[1], "qidx": 4}, "answers question 4; the file has 4"),
-    "before the start": (
-        {**ROWS[1], "qidx": -1},
-        "is not a reply (Expected `int` >= 0",
-    ),
+    "before the start": ({**ROWS[1], "qidx": -1}, "is not a reply (Expected `int` >= 0"),
     "the same again": (ROWS[0], "answers qsingle0 again; the first reply is kept"),
     "too long": (
         {**ROWS[1], "llm_response": "yes " * 2_500_000},
@@ -206,27 +170,25 @@ def test_a_row_that_does_not_fit_is_counted_and_named(import_log, bad):
 
 
 @pytest.mark.parametrize(
-    ("content", "name", "options", "reason"),
+    ("content", "name", "reason"),
     [
         (
             [{**one, "traj_id": "x"} for one in ROWS],
             LOG,
-            (),
             "no row answers a question of this set (answers another",
         ),
-        ([], LOG, (), "no row answers a question of this set (it is empty)"),
-        (ROWS, "replies.log", (), "replies.log: its name has no model; give one with --model"),
+        ([], LOG, "no row answers a question of this set (it is empty)"),
+        (ROWS, "replies.log", "replies.log: its name has no model; give one with --model"),
         (
             [{**ROWS[0], "eval_mode": "dreams"}],
             LOG,
-            (),
             "the mode 'dreams' is unknown; there are full_traj, truncate_head",
         ),
-        (b"\x1f\x8b broken", f"{LOG}.gz", (), "cannot be read after line 0"),
+        (b"\x1f\x8b broken", f"{LOG}.gz", "cannot be read after line 0"),
     ],
 )
-def test_a_log_that_cannot_be_imported_is_one_line(import_log, content, name, options, reason):
-    code, output, read = import_log(content, name, *options)
+def test_a_log_that_cannot_be_imported_is_one_line(import_log, content, name, reason):
+    code, output, read = import_log(content, name)
     assert (code, read, output.count("\n")) == (2, None, 1)
     assert reason in output
 
@@ -244,14 +206,9 @@ def test_replies_in_any_language_are_scored(import_log):
 
 
 def test_the_neutral_form(import_log):
+    counted = {"n_context_tokens": 9, "n_reply_tokens": 2, "seconds": 1.5}
     rows = [
-        {
-            "question_id": "qsingle0",
-            "reply": "SideTable",
-            "n_context_tokens": 9,
-            "n_reply_tokens": 2,
-            "seconds": 1.5,
-        },
+        {"question_id": "qsingle0", "reply": "SideTable", **counted},
         {"question_id": "qmulti4", "reply": "no"},
         {"question_id": "q?", "reply": "no"},
     ]
@@ -266,26 +223,10 @@ def test_the_neutral_form(import_log):
     assert (records[1].tokens.context, records[1].tokens.reply, records[1].seconds) == (9, 2, 1.5)
 
 
-def test_samples_of_lm_eval(make_nieh_set, tmp_path, run_cli):
-    """What our own run exports in lm-eval's files comes back with the same scores."""
-    data, out = make_nieh_set(size=56), tmp_path / "out"
-    assert run_cli("--model", "blind", "--tasks", "nieh_gt", "--data", data, "--out", out)[0] == 0
-    (samples,) = out.rglob("samples_nieh_gt_*.jsonl")
-    words = ("import-replies", samples, "--data", data, "--model", "again", "--out", out)
-    assert run_cli(*words)[0] == 0
-    first, again = (
-        read_run(next((out / name).iterdir()), RECORDS)[1] for name in ("blind", "again")
-    )
-    assert len(again) == len(read_questions(next(data.glob("qa_set*.csv"))))
-    # The samples do not say which frames were shown.
-    payloads = {record.id: replace(record.payload, shown_clues=None) for record in first}
-    assert payloads == {record.id: record.payload for record in again}
-
-
-@pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published logs are not at ../shared/data")
+@needs_published_sets
 def test_every_published_reply_has_its_logged_score(tmp_path, run_cli):
-    logs = sorted((PUBLISHED / "replies").glob("*.log.gz"))
-    code, _, err = run_cli("import-replies", *logs, "--data", PUBLISHED, "--out", tmp_path)
+    logs = sorted((PUBLISHED_SETS / "replies").glob("*.log.gz"))
+    code, _, err = run_cli("import-replies", *logs, "--data", PUBLISHED_SETS, "--out", tmp_path)
     assert (code, "not imported" in err, "scored otherwise" in err) == (0, False, False)
     assert err.count("the prompt it was asked with: published-logs\n") == 3
     means = {}

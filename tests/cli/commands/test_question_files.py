@@ -2,16 +2,15 @@
 
 import json
 import shutil
-from pathlib import Path
 
 import pytest
 
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import PublishedColumns, Question
 
-from ...helpers.command_line import option_words
+from ...helpers.command_line import assert_refused, option_words
+from ...helpers.published import PUBLISHED_SETS, needs_published_sets
 
-PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
 FILES = ("qa_set_nieh_single_clue.csv", "qa_set_nsieh_multi_clue.csv")
 
 
@@ -23,26 +22,16 @@ def alone(make_nieh_set):
     return root
 
 
-def results_of(output, model):
-    (folder,) = (output / model).iterdir()
-    return json.loads((folder / "results.json").read_text())
+def by_clues_of(folder):
+    summary = json.loads((folder / "results.json").read_text())["summary"]
+    return summary["tasks"]["nieh_gt"]["by_clues"]
 
 
-def test_baselines_run_on_them(alone, tmp_path, run_cli):
-    out = tmp_path / "out"
-    words = option_words(model="oracle,blind,random", tasks="nieh_gt", data=alone, out=out)
-    code, _, err = run_cli(*words)
-    assert code == 0, err
-    by_clues = results_of(out, "oracle")["summary"]["tasks"]["nieh_gt"]["by_clues"]
-    assert {name: by_clues[name]["n"] for name in ("1", "2", ">=3", "total")} == {
-        "1": 3,
-        "2": 1,
-        ">=3": 1,
-        "total": 5,
-    }
-    assert (
-        run_cli("show", *(next((out / model).iterdir()) for model in ("oracle", "blind")))[0] == 0
-    )
+def test_baselines_run_on_them(alone, run_cli, evaluate):
+    folders = [evaluate(model, data=alone) for model in ("oracle", "blind", "random")]
+    by_clues = by_clues_of(folders[0])
+    assert [by_clues[name]["n"] for name in ("1", "2", ">=3", "total")] == [3, 1, 1, 5]
+    assert run_cli("show", *folders[:2])[0] == 0
 
 
 @pytest.mark.parametrize(
@@ -55,12 +44,8 @@ def test_baselines_run_on_them(alone, tmp_path, run_cli):
 def test_what_shows_frames_says_that_there_are_none(
     alone, tmp_path, run_cli, model, task, expected
 ):
-    code, out, err = run_cli(
-        "--model", model, "--tasks", task, "--data", alone, "--out", tmp_path / "out"
-    )
-    assert (code, out) == (2, "")
-    assert expected in err.splitlines()[-1]
-    assert "Traceback" not in err
+    words = option_words(model=model, tasks=task, data=alone, out=tmp_path / "out")
+    assert_refused(run_cli(*words), expected, after_notes=True)
 
 
 def test_further_forms_are_refused_in_the_published_words(make_nieh_set, tmp_path, run_cli):
@@ -70,58 +55,54 @@ def test_further_forms_are_refused_in_the_published_words(make_nieh_set, tmp_pat
         *option_words(out=tmp_path / "a.csv", words="published"),
         "--further",
     )
-    code, out, err = run_cli(*words)
-    assert (code, out) == (2, "")
-    assert (
-        "--further adds forms that have no published words; leave it out, or --words published"
-        in err
+    assert_refused(
+        run_cli(*words),
+        "--further adds forms that have no published words; leave it out, or --words published",
     )
     assert not (tmp_path / "a.csv").exists()
 
 
-def test_table4_is_printed_from_the_files_scores(tmp_path, run_cli):
-    matches = tuple((f"match{n}", 0.5) for n in range(1, 5))
-    for file, name, n_clues in (("single", FILES[0], (1,)), ("multi", FILES[1], (2, 4))):
+def write_published(folder, score, single, multi):
+    """Writes both files of the published form: a row for each tuple of clues, so scored."""
+    matches = tuple((f"match{number}", score) for number in (1, 2, 3, 4))
+    for name, kind, of_rows in zip(FILES, ("single", "multi"), (single, multi), strict=True):
         questions = [
-            Question(f"{file}{n}", "Was Box open?", tuple(range(n)), ("Yes",),
-                     published=PublishedColumns(
-                file, f"{file}{n}_q1", 1, (0,), matches))
-            for n in n_clues
+            Question(
+                f"{kind}{number}", f"Is there a mug {number}?", clues, ("yes",),
+                published=PublishedColumns(kind, f"{kind}{number}", matches=matches),
+            )
+            for number, clues in enumerate(of_rows)
         ]  # fmt: skip
-        write_questions(tmp_path / name, questions)
+        write_questions(folder / name, questions)
+
+
+def test_table4_is_printed_from_the_files_scores(tmp_path, run_cli):
+    write_published(tmp_path, 0.5, [(0,)], [(0, 1), (0, 1, 2, 3)])
     code, out, err = run_cli("table", "4", tmp_path)
     assert (code, err) == (0, "")
     assert [line.split()[-6:] for line in out.splitlines() if "match3" in line] == [
         ["(1)", "50.00", "(1)", "50.00", "(3)", "5.0–95.0"]
     ]
     (tmp_path / FILES[1]).unlink()
-    code, out, err = run_cli("table", "4", tmp_path)
-    assert (code, out) == (2, "")
-    assert "no question for the column 2; give a folder with both published question files" in err
+    assert_refused(
+        run_cli("table", "4", tmp_path),
+        "no question for the column 2; give a folder with both published question files",
+    )
 
 
-@pytest.mark.skipif(
-    not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data"
-)
+@needs_published_sets
 @pytest.mark.parametrize(
     ("file", "n", "reference", "strict"),
     [(FILES[0], 829, 75.64, 75.69), (FILES[1], 474, 70.66, 70.67)],
 )
-def test_who_sees_nothing_scores_this_on_the_published_files(
-    tmp_path, run_cli, file, n, reference, strict
-):
-    data, out = PUBLISHED / file, tmp_path / "out"
-    assert (
-        run_cli("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--out", out)[0]
-        == 0
+def test_who_sees_nothing_scores_this_on_the_published_files(evaluate, file, n, reference, strict):
+    oracle, blind = (
+        by_clues_of(evaluate(model, data=PUBLISHED_SETS / file))["total"]
+        for model in ("oracle", "blind")
     )
-    totals = {
-        m: results_of(out, m)["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"]
-        for m in ("oracle", "blind")
-    }
-    assert (totals["oracle"]["n"], totals["oracle"]["scores"]["strict"]["mean"]) == (n, 1.0)
+    assert (oracle["n"], oracle["scores"]["strict"]["mean"]) == (n, 1.0)
     for metric, accuracy in (("reference", reference), ("strict", strict)):
-        assert round(100 * totals["blind"]["scores"][metric]["mean"], 2) == accuracy
+        assert round(100 * blind["scores"][metric]["mean"], 2) == accuracy
 
 
 def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_files(
@@ -129,21 +110,9 @@ def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_fi
 ):
     """One of two files of the published form has a bad row; whatever counts rows counts it, and
     goes on."""
-    scores = tuple((f"match{number}", 1.0) for number in (1, 2, 3, 4))
-    for name, clues_of_rows in zip(FILES, ([(1,), (2,), (3,)], [(1, 2), (1, 2, 3)]), strict=True):
-        kind = "single" if "single" in name else "multi"
-        questions = [
-            Question(
-                f"t{number}", f"Is there a mug {number}?", clues, ("yes",),
-                published=PublishedColumns(kind, f"{kind}{number}", matches=scores),
-            )
-            for number, clues in enumerate(clues_of_rows)
-        ]  # fmt: skip
-        write_questions(tmp_path / name, questions)
+    write_published(tmp_path, 1.0, [(1,), (2,), (3,)], [(1, 2), (1, 2, 3)])
     path = tmp_path / FILES[0]
-    path.write_text(
-        path.read_text().replace("t1,Is there a mug 1?,[2],['yes']", "t1,Is there a mug 1?,[2],")
-    )
+    path.write_text(path.read_text().replace("mug 1?,[2],['yes']", "mug 1?,[2],"))
     log = tmp_path / "log.jsonl"
     log.write_text(
         "".join(json.dumps({"question_id": f"single{n}", "reply": "yes"}) + "\n" for n in range(3))

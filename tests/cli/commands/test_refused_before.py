@@ -13,83 +13,43 @@ def answer(images, text):
 def act(image, instruction):
     return [0, 0, 0, 0, 0, 0, 1]
 """
-# Where "mine" stands for the file of functions: the models, the tasks, more words, the reason.
+DRAWS = "answer draws no replies, as infthor_plans_mini does at temperature 1; add --greedy"
+NO_TOKENS = "answer counts no tokens; take --history full, or leave out the budget"
+NO_REPEATS = "answer draws no replies; leave it out, or give another model"
+# By models and tasks, where "mine" stands for the file of functions: more words, and the reason.
 REFUSED = {
-    "choices": (
-        "random,mine:answer",
-        "infthor_plans_mini",
-        ("--constrained", "--greedy"),
-        "--constrained: answer cannot be held to choices; leave it out",
-    ),
-    "draws": (
-        "random,mine:answer",
-        "infthor_plans_mini",
-        (),
-        "answer draws no replies, as infthor_plans_mini does at temperature 1; add --greedy",
-    ),
-    "draws, in the second suite": (
-        "mine:answer",
-        "nieh_mini_gt,infthor_plans_mini",
-        (),
-        "answer draws no replies, as infthor_plans_mini does at temperature 1; add --greedy",
-    ),
-    "a history in tokens": (
-        "random,mine:answer",
-        "infthor_plans_mini",
-        ("--greedy", "--history", "last:500"),
-        "--history last:N: answer counts no tokens; take --history full, or leave out the budget",
-    ),
-    "an agent's memory in tokens": (
-        "random,mine:answer",
-        "infthor_plans_mini",
-        ("--greedy", "--history", "memory", "--memory", "last", "--budget", "500"),
-        "--budget: answer counts no tokens; take --history full, or leave out the budget",
-    ),
-    "repeats": (
-        "oracle,mine:answer",
-        "nieh_mini_gt",
-        ("--repeats", 2),
-        "--repeats: answer draws no replies; leave it out, or give another model",
-    ),
-    "temperature": (
-        "oracle,mine:answer",
-        "nieh_mini_gt",
-        ("--temperature", 1),
-        "--temperature: answer draws no replies; leave it out, or give another model",
-    ),
-    "choices of a task of one's own": (
-        "oracle,mine:answer",
-        "choosing",
-        (),
-        "choosing: answer does not support choices (2 given); ask without choices",
-    ),
-    "a context in tokens": (
-        "oracle,mine:answer",
-        "nieh_mini_memory",
-        ("--memory", "last", "--budget", 500),
-        "the context has a size in tokens, which answer does not count; give --tokens-per-frame",
-    ),
-    "a policy for questions": (
-        "oracle,mine:act",
-        "nieh_mini_gt",
-        (),
-        "mine.py:act cannot be evaluated on nieh, which needs a model that answers in words",
-    ),
-    "a model for arms": (
-        "still,mine:answer",
-        "manipulathor_mini",
-        (),
-        "mine.py:answer cannot be evaluated on manipulation, which needs a policy that drives an "
-        "arm (openvla, spatialvla, ...)",
-    ),
-    "no checkpoint": (
-        "oracle,hf-vlm:pretrained=./nowhere",
-        "nieh_mini_gt",
-        (),
-        "./nowhere",
-    ),
-    "no key": ("oracle,anthropic:model=m", "nieh_mini_gt", (), "ANTHROPIC_API_KEY"),
+    ("random,mine:answer", "infthor_plans_mini"): {
+        "--constrained --greedy": "--constrained: answer cannot be held to choices; leave it out",
+        "": DRAWS,
+        "--greedy --history last:500": f"--history last:N: {NO_TOKENS}",
+        "--greedy --history memory --memory last --budget 500": f"--budget: {NO_TOKENS}",
+    },
+    ("mine:answer", "nieh_mini_gt,infthor_plans_mini"): {"": DRAWS},
+    ("oracle,mine:answer", "nieh_mini_gt"): {
+        "--repeats 2": f"--repeats: {NO_REPEATS}",
+        "--temperature 1": f"--temperature: {NO_REPEATS}",
+        "--repeats 2 --workers 2": f"--repeats: {NO_REPEATS}",
+    },
+    ("oracle,mine:answer", "choosing"): {
+        "": "choosing: answer does not support choices (2 given); ask without choices",
+    },
+    ("oracle,mine:answer", "nieh_mini_memory"): {
+        "--memory last --budget 500": "the context has a size in tokens, which answer does not "
+        "count; give --tokens-per-frame",
+    },
+    ("oracle,mine:act", "nieh_mini_gt"): {
+        "": "mine.py:act cannot be evaluated on nieh, which needs a model that answers in words",
+    },
+    ("still,mine:answer", "manipulathor_mini"): {
+        "": "mine.py:answer cannot be evaluated on manipulation, which needs a policy that drives "
+        "an arm (openvla, spatialvla, ...)",
+    },
+    ("oracle,hf-vlm:pretrained=./nowhere", "nieh_mini_gt"): {"": "./nowhere"},
+    ("oracle,anthropic:model=m", "nieh_mini_gt"): {"": "ANTHROPIC_API_KEY"},
 }
+CASES = [
+    (*run, words, reason) for run, refusals in REFUSED.items() for words, reason in refusals.items()
+]
 
 
 @pytest.fixture
@@ -114,9 +74,9 @@ def refuse(run_cli, tmp_path, monkeypatch):
     return refuse
 
 
-@pytest.mark.parametrize("models, tasks, more, reason", REFUSED.values(), ids=REFUSED)
-def test_a_later_run_is_refused_before_the_first_has_begun(refuse, models, tasks, more, reason):
-    refuse(models, tasks, reason, "run", *more)
+@pytest.mark.parametrize(("models", "tasks", "words", "reason"), CASES)
+def test_a_later_run_is_refused_before_the_first_has_begun(refuse, models, tasks, words, reason):
+    refuse(models, tasks, reason, "run", *words.split())
 
 
 @pytest.mark.parametrize(
@@ -129,8 +89,3 @@ def test_a_later_run_is_refused_before_the_first_has_begun(refuse, models, tasks
 def test_nothing_is_measured_or_compared_before_either(refuse, command, more, model, reason):
     models = f"qwen2.5-vl-tiny:batch_size=2,{model}"
     refuse(models, "nieh_mini_gt", reason, command, "--repeats", 2, *more)
-
-
-def test_workers_refuse_it_as_well(refuse):
-    models, tasks, more, reason = REFUSED["repeats"]
-    refuse(models, tasks, reason, "run", *more, "--workers", 2)

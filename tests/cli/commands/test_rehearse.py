@@ -9,6 +9,7 @@ import pytest
 from infthor_eval.cli.rehearsal import rehearse
 
 from ...helpers.bundled import BUNDLED
+from ...helpers.command_line import assert_refused
 
 
 @pytest.fixture(autouse=True)
@@ -86,6 +87,4 @@ def test_people_read_lines_and_what_is_missing_is_said(
     ],
 )
 def test_misuse_is_one_line(run_cli: Any, words: tuple[str, ...], reason: str) -> None:
-    code, out, err = run_cli("doctor", *words)
-    assert (code, out) == (2, "")
-    assert reason in err and err.count("\n") == 1
+    assert_refused(run_cli("doctor", *words), reason)

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from ...helpers.command_line import assert_refused, option_words
+from ...helpers.command_line import assert_refused, option_words, read_success
 from ...helpers.journals import write_run
 from ...helpers.plan_runs import make_plan_record, make_planner_run, make_plans_run
 
@@ -51,67 +51,38 @@ def test_runs_of_one_name_are_told_apart_by_their_folders(tmp_path, run_cli):
     assert "m (infthor_plans-2)" in output
 
 
-def test_what_is_no_run_of_plans_is_refused(folders, make_nieh_set, tmp_path, run_cli):
-    assert_refused(
-        run_cli("report", tmp_path, "--figure", "7"),
-        f"{tmp_path}: no journal in it; give the folder of a run",
-    )
-    run_cli(
-        *option_words(
-            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "nieh"
-        )
-    )
-    (nieh_run,) = (tmp_path / "nieh" / "oracle").iterdir()
-    assert_refused(
-        run_cli("report", folders[0], nieh_run, "--figure", "7"),
-        f"{nieh_run}: is a run of nieh, and figure 7 is of plans",
-    )
+def test_what_is_no_run_of_plans_is_refused(folders, make_nieh_set, tmp_path, run_cli, evaluate):
+    nieh_run = evaluate(data=make_nieh_set(size=56))
+    for runs, expected in (
+        ([tmp_path], f"{tmp_path}: no journal in it; give the folder of a run"),
+        ([folders[0], nieh_run], f"{nieh_run}: is a run of nieh, and figure 7 is of plans"),
+    ):
+        assert_refused(run_cli("report", *runs, "--figure", "7"), expected)
 
 
 def test_misuse_is_one_line(folders, tmp_path, run_cli):
-    assert_refused(
-        run_cli("report", *folders, "--figure", "5"),
-        "--figure 5: is none that can be drawn; there are 6 (reward",
-    )
-    assert_refused(
-        run_cli("report", *folders, "--task", "a"),
-        "--task: is for a figure; give --figure too, or leave it out",
-    )
-    assert_refused(
-        run_cli("report", *folders, "--out", tmp_path / "page.txt"),
-        "the page is an .html file; name one",
-    )
-    assert_refused(run_cli("report", "--figure", "7"), "RUN...")
-    assert_refused(run_cli("report", folders[0], folders[0], "--figure", "7"), "given twice")
     (tmp_path / "file").write_text("")
-    assert_refused(
-        run_cli("report", folders[0], "--figure", "7", "--out", tmp_path / "file"),
-        "cannot be written to",
-    )
-    missing = tmp_path / "missing.yaml"
-    assert_refused(
-        run_cli("report", folders[0], "--figure", "7", "--panels", missing, "--out", tmp_path),
-        f"{missing}: ",
-    )
+    first, figure, missing = folders[0], ("--figure", "7"), tmp_path / "missing.yaml"
+    for words, expected in (
+        ((*folders, "--figure", "5"), "--figure 5: is none that can be drawn; there are 6 (reward"),
+        ((*folders, "--task", "a"), "--task: is for a figure; give --figure too, or leave it out"),
+        ((*folders, "--out", tmp_path / "page.txt"), "the page is an .html file; name one"),
+        (figure, "RUN..."),
+        ((first, first, *figure), "given twice"),
+        ((first, *figure, "--out", tmp_path / "file"), "cannot be written to"),
+        ((first, *figure, "--panels", missing, "--out", tmp_path), f"{missing}: "),
+    ):
+        assert_refused(run_cli("report", *words), expected)
 
 
-def test_a_page_is_written_and_its_size_is_told(make_nieh_set, tmp_path, run_cli):
-    run_cli(
-        *option_words(
-            model="oracle,blind",
-            tasks="nieh_gt",
-            data=make_nieh_set(size=56),
-            out=tmp_path / "out",
-        )
-    )
-    runs = [
-        folder for model in ("oracle", "blind") for folder in (tmp_path / "out" / model).iterdir()
-    ]
-    code, out, err = run_cli("report", *runs, "--out", tmp_path / "pages" / "report.html")
+def test_a_page_is_written_and_its_size_is_told(make_nieh_set, tmp_path, run_cli, evaluate):
+    data, place = make_nieh_set(size=56), tmp_path / "pages" / "report.html"
+    runs = [evaluate(model, data=data) for model in ("oracle", "blind")]
+    code, out, err = run_cli("report", *runs, "--out", place)
     assert (code, err) == (0, "")
     assert out.startswith("5 samples, ")
-    assert out.strip().endswith(f"MB: {tmp_path / 'pages' / 'report.html'}")
-    page = (tmp_path / "pages" / "report.html").read_text()
+    assert out.strip().endswith(f"MB: {place}")
+    page = place.read_text()
     # How it is done again, and where its frames were.
     assert "infthor-eval run --model oracle --tasks nieh_gt" in page
     assert "no frames are shown" not in page
@@ -121,12 +92,8 @@ def test_replays_are_counted_with_the_time_left_also_where_there_is_no_terminal(
     scripted_run, scripted_data, tmp_path, run_cli, monkeypatch
 ):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
-    code, out, err = run_cli(
-        "report",
-        scripted_run,
-        *option_words(data=scripted_data, episodes=3, out=tmp_path / "report.html"),
-    )
-    assert code == 0
+    words = option_words(data=scripted_data, episodes=3, out=tmp_path / "report.html")
+    out, err = read_success(run_cli("report", scripted_run, *words))
     assert "12 samples, " in out
     first, second = err.splitlines()  # the third is the last: the page's size follows
     pattern = r"episodes replayed: {} of 3 \({} %\), .* left, .*; scripted, bedroom-1-seed7"
@@ -134,13 +101,8 @@ def test_replays_are_counted_with_the_time_left_also_where_there_is_no_terminal(
     assert re.fullmatch(pattern.format(2, 67), second)
 
 
-def test_what_is_no_run_is_skipped_and_said(make_nieh_set, tmp_path, run_cli):
-    run_cli(
-        *option_words(
-            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "out"
-        )
-    )
-    (run,) = (tmp_path / "out" / "oracle").iterdir()
+def test_what_is_no_run_is_skipped_and_said(make_nieh_set, tmp_path, run_cli, evaluate):
+    run = evaluate(data=make_nieh_set(size=56))
     earlier = tmp_path / "earlier"
     earlier.mkdir()
     (earlier / "report.html").touch()
@@ -153,7 +115,7 @@ def test_what_is_no_run_is_skipped_and_said(make_nieh_set, tmp_path, run_cli):
     assert_refused(
         run_cli("show", tmp_path / "nope"), "nope: no such folder; `infthor-eval ls runs`"
     )
-    assert_refused(run_cli("show", tmp_path / "out"), f"give the folder of a run, such as {run}")
+    assert_refused(run_cli("show", run.parents[1]), f"give the folder of a run, such as {run}")
 
 
 def test_a_folder_of_runs_becomes_an_index_with_a_page_for_each(folders, tmp_path, run_cli):
@@ -161,8 +123,7 @@ def test_a_folder_of_runs_becomes_an_index_with_a_page_for_each(folders, tmp_pat
     broken.mkdir(parents=True)
     (broken / "worker-0.jsonl").write_text("no header\n")
     out = tmp_path / "index"
-    code, output, err = run_cli("report", tmp_path / "results", "--out", out)
-    assert code == 0
+    output, err = read_success(run_cli("report", tmp_path / "results", "--out", out))
     assert re.fullmatch(r"3 runs, [\d.]+ MB: .*index.html", output.strip().replace("\n", ""))
     assert f"{broken.parent}: not read: " in err
     index = (out / "index.html").read_text()

@@ -11,7 +11,6 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 from infthor_eval.storage.limits import SCORER_SECONDS
 
-from ...helpers.command_line import option_words
 from ...helpers.nieh_runs import make_record
 from .rescored import REPLIES, read_journal_lines, read_row, read_scores
 
@@ -30,12 +29,7 @@ def test_todays_scores_are_a_run_that_names_its_source(source, rescore, run_cli)
     assert "7 replies scored; 1 without a reply stay failed; 2 were never asked" in output
     assert "nieh_gt, strict: 1 of 7 scores differ from those in the journal" in output
     assert "  q0: 0, now 1: 'Sofa'" in output
-    assert read_row(output, "nieh_gt", "strict", "our", "strict", "scorer") == [
-        "7",
-        "40.00",
-        "54.29",
-        "1",
-    ]
+    assert read_row(output, "nieh_gt strict our strict scorer") == "7 40.00 54.29 1"
     header, records = read_run(new, RECORDS)
     assert (header.name, new.parent.name, new.name) == ("m-rescored",) * 2 + (
         f"nieh_gt-{header.config.hash}",
@@ -54,18 +48,11 @@ def test_todays_scores_are_a_run_that_names_its_source(source, rescore, run_cli)
 
 def test_the_same_command_again_writes_nothing_new(source, rescore):
     _, _, new = rescore(source())
-    before = (
-        read_journal_lines(new),
-        (new / "results.json").read_bytes(),
-        (new / "rescored.json").read_bytes(),
-    )
+    names = ("journal/worker-0.jsonl", "results.json", "rescored.json")
+    before = [(new / name).read_bytes() for name in names]
     _, _, again = rescore(new.parents[2] / "elsewhere" / "a run")
     assert again == new
-    assert (
-        read_journal_lines(new),
-        (new / "results.json").read_bytes(),
-        (new / "rescored.json").read_bytes(),
-    ) == before
+    assert [(new / name).read_bytes() for name in names] == before
 
 
 def test_a_changed_scorer_replaces_what_the_journal_has(source, rescore, monkeypatch):
@@ -95,12 +82,7 @@ def test_metrics_of_a_task_file_are_left_out_and_replies_that_they_failed_on_are
     assert [(one.payload.scores, one.failure) for one in read_run(new, RECORDS)[1]] == [
         (RIGHT, None)
     ] * 2
-    assert read_row(output, "nieh_gt", "strict", "our", "strict", "scorer") == [
-        "2",
-        "-",
-        "100.00",
-        "-",
-    ]
+    assert read_row(output, "nieh_gt strict our strict scorer") == "2 - 100.00 -"
 
 
 def test_a_run_of_another_suite_and_a_folder_without_a_run_are_refused_in_one_line(
@@ -114,15 +96,8 @@ def test_a_run_of_another_suite_and_a_folder_without_a_run_are_refused_in_one_li
     assert "no journal in it" in output
 
 
-def test_a_run_of_ours_has_the_scores_that_it_had(make_nieh_set, run_cli, rescore, tmp_path):
-    data = make_nieh_set(size=56)
-    assert (
-        run_cli(*option_words(model="oracle", tasks="nieh_gt", data=data, out=tmp_path / "first"))[
-            0
-        ]
-        == 0
-    )
-    (folder,) = (tmp_path / "first" / "oracle").iterdir()
+def test_a_run_of_ours_has_the_scores_that_it_had(make_nieh_set, rescore, evaluate):
+    folder = evaluate(data=make_nieh_set(size=56))
     code, output, new = rescore(folder)
     assert (code, "5 replies scored\n" in output, "differ from" in output) == (0, True, False)
     before, now = (json.loads((one / "results.json").read_text()) for one in (folder, new))
@@ -154,22 +129,8 @@ def test_a_function_in_a_file_is_a_metric_of_its_name(source, rescore, own):
     own(LENGTH)
     code, output, new = rescore(source(), "--scorer", "own.py:length")
     assert code == 0
-    assert read_scores(new, "length") == {
-        "q0": 5,
-        "q1": 15,
-        "q2": 4,
-        "q3": 4,
-        "q4": 4,
-        "q5": 8,
-        "q6": None,
-        "q7": 12,
-    }
-    assert read_row(output, "nieh_gt", "length", "length", "in", "own.py") == [
-        "7",
-        "-",
-        "742.86",
-        "-",
-    ]
+    assert list(read_scores(new, "length").values()) == [5, 15, 4, 4, 4, 8, None, 12]
+    assert read_row(output, "nieh_gt length length in own.py") == "7 - 742.86 -"
     scorer = read_run(new, RECORDS)[0].config.rescored.scorer
     assert (scorer["name"], scorer["metrics"], scorer["file"]) == ("length", ["length"], "own.py")
     own(LENGTH + "# edited\n")
@@ -179,12 +140,8 @@ def test_a_function_in_a_file_is_a_metric_of_its_name(source, rescore, own):
 def test_a_mapping_is_several_metrics(source, rescore, own):
     own("def both(reply, answers):\n    return {'b': True, 'a': reply == answers[0]}\n")
     _, output, new = rescore(source(), "--scorer", "./own.py:both")
-    assert read_run(new, RECORDS)[0].config.tasks["nieh_gt"].metrics.names == (
-        "reference",
-        "strict",
-        "b",
-        "a",
-    )
+    names = read_run(new, RECORDS)[0].config.tasks["nieh_gt"].metrics.names
+    assert names == ("reference", "strict", "b", "a")
     assert read_scores(new, "a")["q0"] == read_scores(new, "b")["q1"] == 1.0
     assert "a: both in own.py." in output
 
@@ -202,11 +159,8 @@ def test_an_exception_fails_the_reply_alone_and_its_traceback_is_kept(source, re
     assert "1 replies scored; 6 failed by the scorer; 1 without a reply stay failed" in output
     assert "reply.split()[2]" in (new / "journal" / "tracebacks.txt").read_text()
     records = {one.id: one for one in read_run(new, RECORDS)[1]}
-    assert (records["q0"].failure, records["q0"].payload.scores, records["q0"].payload.reply) == (
-        failure,
-        {},
-        "Sofa",
-    )
+    payload = records["q0"].payload
+    assert (records["q0"].failure, payload.scores, payload.reply) == (failure, {}, "Sofa")
     assert records["q1"].failure is None
     lines = read_journal_lines(new)
     rescore(folder, "--scorer", "own.py:third")

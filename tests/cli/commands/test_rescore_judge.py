@@ -57,6 +57,8 @@ class Talk(Transcript):
         return Reply("Yes." if data["reply"] in data["right"] else "no")
 """
 WITH_JUDGE = ("--judge", "judge.py:Judge")
+UNSURE = "the rules are unsure of"
+RIGHT, WRONG = (f"are {which} by the rules (sample)" for which in ("right", "wrong"))
 
 
 @pytest.fixture
@@ -90,31 +92,14 @@ def test_a_judge_decides_where_the_rules_are_unsure(source, rescore, requests, r
     # Two unsure replies; Sofa and Bed are right, Bed for Sofa is wrong. A share of several answers
     # is neither.
     assert len(requests()) == 5
-    assert read_report(new)["judge"]["unsure"] == {"n": 2, "n_right": 1, "n_partly": 0} | {
-        "n_wrong": 1,
-        "n_neither": 0,
-        "n_not_asked": 0,
-    }
-    assert read_row(output, "the", "rules", "are", "unsure", "of") == ["2", "1", "0", "1", "0", "0"]
-    assert read_row(output, "are", "right", "by", "the", "rules", "(sample)") == [
-        "2",
-        "2",
-        "0",
-        "0",
-        "0",
-        "0",
-    ]
-    assert read_row(output, "are", "wrong", "by", "the", "rules", "(sample)") == [
-        "1",
-        "0",
-        "0",
-        "1",
-        "0",
-        "0",
-    ]
+    counts = {"n": 2, "n_right": 1, "n_partly": 0, "n_wrong": 1, "n_neither": 0, "n_not_asked": 0}
+    assert read_report(new)["judge"]["unsure"] == counts
+    assert read_row(output, UNSURE) == "2 1 0 1 0 0"
+    assert read_row(output, RIGHT) == "2 2 0 0 0 0"
+    assert read_row(output, WRONG) == "1 0 0 1 0 0"
     assert "Judge and rules agree on 100.00 % of the sample." in output
     by = "strict, and Judge where the rules are unsure"
-    assert read_row(output, "nieh_gt", "judged", *by.split()) == ["7", "-", "68.57", "-"]
+    assert read_row(output, f"nieh_gt judged {by}") == "7 - 68.57 -"
     assert f"judged: {by}." in run_cli("show", new)[1]
     assert json.loads((new / "results.json").read_text())["usage"]["requests"] == 5
     judge = read_run(new, RECORDS)[0].config.rescored.judge
@@ -131,11 +116,9 @@ def test_a_verdict_is_in_the_journal_and_is_not_asked_for_again(source, rescore,
     assert soft["judge"]["soft"] == "yes"
     assert len(requests()) == 5
     assert rescore(folder, *WITH_JUDGE)[2] == new
-    assert (requests(), read_journal_lines(new), (new / "rescored.json").read_bytes()) == (
-        [],
-        lines,
-        report,
-    )
+    assert requests() == []
+    assert read_journal_lines(new) == lines
+    assert (new / "rescored.json").read_bytes() == report
     other = rescore(folder, *WITH_JUDGE, "--judge-args", "soft=no")[2]
     assert (other != new, len(requests())) == (True, 5)
     assert rescore(folder, "--judge", "judge.py:Judge:soft=no")[2] == other
@@ -158,7 +141,7 @@ def test_no_verdict_leaves_the_strict_score_and_is_counted(
 ):
     _, output, new = rescore(source(), *WITH_JUDGE, "--judge-args", f"soft={said_by_judge}")
     assert read_scores(new, "judged")["q1"] == 0.0
-    assert read_row(output, "the", "rules", "are", "unsure", "of") == ["2", "0", "0", "1", "1", "0"]
+    assert read_row(output, UNSURE) == "2 0 0 1 1 0"
 
 
 def test_a_judge_that_cannot_be_asked_is_counted_and_asked_again_next_time(
@@ -172,7 +155,7 @@ def test_a_judge_that_cannot_be_asked_is_counted_and_asked_again_next_time(
         in output
     )
     assert "ZeroDivisionError in judge.py:" in output
-    assert read_row(output, "the", "rules", "are", "unsure", "of") == ["2", "0", "0", "1", "0", "1"]
+    assert read_row(output, UNSURE) == "2 0 0 1 0 1"
     assert read_scores(new, "judged")["q1"] == 0.0
     requests()
     rescore(folder, *WITH_JUDGE, "--judge-args", "soft=raise")
@@ -231,15 +214,8 @@ def test_the_published_prompt_asks_for_a_score_and_a_share_counts(
         "q1": 0.5,
         "q5": 1.0,
     }
-    assert read_row(output, "the", "rules", "are", "unsure", "of") == ["2", "1", "1", "0", "0", "0"]
-    assert read_row(output, "are", "wrong", "by", "the", "rules", "(sample)") == [
-        "1",
-        "1",
-        "0",
-        "0",
-        "0",
-        "0",
-    ]
+    assert read_row(output, UNSURE) == "2 1 1 0 0 0"
+    assert read_row(output, WRONG) == "1 1 0 0 0 0"
     assert read_run(new, RECORDS)[0].config.rescored.judge["prompt"] == "published"
 
 
@@ -258,8 +234,7 @@ def test_the_sample_is_seeded_and_half_right_half_wrong(source, rescore, request
     requests_by_seed = []
     for seed in (0, 0, 1):
         _, output, _ = rescore(folder, *WITH_JUDGE, "--seed", seed)
-        assert read_row(output, "are", "right", "by", "the", "rules", "(sample)")[0] == "25"
-        assert read_row(output, "are", "wrong", "by", "the", "rules", "(sample)")[0] == "25"
+        assert all(read_row(output, drawn).startswith("25 ") for drawn in (RIGHT, WRONG))
         requests_by_seed.append(set(requests()))
     assert [len(one) for one in requests_by_seed] == [50, 0, 50]
     assert requests_by_seed[0] != requests_by_seed[2]

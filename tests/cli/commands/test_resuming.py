@@ -44,17 +44,12 @@ def test_a_name_appears_in_the_folder_the_table_and_the_results(ask, tmp_path):
     assert len({path.parent.name for path in (tmp_path / "out").rglob("results.json")}) == 1
 
 
-@pytest.mark.parametrize("name", ["../up", "a/b", "", ".hidden", "-x\n"])
-def test_a_name_that_cannot_be_a_folders_is_refused(ask, tmp_path, name):
-    assert_refused(ask(f"--name={name}", model="oracle"), "names a folder")
-    assert not (tmp_path / "out").exists()
-
-
-def test_one_name_for_two_models_is_refused(ask, tmp_path):
-    assert_refused(
-        ask("--name", "both", model="oracle,blind"),
-        "--name both: names one run, but 2 models are given",
-    )
+@pytest.mark.parametrize("name", ["../up", "a/b", "", ".hidden", "-x\n", "both"])
+def test_a_name_that_cannot_be_a_folders_or_is_for_two_models_is_refused(ask, tmp_path, name):
+    model, expected = "oracle", "names a folder"
+    if name == "both":
+        model, expected = "oracle,blind", "--name both: names one run, but 2 models are given"
+    assert_refused(ask(f"--name={name}", model=model), expected)
     assert not (tmp_path / "out").exists()
 
 
@@ -93,65 +88,47 @@ def test_the_journal_of_an_active_run_is_left_alone(ask, tmp_path, option):
     assert len(replies(folder)) == 5
 
 
-def test_a_bad_line_in_a_journal_is_named_and_recovered_from(ask, tmp_path):
+def _spoil_two_units(lines):
+    first, second, *_ = (at for at, line in enumerate(lines) if b'"type":"unit"' in line)
+    spoiled = {first: lines[first][:40] + b"\x00\n", second: b'{"type":"unit","task":"nieh_gt"}\n'}
+    return [spoiled.get(at, line) for at, line in enumerate(lines)]
+
+
+# What is done to the lines of a journal, what is said of the first bad one, and how many units it
+# costs.
+BAD_JOURNALS = {
+    "bad lines": (_spoil_two_units, "not a line of a journal", 2),
+    "no first line": (
+        lambda lines: [b"no header\n", *lines[1:]],
+        "not the first line of a journal",
+        0,
+    ),
+    "two journals": (lambda lines: lines * 2, "a second header in the middle of the records", 0),
+}
+
+
+@pytest.mark.parametrize("name", BAD_JOURNALS)
+def test_a_bad_line_in_a_journal_is_named_and_recovered_from(ask, tmp_path, name):
+    damage, expected, n_lost = BAD_JOURNALS[name]
     ask()
     path = find_one(tmp_path / "out", "worker-0.jsonl")
     before, lines = replies(path.parents[1]), path.read_bytes().splitlines(keepends=True)
-    assert len(lines) == 6
-    lines[2] = lines[2][:40] + b"\x00\n"
-    lines[4] = b'{"type":"unit","task":"nieh_gt"}\n'
-    path.write_bytes(b"".join(lines))
-
-    code, out, err = ask()
-    assert (code, out) == (2, "")
-    (line,) = [line for line in err.splitlines() if line.startswith("infthor-eval: ")]
-    assert f"{path}, line 3: not a line of a journal" in line
-    assert "--recover" in line
-    assert "Traceback" not in err
-    assert path.read_bytes() == b"".join(lines)
+    damaged = damage(lines)
+    bad = [line for line in damaged if line not in lines] or lines[:1]  # a second header
+    number = damaged.index(bad[0], 0 if bad[0] not in lines else 1) + 1
+    path.write_bytes(b"".join(damaged))
+    assert_refused(ask(), f"{path}, line {number}: {expected}", "--recover", after_notes=True)
+    assert path.read_bytes() == b"".join(damaged)
 
     code, _, err = ask("--recover")
     assert code == 0
-    assert (
-        "qwen2.5-vl-tiny: 2 bad line(s) of the journal set aside; those samples are tried again"
-        in err
-    )
-    assert "2 evaluated now, 3 resumed from the journal" in err
+    told = "bad line(s) of the journal set aside; those samples are tried again"
+    assert f"qwen2.5-vl-tiny: {len(bad)} {told}" in err
+    assert f"{n_lost} evaluated now, {5 - n_lost} resumed from the journal" in err
     assert replies(path.parents[1]) == before
-    assert (path.parent / "bad_lines.txt").read_bytes() == lines[2] + lines[4]
+    assert (path.parent / "bad_lines.txt").read_bytes() == b"".join(bad)
     code, _, err = ask("--recover")
     assert "bad line" not in err
-    assert "0 evaluated now, 5 resumed from the journal" in err
-
-
-def test_a_journal_without_its_first_line_is_recovered_from(ask, tmp_path):
-    ask()
-    path = find_one(tmp_path / "out", "worker-0.jsonl")
-    before, lines = replies(path.parents[1]), path.read_bytes().splitlines(keepends=True)
-    path.write_bytes(b"no header\n" + b"".join(lines[1:]))
-    code, out, err = ask()
-    assert (code, out) == (2, "")
-    assert f"{path}, line 1: not the first line of a journal" in err
-    assert "--recover" in err
-    code, _, err = ask("--recover")
-    assert code == 0
-    assert "1 bad line(s) of the journal set aside" in err
-    assert "0 evaluated now, 5 resumed from the journal" in err
-    assert replies(path.parents[1]) == before
-
-
-def test_two_journals_in_one_file_are_named_and_recovered_from(ask, tmp_path):
-    ask(model="oracle")
-    path = find_one(tmp_path / "out", "worker-0.jsonl")
-    content = path.read_bytes()
-    path.write_bytes(2 * content)
-    code, out, err = ask(model="oracle")
-    assert (code, out) == (2, "")
-    assert f"{path}, line 7: a second header in the middle of the records" in err
-    assert "Traceback" not in err
-    code, _, err = ask("--recover", model="oracle")
-    assert code == 0
-    assert "oracle: 1 bad line(s) of the journal set aside" in err
     assert "0 evaluated now, 5 resumed from the journal" in err
 
 

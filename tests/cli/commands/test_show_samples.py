@@ -9,19 +9,15 @@ import pandas
 import pytest
 
 import infthor_eval
-from tests.helpers.command_line import assert_refused, option_words
+from tests.helpers.command_line import assert_refused
 from tests.helpers.processes import cli_words
 
 
 @pytest.fixture
-def folders(make_nieh_set, tmp_path, run_cli):
+def folders(make_nieh_set, evaluate):
     """The folders of runs of the oracle and of the blind on five questions."""
     data = make_nieh_set(size=56)
-    code, _, err = run_cli(
-        *option_words(model="oracle,blind", tasks="nieh_gt", data=data, out=tmp_path / "out")
-    )
-    assert code == 0, err
-    return [next((tmp_path / "out" / model).iterdir()) for model in ("oracle", "blind")]
+    return [evaluate(model, data=data) for model in ("oracle", "blind")]
 
 
 def test_csv_has_a_row_per_sample_of_every_run(folders, run_cli):

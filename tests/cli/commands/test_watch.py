@@ -11,7 +11,7 @@ from infthor_eval.plans.records import RECORDS
 from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.runs import read_run
 
-from ...helpers.command_line import assert_refused, option_words, read_remarks
+from ...helpers.command_line import assert_refused, option_words, read_remarks, read_success
 from ...helpers.journals import write_journal
 from ...helpers.trajectories import FORK, cut_trajectory
 from ...helpers.trajectories import MUG as NAME
@@ -43,10 +43,8 @@ def test_two_plans_become_an_mp4(scripted_run, scripted_data, tmp_path, run_cli)
 
 def test_a_gif_is_as_long_as_its_plans(scripted_run, scripted_data, tmp_path, run_cli):
     out = tmp_path / "watched.gif"
-    code, _, _ = run_cli(
-        "watch", scripted_run, "--plans", 2, "--data", scripted_data, "--out", out, "--fps", 5
-    )
-    assert code == 0
+    words = option_words(plans=2, data=scripted_data, out=out, fps=5)
+    read_success(run_cli("watch", scripted_run, *words))
     with Image.open(out) as gif:
         assert gif.size == SIZE
         durations = []
@@ -88,54 +86,37 @@ def test_what_ends_otherwise_than_recorded_is_said_in_a_line(
     assert "1 of 12 plans" in output
 
 
-def test_what_cannot_be_watched_is_one_line(
-    scripted_run, scripted_data, make_nieh_set, tmp_path, run_cli
-):
-    def watch(*words):
-        return run_cli("watch", scripted_run, "--data", scripted_data, *words)
+REFUSED = {
+    "--trajectory hall-9": f"unknown trajectory of this run 'hall-9'; there are {NAME}",
+    "--task infthor": "unknown task of this run 'infthor'; did you mean 'infthor_plans'?",
+    "--plans 3-99": "--plans 3-99: the run has plans 1 to 12",
+    "--plans 99": "--plans 99: the run has plans 1 to 12",
+    "--plans two": "--plans 'two': is neither a plan's number nor two of them; write 7, or 3-7",
+    "--out a.avi": "a.avi: unknown format; give a file name that ends in .mp4 or .gif",
+    "--out b.mp4 --fps 0": "--fps",
+    "--out a.mp4": "not a file; give another place with --out",
+}
 
-    assert_refused(
-        watch("--trajectory", "hall-9"),
-        f"unknown trajectory of this run 'hall-9'; there are {NAME}",
-    )
-    assert_refused(
-        watch("--task", "infthor"),
-        "unknown task of this run 'infthor'; did you mean 'infthor_plans'?",
-    )
-    assert_refused(watch("--plans", "3-99"), "--plans 3-99: the run has plans 1 to 12")
-    assert_refused(watch("--plans", "99"), "--plans 99: the run has plans 1 to 12")
-    assert_refused(
-        watch("--plans", "two"),
-        "--plans 'two': is neither a plan's number nor two of them; write 7, or 3-7",
-    )
-    assert_refused(
-        watch("--out", tmp_path / "a.avi"),
-        "a.avi: unknown format; give a file name that ends in .mp4 or .gif",
-    )
-    assert_refused(watch("--out", tmp_path / "a.mp4", "--fps", "0"), "--fps")
+
+def test_what_cannot_be_watched_is_one_line(
+    scripted_run, scripted_data, make_nieh_set, tmp_path, run_cli, evaluate, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "a.mp4").mkdir()
-    assert_refused(watch("--out", tmp_path / "a.mp4"), "not a file; give another place with --out")
-    assert_refused(
-        run_cli("watch", scripted_run),
-        "do not come with the package; give them as --data FILE or FOLDER",
-    )
-    assert_refused(
-        run_cli("watch", scripted_run, "--data", tmp_path / "none"),
-        "there is no such file or folder",
-    )
-    assert_refused(
-        run_cli("watch", tmp_path), f"{tmp_path}: no journal in it; give the folder of a run"
-    )
-    run_cli(
-        *option_words(
-            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "nieh"
-        )
-    )
-    (nieh_run,) = (tmp_path / "nieh" / "oracle").iterdir()
-    assert_refused(
-        run_cli("watch", nieh_run),
-        f"{nieh_run}: is a run of nieh, and only runs of plans and manipulation can be watched",
-    )
+    for words, expected in REFUSED.items():
+        ended = run_cli("watch", scripted_run, "--data", scripted_data, *words.split())
+        assert_refused(ended, expected)
+    nieh_run = evaluate(data=make_nieh_set(size=56))
+    for words, expected in (
+        ([scripted_run], "do not come with the package; give them as --data FILE or FOLDER"),
+        ([scripted_run, "--data", "none"], "there is no such file or folder"),
+        ([tmp_path], f"{tmp_path}: no journal in it; give the folder of a run"),
+        (
+            [nieh_run],
+            f"{nieh_run}: is a run of nieh, and only runs of plans and manipulation can be watched",
+        ),
+    ):
+        assert_refused(run_cli("watch", *words), expected)
 
 
 @pytest.mark.parametrize("name", [NAME, FORK])
@@ -144,11 +125,6 @@ def test_a_trajectory_that_is_not_the_runs_is_one_line(scripted_run, tmp_path, r
     expected = (
         "changed since the run" if name == NAME else f"not among the trajectories of --data ({name}"
     )
-    assert_refused(
-        run_cli(
-            "watch", scripted_run, "--data", tmp_path / "changed.json", "--out", tmp_path / "a.gif"
-        ),
-        NAME,
-        expected,
-    )
+    words = option_words(data=tmp_path / "changed.json", out=tmp_path / "a.gif")
+    assert_refused(run_cli("watch", scripted_run, *words), NAME, expected)
     assert not (tmp_path / "a.gif").exists()

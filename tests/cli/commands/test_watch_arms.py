@@ -114,37 +114,23 @@ def test_episodes_in_which_nobody_acted_have_the_title_alone(arm_run, episodes, 
 
 
 def test_what_cannot_be_watched_is_one_line(
-    arm_run, episodes, trajectory, scripted_run, tmp_path, run_cli
+    arm_run, episodes, trajectory, scripted_run, tmp_path, run_cli, monkeypatch
 ):
-    def watch(*words):
-        return run_cli("watch", arm_run, *words)
-
+    monkeypatch.chdir(tmp_path)
+    of_plans = f"is not for runs of manipulation, and {arm_run} is one; leave it out"
     there = ", ".join(str(payload.index) for payload in episodes)
-    assert_refused(
-        watch("--trajectory", "hall-9"),
-        f"unknown trajectory of this run 'hall-9'; there are {trajectory}",
-    )
-    assert_refused(watch("--task", "nothing"), "unknown task of this run 'nothing'")
-    assert_refused(
-        watch("--episode", "1"), f"--episode 1: the run has episodes {there} of {trajectory}"
-    )
-    assert_refused(
-        watch("--episode", "one"), "--episode 'one': is no number of an action; write 17, or 17,75"
-    )
-    assert_refused(
-        watch("--plans", "1"),
-        f"--plans: is not for runs of manipulation, and {arm_run} is one; leave it out",
-    )
-    assert_refused(watch("--sheet", tmp_path / "a.jpg"), "a.jpg: a sheet is a PNG")
-    assert_refused(
-        watch("--sheet", tmp_path / "a.png", "--out", tmp_path / "a.gif"),
-        "--sheet and --out: one picture or",
-    )
-    assert_refused(watch("--data", tmp_path / "none"), "there is no such file or folder")
-    assert_refused(
-        run_cli("watch", scripted_run, "--episode", "1"), "--episode: is not for runs of plans"
-    )
-    assert_refused(
-        run_cli("watch", scripted_run, "--sheet", tmp_path / "a.png"),
-        "--sheet: is not for runs of plans",
-    )
+    refused = {
+        "--trajectory hall-9": f"unknown trajectory of this run 'hall-9'; there are {trajectory}",
+        "--task nothing": "unknown task of this run 'nothing'",
+        "--episode 1": f"--episode 1: the run has episodes {there} of {trajectory}",
+        "--episode one": "--episode 'one': is no number of an action; write 17, or 17,75",
+        "--plans 1": f"--plans: {of_plans}",
+        "--sheet a.jpg": "a.jpg: a sheet is a PNG",
+        "--sheet a.png --out a.gif": "--sheet and --out: one picture or",
+        "--data none": "there is no such file or folder",
+    }
+    for words, expected in refused.items():
+        assert_refused(run_cli("watch", arm_run, *words.split()), expected)
+    for option, value in (("--episode", 1), ("--sheet", "a.png")):
+        ended = run_cli("watch", scripted_run, option, value)
+        assert_refused(ended, f"{option}: is not for runs of plans")

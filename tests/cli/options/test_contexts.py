@@ -9,7 +9,7 @@ import pytest
 from infthor_eval.formats.question import Question
 from infthor_eval.runs import read_header
 
-from ...helpers.command_line import assert_refused, option_words
+from ...helpers.command_line import assert_refused, option_words, read_success
 from ...helpers.files import find_one
 from ...helpers.journals import read_records
 from ...helpers.processes import finish, start_cli
@@ -40,14 +40,13 @@ def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(
     tasks, out = "nieh_clip_retrieval,nieh_memory_frames", tmp_path / "out"
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", tasks, "--data", data, "--out", out]
     first, second = make_clip(seed=0), make_clip(seed=1)
-    code, _, err = run_cli(*arguments, "--retriever", first)
-    assert code == 0, err
+    read_success(run_cli(*arguments, "--retriever", first))
     assert [len(doc["frames"]) for doc in docs(out, "nieh_clip_retrieval")] == [10] * 6
     assert [(len(doc["frames"]), doc["frames"][-1]) for doc in docs(out, "nieh_memory_frames")] == [
         (21, 44)
     ] * 6
     results = find_one(out, "results.json").read_bytes()
-    code, _, err = run_cli(*arguments, "--retriever", first)
+    _, _, err = run_cli(*arguments, "--retriever", first)
     assert "0 evaluated now, 12 resumed" in err
     assert find_one(out, "results.json").read_bytes() == results
     assert run_cli(*arguments, "--retriever", second)[0] == 0
@@ -64,12 +63,12 @@ def test_a_missing_retriever_ends_in_one_line(data, tmp_path, run_cli, monkeypat
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_OFFLINE", True)
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
     arguments = ["--model", "oracle", "--data", data, "--out", tmp_path / "out"]
-    for tasks, options, expected in (
-        ("nieh_clip_retrieval", (), "and give --retriever DIR"),
+    for tasks, options, *expected in (
+        ("nieh_clip_retrieval", (), "not in the local cache", "and give --retriever DIR"),
         ("nieh_memory_frames", ("--retriever", "./nowhere"), "there is no such folder"),
         ("nieh_gt", ("--retriever", "./nowhere"), "no context of nieh_gt retrieves frames"),
     ):
-        assert_refused(run_cli(*arguments, "--tasks", tasks, *options), expected)
+        assert_refused(run_cli(*arguments, "--tasks", tasks, *options), *expected)
     assert not (tmp_path / "out").exists()
 
 
@@ -89,37 +88,16 @@ def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run
     arguments = option_words(
         model="qwen2.5-vl-tiny", tasks="nieh_interleaved,nieh_text_state", data=data
     )
-    code, _, err = run_cli(*arguments, "--out", out, "--trajectories", folder)
-    assert code == 0, err
+    read_success(run_cli(*arguments, "--out", out, "--trajectories", folder))
     assert [doc["frames"] for doc in docs(out, "nieh_interleaved")] == [[0, 7]] * 6
     assert [doc["frames"] for doc in docs(out, "nieh_text_state")] == [[44]] * 6
-    code, _, err = run_cli(*arguments, "--out", tmp_path / "none")
-    assert code == 2
-    assert (
-        "can be asked (the trajectory's JSON is not in metadata/; give its folder with "
-        "--trajectories)" in err
-    )
+    elsewhere = "no such folder; give the folder of the trajectories with --traj"
     for tasks, trajectories, expected in (
         ("nieh_gt", folder, "no context of nieh_gt tells of the trajectory"),
-        (
-            "nieh_interleaved",
-            tmp_path / "no",
-            "no such folder; give the folder of the trajectories with --traj",
-        ),
+        ("nieh_interleaved", tmp_path / "no", elsewhere),
     ):
-        assert_refused(
-            run_cli(
-                "--model",
-                "oracle",
-                "--tasks",
-                tasks,
-                "--data",
-                data,
-                "--trajectories",
-                trajectories,
-            ),
-            expected,
-        )
+        words = option_words(model="oracle", tasks=tasks, data=data, trajectories=trajectories)
+        assert_refused(run_cli(*words), expected)
 
 
 def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(
@@ -129,18 +107,13 @@ def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(
     write_video(metadata / "traj_a" / "traj_a_10fps.mp4", range(0, 250, 10))
     (metadata / "traj_b" / "traj_b_10fps.mp4").write_bytes(b"no video")
     arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh_video", data=data, out=out)
-    code, _, err = run_cli(*arguments)
-    assert code == 0, err
+    _, err = read_success(run_cli(*arguments))
     assert "nieh_video: 3 sample(s) skipped: " in err
     assert "traj_b_10fps.mp4: not a video that OpenCV can decode" in err
-    results = json.loads(find_one(out, "results.json").read_text())["summary"]["tasks"][
-        "nieh_video"
-    ]
-    assert (results["n"], results["skipped"]["n"], list(results["by_variant"])) == (
-        3,
-        3,
-        ["source=mp4"],
-    )
+    summary = json.loads(find_one(out, "results.json").read_text())["summary"]
+    task = summary["tasks"]["nieh_video"]
+    assert (task["n"], task["skipped"]["n"]) == (3, 3)
+    assert list(task["by_variant"]) == ["source=mp4"]
     assert [len(doc["frames"]) for doc in docs(out, "nieh_video")] == [4] * 3
     assert "; the film is given as a video" in err
     (metadata / "traj_b" / "traj_b_10fps.mp4").unlink()
@@ -167,10 +140,8 @@ def test_a_film_is_a_video_where_a_family_takes_it_and_the_run_says_so(
     data, tmp_path, run_cli, model, film, placeholder, expected
 ):
     out = tmp_path / "out"
-    code, _, err = run_cli(
-        "--model", model, "--tasks", "nieh_video", "--data", data, "--out", out, "--limit", 1
-    )
-    assert code == 0, err
+    words = option_words(model=model, tasks="nieh_video", data=data, out=out, limit=1)
+    _, err = read_success(run_cli(*words))
     assert expected in err
     (folder,) = {path.parent for path in out.rglob("results.json")}
     assert read_header(folder).config.tasks["nieh_video"]["film"] == film

@@ -4,6 +4,8 @@ import pytest
 
 from tests.helpers.trajectories import FORK, MUG, cut_trajectory, write_trajectories
 
+from ...helpers.command_line import read_success
+
 
 def results(folder):
     (path,) = folder.rglob("results.json")
@@ -33,8 +35,8 @@ def test_two_workers_have_the_results_of_one_process(run_cli, make_nieh_set, tmp
     )
     words = ("--model", model, "--tasks", task, "--data", data)
     for workers in (1, 2):
-        code, output, err = run_cli(*words, "--out", tmp_path / str(workers), "--workers", workers)
-        assert code == 0, err
+        more = ("--out", tmp_path / str(workers), "--workers", workers)
+        output, _ = read_success(run_cli(*words, *more))
         assert model in output
     one, two = tmp_path / "1", tmp_path / "2"
     assert results(one) == results(two)

@@ -137,9 +137,5 @@ def test_quiet_prints_only_failures(make_nieh_set, tmp_path, run_cli):
 
 
 def test_a_duration_has_one_unit():
-    assert [format_duration(seconds) for seconds in (1.5, 119, 240, 7200)] == [
-        "1.5 s",
-        "119.0 s",
-        "4 min",
-        "2.0 h",
-    ]
+    durations = [format_duration(seconds) for seconds in (1.5, 119, 240, 7200)]
+    assert durations == ["1.5 s", "119.0 s", "4 min", "2.0 h"]

@@ -5,9 +5,8 @@ from typing import Any
 import pytest
 
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.asking.baselines import BASELINES, Baseline, Blind, Oracle, Random
+from infthor_eval.nieh.asking.baselines import BASELINES, Baseline, Blind, Random
 from infthor_eval.nieh.contexts import QuestionVariant
-from infthor_eval.nieh.guessing.chains import question_type
 from model_adapters import names
 
 
@@ -42,40 +41,7 @@ def predict_all(
     return [predict(sample) for sample in key]
 
 
-def test_oracle_reads_the_key() -> None:
-    assert predict_all(Oracle(0), KEY)[:4] == ["yes", "no", "no", "Mug, Plate"]
-
-
-def test_type_is_the_files_or_the_leading_words() -> None:
-    assert [question_type(sample.question) for sample in (KEY[0], KEY[6])] == [
-        "presence",
-        "how many",
-    ]
-
-
 # -- blind
-
-
-def test_blind_guesses_from_the_words_with_the_objects_among_them() -> None:
-    key = [
-        make_sample(f"{stem} a {name}?", answer, traj=f"t{number}")
-        for number in range(4)
-        for stem in ("Is there", "Have you seen")
-        for name, answer in (("mug", "yes"), ("safe", "no"))
-    ] + [make_sample("Where is the mug?", "Shelf", traj=f"t{number}") for number in range(4)]
-    assert predict_all(Blind(0), key) == ["yes", "no"] * 8 + ["Shelf"] * 4
-
-
-def test_blind_learns_nothing_from_the_trajectory_that_is_asked_about() -> None:
-    key = [
-        make_sample(f"Is number {n} here?", "no" if t else "yes", traj=f"t{t}")
-        for t in range(9)
-        for n in range(5)
-    ]
-    assert predict_all(Blind(0), key) == ["no"] * 45
-    assert predict_all(
-        Blind(0), [make_sample(f"Where is {t}?", f"place {t}", traj=f"t{t}") for t in range(3)]
-    ) == [*("place 1", "place 0", "place 0")]
 
 
 def test_blind_on_one_trajectory_learns_from_the_other_questions() -> None:

@@ -8,12 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from infthor_eval.errors import DataError, UsageError
+from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import SkippedQuestion
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings, QuestionVariant
 from infthor_eval.nieh.contexts.haystack import sampling_pool
-from infthor_eval.settings import read
 
 from ...helpers.questions import make_question
 
@@ -139,6 +138,15 @@ IN_A_ROW = [
     (100, (50, 51, 52), 2, [None] * 5),
     (100, (50, 51), 1, [None] * 5),
     (100, (76, 77), 25, [range(76, 100), *(range(76 - 5 * d, 101 - 5 * d) for d in range(1, 5))]),
+    # A put is one needle; its first window may end one frame too late, and is one shorter.
+    (100, (50, 51), 10, [range(start, start + 10) for start in (50, 48, 46, 44, 42)]),
+    (59, (50, 51), 10, [range(50, 59), *(range(at, at + 10) for at in (48, 46, 44, 42))]),
+    (58, (50, 51), 10, [None, *(range(at, at + 10) for at in (48, 46, 44, 42))]),
+    # More clues lie at the last depth every time.
+    (100, (50, 51, 52), 10, [range(42, 52)] * 5),
+    # The smallest and the fullest.
+    (10, (4,), 1, [(4,)] * 5),
+    (100, (1, 5, 9), 3, [(1, 5, 9)] * 5),
 ]
 
 
@@ -147,26 +155,6 @@ def test_clues_in_a_row_have_the_published_windows(n_frames, clues, n, expected)
     samples = windows(n_frames, clues, ctx_size=n, tokens_per_frame=1000)
     frames = [sample.frames if isinstance(sample, QuestionVariant) else None for sample in samples]
     assert frames == [window and tuple(window) for window in expected]
-
-
-def test_two_adjacent_clues_are_one_needle():
-    samples = windows(100, [50, 51], ctx_size=10, tokens_per_frame=1000)
-    assert [sample.variant for sample in samples] == [f"depth={depth:g}" for depth in DEPTHS]
-    assert [sample.frames[0] for sample in samples] == [50, 48, 46, 44, 42]
-    assert all({50, 51} <= set(sample.frames) for sample in samples)
-
-
-def test_the_window_of_a_put_may_end_one_frame_too_late_and_is_one_shorter():
-    first, *_ = windows(59, [50, 51], ctx_size=10, tokens_per_frame=1000)
-    assert first.frames == tuple(range(50, 59))
-    for n_frames, clues in ((58, [50, 51]), (59, [50])):
-        first, *_ = windows(n_frames, clues, ctx_size=10, tokens_per_frame=1000)
-        assert first.reason == "the window reaches outside the trajectory"
-
-
-def test_more_clues_that_follow_each_other_lie_at_the_last_depth_every_time():
-    samples = windows(100, [50, 51, 52], ctx_size=10, tokens_per_frame=1000)
-    assert [sample.frames for sample in samples] == [tuple(range(42, 52))] * 5
 
 
 def test_a_question_without_a_needle_is_asked_once_outside_the_depths():
@@ -181,15 +169,6 @@ def test_a_question_without_a_needle_is_asked_once_outside_the_depths():
     assert len(find_only_sample(100).frames) == 10
     assert find_only_sample(100).frames[-1] - find_only_sample(100).frames[0] == 9
     assert find_only_sample(5).reason == "the window reaches outside the trajectory"
-
-
-def test_the_smallest_and_the_fullest_windows():
-    assert [sample.frames for sample in windows(10, [4], ctx_size=1, tokens_per_frame=1000)] == [
-        (4,)
-    ] * 5
-    assert {
-        sample.frames for sample in windows(100, [1, 5, 9], ctx_size=3, tokens_per_frame=1000)
-    } == {(1, 5, 9)}
 
 
 @pytest.mark.parametrize(("n_frames", "starts"), [(10, {0}), (11, {0, 1})])
@@ -219,17 +198,7 @@ def test_what_does_not_fit_says_why():
     assert reasons(100, [1], 0.5) == {"no frame fits the window"}
 
 
-def test_a_kilo_token_is_the_published_one_unless_told_otherwise():
-    def n_frames(context, **settings):
-        question = make_question(clues=(999,))
-        settings = ContextSettings(ctx_size=8, tokens_per_frame=121, **settings)
-        samples = CONTEXTS[context].samples(Frames(1000), question, settings)
-        return next(len(sample.frames) for sample in samples if isinstance(sample, QuestionVariant))
-
-    assert n_frames("truncate_head") == 8 * 1024 // 121
-    assert n_frames("truncate_head", k_tokens=1000) == 8000 // 121
-    with pytest.raises(DataError, match="k_tokens is 1023"):
-        read(ContextSettings, {"k_tokens": 1023})
+def test_a_window_without_its_sizes_is_refused():
     with pytest.raises(UsageError, match="needs tokens_per_frame"):
         windows(10, [1], ctx_size=8)
     with pytest.raises(UsageError, match="needs its size"):

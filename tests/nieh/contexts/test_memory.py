@@ -2,7 +2,6 @@
 
 import json
 
-import msgspec
 import pytest
 
 from infthor_eval.errors import UsageError
@@ -212,11 +211,6 @@ def test_our_model_under_another_host_recalls_itself(find_memory_samples, monkey
     assert sample_of(doc).recalled is None
 
 
-def test_a_task_without_a_memory_says_how_to_give_one(make_nieh_set):
-    with pytest.raises(UsageError, match="needs a memory: give --memory NAME"):
-        find_samples({"context": "memory", "data": str(make_nieh_set(QUESTIONS))})
-
-
 def test_actions_and_goals_come_from_log_and_trajectory(find_memory_samples):
     open_set.cache_clear()
     task_samples = find_samples(
@@ -230,8 +224,3 @@ def test_actions_and_goals_come_from_log_and_trajectory(find_memory_samples):
     assert sum(": goal: " in line for line in lines) >= 2
     assert any("PickupObject" in line and "; holds " in line for line in lines)
     assert int(lines[-1].split()[1].rstrip(":")) == len(steps) - 1
-
-
-def test_a_recall_is_as_it_was_after_the_journal():
-    recall = NiehRecall(recalled=(3, "a mug", 1), build_s=0.5, recall_s=0.1)
-    assert msgspec.json.decode(msgspec.json.encode(recall), type=NiehRecall) == recall

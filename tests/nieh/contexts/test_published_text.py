@@ -46,15 +46,8 @@ LOG = [(0, "000000001.png"), (1, "000000002.png"), (1, "000000003.png"), (3, "00
 GOAL, STATE = "Your task goal: get a mug. ", " State: "
 INTERLEAVED = [
     *(GOAL, STATE, 0, " Action: RotateLeft", STATE, 1, " Action: PickupObject Mug", STATE, 2, 3),
-    *(
-        "Your task goal: cool it. ",
-        STATE,
-        3,
-        " Action: MoveAhead",
-        " Action: PutObject Mug Fridge",
-        STATE,
-        4,
-    ),
+    *("Your task goal: cool it. ", STATE, 3, " Action: MoveAhead"),
+    *(" Action: PutObject Mug Fridge", STATE, 4),
 ]
 
 

@@ -17,7 +17,6 @@ from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.report.sample import Sample
 from infthor_eval.run import Run
-from infthor_eval.settings import read
 from model_adapters.hf.retrieval import open_retriever
 
 TEXTS = ("Is there a mug?", "Where was the plate?", "What did you put on the table?")
@@ -202,21 +201,12 @@ def test_the_identity_tells_weights_apart_and_not_places(noise, make_clip, clip,
     assert CONTEXTS["trajectory"].sources(data, ContextSettings()) == {}
 
 
-def test_a_retriever_that_cannot_be_had_says_what_to_do(noise, clip, tmp_path, monkeypatch):
-    root = noise(4)
-    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_OFFLINE", True)
-    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
-    with pytest.raises(
-        UsageError, match=r"not in the local cache .* `hf download .*` and give --retriever DIR"
-    ):
-        frames_of("clip_retrieval", root)
-    with pytest.raises(UsageError, match=r"--retriever \./nowhere: there is no such folder"):
-        frames_of("clip_retrieval", root, retriever="./nowhere")
+def test_a_retriever_that_cannot_be_loaded_says_so(noise, clip, tmp_path):
     half = tmp_path / "half"
     shutil.copytree(clip, half)
     (half / "model.safetensors").write_bytes(b"no weights")
     with pytest.raises(UsageError, match="half cannot be loaded"):
-        frames_of("clip_retrieval", root, retriever=str(half))
+        frames_of("clip_retrieval", noise(4), retriever=str(half))
 
 
 def test_a_checkpoint_of_another_kind_is_refused(noise, tmp_path):
@@ -225,13 +215,6 @@ def test_a_checkpoint_of_another_kind_is_refused(noise, tmp_path):
     save_tiny_checkpoint(tmp_path / "qwen", seed=0)
     with pytest.raises(UsageError, match="is a qwen2_5_vl checkpoint; retrieval needs one of CLIP"):
         frames_of("clip_retrieval", noise(4), retriever=str(tmp_path / "qwen"))
-
-
-def test_so_many_frames_cannot_be():
-    for name in ("top_k", "budget"):
-        for value in (0, -1, 2.5, "ten"):
-            with pytest.raises(DataError, match=f"{name} is .*whole number|Expected `int`.*{name}"):
-                read(ContextSettings, {name: value})
 
 
 def test_which_frames_were_retrieved_is_known_without_model_and_set(noise, clip, tmp_path, run_cli):

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -11,9 +10,9 @@ from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.nieh.guessing.audit import BY, Audit, AuditedQuestion, Group, audit, chance_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS
 
+from ...helpers.published import PUBLISHED_SETS, needs_published_sets
 from ...helpers.questions import make_question
 
-PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
 SINGLE, MULTI = "qa_set_nieh_single_clue", "qa_set_nsieh_multi_clue"
 NAMES = [*(guesser.name for guesser in GUESSERS), "blind"]
 PRESENCE, OPEN = "Is Mug on the Bed?", "Where is Mug now?"
@@ -121,11 +120,9 @@ def test_a_set_is_audited_question_by_question(tmp_path):
     ]
 
 
-@pytest.mark.skipif(
-    not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data"
-)
+@needs_published_sets
 def test_what_the_published_files_give_without_a_frame():
-    published = audit(NiehSet(PUBLISHED))
+    published = audit(NiehSet(PUBLISHED_SETS))
     single, multi = published.groups("file")
     assert [(group.name, len(group.questions)) for group in (single, multi)] == [
         (SINGLE, 829),

@@ -101,14 +101,6 @@ def test_of_equally_likely_answers_the_first_in_the_alphabet_is_guessed():
     assert fit(frozenset({1})) == {4: "fig"}
 
 
-@pytest.mark.parametrize(
-    "chains", [chains_of_words, chains_of_words_and_count, chains_of_words_and_place]
-)
-def test_of_one_question_nothing_is_learned(chains):
-    (sample,) = make_samples_on_clues(make_question("t", "Why?", "x"))
-    assert guess_with(guess_by_chains, [sample], chains=chains) == [""]
-
-
 def test_a_long_question_takes_memory_by_its_length():
     """Chains of all its leading words, and forms before each word, would take gigabytes."""
     (short, long) = (

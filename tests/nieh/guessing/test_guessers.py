@@ -55,7 +55,7 @@ def test_answers_on_the_own_trajectory_change_no_guess_at_it(guesser, rows):
 
 @_EACH
 @settings(max_examples=8)
-@given(st.lists(_ROWS, min_size=2, max_size=8), st.integers(0, 7))
+@given(st.lists(_ROWS, min_size=1, max_size=8), st.integers(0, 7))
 def test_on_one_trajectory_alone_a_question_is_left_out_itself(guesser, rows, place):
     questions = questions_of([(0, *row[1:]) for row in rows])
     place %= len(questions)
@@ -84,8 +84,6 @@ def test_a_constant_is_the_commonest_answer_elsewhere_or_yes_if_that_is_about_as
         *(make_question(traj, f"{traj} {i}?", answer) for i, (traj, answer) in enumerate(key))
     )
     assert named("one answer a file").guess(samples) == ["no"] * 3 + ["yes"] * 7
-    (alone,) = make_samples_on_clues(make_question("t", "Why?", "x"))
-    assert named("one answer a file").guess([alone]) == [""]
 
 
 def test_the_constant_of_a_form_is_that_of_its_answers_and_of_all_if_it_is_new():

@@ -19,10 +19,11 @@ from infthor_eval.nieh.published import imported_replies as module
 from infthor_eval.nieh.published.imported_replies import asked_prompt
 
 from ...helpers.files import read_json_lines
+from ...helpers.published import PUBLISHED_SETS, needs_published_sets
 from ...helpers.questions import make_question
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "goldens" / "prompts.json").read_text())
-REPLIES = Path(__file__).parents[3] / "../shared/data/published_sets/replies"
+REPLIES = PUBLISHED_SETS / "replies"
 
 
 def vocabulary() -> Path:
@@ -38,9 +39,6 @@ def vocabulary() -> Path:
 
 
 VOCABULARY = vocabulary()
-needs_logs = pytest.mark.skipif(
-    not REPLIES.is_dir(), reason="the published logs are not at ../shared/data"
-)
 needs_vocabulary = pytest.mark.skipif(
     not VOCABULARY.is_file(), reason="neither QWEN_VOCABULARY nor the package dashscope"
 )
@@ -95,7 +93,7 @@ def test_the_prompt_of_main_is_the_published_text(case):
     assert question_text(context.intro, make_question("t", case["question"])) == case["text"]
 
 
-@needs_logs
+@needs_published_sets
 @needs_vocabulary
 def test_the_logs_prompt_has_the_logged_number_of_tokens_in_every_row():
     n = {PUBLISHED_LOGS: 0, PUBLISHED_MAIN: 0}
@@ -129,7 +127,7 @@ def test_the_tokens_of_the_prompts_own_words_are_those_of_the_vocabulary():
     assert {name: n - n_question for name, n in of_films.items()} == module._OF_FILMS
 
 
-@needs_logs
+@needs_published_sets
 def test_each_published_log_tells_its_prompt_without_the_vocabulary():
     logs = sorted(REPLIES.glob("*.log.gz"))
     assert len(logs) == 6

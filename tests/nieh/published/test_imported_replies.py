@@ -2,7 +2,6 @@
 of videos."""
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -15,8 +14,9 @@ from infthor_eval.nieh.published.imported_replies import import_logs
 from infthor_eval.nieh.records import BlindGuess, ShownClues
 from infthor_eval.nieh.results.summary import summarise
 
+from ...helpers.published import PUBLISHED_SETS, make_log_row, needs_published_sets
+
 SINGLE, MULTI = "qa_set_nieh_single_clue", "qa_set_nsieh_multi_clue"
-PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
 QUESTIONS = [
     Question(
         f"t{number // 2}",
@@ -52,14 +52,7 @@ def imported(tmp_path):
 
 
 def row(number, **more):
-    question = QUESTIONS[number]
-    about = {
-        "qidx": number,
-        "traj_id": question.traj_id,
-        "question": question.text,
-        "gt_img_idx": list(question.clues),
-    }
-    return about | {"gt_answer": list(question.answers), "llm_response": "bed"} | more
+    return make_log_row(number, QUESTIONS[number], **({"reply": "bed"} | more))
 
 
 def shown_clues_of(run):
@@ -84,6 +77,7 @@ def test_the_end_of_a_trajectory_tells_its_length_and_what_was_shown(imported):
     end = {"eval_mode": "truncate_head", "ctx_size_k": 1, "n_imgs": 5}
     rows = [row(number, **end, selected_img_indices=[6, 7, 8, 9]) for number in range(3)]
     (run,) = imported(full_traj_truncate_head_1K=rows)
+    assert run.settings["ctx_size"] == 1
     assert (run.task, shown_clues_of(run)) == (
         "nieh_truncate_head_1k",
         {"q0": (0, 1, 6), "q1": (1, 1, 1), "q2": (1, 2, 3)},
@@ -99,7 +93,7 @@ def test_the_end_of_a_trajectory_tells_its_length_and_what_was_shown(imported):
     ],
 )
 def test_thoughts_and_marks_are_no_part_of_an_answer(imported, said, thinking):
-    (run,) = imported(full_traj=[row(0, llm_response=said)])
+    (run,) = imported(full_traj=[row(0, reply=said)])
     (record,) = run.records
     assert record.payload.reply.lower() == "bed"
     assert record.payload.thinking == thinking
@@ -116,6 +110,7 @@ def test_lengths_serve_the_logs_of_other_modes(imported):
     alone = imported(full_traj_clip_retrieval=retrieved)
     assert [shown_clues_of(run) for run in alone] == [{"q0": (1, 1, None), "q1": None, "q2": None}]
     run, _ = imported(full_traj_clip_retrieval=retrieved, full_traj=[row(1, n_imgs=10)])
+    assert run.settings["top_k"] == 2
     assert (run.task, shown_clues_of(run)) == (
         "nieh_clip_retrieval",
         {"q0": (1, 1, 6), "q1": None, "q2": None},
@@ -167,47 +162,26 @@ def test_the_name_of_a_log_of_videos_tells_their_rate(imported, name, task, sett
 
 # 123 tokens a frame, 144 a pair of frames of a film; the prompt's own words, and a word of the
 # question each.
-WORDS = {"published-logs": 60 + 5, "published-main": 52 + 5}
-FILM = 54 + 5
+LOGS, MAIN = ("published-logs", 60 + 5), ("published-main", 52 + 5)
+FILM = {"eval_mode": "video", "ctx_n_tokens": 290 + 54 + 5}
 END = {"eval_mode": "truncate_head", "ctx_size_k": 32, "n_imgs": 270}
 
 
 @pytest.mark.parametrize(
     ("name", "row_of", "task", "prompt"),
     [
-        (
-            "full_traj",
-            {"n_imgs": 10, "ctx_n_tokens": 1230 + WORDS["published-logs"]},
-            "full",
-            "published-logs",
-        ),
-        (
-            "full_traj_x",
-            {**END, "ctx_n_tokens": 270 * 123 + WORDS["published-logs"]},
-            "last_32k",
-            "published-logs",
-        ),
-        (
-            "full_traj_video_fps2",
-            {"eval_mode": "video", "ctx_n_tokens": 290 + FILM},
-            "video_2fps",
-            "published-main",
-        ),
+        ("full_traj", {"n_imgs": 10, "ctx_n_tokens": 1230 + LOGS[1]}, "nieh_published_full", LOGS),
+        # Frames asked about in the words of main are no published row.
+        ("full_traj", {"n_imgs": 10, "ctx_n_tokens": 1230 + MAIN[1]}, "nieh_full", MAIN),
+        ("full_traj_x", {**END, "ctx_n_tokens": 33210 + LOGS[1]}, "nieh_published_last_32k", LOGS),
+        ("full_traj_video_fps2", FILM, "nieh_published_video_2fps", MAIN),
     ],
 )
 def test_a_log_that_tells_its_prompt_is_the_task_of_its_published_row(
     imported, name, row_of, task, prompt
 ):
     (run,) = imported(**{name: [row(0, **row_of)]})
-    assert (run.task, run.settings["prompt"]) == (f"nieh_published_{task}", prompt)
-
-
-def test_frames_asked_about_in_the_words_of_main_are_no_published_row(imported):
-    (run,) = imported(full_traj=[row(0, n_imgs=10, ctx_n_tokens=1230 + WORDS["published-main"])])
-    assert (run.task, run.settings) == (
-        "nieh_full",
-        {"context": "trajectory", "prompt": "published-main"},
-    )
+    assert (run.task, run.settings["prompt"]) == (task, prompt[0])
 
 
 def test_records_have_what_blind_says_that_suits_the_mode(imported, monkeypatch):
@@ -218,11 +192,11 @@ def test_records_have_what_blind_says_that_suits_the_mode(imported, monkeypatch)
     assert {record.id: record.payload.blind for record in run.records} == {"q0": blind, "q1": None}
 
 
-@pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published logs are not at ../shared/data")
+@needs_published_sets
 def test_published_replies_at_32k_by_shown_clues():
     logs, data = (
-        sorted((PUBLISHED / "replies").glob("*truncate_head_32K.log.gz")),
-        NiehSet(PUBLISHED),
+        sorted((PUBLISHED_SETS / "replies").glob("*truncate_head_32K.log.gz")),
+        NiehSet(PUBLISHED_SETS),
     )
     (run,) = import_logs(logs, data)
     ((_, task),) = summarise(run.header(data).config, run.records).tasks.items()

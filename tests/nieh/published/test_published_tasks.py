@@ -2,7 +2,6 @@
 
 import pytest
 
-from infthor_eval.errors import UsageError
 from infthor_eval.formats.published import published_tables
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import CONTEXTS
@@ -138,23 +137,3 @@ def test_lm_evals_docs_keep_the_words(make_nieh_set):
     assert prompt == "<image>" * 6 + question_text(
         "", samples.samples[0].question, "published-logs"
     )
-
-
-@pytest.mark.parametrize(
-    ("tasks", "prompt", "expected"),
-    [
-        (
-            ("nieh_published_full",),
-            "published-main",
-            "no task of nieh_published_full leaves its words open; leave it out",
-        ),
-        (
-            ("nieh_full", "nieh_video"),
-            "published-logs",
-            "the context video is asked in words of its own; it is for clues",
-        ),
-    ],
-)
-def test_a_prompt_without_effect_is_refused(prepare_run, tasks, prompt, expected):
-    with pytest.raises(UsageError, match=expected):
-        prepare_run(tasks=tasks, suite_options={"prompt": prompt})

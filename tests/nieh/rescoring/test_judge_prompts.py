@@ -63,14 +63,8 @@ VERDICTS = {
         *("A sofa is a couch.\nYes", "There is no difference.\nAnswer: yes"),
     ],
     0.0: [
-        *(
-            "no",
-            "No.",
-            "**No**",
-            "No, it names another thing.",
-            "No. It contradicts, with no doubt.",
-        ),
-        *("No\nThe couch is no table.", "The answer is no.", "Verdict: No", "It differs.\nNo."),
+        *("no", "No.", "**No**", "No, it names another thing.", "The answer is no.", "Verdict: No"),
+        *("No. It contradicts, with no doubt.", "No\nThe couch is no table.", "It differs.\nNo."),
     ],
     None: [
         *("yes and no", "Yes or no", "yes/no", "Yes, no.", "Yes. No.", "Yes, but no.", "No, yes."),

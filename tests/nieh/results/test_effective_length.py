@@ -103,21 +103,17 @@ def test_the_same_rule_holds_above_blind():
 
 def test_without_a_run_on_the_clue_frames_there_is_none():
     runs = [sized("haystack", 8, 0.8)]
-    others = (
+    others = [
         make_run(make_config(model="other"), of_share(0.8)),
         make_run(make_config(frames="blank"), of_share(0.8)),
         make_run(make_config(), []),
-    )
+    ]
     for other in others:
         assert effective_lengths([*runs, other]) == []
     assert effective_lengths([ON_CLUES]) == []
     assert effective_lengths([ON_CLUES, sized("haystack", 8, 0.8, model="other")]) == []
-    assert (
-        effective_lengths([ON_CLUES, make_run(make_config(context="haystack", ctx_size=8), [])])[0]
-        .rows[0]
-        .cells[4]
-        == "-"
-    )
+    empty = make_run(make_config(context="haystack", ctx_size=8), [])
+    assert effective_lengths([ON_CLUES, empty])[0].rows[0].cells[4] == "-"
 
 
 def test_a_metric_that_one_of_the_tasks_alone_has_is_left_out_there():

@@ -35,15 +35,7 @@ def test_by_shown_clues_and_by_distance():
     by_clues, by_distance = question_facet_tables(
         [make_run(make_config(context="truncate_head", ctx_size=32), records)]
     )
-    assert [column.name for column in by_clues.columns] == [
-        "model",
-        "task",
-        "file",
-        "scorer",
-        "all",
-        "some",
-        "none",
-    ]
+    assert " ".join(it.name for it in by_clues.columns) == "model task file scorer all some none"
     ((*about, whole, some, none),) = strict(by_clues)
     assert about == ["a run", "nieh_gt", "total", "strict"]
     assert (whole, some) == ("100.0 (1)", "-")  # one trajectory has no interval
@@ -74,12 +66,8 @@ def test_what_says_nothing_is_left_out():
     (far,) = question_facet_tables([make_run(make_config(context="trajectory"), everything)])
     assert "end of the trajectory" in far.title
     assert question_facet_tables([make_run(make_config(context="clues"), everything)]) == []
-    assert (
-        question_facet_tables(
-            [make_run(make_config(context="trajectory"), [make_record(0, "mug")])]
-        )
-        == []
-    )
+    unknown = make_run(make_config(context="trajectory"), [make_record(0, "mug")])
+    assert question_facet_tables([unknown]) == []
 
 
 def guessed(number, reply, score, mean=0.5, form="f"):
@@ -95,10 +83,7 @@ def test_a_cell_has_the_score_above_blind_with_its_interval():
     cell = above_blind_cell(above_blind(records, "strict"))
     assert cell.numbers[""] == "33.3"  # (0.5 - 0.25) / 0.75
     assert cell == f"33.3 [{cell.numbers['low']}, {cell.numbers['high']}]"
-    assert [above_blind_cell(none) for none in (None, above_blind([], "strict"))] == [
-        "-",
-        "-",
-    ]
+    assert [above_blind_cell(it) for it in (None, above_blind([], "strict"))] == ["-"] * 2
 
 
 @pytest.mark.parametrize("n_solved", [0, 2])

@@ -1,14 +1,13 @@
 """A facet of questions is one entry: tables, page, notebook, results and exports have it."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 
 from infthor_eval.nieh.results.facets import FACETS, N_WORDS
 
 from ...helpers.nieh_runs import make_record
+from ...helpers.processes import run_python
 
 # Planted before anything else is imported, as an entry in the source would be.
 _PLANTED = """
@@ -37,13 +36,7 @@ infthor_eval.load_run(folder).to_csv("frame.csv")
 @pytest.fixture(scope="module")
 def planted(tmp_path_factory):
     folder = tmp_path_factory.mktemp("planted")
-    done = subprocess.run(
-        [sys.executable, "-c", _PLANTED],
-        cwd=folder,
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-    )
+    done = run_python(_PLANTED, cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, done.stdout
 

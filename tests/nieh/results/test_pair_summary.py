@@ -5,11 +5,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from infthor_eval.nieh.records import NiehAnswer, ShownClues, TwinSide
+from infthor_eval.nieh.records import ShownClues, TwinSide
 from infthor_eval.nieh.results.pair_summary import NEVER_CHANGED, score_pairs, summarise_pairs
-from infthor_eval.nieh.scoring import scores
 from infthor_eval.rates import format_percent
-from infthor_eval.runs import UnitRecord
+
+from ...helpers.nieh_runs import make_record
 
 PLACES = ("bowl", "drawer", "sofa", "desk")
 
@@ -41,26 +41,8 @@ def side(
         n_since_change=age,
     )
     shown = None if n_after is None else ShownClues(n_shown=1, n_clues=1, n_after=n_after)
-    payload = NiehAnswer(
-        question="Where is the mug now?",
-        question_type="location",
-        n_clues=1,
-        clue_column="1",
-        answers=(answer,),
-        shown_clues=shown,
-        twin=twin,
-    )
-    if reply is not None:
-        payload = payload.with_reply(reply, scores(reply, (answer,)))
-    return UnitRecord(
-        task="nieh_twins",
-        id=f"{base}-{world}/{pair}",
-        cluster=base,
-        fingerprint="f",
-        payload=payload,
-        repeat=repeat,
-        failure="broke" if reply is None else None,
-    )
+    named = {"task": "nieh_twins", "id": f"{base}-{world}/{pair}", "cluster": base}
+    return make_record(0, reply, (answer,), twin=twin, shown_clues=shown, repeat=repeat, **named)
 
 
 def pair(first, second, name="a/1", **about):

@@ -124,10 +124,8 @@ def test_the_figures_are_those_of_a_calculation_by_hand():
     noise = (1 / 3 / 4) / 3
     assert repeats.variance_between == pytest.approx(0.25 - noise)
     assert repeats.drawing == pytest.approx(1.96 * math.sqrt(1 / 3 / 4) / 3)
-    assert (
-        summarise_repeats(by_question([make_record(0, "mug"), make_record(1, "mug")]), "strict")
-        is None
-    )
+    single = by_question([make_record(0, "mug"), make_record(1, "mug")])
+    assert summarise_repeats(single, "strict") is None
     (table,) = [
         table for table in tables([make_run(make_config(), records)]) if "repeat" in table.title
     ]
@@ -135,12 +133,7 @@ def test_the_figures_are_those_of_a_calculation_by_hand():
 
 
 def test_repeated_runs_are_compared_by_the_means_of_their_questions():
-    once = [
-        make_record(0, "mug"),
-        make_record(1, "cup"),
-        make_record(2, "mug"),
-        make_record(3, "cup"),
-    ]
+    once = [make_record(number, reply) for number, reply in enumerate(("mug", "cup") * 2)]
     often = [answer for number in range(4) for answer in make_repeats(number, "mug", "cup")]
     strict = {one.metric: one for one in compare(NiehSuite(), NiehPresenter(), once, often)}[
         "strict"

@@ -18,14 +18,9 @@ LEARNED = re.compile(r"(?<=\n)\| learner: [^|]* \| ([\d.]+) \|")
 DAY = ("--day", "2026-11-25")
 # What NeurIPS 2026 asks for.
 RESPONSIBLE = (
-    "rai:dataLimitations",
-    "rai:dataBiases",
-    "rai:personalSensitiveInformation",
-    "rai:dataUseCases",
-    "rai:dataSocialImpact",
-    "rai:hasSyntheticData",
-    "prov:wasDerivedFrom",
-    "prov:wasGeneratedBy",
+    *("rai:dataLimitations", "rai:dataBiases", "rai:personalSensitiveInformation"),
+    *("rai:dataUseCases", "rai:dataSocialImpact", "rai:hasSyntheticData"),
+    *("prov:wasDerivedFrom", "prov:wasGeneratedBy"),
 )
 
 

@@ -10,7 +10,7 @@ from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.report.live.state import LiveRun
 from infthor_eval.runs import RunHeader
 from infthor_eval.runs.journals.journal import Journal
-from tests.helpers.nieh_runs import make_config, make_header
+from tests.helpers.nieh_runs import make_config, make_header, make_record
 
 N_UNITS = 8
 
@@ -30,6 +30,13 @@ def open_journal(tmp_path: Path) -> Callable[..., Journal[NiehAnswer]]:
         return Journal(tmp_path / "results" / name / "nieh-1", header_of(name), RECORDS, worker)
 
     return open_journal
+
+
+@pytest.fixture
+def begun(open_journal: Callable[..., Journal[NiehAnswer]]) -> None:
+    """A run with one answer, which nobody goes on with."""
+    with open_journal() as journal:
+        journal.append(make_record(0, "Sofa", ("Sofa",)))
 
 
 @pytest.fixture

@@ -111,11 +111,7 @@ def test_hostile_text_is_text(tab: Any, tmp_path: Path) -> None:
     assert HOSTILE.strip() in tab.locator(".sample .q").last.text_content()
 
 
-def test_a_wrong_token_shows_nothing_of_the_run(
-    browser: Any, server: PageServer, open_journal
-) -> None:
-    with open_journal() as journal:
-        journal.append(make_record(0, "Sofa", ("Sofa",)))
+def test_a_wrong_token_shows_nothing_of_the_run(browser: Any, server: PageServer, begun) -> None:
     opened = browser.new_page()
     for path in ("wrong/", "", "wrong/state.json"):
         answer = opened.goto(f"http://127.0.0.1:{server.port}/{path}")
@@ -125,9 +121,7 @@ def test_a_wrong_token_shows_nothing_of_the_run(
     opened.close()
 
 
-def test_a_page_whose_server_has_ended_says_so(browser: Any, live, open_journal) -> None:
-    with open_journal() as journal:
-        journal.append(make_record(0, "Sofa", ("Sofa",)))
+def test_a_page_whose_server_has_ended_says_so(browser: Any, live, begun) -> None:
     with serve_pages(live_routes(live)) as server:
         opened = browser.new_page()
         opened.goto(server.address)

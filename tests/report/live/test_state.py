@@ -9,6 +9,7 @@ import pytest
 from infthor_eval.report.live.state import LiveRun
 from infthor_eval.runs.journals import journal as journals
 from infthor_eval.runs.journals.following import is_written
+from tests.helpers.command_line import option_words
 from tests.helpers.nieh_runs import make_record
 
 from .conftest import N_UNITS
@@ -24,11 +25,8 @@ def folder_of(path: Path) -> Path:
 
 def test_a_run_that_has_not_started_is_waited_for(live, tmp_path, open_journal) -> None:
     state = live.state()
-    assert (state.status, state.folder, state.totals.n_done) == (
-        "waiting",
-        str(tmp_path / "results"),
-        0,
-    )
+    assert (state.status, state.folder) == ("waiting", str(tmp_path / "results"))
+    assert state.totals.n_done == 0
     (tmp_path / "results" / "m").mkdir(parents=True)
     assert live.state().status == "waiting"
     with open_journal():
@@ -59,13 +57,10 @@ def test_what_is_appended_is_seen_and_summed_up(live, open_journal) -> None:
 
 
 def test_the_metrics_at_the_end_are_those_of_the_results(run_cli, tmp_path, make_nieh_set) -> None:
-    data = make_nieh_set(size=56)
-    assert (
-        run_cli(
-            "--model", "blind", "--tasks", "nieh_gt", "--data", data, "--out", tmp_path / "out"
-        )[0]
-        == 0
+    words = option_words(
+        model="blind", tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "out"
     )
+    assert run_cli(*words)[0] == 0
     state = LiveRun(tmp_path / "out").state()
     (results,) = (tmp_path / "out").rglob("results.json")
     stored = msgspec.json.decode(results.read_bytes())["primary_metrics"]
@@ -73,9 +68,7 @@ def test_the_metrics_at_the_end_are_those_of_the_results(run_cli, tmp_path, make
     assert (state.status, state.n_units, state.totals.n_done) == ("done", 5, 5)
 
 
-def test_a_half_written_line_is_left_for_later(live, open_journal, tmp_path) -> None:
-    with open_journal() as journal:
-        journal.append(make_record(0, "Sofa", ("Sofa",)))
+def test_a_half_written_line_is_left_for_later(live, begun, tmp_path) -> None:
     shard = folder_of(tmp_path) / "journal" / "worker-0.jsonl"
     whole = shard.read_bytes()
     line = msgspec.json.encode(make_record(1, "Bed", ("Sofa",)))
@@ -112,9 +105,7 @@ def test_a_killed_run_is_not_called_running(live, open_journal) -> None:
         assert live.state().status == "running"  # gone on
 
 
-def test_a_stopped_run_is_called_stopped(live, open_journal, tmp_path) -> None:
-    with open_journal() as journal:
-        journal.append(make_record(0, "Sofa", ("Sofa",)))
+def test_a_stopped_run_is_called_stopped(live, begun, tmp_path) -> None:
     (folder_of(tmp_path) / "results.json").write_text('{"n_missing": 7, "primary_metrics": {}}')
     assert live.state().status == "stopped"
 
@@ -151,9 +142,7 @@ def test_a_run_that_starts_again_is_read_again(live, open_journal, tmp_path) -> 
     assert (state.totals.n_done, [sample.reply for sample in state.newest]) == (1, ["Bed"])
 
 
-def test_a_bad_line_is_told_in_one_line(live, open_journal, tmp_path) -> None:
-    with open_journal() as journal:
-        journal.append(make_record(0, "Sofa", ("Sofa",)))
+def test_a_bad_line_is_told_in_one_line(live, begun, tmp_path) -> None:
     shard = folder_of(tmp_path) / "journal" / "worker-0.jsonl"
     shard.write_bytes(shard.read_bytes() + b"no record\n")
     for _ in range(2):
@@ -163,10 +152,8 @@ def test_a_bad_line_is_told_in_one_line(live, open_journal, tmp_path) -> None:
 
 
 def test_watching_leaves_the_folder_as_it_was_and_holds_no_lock(
-    live, open_journal, tmp_path
+    live, begun, open_journal, tmp_path
 ) -> None:
-    with open_journal() as journal:
-        journal.append(make_record(0, "Sofa", ("Sofa",)))
     paths = sorted((tmp_path / "results").rglob("*"))
     before = [
         (path, path.stat().st_mtime_ns, path.is_file() and path.read_bytes()) for path in paths
@@ -194,9 +181,7 @@ def test_long_texts_are_cut(live, open_journal) -> None:
     assert len(sample.reply) == 2001
 
 
-def test_a_run_that_is_moved_away_is_waited_for(live, open_journal, tmp_path) -> None:
-    with open_journal() as journal:
-        journal.append(make_record(0, "Sofa", ("Sofa",)))
+def test_a_run_that_is_moved_away_is_waited_for(live, begun, tmp_path) -> None:
     assert live.state().totals.n_done == 1
     (tmp_path / "results").rename(tmp_path / "elsewhere")
     assert (live.state().status, live.state().totals.n_done) == ("waiting", 0)
@@ -204,12 +189,7 @@ def test_a_run_that_is_moved_away_is_waited_for(live, open_journal, tmp_path) ->
     assert (live.state().totals.n_done, live.state().problem) == (1, "")
 
 
-def test_what_the_system_refuses_is_told_in_one_line(
-    live, open_journal, tmp_path, monkeypatch
-) -> None:
-    with open_journal() as journal:
-        journal.append(make_record(0, "Sofa", ("Sofa",)))
-
+def test_what_the_system_refuses_is_told_in_one_line(live, begun, tmp_path, monkeypatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied")
 

@@ -65,13 +65,9 @@ def test_the_ending_is_green_or_red_and_what_is_told_is_written():
     assert RED in find_colours(draw_arm_frame(lost, ""))
     assert not {GREEN, RED} & find_colours(draw_arm_frame(START, ""))
     plain = draw_arm_frame(END, "").tobytes()
-    for change in (
-        {"refusals": ("Collided",)},
-        {"note": "differs"},
-        {"requests": ("other",)},
-        {"n_collisions": 3},
-    ):
-        assert draw_arm_frame(replace(END, **change), "").tobytes() != plain
+    changes = {"refusals": ("Collided",), "note": "differs", "requests": ("other",)}
+    for name, value in (changes | {"n_collisions": 3}).items():
+        assert draw_arm_frame(replace(END, **{name: value}), "").tobytes() != plain
 
 
 def test_the_reach_shows_hand_and_target_and_not_what_lies_beside():

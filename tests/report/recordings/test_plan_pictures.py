@@ -75,13 +75,10 @@ def test_the_same_moments_are_the_same_pictures():
 
 def test_reply_fault_and_difference_are_each_written():
     plain = draw_plan_frame(END, "")
-    for change in (
-        {"reply": "take it"},
-        {"wrong": "no Mug in sight"},
-        {"note": "it earns 2"},
-        {"action": "RotateLeft"},
-    ):
-        assert not np.array_equal(words(draw_plan_frame(replace(END, **change), "")), words(plain))
+    changes = {"reply": "take it", "wrong": "no Mug in sight", "note": "it earns 2"}
+    for name, value in (changes | {"action": "RotateLeft"}).items():
+        changed = draw_plan_frame(replace(END, **{name: value}), "")
+        assert not np.array_equal(words(changed), words(plain))
 
 
 def test_whatever_a_model_says_there_is_room_for_it():

@@ -4,27 +4,16 @@ import msgspec
 import pytest
 
 from infthor_eval.report.web.samples import Timeline, TimelineFrame
-from infthor_eval.storage.folders import packaged_folder
 
-DATA = packaged_folder("sets/nieh_mini")
-
-
-@pytest.fixture(scope="module")
-def page(make_page, nieh_runs):
-    return make_page(*nieh_runs, data=DATA)
-
-
-def changed(page, **changes):
-    return page.__class__(**(vars(page) | changes))
+from .conftest import changed
 
 
 def count(tab):
     return int(tab.locator("#count").inner_text().split()[0])
 
 
-def test_a_question_is_shown_in_all_contexts_with_frames_and_reasons(page, open_page):
-    opened = open_page(page)
-    tab, first = opened.tab, page.samples[0]
+def test_a_question_is_shown_in_all_contexts_with_frames_and_reasons(page, tab):
+    first = page.samples[0]
     same = [sample for sample in page.samples if sample.id == first.id]
     assert len({(sample.task, sample.variant) for sample in same}) > 2
     answers = tab.locator("details.answers .answer")
@@ -38,7 +27,6 @@ def test_a_question_is_shown_in_all_contexts_with_frames_and_reasons(page, open_
     tab.locator("details.answers > summary").click()
     tab.keyboard.press("j")
     assert tab.locator("details.answers").get_attribute("open") is None  # as it was left
-    assert opened.errors == []
 
 
 def test_what_a_memory_recalled_is_shown_as_pictures_and_texts(page, open_page):
@@ -64,8 +52,7 @@ def test_renumbering_facts_reaches_recalled_frames():
     assert (numbers.frames[0].facts, numbers.recalled[0].facts) == (5, 7)
 
 
-def test_questions_that_two_runs_disagree_on(page, open_page):
-    tab = open_page(page).tab
+def test_questions_that_two_runs_disagree_on(page, tab):
     tab.select_option("#run", index=1)
     tab.select_option("#against", index=2)
     differ = [sample for sample in page.samples if len({it.outcome for it in sample.results}) > 1]
@@ -91,9 +78,7 @@ def test_runs_of_different_contexts_disagree_by_question(page, open_page):
     assert count(tab) == 1
 
 
-def test_the_list_is_sorted_by_a_column_either_way(page, open_page):
-    opened = open_page(page)
-    tab = opened.tab
+def test_the_list_is_sorted_by_a_column_either_way(page, tab):
     tab.select_option("#sort", "question")
     titles = sorted(sample.title for sample in page.samples)
     assert tab.locator(".item .q").first.inner_text() == titles[0]
@@ -104,11 +89,9 @@ def test_the_list_is_sorted_by_a_column_either_way(page, open_page):
     times = tab.locator("#sample .results td[data-name=seconds]").all_inner_texts()
     assert max(map(float, times)) == pytest.approx(slowest, abs=0.005)
     tab.keyboard.press("Escape")
-    assert opened.errors == []
 
 
-def test_the_table_of_runs_is_sorted_and_its_chart_is_saved(page, open_page, tmp_path):
-    tab = open_page(page).tab
+def test_the_table_of_runs_is_sorted_and_its_chart_is_saved(tab, tmp_path):
     heading = tab.locator("#results th", has_text="%").first
     heading.locator("button").click()
     assert heading.get_attribute("aria-sort") == "descending"

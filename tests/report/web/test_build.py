@@ -1,13 +1,10 @@
 """What stands on the page of real runs."""
 
-import json
-import shutil
 from collections import Counter
 from copy import copy
 from itertools import pairwise
 
 import msgspec
-import pytest
 
 from infthor_eval.nieh.samples import open_set
 from infthor_eval.report.svg import draw
@@ -34,11 +31,6 @@ def replace_simulator(runs, simulator):
         other.own_header = other.header = header
         replaced.append(other)
     return replaced
-
-
-@pytest.fixture(scope="module")
-def page(make_page, nieh_runs):
-    return make_page(*nieh_runs, data=DATA)
 
 
 def test_every_sample_of_every_run_is_there_with_its_frames(page, nieh_runs):
@@ -138,26 +130,6 @@ def test_without_its_set_or_with_another_one_there_are_no_frames_and_it_is_said(
     assert all(sample.timeline is None for sample in haystack)
 
 
-def test_a_run_that_was_stopped_and_has_failures_says_so(make_page, nieh_runs, tmp_path):
-    copy = tmp_path / "stopped"
-    shutil.copytree(nieh_runs[0], copy)
-    (journal,) = (copy / "journal").glob("*.jsonl")
-    lines = journal.read_text().splitlines()
-    record = json.loads(lines[1])
-    record["failure"] = "the frame is gone"
-    record["payload"].pop("reply", None)
-    record["payload"].pop("scores", None)
-    journal.write_text("\n".join([lines[0], json.dumps(record), *lines[2:-3]]) + "\n")
-    results = json.loads((copy / "results.json").read_text())
-    (copy / "results.json").write_text(json.dumps(results | {"n_missing": 3}))
-    page = make_page(copy)
-    (table,) = next(section.tables for section in page.sections if section.key == "left-out")
-    facts = {row.cells[2]: row.cells[3:] for row in table.rows}
-    assert facts["failed"] == ("1", "the frame is gone")
-    assert facts["not asked"][0] == "3"
-    assert sum(sample.results[0].outcome == "failed" for sample in page.samples) == 1
-
-
 def test_the_footer_names_the_embedded_simulator_only_where_it_was_used(page, make_page, nieh_runs):
     embedded = [run for run in open_runs(nieh_runs) if "embedded" in run.simulator]
     assert bool(embedded) == bool(page.remark)
@@ -167,12 +139,8 @@ def test_the_footer_names_the_embedded_simulator_only_where_it_was_used(page, ma
 
 def test_plans_have_their_steps_and_what_was_seen(make_page, scripted_run, scripted_data):
     page = make_page(scripted_run, data=scripted_data, episodes=3)
-    assert {section.key for section in page.sections} >= {
-        "results",
-        "plans",
-        "rewards-infthor_plans",
-        "cost",
-    }
+    keys = {section.key for section in page.sections}
+    assert keys >= {"results", "plans", "rewards-infthor_plans", "cost"}
     seen = [sample for sample in page.samples if sample.results[0].map is not None]
     assert len(seen) == 3
     for sample in seen:
@@ -198,9 +166,5 @@ def test_what_takes_long_is_counted_to_its_end(nieh_runs, scripted_run, scripted
 
     runs = open_runs([*nieh_runs, scripted_run])
     build_page(runs, PageRequest(episodes=1), Watching())
-    assert set(begun) == {
-        "runs summarised",
-        "frames read",
-        "episodes replayed",
-    }
+    assert set(begun) == {"runs summarised", "frames read", "episodes replayed"}
     assert counted == begun

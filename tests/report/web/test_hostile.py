@@ -169,6 +169,7 @@ def test_the_browser_itself_stops_what_a_faulty_script_would_do(
     refused = opened.tab.evaluate(done) or ""
     opened.tab.wait_for_timeout(100)
     said = " ".join([refused, *opened.errors])
+    opened.errors.clear()
     assert "Content Security Policy" in said or "Trusted" in said
     assert told in said or "default-src" in said
     title = opened.tab.locator("h1")

@@ -3,22 +3,17 @@
 import pytest
 
 from infthor_eval.report.web.sections import Section
-from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.tables import Column, Row, Table
 
-DATA = packaged_folder("sets/nieh_mini")
+from .conftest import changed
+
 PHONE = {"width": 420, "height": 900}
-
-
-@pytest.fixture(scope="module")
-def page(make_page, nieh_runs):
-    return make_page(*nieh_runs, data=DATA)
 
 
 @pytest.fixture
 def phone(page, open_page):
     def phone(**changes):
-        opened = open_page(page.__class__(**(vars(page) | changes)))
+        opened = open_page(changed(page, **changes))
         opened.tab.set_viewport_size(PHONE)
         return opened.tab
 
@@ -84,15 +79,8 @@ def test_parts_of_a_section_have_no_link_and_long_titles_leave_room_for_the_othe
         Section("part", "part of it", notes=("x",), is_linked=False),
         Section("last", "Last", notes=("x",)),
     ]
-    tab = open_page(
-        page.__class__(**(vars(page) | {"sections": sections, "title": "long title " * 20}))
-    ).tab
-    assert [text[:7] for text in tab.locator("nav a").all_inner_texts()] == [
-        "Results",
-        "a title",
-        "Last",
-        "Samples",
-        "Setting",
-    ]
+    tab = open_page(changed(page, sections=sections, title="long title " * 20)).tab
+    links = [text[:7] for text in tab.locator("nav a").all_inner_texts()]
+    assert links == ["Results", "a title", "Last", "Samples", "Setting"]
     box = tab.locator("nav a").last.bounding_box()
     assert box["x"] + box["width"] < tab.locator("#theme").bounding_box()["x"]

@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from ....helpers.command_line import read_success
+
 
 def test_a_dumped_scene_runs_from_the_folder_and_keeps_its_objects(tmp_path, run_cli):
     folder = tmp_path / "data"
-    code, out, err = run_cli(
-        "scenes", "dump", "kitchen-2", "bedroom-1", "--embedded", "--out", folder
+    out, _ = read_success(
+        run_cli("scenes", "dump", "kitchen-2", "bedroom-1", "--embedded", "--out", folder)
     )
-    assert code == 0, err
     assert run_cli("scenes", "dump", "kitchen-2", "--embedded", "--out", folder)[0] == 0
     with gzip.open(folder / "thor_scenes" / "objects.jsonl.gz", "rt") as file:
         lines = [json.loads(line) for line in file]
@@ -26,8 +27,7 @@ def test_a_dumped_scene_runs_from_the_folder_and_keeps_its_objects(tmp_path, run
 
 def test_a_scene_is_drawn_from_above_and_from_the_agent(tmp_path, run_cli):
     path = tmp_path / "kitchen.png"
-    code, _, err = run_cli("scenes", "show", "kitchen-1", "--out", path, "--size", 100)
-    assert code == 0, err
+    read_success(run_cli("scenes", "show", "kitchen-1", "--out", path, "--size", 100))
     picture = np.asarray(Image.open(path))
     assert picture.shape == (100, 200, 3)
     for half in (picture[:, :100], picture[:, 100:]):

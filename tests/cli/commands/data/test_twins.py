@@ -11,7 +11,7 @@ from infthor_eval.formats.twins import read_pairs
 from infthor_eval.thor import launch
 from infthor_eval.thor.launch import embedded_launch
 
-from ....helpers.command_line import assert_refused
+from ....helpers.command_line import assert_refused, read_success
 from ....helpers.trajectories import FORK, MUG, cut_trajectory, write_trajectories
 
 OPTIONS = ("--kinds", "state,replace", "--per-kind", 1, "--per-trajectory", 3)
@@ -51,13 +51,11 @@ def test_a_set_of_twins(data, tmp_path, run_cli):
 
     # Again: the same files, of an earlier run; then with two workers, from the beginning.
     before = content(tmp_path / "one")
-    code, out, _ = run_cli("twins", data, "--out", tmp_path / "one", *OPTIONS)
-    assert code == 0
+    out, _ = read_success(run_cli("twins", data, "--out", tmp_path / "one", *OPTIONS))
     assert "2 trajectories (2 of earlier runs)" in out
     assert content(tmp_path / "one") == before
     other = tmp_path / "two"
-    code, _, _ = run_cli("twins", data, "--out", other, *OPTIONS, "--workers", 2)
-    assert code == 0
+    read_success(run_cli("twins", data, "--out", other, *OPTIONS, "--workers", 2))
     assert content(other) == before
 
     # With another seed the set is not continued.
@@ -90,16 +88,14 @@ def test_the_same_command_with_unity(data, tmp_path, run_cli, monkeypatch):
     # No Unity is here: the embedded simulator answers in its place, behind the same client.
     monkeypatch.setattr(launch, "unity_launch", lambda: replace(embedded_launch(), label="unity"))
     options = ("--kinds", "state", "--per-kind", 1, "--unity")
-    code, _, _ = run_cli("twins", data, "--out", tmp_path, *options)
-    assert code == 0
+    read_success(run_cli("twins", data, "--out", tmp_path, *options))
     assert read_pairs(tmp_path)
     assert json.loads((tmp_path / "set.json").read_text())["simulator"] == "unity"
 
 
 def test_twins_with_final_tasks_print_their_numbers(data, tmp_path, run_cli):
     # Two short trajectories, after which there is no room for a history of 40 actions.
-    code, out, _ = run_cli("twins", data, "--out", tmp_path / "agents", "--final-tasks")
-    assert code == 0
+    out, _ = read_success(run_cli("twins", data, "--out", tmp_path / "agents", "--final-tasks"))
     assert "2 trajectories (0 of earlier runs): 0 of 0 edits kept; 0 pairs of final tasks" in out
     code, out, _ = run_cli("twins", data, "--out", tmp_path / "agents", "--final-tasks", "--json")
     summary = json.loads(out)

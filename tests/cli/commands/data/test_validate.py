@@ -1,5 +1,6 @@
 import csv
 import json
+from functools import partial
 
 import pytest
 
@@ -8,8 +9,9 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.asking.baselines import BASELINES
 from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.storage.folders import packaged_folder
-from model_adapters import Capabilities
 
+from ....helpers.baselines import ScriptedBaseline
+from ....helpers.command_line import assert_refused, option_words, read_success
 from ....helpers.questions import make_question
 
 # Of known skill: which answers each scripted model gets right.
@@ -30,35 +32,19 @@ QUESTIONS = [
 ]
 
 
-class Scripted:
-    """A baseline of that skill."""
-
-    capabilities = Capabilities(counts_tokens=False, token_ids=False)
-
-    def __init__(self, name):
-        self.name = name
-
-    def identity(self):
-        return {}
-
-    def close(self):
-        pass
-
-    def fit(self, _data, _context):
-        return self.answer
-
-    def answer(self, sample, _shown=()):
-        question = sample.question
-        if self.name == "half" and SKILLS["half"](question):
-            return str(question.answers[0])
-        return (
-            ", ".join(question.answers) if SKILLS[self.name](question) else "<script>wrong</script>"
-        )
+def reply_of(name, question):
+    """The reply of a model of that skill."""
+    if name == "half" and SKILLS["half"](question):
+        return str(question.answers[0])
+    return ", ".join(question.answers) if SKILLS[name](question) else "<script>wrong</script>"
 
 
 @pytest.fixture
 def data(make_nieh_set, monkeypatch):
-    scripted = {name: lambda seed, name=name: Scripted(name) for name in SKILLS}
+    scripted = {
+        name: lambda _, name=name: ScriptedBaseline(name, partial(reply_of, name))
+        for name in SKILLS
+    }
     monkeypatch.setattr(NiehSuite, "baselines", {**BASELINES, **scripted})
     return make_nieh_set(QUESTIONS, size=56)
 
@@ -71,8 +57,7 @@ def test_questions_that_one_model_answers_are_kept_and_the_rest_is_rejected_or_i
     data, tmp_path, run_cli
 ):
     out = tmp_path / "validated"
-    code, printed, err = run_cli("validate", data, "--model", "yes,none", "--out", out)
-    assert code == 0, err
+    printed, _ = read_success(run_cli("validate", data, "--model", "yes,none", "--out", out))
     assert kept(out) == ["Is there a mug?", "Was it there?"]
     rejected = [json.loads(line) for line in (out / "rejected.jsonl").read_text().splitlines()]
     assert [item["question"] for item in rejected] == ["What is <b>it</b>?"]
@@ -84,12 +69,8 @@ def test_questions_that_one_model_answers_are_kept_and_the_rest_is_rejected_or_i
     assert next(line for line in printed.splitlines() if line.startswith("  yes")).split()[3:9] == [
         *("100.00", "(1)", "100.00", "(1)", "-", "100.00")
     ]
-    assert (
-        run_cli("--model", "oracle", "--tasks", "nieh_gt", "--data", out, "--out", tmp_path / "o")[
-            0
-        ]
-        == 0
-    )
+    words = option_words(model="oracle", tasks="nieh_gt", data=out, out=tmp_path / "o")
+    assert run_cli(*words)[0] == 0
 
 
 def test_the_bundled_set_keeps_exactly_what_a_model_of_four_can_answer(data, tmp_path, run_cli):
@@ -98,8 +79,9 @@ def test_the_bundled_set_keeps_exactly_what_a_model_of_four_can_answer(data, tmp
         tmp_path / "validated",
         ("yes", "counter", "places", "none"),
     )
-    code, printed, err = run_cli("validate", bundled, "--model", ",".join(models), "--out", out)
-    assert code == 0, err
+    printed, _ = read_success(
+        run_cli("validate", bundled, "--model", ",".join(models), "--out", out)
+    )
     questions = [
         item for path in sorted(bundled.glob("qa_set*.csv")) for item in read_questions(path)
     ]
@@ -143,8 +125,7 @@ def test_decisions_are_applied(data, tmp_path, run_cli):
     decisions.write_text(
         "question_id,decision\n" + "".join(f"{row['question_id']},{c}\n" for row, c in choices)
     )
-    code, printed, err = run_cli(*arguments, "--decisions", decisions)
-    assert code == 0
+    printed, err = read_success(run_cli(*arguments, "--decisions", decisions))
     assert kept(out) == ["Is there a mug?", "What is <b>it</b>?", "Was it there?"]
     assert "3 kept, 1 rejected, 1 to inspect" in printed
     assert "0 evaluated now, 5 resumed" in err
@@ -161,11 +142,10 @@ def test_decisions_are_applied(data, tmp_path, run_cli):
 def test_decisions_that_do_not_fit_are_refused(data, tmp_path, run_cli, content, expected):
     decisions = tmp_path / "decisions.csv"
     decisions.write_text(content)
-    code, _, err = run_cli(
+    ended = run_cli(
         "validate", data, "--model", "none", "--out", tmp_path / "v", "--decisions", decisions
     )
-    assert code == 2
-    assert expected in err
+    assert_refused(ended, expected, after_notes=True)
     assert not (tmp_path / "v" / "qa_set_validated.csv").exists()
 
 
@@ -176,6 +156,5 @@ def test_the_published_filter_keeps_what_is_answered_in_part(data, tmp_path, run
     code, out, _ = run_cli(*words, str(tmp_path / "published"), "--published")
     assert (code, "1 kept" in out) == (0, True)
     assert kept(tmp_path / "published") == ["Which two?"]
-    code, _, err = run_cli(*words, str(tmp_path / "both"), "--published", "--scorer", "strict")
-    assert code == 2
-    assert "--scorer strict" in err
+    ended = run_cli(*words, str(tmp_path / "both"), "--published", "--scorer", "strict")
+    assert_refused(ended, "--scorer strict", after_notes=True)
