@@ -4,7 +4,6 @@ import numpy as np
 
 
 def test_third_party_frames(kitchen):
-    kitchen.reset("kitchen-1")
     kitchen.step(
         "AddThirdPartyCamera",
         position={"x": 0, "y": 2, "z": 0},
@@ -36,7 +35,6 @@ def test_third_party_frames(kitchen):
 
 
 def test_map_view_is_to_scale(kitchen):
-    kitchen.reset("kitchen-1")
     event = kitchen.step("ToggleMapView")
     table = next(o for o in event.metadata["objects"] if o["objectType"] == "DiningTable")
     bounds = event.metadata["sceneBounds"]["size"]
@@ -56,7 +54,6 @@ def test_resolution_changes(kitchen):
 
 
 def test_frames_can_be_left_out(kitchen):
-    kitchen.reset("kitchen-1")
     event = kitchen.step("Pass", renderImage=False, renderDepthImage=False)
     assert event.frame is None
     assert event.depth_frame is None
@@ -64,7 +61,6 @@ def test_frames_can_be_left_out(kitchen):
 
 
 def test_a_camera_keeps_what_is_not_given(kitchen):
-    kitchen.reset("kitchen-1")
     kitchen.step(
         "AddThirdPartyCamera",
         position={"x": 1, "y": 2, "z": 0},
@@ -85,7 +81,6 @@ def test_a_camera_keeps_what_is_not_given(kitchen):
 
 
 def test_a_camera_becomes_orthographic_and_back(kitchen):
-    kitchen.reset("kitchen-1")
     above = {"position": {"x": 0, "y": 2.5, "z": 0}, "rotation": {"x": 90, "y": 0, "z": 0}}
     plain = kitchen.step("AddThirdPartyCamera", **above).third_party_camera_frames[0]
 
@@ -103,7 +98,7 @@ def test_a_camera_becomes_orthographic_and_back(kitchen):
 
 def test_the_usual_view_from_above_looks_into_the_rooms(kitchen):
     """The recipe of ProcTHOR's scripts, and the same without the lines about perspective."""
-    event = kitchen.reset("kitchen-1")
+    event = kitchen.last_event
     pose = kitchen.step("GetMapViewCameraProperties").metadata["actionReturn"]
     bounds = event.metadata["sceneBounds"]["size"]
     high = {**pose["position"], "y": pose["position"]["y"] + 1.1 * max(bounds["x"], bounds["z"])}
@@ -119,7 +114,6 @@ def test_the_usual_view_from_above_looks_into_the_rooms(kitchen):
 
 
 def test_clipping_planes_cut_the_picture(kitchen):
-    kitchen.reset("kitchen-1")
     above = {"position": {"x": 0, "y": 2.5, "z": 0}, "rotation": {"x": 90, "y": 0, "z": 0}}
 
     def depth(event):

@@ -124,8 +124,7 @@ def test_malformed_supplements_are_named(tmp_path, content):
 
 
 def test_poses_rearrange_the_loose_objects(folder):
-    bench = Bench(Catalogue(folder), size=40)
-    bench.reset("FloorPlan901")
+    bench = Bench.at("FloorPlan901", catalogue=Catalogue(folder), size=40)
     mug = bench.object(bench.first("Mug"))
     table = bench.object(bench.first("DiningTable"))["axisAlignedBoundingBox"]
     top = table["center"]["y"] + table["size"]["y"] / 2
@@ -155,11 +154,10 @@ def test_poses_rearrange_the_loose_objects(folder):
 
 
 def test_toggles_and_states_of_all(folder):
-    bench = Bench(Catalogue(folder), size=40)
-    bench.reset("FloorPlan901")
+    bench = Bench.at("FloorPlan901", catalogue=Catalogue(folder), size=40)
     bench.ok("SetObjectToggles", objectToggles=[{"objectType": "LightSwitch", "isOn": False}])
     assert not bench.object(bench.first("LightSwitch"))["isToggled"]
-    bench.ok("SetStateOfAllObjects", StateChange="CanBeDirty", forceAction=True)
+    bench.force("SetStateOfAllObjects", StateChange="CanBeDirty")
     assert all(o["isDirty"] for o in bench.metadata["objects"] if o["dirtyable"])
     bench.ok("SetStateOfAllObjects", StateChange="CanBeFilled", forceAction=False)
     assert not any(o["isFilledWithLiquid"] for o in bench.metadata["objects"])

@@ -112,10 +112,9 @@ def test_by_hand_a_thing_fits_in_a_round_vessel_by_its_corners():
 
 
 def test_a_thing_that_is_too_high_is_not_put_into_a_drawer():
-    bench = Bench(size=60)
-    bench.reset("kitchen-1")
+    bench = Bench.at("kitchen-1", size=60)
     drawer = bench.first("Drawer")
     lettuce = next(o for o in bench.metadata["objects"] if o["objectType"] == "Lettuce")["objectId"]
-    bench.ok("OpenObject", objectId=drawer, forceAction=True)
-    bench.ok("PickupObject", objectId=lettuce, forceAction=True)
-    assert "No valid positions" in bench.refused("PutObject", objectId=drawer, forceAction=True)
+    bench.force("OpenObject", drawer)
+    bench.force("PickupObject", lettuce)
+    assert "No valid positions" in bench.refused("PutObject", drawer, forceAction=True)

@@ -1,6 +1,5 @@
 """ProcTHOR houses: through CreateHouse, as the Controller sends them."""
 
-import copy
 import gzip
 import json
 from typing import Any
@@ -105,8 +104,7 @@ def furnished_house() -> dict[str, Any]:
 
 
 def test_objects_of_a_house_keep_their_ids():
-    bench = Bench(size=20)
-    bench.reset("Procedural")
+    bench = Bench.at("Procedural", size=20)
     bench.ok("CreateHouse", house=furnished_house())
     before = {o["objectId"] for o in bench.metadata["objects"]}
     loose = [
@@ -161,68 +159,42 @@ def test_without_its_doorway_the_rooms_are_apart():
 
 def test_assets_have_their_sizes_where_the_folder_has_them(tmp_path):
     (tmp_path / "procthor").mkdir()
-    with gzip.open(
-        tmp_path / "procthor" / "asset-database.json.gz", "wt", encoding="utf-8"
-    ) as file:
-        json.dump(
-            {"Fridge": [{"assetId": "Fridge_11", "boundingBox": {"x": 0.8, "y": 1.7, "z": 0.7}}]},
-            file,
-        )
+    path = tmp_path / "procthor" / "asset-database.json.gz"
+    fridge = {"assetId": "Fridge_11", "boundingBox": {"x": 0.8, "y": 1.7, "z": 0.7}}
+    path.write_bytes(gzip.compress(json.dumps({"Fridge": [fridge]}).encode()))
     world = Catalogue(tmp_path).house(house())
     assert world.objects["Fridge|2|1"].box_size.tolist() == [0.8, 1.7, 0.7]
-    with gzip.open(
-        tmp_path / "procthor" / "asset-database.json.gz", "wt", encoding="utf-8"
-    ) as file:
-        file.write("[1]")
+    path.write_bytes(gzip.compress(b"[1]"))
     with pytest.raises(DataError, match="asset-database"):
         Catalogue(tmp_path).house(house())
 
 
-def without_rooms(bad):
-    del bad["rooms"]
+MALFORMED = {
+    "without rooms": lambda bad: bad.pop("rooms"),
+    "without walls": lambda bad: bad.pop("walls"),
+    # Python has such an integer, and no such float
+    "beyond numbers": lambda bad: bad["walls"][0]["polygon"][0].update(x=10**400),
+    "a name that no message carries": lambda bad: bad["objects"][0].update(id="Fridge|\ud800"),
+}
 
 
-def without_walls(bad):
-    del bad["walls"]
-
-
-def with_a_wall_beyond_numbers(bad):
-    bad["walls"][0]["polygon"][0]["x"] = 10**400  # Python has such an integer, and no such float
-
-
-def with_a_name_that_no_message_carries(bad):
-    bad["objects"][0]["id"] = "Fridge|\ud800"
-
-
-@pytest.mark.parametrize(
-    "break_it",
-    [
-        without_rooms,
-        without_walls,
-        with_a_wall_beyond_numbers,
-        with_a_name_that_no_message_carries,
-    ],
-)
-def test_malformed_houses_are_refused(break_it):
-    bench = Bench(size=20)
-    bench.ok("Reset", sceneName="Procedural")
-    bench.ok("Initialize", fastActionEmit=False)
-    bad = copy.deepcopy(house())
-    break_it(bad)
+@pytest.mark.parametrize("fault", MALFORMED)
+def test_malformed_houses_are_refused(fault):
+    bench = Bench.at("Procedural", size=20)
+    bad = house()
+    MALFORMED[fault](bad)
     assert "ProcTHOR" in bench.refused("CreateHouse", house=bad)
     bench.ok("CreateHouse", house=house())
 
 
 @pytest.mark.parametrize("far", [1e30, float("nan"), -201.0])
 def test_floors_without_end_are_refused_at_once(far):
-    bad = copy.deepcopy(house())
+    bad = house()
     bad["rooms"][1]["floorPolygon"][2]["z"] = far
     with pytest.raises(DataError, match="a floor reaches to"):
         Catalogue().house(bad)
 
 
 def test_an_error_may_quote_what_no_message_carries():
-    bench = Bench(size=20)
-    bench.ok("Reset", sceneName="Procedural")
-    bench.ok("Initialize", fastActionEmit=False)
+    bench = Bench.at("Procedural", size=20)
     assert "\\ud800" in bench.refused("CreateHouse", house="\ud800")

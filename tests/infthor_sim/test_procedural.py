@@ -91,8 +91,7 @@ def test_a_house_is_connected(seed):
     ],
 )  # fmt: skip
 def test_tasks_can_be_done_by_an_agent_that_must_see(task):
-    bench = Bench(size=150)
-    bench.reset("kitchen-2")
+    bench = Bench.at("kitchen-2", size=150)
     _, what, *rest = task.split()
     pick(bench, what)
     for verb, target in zip(rest[::2], rest[1::2], strict=True):
@@ -108,9 +107,9 @@ def pick(bench: Bench, object_type: str) -> str:
         parent = bench.sim.world.objects[item].parent
         if bench.sim.world.is_hidden(bench.sim.world.objects[item]):
             bench.stand_before(parent)
-            bench.ok("OpenObject", objectId=parent)
+            bench.ok("OpenObject", parent)
         bench.stand_before(item)
-        bench.ok("PickupObject", objectId=item)
+        bench.ok("PickupObject", item)
         return item
     raise ActionError(f"no {object_type}")
 
@@ -118,7 +117,7 @@ def pick(bench: Bench, object_type: str) -> str:
 def put(bench: Bench, object_type: str) -> str:
     target = bench.first(object_type)
     bench.stand_before(target)
-    bench.ok("PutObject", objectId=target)
+    bench.ok("PutObject", target)
     return target
 
 
@@ -126,16 +125,16 @@ def store(bench: Bench, object_type: str) -> tuple[str, str]:
     """Opens, puts, closes; returns what was stored and where."""
     target, item = bench.first(object_type), bench.metadata["inventoryObjects"][0]["objectId"]
     bench.stand_before(target)
-    bench.ok("OpenObject", objectId=target)
-    bench.ok("PutObject", objectId=target)
-    bench.ok("CloseObject", objectId=target)
+    bench.ok("OpenObject", target)
+    bench.ok("PutObject", target)
+    bench.ok("CloseObject", target)
     return item, target
 
 
 def heat(bench: Bench, object_type: str) -> None:
     item, target = store(bench, object_type)
-    bench.ok("ToggleObjectOn", objectId=target)
-    bench.ok("ToggleObjectOff", objectId=target)
+    bench.ok("ToggleObjectOn", target)
+    bench.ok("ToggleObjectOff", target)
     fetch(bench, item, target, "Hot")
 
 
@@ -145,24 +144,24 @@ def cool(bench: Bench, object_type: str) -> None:
 
 
 def fetch(bench: Bench, item: str, target: str, temperature: str) -> None:
-    bench.ok("OpenObject", objectId=target)
+    bench.ok("OpenObject", target)
     bench.stand_before(item)
-    bench.ok("PickupObject", objectId=item)
-    bench.ok("CloseObject", objectId=target, forceAction=True)
+    bench.ok("PickupObject", item)
+    bench.force("CloseObject", target)
     assert bench.object(item)["temperature"] == temperature
 
 
 def clean(bench: Bench, object_type: str) -> None:
     item = bench.metadata["inventoryObjects"][0]["objectId"]
-    bench.ok("DirtyObject", objectId=item)
+    bench.ok("DirtyObject", item)
     target = put(bench, object_type)
     faucet = bench.first("Faucet")
     bench.stand_before(faucet)
-    bench.ok("ToggleObjectOn", objectId=faucet)
-    bench.ok("ToggleObjectOff", objectId=faucet)
+    bench.ok("ToggleObjectOn", faucet)
+    bench.ok("ToggleObjectOff", faucet)
     assert not bench.object(item)["isDirty"]
     bench.stand_before(target)
-    bench.ok("PickupObject", objectId=item)
+    bench.ok("PickupObject", item)
 
 
 def cut(bench: Bench, object_type: str) -> None:
@@ -170,9 +169,9 @@ def cut(bench: Bench, object_type: str) -> None:
     parent = bench.sim.world.objects[target].parent
     if bench.sim.world.is_hidden(bench.sim.world.objects[target]):
         bench.stand_before(parent)
-        bench.ok("OpenObject", objectId=parent)
+        bench.ok("OpenObject", parent)
     bench.stand_before(target)
-    bench.ok("SliceObject", objectId=target)
+    bench.ok("SliceObject", target)
 
 
 VERBS = {"put": put, "heat": heat, "cool": cool, "clean": clean, "slice": cut}

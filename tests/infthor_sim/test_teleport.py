@@ -5,13 +5,6 @@ import pytest
 from .harness import Bench
 
 
-@pytest.fixture
-def bench() -> Bench:
-    new = Bench(size=40)
-    new.reset("kitchen-1")
-    return new
-
-
 def there(bench: Bench) -> dict[str, float]:
     """A cell other than the agent's."""
     here = bench.metadata["agent"]["position"]
@@ -32,7 +25,7 @@ def test_a_place_off_the_floor_is_refused_unless_forced(bench, off):
     assert "too large a change" in message
     assert "y component" in message
     assert bench.metadata["agent"] == before
-    bench.ok("Teleport", position={**place, "y": place["y"] + off}, forceAction=True)
+    bench.force("Teleport", position={**place, "y": place["y"] + off})
     assert bench.metadata["agent"]["position"]["y"] == pytest.approx(place["y"] + off, abs=1e-5)
 
 
@@ -59,7 +52,7 @@ def test_what_a_teleport_does_not_name_stays(bench):
 
 
 def test_rotate_look(kitchen):
-    before = kitchen.reset("kitchen-1").metadata["agent"]
+    before = kitchen.last_event.metadata["agent"]
     after = kitchen.step("RotateLook", rotation=90, horizon=31).metadata["agent"]
     assert after["position"] == before["position"]
     assert after["rotation"] == {"x": 0, "y": 90, "z": 0}
@@ -96,7 +89,6 @@ def test_a_leash_keeps_the_agent_near_an_object(bench):
     far = bench.object(fridge)["distance"]
     moves = ("MoveAhead", "MoveBack", "MoveLeft", "MoveRight")
     refused = [
-        bench.step(move, objectId=fridge, maxAgentsDistance=far / 2)["errorMessage"]
-        for move in moves
+        bench.step(move, fridge, maxAgentsDistance=far / 2)["errorMessage"] for move in moves
     ]
     assert all("beyond the max distance" in message for message in refused)
