@@ -19,12 +19,6 @@ from ..helpers.bundled import BUNDLED, bundled_name
 from ..helpers.trajectories import LAMP, read_trajectory
 
 
-@pytest.fixture(scope="module")
-def simulator():
-    with Simulator(embedded_launch(), instances=False, max_copies=64) as simulator:
-        yield simulator
-
-
 def trajectory(scene: str = "kitchen-2") -> Trajectory:
     return next(iter_trajectories(BUNDLED / "metadata" / bundled_name(scene) / "traj_data.json"))
 

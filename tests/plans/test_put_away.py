@@ -12,19 +12,11 @@ from infthor_eval.plans.plan import PlanKind, plans_of, tasks_of
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.runs import execute
 from infthor_eval.thor.frames import FrameFolder
-from infthor_eval.thor.launch import embedded_launch
-from infthor_eval.thor.simulator import Simulator
 
 from ..helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 from .put_away import PEN, pen_put_away, put_away_without_actions, read
 
 PUT = 4  # the plan that puts the pen away; 22 actions, the last of which puts it
-
-
-@pytest.fixture(scope="module")
-def simulator():
-    with Simulator(embedded_launch(), instances=False, max_copies=32) as simulator:
-        yield simulator
 
 
 def by_expert(environment, plan):
