@@ -122,11 +122,8 @@ def test_blank_frames_have_the_size_that_is_shown(save: Save) -> None:
 def test_what_needs_nothing_is_left_as_it_is(save: Save) -> None:
     palette = Image.fromarray(RGB).quantize(16)
     late = save(SMOOTH)  # browsers have drawn the picture when they come to it
-    late.path.write_bytes(
-        late.path.read_bytes()[:-12]
-        + _chunk(b"eXIf", _turned(6).tobytes()[6:])
-        + _chunk(b"IEND", b"")
-    )
+    late_data = _chunk(b"eXIf", _turned(6).tobytes()[6:]) + _chunk(b"IEND", b"")
+    late.path.write_bytes(late.path.read_bytes()[:-12] + late_data)
     for frame in (
         save(SMOOTH),
         save(SMOOTH, "JPEG"),
@@ -134,10 +131,7 @@ def test_what_needs_nothing_is_left_as_it_is(save: Save) -> None:
         save(palette),
         save(SMOOTH.convert("L")),
         save(SMOOTH.convert("1")),
-        save(SMOOTH, exif=_turned(1)),
-        save(SMOOTH, exif=_turned(9)),
-        save(SMOOTH, exif=b"no data"),
-        save(SMOOTH, exif=b"MM"),
+        *(save(SMOOTH, exif=exif) for exif in (_turned(1), _turned(9), b"no data", b"MM")),
         save(SMOOTH, "JPEG", exif=b"Exif\0\0no data"),
         late,
     ):
