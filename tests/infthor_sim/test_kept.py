@@ -66,7 +66,7 @@ def act(bench: Bench, step: tuple[str, Any] | tuple[str, int, bool]) -> None:
 
 @PROPERTY
 @given(scene=SCENES, steps=st.lists(st.one_of(STEP, RETURN), min_size=5, max_size=25))
-def test_a_simulator_that_keeps_nothing_answers_the_same(scene, steps) -> None:
+def test_a_simulator_that_keeps_nothing_answers_the_same(scene, steps):
     keeping, forgetting = Bench(size=SIZE), Bench(size=SIZE)
     for bench in (keeping, forgetting):
         bench.reset(scene, **ALL_PICTURES)
@@ -77,7 +77,7 @@ def test_a_simulator_that_keeps_nothing_answers_the_same(scene, steps) -> None:
         assert shown(keeping) == reply_anew(forgetting), step
 
 
-def test_a_state_that_comes_back_is_not_taken_for_the_one_left() -> None:
+def test_a_state_that_comes_back_is_not_taken_for_the_one_left():
     bench = Bench.at("kitchen-1", **ALL_PICTURES, size=SIZE)
     fridge = bench.first("Fridge")
     bench.ok("SaveState")
@@ -93,7 +93,7 @@ def test_a_state_that_comes_back_is_not_taken_for_the_one_left() -> None:
     assert half == reply_anew(bench)
 
 
-def test_colours_are_kept_while_nothing_changes() -> None:
+def test_colours_are_kept_while_nothing_changes():
     bench = Bench.at("kitchen-1", size=SIZE)
     views = bench.sim.views
     first = views.colours(views.agent_frame())

@@ -36,7 +36,7 @@ def change(bench: Bench) -> None:
             return
 
 
-def test_what_was_saved_comes_back_whole_and_more_than_once(bench: Bench) -> None:
+def test_what_was_saved_comes_back_whole_and_more_than_once(bench):
     bench.ok("SaveState")
     before = state(bench)
     for _ in range(2):
@@ -46,7 +46,7 @@ def test_what_was_saved_comes_back_whole_and_more_than_once(bench: Bench) -> Non
         assert state(bench) == before
 
 
-def test_after_coming_back_the_same_actions_have_the_same_outcome(bench: Bench) -> None:
+def test_after_coming_back_the_same_actions_have_the_same_outcome(bench):
     bench.ok("SaveState")
     change(bench)
     after = copy.deepcopy(state(bench))
@@ -55,14 +55,14 @@ def test_after_coming_back_the_same_actions_have_the_same_outcome(bench: Bench) 
     assert state(bench) == after
 
 
-def test_nothing_saved_and_a_saved_state_of_another_scene_are_refused(bench: Bench) -> None:
+def test_nothing_saved_and_a_saved_state_of_another_scene_are_refused(bench):
     assert "no saved state" in bench.refused("RestoreState")
     bench.ok("SaveState")
     bench.ok("Reset", sceneName="kitchen-3")
     assert "no saved state" in bench.refused("RestoreState")
 
 
-def test_slots_are_kept_apart(bench: Bench) -> None:
+def test_slots_are_kept_apart(bench):
     bench.ok("SaveState", slot=0)
     first = state(bench)
     change(bench)
