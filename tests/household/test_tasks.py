@@ -1,10 +1,10 @@
 import json
 import random
-from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.trajectory import SubTask, TaskInfo

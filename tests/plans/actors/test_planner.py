@@ -36,12 +36,8 @@ def test_every_plan_is_carried_out(simulator, name):
     rules = reward_rules("default")
     restored = restore(simulator, trajectory.scene)
     assert not restored.refused and not restored.dropped
-    grounding, tasks, plans = (
-        Grounding(simulator.view),
-        tasks_of(trajectory),
-        plans_of(trajectory, Words.PUBLISHED),
-    )
-    treatments = Treatments()
+    grounding, treatments = Grounding(simulator.view), Treatments()
+    tasks, plans = tasks_of(trajectory), plans_of(trajectory, Words.PUBLISHED)
     for plan in plans:
         begins = plan.index == 0 or plans[plan.index - 1].task != plan.task
         treatments = Treatments() if begins else treatments
