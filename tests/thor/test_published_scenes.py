@@ -85,7 +85,7 @@ def test_a_fetched_floor_plan_runs(fetch, tmp_path, run_cli):
         (OBJECTS, b'{"a": {"objectId": 1}}', "not metadata of objects"),
         (CELLS, b"no array", "not an array"),
         (CELLS, b"", "not an array"),
-        (CELLS, array_file(np.zeros(3)), "not positions (n, 2)"),
+        pytest.param(CELLS, array_file(np.zeros(3)), "not positions (n, 2)", id="positions"),
     ],
 )
 def test_what_is_no_floor_plan_is_one_line(root, fetch, end, content, expected):
