@@ -4,33 +4,20 @@ import numpy as np
 
 
 def test_third_party_frames(kitchen):
-    kitchen.step(
-        "AddThirdPartyCamera",
-        position={"x": 0, "y": 2, "z": 0},
-        rotation={"x": 60, "y": 0, "z": 0},
-        fieldOfView=90,
-    )
+    pose = {"position": {"x": 0, "y": 2, "z": 0}, "rotation": {"x": 60, "y": 0, "z": 0}}
+    kitchen.step("AddThirdPartyCamera", **pose, fieldOfView=90)
     properties = kitchen.step("GetMapViewCameraProperties").metadata["actionReturn"]
     event = kitchen.step(action="AddThirdPartyCamera", **properties)
-    assert len(event.third_party_camera_frames) == 2
-    assert len(event.third_party_depth_frames) == 2
-    assert len(event.third_party_instance_masks) == 2
-    above = event.third_party_instance_masks[1]
-    assert {name.split("|")[0] for name in above if "|" in name} >= {
-        "CounterTop",
-        "Fridge",
-        "DiningTable",
-    }
-    moved = kitchen.step(
-        "UpdateThirdPartyCamera", thirdPartyCameraId=0, rotation={"x": 60, "y": 90, "z": 0}
-    )
-    assert not np.array_equal(
-        moved.third_party_camera_frames[0], event.third_party_camera_frames[0]
-    )
-    assert np.array_equal(moved.third_party_camera_frames[1], event.third_party_camera_frames[1])
-    assert not kitchen.step("UpdateThirdPartyCamera", thirdPartyCameraId=7).metadata[
-        "lastActionSuccess"
-    ]
+    frames, masks = event.third_party_camera_frames, event.third_party_instance_masks
+    assert len(frames) == len(event.third_party_depth_frames) == len(masks) == 2
+    above = {name.split("|")[0] for name in masks[1] if "|" in name}
+    assert above >= {"CounterTop", "Fridge", "DiningTable"}
+    turned = {"thirdPartyCameraId": 0, "rotation": {"x": 60, "y": 90, "z": 0}}
+    moved = kitchen.step("UpdateThirdPartyCamera", **turned).third_party_camera_frames
+    assert not np.array_equal(moved[0], frames[0])
+    assert np.array_equal(moved[1], frames[1])
+    unknown = kitchen.step("UpdateThirdPartyCamera", thirdPartyCameraId=7)
+    assert not unknown.metadata["lastActionSuccess"]
     assert kitchen.reset("kitchen-1").third_party_camera_frames == []
 
 
@@ -61,15 +48,10 @@ def test_frames_can_be_left_out(kitchen):
 
 
 def test_a_camera_keeps_what_is_not_given(kitchen):
-    kitchen.step(
-        "AddThirdPartyCamera",
-        position={"x": 1, "y": 2, "z": 0},
-        rotation={"x": 30, "y": 40, "z": 50},
-        fieldOfView=45,
-    )
-    event = kitchen.step(
-        "UpdateThirdPartyCamera", position={"x": 0.5, "z": 0.2}, rotation={"y": 90}, fieldOfView=55
-    )
+    pose = {"position": {"x": 1, "y": 2, "z": 0}, "rotation": {"x": 30, "y": 40, "z": 50}}
+    kitchen.step("AddThirdPartyCamera", **pose, fieldOfView=45)
+    changes = {"position": {"x": 0.5, "z": 0.2}, "rotation": {"y": 90}}
+    event = kitchen.step("UpdateThirdPartyCamera", **changes, fieldOfView=55)
     camera = event.metadata["thirdPartyCameras"][0]
     assert camera["position"] == {"x": 0.5, "y": 2, "z": 0.2}
     assert camera["rotation"] == {"x": 30, "y": 90, "z": 50}
@@ -85,9 +67,8 @@ def test_a_camera_becomes_orthographic_and_back(kitchen):
     plain = kitchen.step("AddThirdPartyCamera", **above).third_party_camera_frames[0]
 
     def seen(**lens):
-        return kitchen.step(
-            "UpdateThirdPartyCamera", thirdPartyCameraId=0, **lens
-        ).third_party_camera_frames[0]
+        event = kitchen.step("UpdateThirdPartyCamera", thirdPartyCameraId=0, **lens)
+        return event.third_party_camera_frames[0]
 
     flat = seen(orthographic=True, orthographicSize=2.0)
     assert not np.array_equal(flat, plain)
@@ -106,8 +87,8 @@ def test_the_usual_view_from_above_looks_into_the_rooms(kitchen):
     flat = {key: pose[key] for key in ("orthographic", "orthographicSize")}
     perspective = {"fieldOfView": 50, "orthographic": False}
     for extra in (perspective, flat):
-        event = kitchen.step("AddThirdPartyCamera", **lens, **extra, skyboxColor="white",
-                             raise_for_failure=True)  # fmt: skip
+        more = {**extra, "skyboxColor": "white", "raise_for_failure": True}
+        event = kitchen.step("AddThirdPartyCamera", **lens, **more)
         seen = event.third_party_instance_masks[-1]
         assert {name.split("|")[0] for name in seen} >= {"CounterTop", "Fridge", "Floor"}
         assert "Ceiling" not in seen

@@ -22,9 +22,8 @@ def test_moves_and_turns(kitchen):
     before = kitchen.last_event.metadata["agent"]
     after = kitchen.step("RotateRight").metadata["agent"]
     assert after["rotation"]["y"] == (before["rotation"]["y"] + 90) % 360
-    cells = {
-        (p["x"], p["z"]) for p in kitchen.step("GetReachablePositions").metadata["actionReturn"]
-    }
+    listed = kitchen.step("GetReachablePositions").metadata["actionReturn"]
+    cells = {(p["x"], p["z"]) for p in listed}
     assert (before["position"]["x"], before["position"]["z"]) in cells
     moved = kitchen.step("MoveAhead")
     at = moved.metadata["agent"]["position"]

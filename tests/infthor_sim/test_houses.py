@@ -19,21 +19,13 @@ def point(x: float, z: float, y: float = 0.0) -> dict[str, float]:
 
 def wall(room: str, x0: float, z0: float, x1: float, z1: float) -> dict[str, Any]:
     polygon = [point(x0, z0), point(x1, z1), point(x1, z1, 2.7), point(x0, z0, 2.7)]
-    return {
-        "id": f"wall|{room}|{x0}|{z0}|{x1}|{z1}",
-        "roomId": room,
-        "polygon": polygon,
-        "material": {"name": "A"},
-    }
+    name = f"wall|{room}|{x0}|{z0}|{x1}|{z1}"
+    return {"id": name, "roomId": room, "polygon": polygon, "material": {"name": "A"}}
 
 
 def room(name: str, room_type: str, *corners: tuple[float, float]) -> dict[str, Any]:
-    return {
-        "id": name,
-        "roomType": room_type,
-        "floorPolygon": [point(*c) for c in corners],
-        "ceilings": [],
-    }
+    floor = [point(*c) for c in corners]
+    return {"id": name, "roomType": room_type, "floorPolygon": floor, "ceilings": []}
 
 
 def furniture(
@@ -70,21 +62,11 @@ def house() -> dict[str, Any]:
         furniture("DiningTable|2|2", "Dining_Table_21_2", 1.0, 0.4, 2.0, 0, [apple]),
         furniture("Bed|3|1", "Bed_1", 7.5, 0.45, 2.9, 180),
     ]
-    agent = {
-        "position": point(2.5, 2.5, 0.95),
-        "rotation": {"x": 0, "y": 270, "z": 0},
-        "horizon": 30,
-        "standing": True,
-    }
-    return {
-        "rooms": [kitchen, bedroom],
-        "walls": walls,
-        "doors": [door],
-        "windows": [],
-        "objects": objects,
-        "metadata": {"agent": agent, "schema": "1.0.0"},
-        "proceduralParameters": {},
-    }
+    agent = {"position": point(2.5, 2.5, 0.95), "rotation": {"x": 0, "y": 270, "z": 0}}
+    agent |= {"horizon": 30, "standing": True}
+    parts = {"rooms": [kitchen, bedroom], "walls": walls, "doors": [door], "windows": []}
+    about = {"metadata": {"agent": agent, "schema": "1.0.0"}, "proceduralParameters": {}}
+    return {**parts, "objects": objects, **about}
 
 
 def furnished_house() -> dict[str, Any]:
@@ -117,11 +99,9 @@ def test_objects_of_a_house_keep_their_ids():
     bench.ok("InitialRandomSpawn", randomSeed=3)
     assert {o["objectId"] for o in bench.metadata["objects"]} == before
     bench.ok("SetObjectPoses", objectPoses=[loose[0], loose[0]])
-    named = [o for o in bench.metadata["objects"] if o["pickupable"]]
-    assert [o["objectId"] for o in named] == [
-        loose[0]["objectName"],
-        f"{loose[0]['objectName']}_copy_1",
-    ]
+    named = [o["objectId"] for o in bench.metadata["objects"] if o["pickupable"]]
+    first = loose[0]["objectName"]
+    assert named == [first, f"{first}_copy_1"]
 
 
 def test_a_house_through_the_controller(launch):
@@ -129,25 +109,16 @@ def test_a_house_through_the_controller(launch):
     event = controller.last_event
     check(event.metadata)
     objects = {o["objectId"]: o for o in event.metadata["objects"]}
-    assert set(objects) >= {
-        "Fridge|2|1",
-        "DiningTable|2|2",
-        "Bed|3|1",
-        "Apple|surface|2|4",
-        "room|2",
-        "room|3",
-    }
+    assert set(objects) >= {"Fridge|2|1", "DiningTable|2|2", "Bed|3|1", "room|2", "room|3"}
     assert objects["Apple|surface|2|4"]["parentReceptacles"] == ["DiningTable|2|2"]
     assert event.metadata["agent"]["position"]["x"] == pytest.approx(2.5, abs=0.13)
     assert event.metadata["agent"]["cameraHorizon"] == 30
-    cells = {
-        (p["x"], p["z"]) for p in controller.step("GetReachablePositions").metadata["actionReturn"]
-    }
+    listed = controller.step("GetReachablePositions").metadata["actionReturn"]
+    cells = {(p["x"], p["z"]) for p in listed}
     assert (6.0, 1.5) in cells, "the doorway joins the rooms"
     assert (4.0, 5.0) not in cells, "outside the L"
-    assert controller.step("OpenObject", objectId="Fridge|2|1", forceAction=True).metadata[
-        "lastActionSuccess"
-    ]
+    opened = controller.step("OpenObject", objectId="Fridge|2|1", forceAction=True)
+    assert opened.metadata["lastActionSuccess"]
 
 
 def test_without_its_doorway_the_rooms_are_apart():

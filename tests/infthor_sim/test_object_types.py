@@ -33,10 +33,8 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
 
 def lay_on_table(bench: Bench, object_type: str) -> tuple[str, str]:
     """Puts an object of a new type on the table and keeps the first mug; ids of both."""
-    mug, table = (
-        bench.object(bench.first("Mug")),
-        bench.object(bench.first("DiningTable"))["axisAlignedBoundingBox"],
-    )
+    mug = bench.object(bench.first("Mug"))
+    table = bench.object(bench.first("DiningTable"))["axisAlignedBoundingBox"]
     middle = {**table["center"], "y": table["center"]["y"] + table["size"]["y"] / 2}
     poses = [
         {"objectName": mug["name"], "position": mug["position"], "rotation": mug["rotation"]},

@@ -36,9 +36,8 @@ def test_coordinates_may_be_given_one_by_one(bench):
     assert agent["position"] == pytest.approx(place, abs=1e-5)
     assert (agent["rotation"]["y"], agent["cameraHorizon"], agent["isStanding"]) == (90, 30, False)
     bench.refused("Teleport", x=place["x"], z=place["z"])
-    assert (
-        bench.metadata["errorMessage"] == "action: Teleport is missing the following arguments: y"
-    )
+    missing = "action: Teleport is missing the following arguments: y"
+    assert bench.metadata["errorMessage"] == missing
     bench.refused(
         "TeleportFull", position=place, x=0, rotation={"y": 90}, horizon=30, standing=True
     )
@@ -67,20 +66,11 @@ def test_a_move_needs_a_positive_length(bench, move):
 
 
 def test_a_move_takes_all_of_unitys_arguments(bench):
-    terms = {
-        "speed": 2.0,
-        "returnToStart": True,
-        "disableRendering": True,
-        "manualInteract": False,
-        "objectId": "",
-        "maxAgentsDistance": -1.0,
-        "allowAgentsToIntersect": False,
-        "forceAction": False,
-    }
-    assert not bench.step("MoveAhead", moveMagnitude=0.25, **terms)["errorCode"]
-    assert not bench.step("RotateLeft", speed=2.0, returnToStart=True, disableRendering=True)[
-        "errorCode"
-    ]
+    of_all = {"speed": 2.0, "returnToStart": True, "disableRendering": True}
+    of_moves = {"manualInteract": False, "objectId": "", "maxAgentsDistance": -1.0}
+    of_moves |= {"allowAgentsToIntersect": False, "forceAction": False}
+    assert not bench.step("MoveAhead", moveMagnitude=0.25, **of_all, **of_moves)["errorCode"]
+    assert not bench.step("RotateLeft", **of_all)["errorCode"]
 
 
 def test_a_leash_keeps_the_agent_near_an_object(bench):

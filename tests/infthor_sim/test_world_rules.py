@@ -136,11 +136,7 @@ def test_microwave_heats_and_fridge_cools(bench):
 
 
 def test_tap_cleans_and_fills_and_coffee_machine_fills(bench):
-    faucet, basin, machine = (
-        bench.first("Faucet"),
-        bench.first("SinkBasin"),
-        bench.first("CoffeeMachine"),
-    )
+    faucet, basin, machine = map(bench.first, ("Faucet", "SinkBasin", "CoffeeMachine"))
     mug = bench.first("Mug")
     bench.force("DirtyObject", mug)
     bench.force("PickupObject", mug)
@@ -229,21 +225,16 @@ def test_shortest_path_leads_to_the_fridge(bench):
     fridge = bench.first("Fridge")
     corners = bench.ok("GetShortestPath", fridge)["actionReturn"]["corners"]
     steps = itertools.pairwise(corners)
-    assert all(
-        abs(a["x"] - b["x"]) + abs(a["z"] - b["z"]) == pytest.approx(0.25, abs=1e-6)
-        for a, b in steps
-    )
+    for a, b in steps:
+        assert abs(a["x"] - b["x"]) + abs(a["z"] - b["z"]) == pytest.approx(0.25, abs=1e-6)
     end, goal = corners[-1], bench.object(fridge)["position"]
     assert abs(end["x"] - goal["x"]) + abs(end["z"] - goal["z"]) < 1.5
 
 
 def test_random_placement_follows_its_seed(bench):
     def places() -> list[tuple[str, object]]:
-        return [
-            (o["objectId"], o["parentReceptacles"])
-            for o in bench.metadata["objects"]
-            if o["pickupable"]
-        ]
+        loose = [o for o in bench.metadata["objects"] if o["pickupable"]]
+        return [(o["objectId"], o["parentReceptacles"]) for o in loose]
 
     start = places()
     bench.ok("InitialRandomSpawn", randomSeed=3)
