@@ -38,8 +38,7 @@ _MODULES = {
     "scoring": ("infthor_eval/nieh/scoring.py", "tests/nieh/test_scoring.py"),
     "rewards": (
         "infthor_eval/plans/rewards.py",
-        "tests/plans/test_rewards.py tests/plans/test_rewards_of_ways.py "
-        "tests/plans/test_rewards_of_goals.py",
+        "tests/plans/test_rewards.py tests/plans/test_rewards_of_ways.py",
     ),
     "statistics": ("infthor_eval/statistics.py", "tests/test_statistics.py"),
     "haystack": ("infthor_eval/nieh/contexts/haystack.py", "tests/nieh/contexts/test_haystack.py"),

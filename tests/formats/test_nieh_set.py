@@ -11,6 +11,10 @@ from infthor_eval.formats.set_info import claim_for_simulator
 SOUND = Question("t", "Is there a mug?", (1,), ("yes",))
 
 
+def frame_of(root, number):
+    return root / "metadata" / "t" / "img" / f"{number:09d}.png"
+
+
 def reasons(root):
     return [item.reason for item in NiehSet(root).skipped]
 
@@ -19,10 +23,8 @@ def test_frames_come_in_time_order_and_clues_in_theirs(make_nieh_set):
     root = make_nieh_set([Question("t", "q", (4, 1), ("yes",))])
     data = NiehSet(root)
     assert [frame.path.stem for frame in data.frames("t")] == [f"{index:09d}" for index in range(6)]
-    assert [frame.path.stem for frame in data.clue_frames(data.questions[0])] == [
-        "000000004",
-        "000000001",
-    ]
+    clues = [frame.path.stem for frame in data.clue_frames(data.questions[0])]
+    assert clues == ["000000004", "000000001"]
     assert data.skipped == ()
 
 
@@ -70,24 +72,27 @@ def test_a_trajectory_without_folder_and_a_repeated_question_are_left_out(make_n
     assert reasons(root) == ["is in the files twice", "trajectory other is not in metadata/"]
 
 
-def test_a_clue_that_is_no_image_is_left_out_by_name(make_nieh_set):
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (lambda frame: frame.write_text("not an image"), "not a PNG, JPEG or WebP image"),
+        (
+            lambda frame: frame.rename(frame.with_name("other.png")),
+            "cannot be read (No such file or directory)",
+        ),
+    ],
+)
+def test_a_clue_that_is_no_image_or_has_another_name_is_left_out_by_name(
+    make_nieh_set, spoil, reason
+):
     root = make_nieh_set([SOUND])
-    frame = root / "metadata" / "t" / "img" / "000000001.png"
-    frame.write_text("not an image")
-    assert reasons(root) == [f"{frame}: not a PNG, JPEG or WebP image"]
-
-
-def test_a_clue_under_another_name_is_left_out_by_name(make_nieh_set):
-    root = make_nieh_set([SOUND])
-    frame = root / "metadata" / "t" / "img" / "000000001.png"
-    frame.rename(frame.with_name("other.png"))
-    assert reasons(root) == [f"{frame}: cannot be read (No such file or directory)"]
+    spoil(frame_of(root, 1))
+    assert reasons(root) == [f"{frame_of(root, 1)}: {reason}"]
 
 
 def test_a_frame_without_an_entry_leaves_the_questions_of_its_trajectory_out(make_nieh_set):
     root = make_nieh_set([SOUND, Question("u", "Is there a mug?", (1,), ("yes",))])
-    images = root / "metadata" / "t" / "img"
-    (images / "000000006.png").write_bytes((images / "000000005.png").read_bytes())
+    frame_of(root, 6).write_bytes(frame_of(root, 5).read_bytes())
     reason = (
         "trajectory t: 7 frames but 6 entries in metadata.json (none for 000000006); unpack the "
         "trajectory again"
@@ -98,7 +103,7 @@ def test_a_frame_without_an_entry_leaves_the_questions_of_its_trajectory_out(mak
 
 def test_a_missing_frame_leaves_out_the_questions_that_show_it(make_nieh_set):
     root = make_nieh_set([SOUND, Question("t", "Is there a sink?", (5,), ("yes",))])
-    frame = root / "metadata" / "t" / "img" / "000000005.png"
+    frame = frame_of(root, 5)
     frame.unlink()
     assert reasons(root) == [f"{frame}: cannot be read (No such file or directory)"]
     assert len(NiehSet(root).questions) == 1
@@ -108,9 +113,8 @@ def test_a_missing_frame_leaves_out_the_questions_that_show_it(make_nieh_set):
 def test_two_frames_with_one_number_are_refused(make_nieh_set):
     root = make_nieh_set([SOUND])
     metadata = root / "metadata" / "t" / "metadata.json"
-    metadata.write_text(
-        json.dumps([{**entry, "img_idx": 0} for entry in json.loads(metadata.read_text())])
-    )
+    entries = json.loads(metadata.read_text())
+    metadata.write_text(json.dumps([{**entry, "img_idx": 0} for entry in entries]))
     assert "two entries of metadata.json have img_idx 0" in reasons(root)[0]
 
 
@@ -141,7 +145,7 @@ def test_the_fingerprint_follows_questions_logs_and_frames(make_nieh_set):
     root = make_nieh_set([SOUND])
     before = NiehSet(root).fingerprint
     assert NiehSet(root).fingerprint == before
-    frame = root / "metadata" / "t" / "img" / "000000003.png"
+    frame = frame_of(root, 3)
     frame.write_bytes(frame.read_bytes() + b"more")
     assert NiehSet(root).fingerprint != before
 

@@ -28,15 +28,12 @@ def test_frames_come_in_the_order_of_the_numbers_in_their_names(make_folder):
     root = make_folder(["f10.png", "f2.png", "f1.jpg"], "question,answer", "q,yes")
     data = NiehSet(root)
     (question,) = data.questions
-    assert [frame.name for frame in data.frames(question.traj_id)] == [
-        "f1.jpg",
-        "f2.png",
-        "f10.png",
-    ]
+    names = ["f1.jpg", "f2.png", "f10.png"]
+    assert [frame.name for frame in data.frames(question.traj_id)] == names
     assert question.clues == (0, 1, 2), "without clue frames all are"
     assert question.answers == ("yes",)
     assert layout_of(root) is Layout.NONE
-    assert [step.img_filename for step in read_steps(root)] == ["f1.jpg", "f2.png", "f10.png"]
+    assert [step.img_filename for step in read_steps(root)] == names
 
 
 @pytest.mark.parametrize(
@@ -76,11 +73,7 @@ def test_the_fingerprint_is_that_of_questions_and_frames(make_folder):
     [
         (["1.png"], ["question,reply", "q,a"], "no column answer"),
         (["1.png"], ["question,answer"], "no row is a question \\(it has none\\)"),
-        (
-            ["1.png"],
-            ["question,answer,clues", "q,a,1"],
-            "'clues' is not known; did you mean",
-        ),
+        (["1.png"], ["question,answer,clues", "q,a,1"], "'clues' is not known; did you mean"),
         (["1.png"], ["question,answer,Trajectory", "q,a,1"], "did you mean trajectory?"),
         (["1.png"], ["question,answer,clue_frames", "q,a,7"], "an entry that is no frame"),
         (["1.png", "1.jpg"], ["question,answer", "q,a"], "two frames have the name 1"),
@@ -118,8 +111,7 @@ def test_its_file_is_the_set_as_well_and_may_be_one_of_several(make_folder):
 
 def test_a_question_file_of_the_published_form_beside_pictures_is_read_as_such(make_folder):
     folder = make_folder(["0.png"], "question,answer", "Is there a mug?,yes")
-    (folder / "qa.csv").write_text(
-        "traj_id,question,gt_img_idx,answer\nt,Is there a plate?,[3],['no']\n"
-    )
+    row = "t,Is there a plate?,[3],['no']"
+    (folder / "qa.csv").write_text(f"traj_id,question,gt_img_idx,answer\n{row}\n")
     (question,) = NiehSet(folder / "qa.csv").questions
     assert (question.traj_id, question.clues) == ("t", (3,))

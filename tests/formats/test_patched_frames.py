@@ -58,15 +58,14 @@ def test_name_and_digest_differ_with_the_patch_and_its_place(patched):
     assert patched.n_bytes == sum(path.stat().st_size for path in (patched.path, patch.path))
 
 
-def _damage(frame: FrameRef) -> None:
-    path = frame.patches[0].path
+def cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-30])
 
 
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
-        (_damage, "patch.png: not a readable image"),
+        (lambda frame: cut(frame.patches[0].path), "patch.png: not a readable image"),
         (lambda frame: frame.patches[0].path.write_text("x"), "patch.png: not a readable image"),
         (lambda frame: frame.patches[0].path.unlink(), "patch.png: cannot be read"),
         (lambda frame: frame.path.unlink(), "below.png: cannot be read"),

@@ -39,21 +39,12 @@ def test_every_table_has_a_source_and_a_title_of_its_own(suite):
 )
 def test_means_of_replies_are_those_of_the_logs(title, row, mode):
     published = table("nieh", title)
-    scores = [
-        [
-            reply["score"]
-            for reply in read_json_lines(PUBLISHED / "replies" / REPLIES.format(file, mode))
-        ]
-        for file in ("nieh_single", "nsieh_multi")
-    ]
+    means = []
+    for file in ("nieh_single", "nsieh_multi"):
+        replies = read_json_lines(PUBLISHED / "replies" / REPLIES.format(file, mode))
+        means.append(round(100 * sum(reply["score"] for reply in replies) / len(replies), 2))
     assert published.columns == ("nieh_single_clue", "nsieh_multi_clue")
-    assert (
-        tuple(
-            round(100 * sum(scores_of_scorer) / len(scores_of_scorer), 2)
-            for scores_of_scorer in scores
-        )
-        == published.rows[row].values
-    )
+    assert tuple(means) == published.rows[row].values
 
 
 def test_two_figures_that_disagree_both_stand_and_that_is_said():
@@ -69,17 +60,14 @@ def test_rates_of_plans_are_those_of_the_logs():
     rows = {row.log: row.values for row in table("plans", "logs on final tasks").rows}
     assert len(logs) == len(rows) == 7
     for log in logs:
-        name = (
-            log.name.removeprefix("eval_longhrz_checkpoints_").removesuffix(".log.gz").rstrip("_")
-        )
+        name = log.name.removeprefix("eval_longhrz_checkpoints_").removesuffix(".log.gz")
         counts = Counter()
         for row in read_json_lines(log):
             counts.update(row["metric"])
-        rates = [
-            counts[f"{kind}_success"] / counts[f"{kind}_count"] for kind in ("goto", "pick", "put")
-        ]
+        kinds = ("goto", "pick", "put")
+        rates = [counts[f"{kind}_success"] / counts[f"{kind}_count"] for kind in kinds]
         rates.append(counts["success_count"] / counts["total_count"])
-        assert tuple(round(100 * rate, 1) for rate in rates) == rows[name], name
+        assert tuple(round(100 * rate, 1) for rate in rates) == rows[name.rstrip("_")], name
 
 
 def test_the_model_of_the_final_tasks_is_qwen():

@@ -29,12 +29,8 @@ def shared(make_nieh_set):
 def test_a_set_with_shared_pictures_has_the_same_frames(shared):
     root, own = shared
     for question in NiehSet(own).questions:
-        pairs = zip(
-            NiehSet(root).frames(question.traj_id),
-            NiehSet(own).frames(question.traj_id),
-            strict=True,
-        )
-        assert all(one.digest == other.digest for one, other in pairs)
+        one, other = (NiehSet(folder).frames(question.traj_id) for folder in shared)
+        assert [frame.digest for frame in one] == [frame.digest for frame in other]
     assert NiehSet(root).questions == NiehSet(own).questions
 
 

@@ -41,20 +41,15 @@ def put(folder, document):
 def test_published_layouts_read_alike(tmp_path):
     columns = {key: [value, value] for key, value in PUBLISHED.items()}
     single = read_steps(put(tmp_path, PUBLISHED))
-    assert (
-        single == read_steps(put(tmp_path, [PUBLISHED])) == read_steps(put(tmp_path, columns))[:1]
-    )
+    assert single == read_steps(put(tmp_path, [PUBLISHED]))
+    assert single == read_steps(put(tmp_path, columns))[:1]
     assert single[0].object_log.recep_objs == {"Shelf": ["Vase"]}
     assert single[0].seen is None
 
 
 def test_columns_with_img_idx_alone(tmp_path):
     steps = read_steps(put(tmp_path, {"img_idx": [0, 1, 2]}))
-    assert [step.img_filename for step in steps] == [
-        "000000000.png",
-        "000000001.png",
-        "000000002.png",
-    ]
+    assert [step.img_filename for step in steps] == [f"{number:09d}.png" for number in range(3)]
 
 
 @pytest.mark.parametrize(
@@ -109,11 +104,8 @@ def test_what_is_written_is_read(tmp_path_factory, steps):
 
 
 def test_worlds_apply_changes_in_order():
-    steps = [
-        Step(
-            0, "0.png", changes={"a": ObjectState("Mug"), "b": ObjectState("Fridge", is_open=False)}
-        ),
-        Step(1, "1.png", changes={"b": ObjectState("Fridge", is_open=True)}),
-    ]
+    shut, wide = (ObjectState("Fridge", is_open=is_open) for is_open in (False, True))
+    first = Step(0, "0.png", changes={"a": ObjectState("Mug"), "b": shut})
+    steps = [first, Step(1, "1.png", changes={"b": wide})]
     opened = [dict(world)["b"].is_open for world in iter_object_states(steps)]
     assert opened == [False, True]

@@ -5,11 +5,7 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.trajectory import (
-    encode_trajectory,
-    iter_sources,
-    iter_trajectories,
-)
+from infthor_eval.formats.trajectory import encode_trajectory, iter_sources, iter_trajectories
 
 SHARED = Path(__file__).parents[2] / "../shared/data"
 MINIMAL = {
@@ -22,6 +18,11 @@ MINIMAL = {
 }
 
 
+def read_one(path, **changes):
+    """The trajectory that is read of the smallest document, changed."""
+    return next(iter_trajectories(write(path, MINIMAL | changes)))
+
+
 def write(path, *documents):
     text = "".join(json.dumps(document) + "\n" for document in documents).encode()
     path.write_bytes(gzip.compress(text) if path.suffix == ".gz" else text)
@@ -30,28 +31,23 @@ def write(path, *documents):
 
 @pytest.mark.parametrize("name", ["a.json", "a.jsonl", "a.jsonl.gz"])
 def test_every_container_reads(tmp_path, name):
-    trajectory = next(iter_trajectories(write(tmp_path / name, MINIMAL)))
+    trajectory = read_one(tmp_path / name)
     assert trajectory.scene.init_action.yaw == 90
     assert trajectory.plan.low_actions[0].api_action.action == "MoveAhead"
     assert trajectory.traj_id.startswith("a")
 
 
 def test_vector_rotation(tmp_path):
-    scene = {
-        "floor_plan": "FloorPlan1",
-        "init_action": {"x": 0, "y": 0, "z": 0, "rotation": {"y": 270.0}},
-    }
-    trajectory = next(iter_trajectories(write(tmp_path / "a.json", {**MINIMAL, "scene": scene})))
-    assert trajectory.scene.init_action.yaw == 270
+    turned = MINIMAL["scene"]["init_action"] | {"rotation": {"y": 270.0}}
+    scene = MINIMAL["scene"] | {"init_action": turned}
+    assert read_one(tmp_path / "a.json", scene=scene).scene.init_action.yaw == 270
 
 
 def test_directory_in_order_without_the_sets_own_files(tmp_path):
     for name in ("b.json", "a.json", "metadata.json", "expert_log.json"):
         write(tmp_path / name, {**MINIMAL, "traj_id": name})
-    assert [trajectory.traj_id for trajectory in iter_trajectories(tmp_path)] == [
-        "a.json",
-        "b.json",
-    ]
+    names = [trajectory.traj_id for trajectory in iter_trajectories(tmp_path)]
+    assert names == ["a.json", "b.json"]
 
 
 @pytest.mark.parametrize("name", ["replay.json", "set.json", "status.json", "timeline.json"])
@@ -88,30 +84,22 @@ def test_missing_files(tmp_path, name):
 
 
 def test_written_reads_back(tmp_path):
-    trajectory = next(iter_trajectories(write(tmp_path / "a.json", MINIMAL)))
+    trajectory = read_one(tmp_path / "a.json")
     (tmp_path / "b.json").write_bytes(encode_trajectory(trajectory))
     assert next(iter_trajectories(tmp_path / "b.json")) == trajectory
 
 
 def test_what_the_published_saver_leaves_empty(tmp_path):
     scene = {**MINIMAL["scene"], "floor_plan": "", "scene_num": 28, "dirty_and_empty": None}
-    trajectory = next(
-        iter_trajectories(
-            write(tmp_path / "a.json", {**MINIMAL, "scene": scene, "long_horizon_task": {}})
-        )
-    )
+    trajectory = read_one(tmp_path / "a.json", scene=scene, long_horizon_task={})
     assert (trajectory.scene.floor_plan, trajectory.scene.dirty_and_empty) == ("FloorPlan28", False)
     assert trajectory.long_horizon_task is None
 
 
 def test_keys_that_readers_of_published_trajectories_look_up_are_always_written(tmp_path):
-    trajectory = next(iter_trajectories(write(tmp_path / "a.json", MINIMAL)))
-    document = json.loads(encode_trajectory(trajectory))
-    assert (document["long_horizon_task"], document["sub_tasks"], document["sub_trajs"]) == (
-        {},
-        [],
-        [],
-    )
+    document = json.loads(encode_trajectory(read_one(tmp_path / "a.json")))
+    assert document["long_horizon_task"] == {}
+    assert document["sub_tasks"] == document["sub_trajs"] == []
 
 
 @pytest.mark.parametrize("document", [[], {"scene": {"scene_num": 1}}, {"scene": 3}, {}])

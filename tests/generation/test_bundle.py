@@ -15,8 +15,6 @@ from infthor_eval.generation.bundle import (
 from infthor_eval.generation.questions.generate import generate_questions
 from infthor_eval.storage.digests import digest_of_file, fingerprint
 from infthor_eval.storage.folders import packaged_folder
-from infthor_eval.thor.launch import embedded_launch
-from infthor_eval.thor.simulator import Simulator
 
 BUNDLED = packaged_folder("sets/nieh_mini")
 
@@ -43,31 +41,29 @@ def test_the_bundled_questions_follow_from_the_bundled_logs():
     assert generated.questions == list(NiehSet(BUNDLED).questions)
 
 
-def test_bundled_trajectories_come_out_again_bit_for_bit(tmp_path):
+def test_bundled_trajectories_come_out_again_bit_for_bit(tmp_path, simulator):
     manifest = read_manifest(BUNDLED / MANIFEST)
     part = msgspec.structs.replace(manifest, trajectories=manifest.trajectories[-1:])
-    with Simulator(embedded_launch()) as simulator:
-        again, _ = build_bundle(part, simulator, tmp_path / "set")
+    again, _ = build_bundle(part, simulator, tmp_path / "set")
     files = {name: digest for name, digest in again.files.items() if name.startswith("metadata/")}
     assert len(files) > 75
     assert {name: manifest.files[name] for name in files} == files
 
 
-def test_a_folder_that_is_not_empty_and_a_scene_that_is_not_there_are_refused(tmp_path):
+def test_a_folder_that_is_not_empty_and_a_scene_that_is_not_there_are_refused(tmp_path, simulator):
     manifest = read_manifest(BUNDLED / MANIFEST)
     (tmp_path / "file").write_text("")
-    with Simulator(embedded_launch()) as simulator:
-        with pytest.raises(DataError, match="not empty"):
-            build_bundle(manifest, simulator, tmp_path)
-        nowhere = msgspec.structs.replace(
-            manifest,
-            trajectories=(msgspec.structs.replace(manifest.trajectories[0], scene="attic-1"),),
-        )
-        with pytest.raises(DataError, match="attic-1"):
-            build_bundle(nowhere, simulator, tmp_path / "set")
+    with pytest.raises(DataError, match="not empty"):
+        build_bundle(manifest, simulator, tmp_path)
+    nowhere = msgspec.structs.replace(
+        manifest,
+        trajectories=(msgspec.structs.replace(manifest.trajectories[0], scene="attic-1"),),
+    )
+    with pytest.raises(DataError, match="attic-1"):
+        build_bundle(nowhere, simulator, tmp_path / "set")
 
 
-def test_a_build_that_was_stopped_goes_on_with_what_it_had(tmp_path, monkeypatch):
+def test_a_build_that_was_stopped_goes_on_with_what_it_had(tmp_path, monkeypatch, simulator):
     manifest = Manifest("small", (TrajectoryRecipe("kitchen-1", 0, 1),), per_trajectory=2)
     out, undisturbed = tmp_path / "set", tmp_path / "undisturbed"
     done = []
@@ -77,23 +73,22 @@ def test_a_build_that_was_stopped_goes_on_with_what_it_had(tmp_path, monkeypatch
         if len(done) == 1:  # generated, not replayed
             raise KeyboardInterrupt
 
-    with Simulator(embedded_launch()) as simulator:
-        expected, _ = build_bundle(manifest, simulator, undisturbed)
+    expected, _ = build_bundle(manifest, simulator, undisturbed)
+    with pytest.raises(KeyboardInterrupt):
+        build_bundle(manifest, simulator, out, stop)
+    assert [path.name[0] for path in out.iterdir()] == ["."]
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "replace", _stop_at_manifest(Path.replace))
         with pytest.raises(KeyboardInterrupt):
-            build_bundle(manifest, simulator, out, stop)
-        assert [path.name[0] for path in out.iterdir()] == ["."]
-        with monkeypatch.context() as patched:
-            patched.setattr(Path, "replace", _stop_at_manifest(Path.replace))
-            with pytest.raises(KeyboardInterrupt):
-                build_bundle(manifest, simulator, out, done.append)
-        assert done[1:] == [True, False]
-        again, _ = build_bundle(manifest, simulator, out)
+            build_bundle(manifest, simulator, out, done.append)
+    assert done[1:] == [True, False]
+    again, _ = build_bundle(manifest, simulator, out)
     assert again == expected
     assert [path.name for path in out.iterdir() if path.name.startswith(".")] == []
     assert digest_of_file(out / MANIFEST) == digest_of_file(undisturbed / MANIFEST)
 
 
-def test_a_build_that_was_killed_at_its_manifest_goes_on(tmp_path, monkeypatch):
+def test_a_build_that_was_killed_at_its_manifest_goes_on(tmp_path, monkeypatch, simulator):
     manifest = Manifest("small", (TrajectoryRecipe("bathroom-3", 0, 1),), per_trajectory=2)
     write = Path.write_bytes
 
@@ -103,18 +98,17 @@ def test_a_build_that_was_killed_at_its_manifest_goes_on(tmp_path, monkeypatch):
         write(self, content[:40])
         raise KeyboardInterrupt
 
-    with Simulator(embedded_launch()) as simulator:
-        with monkeypatch.context() as patched:
-            patched.setattr(Path, "write_bytes", cut)
-            with pytest.raises(KeyboardInterrupt):
-                build_bundle(manifest, simulator, tmp_path)
-        built, _ = build_bundle(manifest, simulator, tmp_path)
-        assert read_manifest(tmp_path / MANIFEST) == built
-        # As if it had been killed before the last of its hidden folder was removed.
-        recipe = msgspec.to_builtins(msgspec.structs.replace(built, files={}))
-        (tmp_path / f".building-{fingerprint(recipe)}" / "trajectories").mkdir(parents=True)
-        with pytest.raises(DataError, match="has a whole set; give a new folder"):
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "write_bytes", cut)
+        with pytest.raises(KeyboardInterrupt):
             build_bundle(manifest, simulator, tmp_path)
+    built, _ = build_bundle(manifest, simulator, tmp_path)
+    assert read_manifest(tmp_path / MANIFEST) == built
+    # As if it had been killed before the last of its hidden folder was removed.
+    recipe = msgspec.to_builtins(msgspec.structs.replace(built, files={}))
+    (tmp_path / f".building-{fingerprint(recipe)}" / "trajectories").mkdir(parents=True)
+    with pytest.raises(DataError, match="has a whole set; give a new folder"):
+        build_bundle(manifest, simulator, tmp_path)
     assert not list(tmp_path.glob(".*"))
 
 

@@ -2,7 +2,6 @@
 
 import dataclasses
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -34,6 +33,7 @@ from tests.household.rooms import APPLE, COUNTER, FRIDGE, KITCHEN, KNIFE, MUG, T
 from tests.thor.views import view
 
 from ..helpers.command_line import option_words
+from ..helpers.processes import cli_words
 
 SHARED = Path(__file__).parents[2] / "../shared/data"
 OTHERS = [item for item in KITCHEN.objects.values() if item.object_id != MUG.object_id]
@@ -62,9 +62,8 @@ def test_every_task_begins_with_an_empty_hand(simulator):
 def test_sub_goals_and_actions_are_numbered_through(simulator):
     trajectory = generate(TrajectorySettings("living-room-2", 5, 60, 4), simulator).trajectory
     plan = trajectory.plan
-    assert [high.high_idx for high in plan.high_pddl] == list(range(len(plan.high_pddl))) and len(
-        plan.high_pddl
-    ) >= 4
+    assert [high.high_idx for high in plan.high_pddl] == list(range(len(plan.high_pddl)))
+    assert len(plan.high_pddl) >= 4
     assert [low.low_idx for low in plan.low_actions] == list(range(len(plan.low_actions)))
     assert len(plan.low_actions) >= 60
     owners = [low.high_idx for low in plan.low_actions]
@@ -206,10 +205,11 @@ def _refused(trajectory, simulator):
     return refused
 
 
-class _Failing:
+@pytest.fixture
+def fail_while(monkeypatch):
     """Makes plans fail after their first action, as long as `while_` says so of the factory."""
 
-    def __init__(self, monkeypatch, while_):
+    def fail_while(while_):
         execute = factory._Factory._execute
 
         def fail(self, act, look):
@@ -220,17 +220,22 @@ class _Failing:
 
         monkeypatch.setattr(factory._Factory, "_execute", fail)
 
+    return fail_while
 
-def test_at_dead_ends_1_2_and_4_subgoals_are_dropped(simulator, monkeypatch):
-    tries = iter(range(10_000))
-    started = []
+
+def times_from(n_times, n_subgoals):
+    """Whether a plan is one of the first so many since there are so many sub-goals."""
+    reached, tries = [], iter(range(10_000))
 
     def while_(generated):
-        if generated._draft.n_subgoals >= 8:
-            started.append(True)
-        return bool(started) and next(tries) < 9
+        reached.append(generated._draft.n_subgoals)
+        return max(reached) >= n_subgoals and next(tries) < n_times
 
-    _Failing(monkeypatch, while_)
+    return while_
+
+
+def test_at_dead_ends_1_2_and_4_subgoals_are_dropped(simulator, fail_while):
+    fail_while(times_from(9, 8))
     kinds = (TaskType.PLACE, TaskType.PLACE_TWO)  # which leave nothing in the hand
     generated = generate(
         TrajectorySettings("living-room-2", 5, 150, 9, task_types=kinds, max_fail=2), simulator
@@ -245,16 +250,8 @@ def test_at_dead_ends_1_2_and_4_subgoals_are_dropped(simulator, monkeypatch):
     assert _refused(generated.trajectory, simulator) == []
 
 
-def test_at_dead_ends_a_put_down_is_dropped_with_its_task(simulator, monkeypatch):
-    tries = iter(range(10_000))
-    started = []
-
-    def while_(generated):
-        if generated._draft.n_subgoals >= 4:
-            started.append(True)
-        return bool(started) and next(tries) < 4
-
-    _Failing(monkeypatch, while_)
+def test_at_dead_ends_a_put_down_is_dropped_with_its_task(simulator, fail_while):
+    fail_while(times_from(4, 4))
     kinds = (TaskType.EXAMINE,)  # which leave the object in the hand
     generated = generate(
         TrajectorySettings("bedroom-3", 0, 30, 5, task_types=kinds, max_fail=1), simulator
@@ -266,10 +263,10 @@ def test_at_dead_ends_a_put_down_is_dropped_with_its_task(simulator, monkeypatch
     assert _refused(generated.trajectory, simulator) == []
 
 
-def test_an_accepted_task_ends_the_row_of_failures(simulator, monkeypatch):
+def test_an_accepted_task_ends_the_row_of_failures(simulator, fail_while):
     tries = iter(range(10_000))
     # What fails of itself is among the other two.
-    _Failing(monkeypatch, lambda _: next(tries) % 4 < 2)
+    fail_while(lambda _: next(tries) % 4 < 2)
     generated = generate(TrajectorySettings("living-room-2", 5, 60, 6, max_fail=4), simulator)
     assert (
         generated.statistics.roll_backs == [] and generated.statistics.reasons["made to fail"] >= 6
@@ -277,14 +274,8 @@ def test_an_accepted_task_ends_the_row_of_failures(simulator, monkeypatch):
 
 
 @pytest.mark.parametrize("floor", [0, 40, 10_000])
-def test_what_gives_up_is_kept_from_a_floor_on(simulator, monkeypatch, floor):
-    reached = []
-
-    def while_(generated):
-        reached.append(generated._draft.n_subgoals)
-        return max(reached) >= 4
-
-    _Failing(monkeypatch, while_)
+def test_what_gives_up_is_kept_from_a_floor_on(simulator, fail_while, floor):
+    fail_while(times_from(10_000, 4))
     settings = TrajectorySettings("living-room-2", 5, 300, 3, True, max_fail=2, save_floor=floor)
     if floor != 40:
         with pytest.raises(
@@ -293,16 +284,12 @@ def test_what_gives_up_is_kept_from_a_floor_on(simulator, monkeypatch, floor):
             generate(settings, simulator)
         return
     generated = generate(settings, simulator)
-    assert (
-        len(generated.trajectory.plan.low_actions) >= 40
-        and len(generated.trajectory.sub_tasks) == 4
-    )
-    assert (
-        generated.trajectory.gen_info["banked_on_giveup"] is True
-        and generated.trajectory.long_horizon_task is None
-    )
-    assert len(generated.problems) == len(generated.trajectory.sub_tasks)
-    assert _refused(generated.trajectory, simulator) == []
+    trajectory = generated.trajectory
+    assert len(trajectory.plan.low_actions) >= 40
+    assert len(trajectory.sub_tasks) == len(generated.problems) == 4
+    assert trajectory.gen_info["banked_on_giveup"] is True
+    assert trajectory.long_horizon_task is None
+    assert _refused(trajectory, simulator) == []
 
 
 def test_a_pool_of_tasks_that_is_exhausted_begins_again(simulator):
@@ -315,19 +302,10 @@ def test_a_pool_of_tasks_that_is_exhausted_begins_again(simulator):
 
 
 def test_the_same_bytes_come_out_after_a_kill_with_roll_backs(run_cli, tmp_path):
-    words = [
-        "generate",
-        *option_words(scene="kitchen-5", seed="5", min_steps="150", min_subgoals="1"),
-    ]
-    words += ["--max-fail", "1"]
+    lengths = option_words(min_steps=150, min_subgoals=1, max_fail=1)
+    words = ["generate", *option_words(scene="kitchen-5", seed=5), *lengths]
     assert run_cli(*words, "--out", tmp_path / "whole")[0] == 0
-    command = [
-        sys.executable,
-        "-c",
-        "import sys; from infthor_eval.cli import main; sys.exit(main())",
-        *words,
-    ]
-    killed = subprocess.Popen([*command, "--out", str(tmp_path / "killed")])
+    killed = subprocess.Popen(cli_words(*words, "--out", tmp_path / "killed"))
     time.sleep(6)
     killed.kill()
     killed.wait()

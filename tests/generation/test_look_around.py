@@ -1,6 +1,5 @@
 """Looking around: insertions as published, in lists of actions, in files, in generated sets."""
 
-import gzip
 import json
 from pathlib import Path
 
@@ -24,8 +23,9 @@ from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.replay_summary import summarise
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.storage.folders import packaged_folder
-from infthor_eval.thor.launch import embedded_launch
-from infthor_eval.thor.simulator import Simulator
+
+from ..helpers.command_line import assert_refused
+from ..helpers.files import read_json_lines
 
 GOLDENS = Path(__file__).parents[1] / "goldens"
 BUNDLED = packaged_folder("sets/plans_mini") / "trajectories.jsonl.gz"
@@ -43,19 +43,12 @@ horizons = st.sampled_from([-30, 0, 15, 30, 45, 60, 90])
 
 
 @pytest.fixture(scope="module")
-def simulator():
-    with Simulator(embedded_launch()) as simulator:
-        yield simulator
-
-
-@pytest.fixture(scope="module")
 def made(simulator):
     return generate(SETTINGS, simulator).trajectory
 
 
 def goldens(name):
-    with gzip.open(GOLDENS / name, "rt") as file:
-        return [json.loads(line) for line in file]
+    return read_json_lines(GOLDENS / name)
 
 
 def looked(names, horizon=30, min_run=MIN_RUN):
@@ -171,10 +164,7 @@ def test_what_cannot_be_changed_is_refused_in_one_line(run_cli, tmp_path, change
     change(document)
     file = tmp_path / "given.json"
     file.write_text(json.dumps(document))
-    code, out, err = run_cli("look-around", file, "--out", tmp_path / "new.json")
-    assert (code, out) == (2, "")
-    assert said in err
-    assert err.count("\n") == 1
+    assert_refused(run_cli("look-around", file, "--out", tmp_path / "new.json"), said)
     assert not (tmp_path / "new.json").exists()
 
 
@@ -186,20 +176,15 @@ def test_what_is_no_trajectory_is_refused_in_one_line(run_cli, tmp_path, name, s
     (tmp_path / "empty").mkdir()
     (tmp_path / "none.json").write_text("[1]")
     (tmp_path / "a.jsonl").write_text("{}\n")
-    code, out, err = run_cli("look-around", tmp_path / name, "--out", tmp_path / "out")
-    assert (code, out) == (2, "")
-    assert said in err
-    assert err.count("\n") == 1
+    assert_refused(run_cli("look-around", tmp_path / name, "--out", tmp_path / "out"), said)
 
 
 def test_a_file_that_cannot_be_written_is_told(run_cli, tmp_path):
     file = tmp_path / "given.json"
     file.write_text(goldens("look_around_files.jsonl.gz")[1]["given"])
     for out, said in ((tmp_path, "not a file"), (file / "x", "cannot be written to")):
-        code, _, err = run_cli("look-around", file, "--out", out)
-        assert code == 2
-        assert said in err
-        assert "another place with --out" in err
+        ended = run_cli("look-around", file, "--out", out)
+        assert_refused(ended, said, "another place with --out")
 
 
 def test_what_a_file_tells_of_its_generation_may_be_null(tmp_path):
@@ -247,11 +232,8 @@ def test_apart_from_what_is_inserted_the_actions_are_the_same(made, simulator):
     both = list(zip(kept, without.plan.low_actions, strict=False))
     assert len(both) >= 30
     for one, other in both:
-        assert (one.api_action, one.discrete_action, one.high_idx) == (
-            other.api_action,
-            other.discrete_action,
-            other.high_idx,
-        )
+        for name in ("api_action", "discrete_action", "high_idx"):
+            assert getattr(one, name) == getattr(other, name)
 
 
 def test_a_generation_is_resumed_with_the_same_option_alone(simulator, tmp_path):

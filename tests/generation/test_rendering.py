@@ -128,10 +128,9 @@ def _require_equal_poses(published: list[list[float]], ours: list[tuple[int, Age
 
 
 @pytest.fixture(scope="module")
-def generated(tmp_path_factory):
+def generated(tmp_path_factory, simulator):
     out = tmp_path_factory.mktemp("generated")
-    with Simulator(embedded_launch()) as simulator:
-        result = generate_set([JOB], simulator, out)
+    result = generate_set([JOB], simulator, out)
     assert not result.failures
     return result.paths[0]
 

@@ -27,20 +27,18 @@ JOB = TrajectorySettings("kitchen-3", 4, min_steps=40, min_subgoals=1)
 
 
 @pytest.fixture(scope="module")
-def generated(tmp_path_factory):
+def generated(tmp_path_factory, simulator):
     out = tmp_path_factory.mktemp("generated")
-    with Simulator(embedded_launch()) as simulator:
-        result = generate_set([JOB], simulator, out)
+    result = generate_set([JOB], simulator, out)
     assert not result.failures
     return result.paths[0]
 
 
-def test_a_generated_trajectory_replays_whole(generated, tmp_path):
-    with Simulator(embedded_launch()) as simulator:
-        replayed = replay_set(select([generated]), simulator, tmp_path)
-        lock = tmp_path / "metadata" / f".{JOB.traj_id}.lock"
-        lock.touch()  # of a process that was killed just then
-        again = replay_set(select([generated]), simulator, tmp_path)
+def test_a_generated_trajectory_replays_whole(generated, tmp_path, simulator):
+    replayed = replay_set(select([generated]), simulator, tmp_path)
+    lock = tmp_path / "metadata" / f".{JOB.traj_id}.lock"
+    lock.touch()  # of a process that was killed just then
+    again = replay_set(select([generated]), simulator, tmp_path)
     trajectory = next(iter_trajectories(generated))
     assert summarise(replayed).complete == 1 and not replayed.failures
     assert (again.resumed, replayed.resumed) == (1, 0)
@@ -68,10 +66,9 @@ def test_a_generated_trajectory_replays_whole(generated, tmp_path):
     assert not list((tmp_path / "metadata").glob(".*"))
 
 
-def test_several_frames_per_move(generated, tmp_path):
-    with Simulator(embedded_launch()) as simulator:
-        replayed = replay_set(select([generated]), simulator, tmp_path, form=SetForm(3))
-        again = replay_set(select([generated]), simulator, tmp_path)
+def test_several_frames_per_move(generated, tmp_path, simulator):
+    replayed = replay_set(select([generated]), simulator, tmp_path, form=SetForm(3))
+    again = replay_set(select([generated]), simulator, tmp_path)
     assert summarise(replayed).complete == 1
     assert "3 frames per move" in again.failures[0].message
     steps = read_steps(tmp_path / "metadata" / JOB.traj_id)
@@ -85,40 +82,37 @@ def test_several_frames_per_move(generated, tmp_path):
     ) == 2 * moves
 
 
-def test_the_seed_decides_and_what_exists_is_kept(generated, tmp_path):
-    with Simulator(embedded_launch()) as simulator:
-        generate_set([JOB], simulator, tmp_path)
-        assert (tmp_path / generated.name).read_bytes() == generated.read_bytes()
-        lock = tmp_path / f".{generated.name}.lock"
-        lock.touch()  # of a process that was killed just then
-        assert generate_set([JOB], simulator, tmp_path).resumed == 1
-        assert not lock.exists()
-        other = TrajectorySettings(JOB.scene, JOB.seed, min_steps=41, min_subgoals=1)
-        assert "other settings" in generate_set([other], simulator, tmp_path).failures[0]
+def test_the_seed_decides_and_what_exists_is_kept(generated, tmp_path, simulator):
+    generate_set([JOB], simulator, tmp_path)
+    assert (tmp_path / generated.name).read_bytes() == generated.read_bytes()
+    lock = tmp_path / f".{generated.name}.lock"
+    lock.touch()  # of a process that was killed just then
+    assert generate_set([JOB], simulator, tmp_path).resumed == 1
+    assert not lock.exists()
+    other = TrajectorySettings(JOB.scene, JOB.seed, min_steps=41, min_subgoals=1)
+    assert "other settings" in generate_set([other], simulator, tmp_path).failures[0]
 
 
-def test_one_bad_trajectory_does_not_stop_the_others(generated, tmp_path):
+def test_one_bad_trajectory_does_not_stop_the_others(generated, tmp_path, simulator):
     good = generated.read_bytes()
     nowhere = json.loads(good)
     nowhere["scene"]["floor_plan"], nowhere["traj_id"] = "nowhere-1", "../../escape"
     lines = [json.dumps(nowhere).encode(), b"{broken", json.dumps(json.loads(good)).encode()]
     path = tmp_path / "all.jsonl.gz"
     path.write_bytes(gzip.compress(b"\n".join(lines)))
-    with Simulator(embedded_launch()) as simulator:
-        replayed = replay_set(select([path]), simulator, tmp_path / "set")
+    replayed = replay_set(select([path]), simulator, tmp_path / "set")
     assert len(replayed.reports) == 1
     assert sorted(failure.place.rpartition(":")[2] for failure in replayed.failures) == ["1", "2"]
     assert all(failure.message.count(str(path)) == 1 for failure in replayed.failures)
     assert [folder.name for folder in (tmp_path / "set/metadata").iterdir()] == [JOB.traj_id]
 
 
-def test_another_trajectory_of_the_same_name_is_refused(generated, tmp_path):
+def test_another_trajectory_of_the_same_name_is_refused(generated, tmp_path, simulator):
     changed = json.loads(generated.read_bytes())
     changed["plan"]["low_actions"] = changed["plan"]["low_actions"][:2]
     (tmp_path / "short.json").write_text(json.dumps(changed))
-    with Simulator(embedded_launch()) as simulator:
-        replay_set(select([tmp_path / "short.json"]), simulator, tmp_path / "set")
-        replayed = replay_set(select([generated]), simulator, tmp_path / "set")
+    replay_set(select([tmp_path / "short.json"]), simulator, tmp_path / "set")
+    replayed = replay_set(select([generated]), simulator, tmp_path / "set")
     assert "another trajectory" in replayed.failures[0].message
 
 
@@ -202,9 +196,6 @@ def test_a_set_that_was_claimed_half_is_claimed_again(tmp_path, monkeypatch):
     assert simulator_of(tmp_path) == "embedded"
 
 
-def test_the_simulator_error_is_told(tmp_path):
-    with (
-        Simulator(embedded_launch()) as simulator,
-        pytest.raises(SimulatorError, match="FloorPlan1"),
-    ):
+def test_the_simulator_error_is_told(simulator):
+    with pytest.raises(SimulatorError, match="FloorPlan1"):
         simulator.reset("FloorPlan1")

@@ -25,17 +25,6 @@ PLATE = item("Plate|+03.20|+00.90|+00.10", TABLE, receptacle=True)
 SPOON = item("Spoon|+00.20|+00.95|+00.00", MUG)
 
 KITCHEN = view(
-    COUNTER,
-    TABLE,
-    FRIDGE,
-    MICROWAVE,
-    BASIN,
-    FAUCET,
-    LAMP,
-    APPLE,
-    APPLE_TWO,
-    KNIFE,
-    MUG,
-    PLATE,
-    SPOON,
+    *(COUNTER, TABLE, FRIDGE, MICROWAVE, BASIN, FAUCET, LAMP),
+    *(APPLE, APPLE_TWO, KNIFE, MUG, PLATE, SPOON),
 )

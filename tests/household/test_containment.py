@@ -37,15 +37,13 @@ def test_of_a_logged_object_it_is_told_where_it_is_clear(parents, parent):
 
 
 def test_of_an_object_in_a_view_it_is_what_can_be_carried_then_the_smallest():
-    def of(*parents):
-        return direct_parent(
-            replace(APPLE, parent_receptacles=[item.object_id for item in parents]), KITCHEN.objects
-        )
+    def of(*parents, objects=KITCHEN.objects):
+        ids = [item.object_id for item in parents]
+        return direct_parent(replace(APPLE, parent_receptacles=ids), objects)
 
     assert of(COUNTER, MUG) == MUG.object_id
     assert of(FRIDGE, COUNTER) == COUNTER.object_id  # the fridge here has no box
     assert of() is None
     small = replace(FRIDGE, axis_aligned_bounding_box=Box(Vector(), Vector(0.1, 0.1, 0.1)))
     objects = {**KITCHEN.objects, small.object_id: small}
-    both = replace(APPLE, parent_receptacles=[COUNTER.object_id, small.object_id])
-    assert direct_parent(both, objects) == small.object_id
+    assert of(COUNTER, small, objects=objects) == small.object_id

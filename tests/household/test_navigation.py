@@ -29,9 +29,8 @@ def test_distances_to_a_goal_are_the_lengths_of_the_paths_there(chosen, data):
     facing = st.sampled_from((0, 90, 180, 270))
     goal = GridPose(data.draw(st.sampled_from(sorted(grid.cells))), data.draw(facing))
     x, z = data.draw(st.sampled_from(sorted(grid.cells)))
-    start = GridPose(
-        (x + data.draw(st.integers(-1, 1)), z + data.draw(st.integers(-1, 1))), data.draw(facing)
-    )
+    beside = st.integers(-1, 1)
+    start = GridPose((x + data.draw(beside), z + data.draw(beside)), data.draw(facing))
     path = grid.path(start, goal)
     assert grid.distances_to(goal).get(start) == (None if path is None else len(path))
 

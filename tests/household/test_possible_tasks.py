@@ -20,13 +20,8 @@ def test_no_washing_without_a_faucet():
 
 
 def test_two_things_go_where_the_published_table_of_goals_has_them():
-    pairs = {
-        "CoffeeMachine": "Mug",
-        "HandTowelHolder": "HandTowel",
-        "ToiletPaperHanger": "ToiletPaper",
-        "CounterTop": "Mug",
-        "TowelHolder": "Towel",
-    }
+    pairs = {"CoffeeMachine": "Mug", "HandTowelHolder": "HandTowel"}
+    pairs |= {"ToiletPaperHanger": "ToiletPaper", "CounterTop": "Mug", "TowelHolder": "Towel"}
     places = [thing(f"{name}|+00.00|+00.00|+00.00", receptacle=True) for name in pairs]
     things = [
         item(f"{name}|+00.0{number}|+00.00|+00.00", places[0])

@@ -18,23 +18,14 @@ from tests.plans.building import (
 )
 
 NONE = Treatments()
+IN_BOTH, ON_A_PLATE = kitchen({MUG: BASIN, CUP: BATHTUB}), kitchen({PLATE: FRIDGE, APPLE: PLATE})
 
 
 @pytest.mark.parametrize(
     ("action", "object_id", "view", "expected"),
     [
-        (
-            "ToggleObjectOn",
-            FAUCET,
-            kitchen({MUG: BASIN, CUP: BATHTUB}),
-            Treatments(clean=frozenset({MUG})),
-        ),
-        (
-            "ToggleObjectOn",
-            BATH_FAUCET,
-            kitchen({MUG: BASIN, CUP: BATHTUB}),
-            Treatments(clean=frozenset({CUP})),
-        ),
+        ("ToggleObjectOn", FAUCET, IN_BOTH, Treatments(clean=frozenset({MUG}))),
+        ("ToggleObjectOn", BATH_FAUCET, IN_BOTH, Treatments(clean=frozenset({CUP}))),
         ("ToggleObjectOn", FAUCET, kitchen(without=[BASIN, BATHTUB]), NONE),
         ("ToggleObjectOff", FAUCET, kitchen({MUG: BASIN}), NONE),
         ("ToggleObjectOn", FAUCET, kitchen({MUG: BASIN}, refused=True), NONE),
@@ -43,12 +34,7 @@ NONE = Treatments()
         ("CloseObject", FRIDGE, kitchen({MUG: FRIDGE}), Treatments(cold=frozenset({MUG}))),
         ("OpenObject", FRIDGE, kitchen({MUG: FRIDGE}), NONE),
         # What is on a plate is treated with it.
-        (
-            "CloseObject",
-            FRIDGE,
-            kitchen({PLATE: FRIDGE, APPLE: PLATE}),
-            Treatments(cold=frozenset({PLATE, APPLE})),
-        ),
+        ("CloseObject", FRIDGE, ON_A_PLATE, Treatments(cold=frozenset({PLATE, APPLE}))),
         ("MoveAhead", None, kitchen({MUG: FRIDGE}), NONE),
         ("CloseObject", "Fridge|nowhere", kitchen({MUG: FRIDGE}), NONE),
     ],

@@ -41,6 +41,5 @@ def test_plurals(object_type, words):
 
 
 def test_prepositions():
-    assert [
-        preposition(object_type) for object_type in ("Fridge", "CounterTop", "Plate", "Mug")
-    ] == ["in", "on", "on", "in"]
+    said = {name: preposition(name) for name in ("Fridge", "CounterTop", "Plate", "Mug")}
+    assert said == {"Fridge": "in", "CounterTop": "on", "Plate": "on", "Mug": "in"}

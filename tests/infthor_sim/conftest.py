@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+from .harness import Bench
+
 DATA = Path(__file__).resolve().parents[2] / ".." / "shared" / "data"
 # seconds after which a constructor that hangs (ai2thor waits for ever on a dead player) fails the
 # test
@@ -82,7 +84,19 @@ def launch() -> Iterator[Callable[..., Any]]:
 
 
 @pytest.fixture(scope="module")
-def kitchen() -> Iterator[Any]:
+def started() -> Iterator[Any]:
     controller = start("kitchen-1")
     yield controller
     controller.stop()
+
+
+@pytest.fixture
+def kitchen(started: Any) -> Any:
+    """A module's controller, in its kitchen anew."""
+    started.reset("kitchen-1")
+    return started
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench.at("kitchen-1", size=60)

@@ -9,15 +9,8 @@ from .conftest import need_data
 from .harness import Bench
 
 
-@pytest.fixture
-def bench() -> Bench:
-    new = Bench(size=60)
-    new.reset("kitchen-1")
-    return new
-
-
 def frame(bench: Bench) -> np.ndarray:
-    return np.frombuffer(bench.frames[FieldType.RGB], dtype=np.uint8).astype(float)
+    return bench.picture(FieldType.RGB).astype(float)
 
 
 @pytest.mark.parametrize("action", ["RandomizeMaterials", "RandomizeColors"])
@@ -49,7 +42,7 @@ def test_light(bench):
     bench.ok("RandomizeLighting", brightness=[0.5, 0.5], randomizeColor=False)
     assert frame(bench).mean() == pytest.approx(usual.mean() * 0.5, rel=0.1)
     bench.ok("RandomizeLighting", brightness=[1, 1], hue=[0, 0], saturation=[1, 1])
-    red, green, blue = frame(bench).reshape(-1, 3).mean(axis=0)
+    red, green, blue = frame(bench).mean(axis=(0, 1))
     assert red > 20 * max(green, blue)
     bench.ok("ResetLighting")
     assert np.array_equal(frame(bench), usual)
@@ -75,8 +68,7 @@ def test_sets_of_materials(bench):
 def test_the_scene_decides_on_the_sets(scene, split):
     from infthor_sim.scenes.catalogue import Catalogue
 
-    bench = Bench(Catalogue(need_data()), size=20)
-    bench.reset(scene)
+    bench = Bench.at(scene, catalogue=Catalogue(need_data()), size=20)
     reported = bench.ok("RandomizeMaterials")["actionReturn"]
     assert [name for name in ("Train", "Val", "Test") if reported[f"use{name}Materials"]] == [split]
 

@@ -4,39 +4,24 @@ import numpy as np
 
 
 def test_third_party_frames(kitchen):
-    kitchen.reset("kitchen-1")
-    kitchen.step(
-        "AddThirdPartyCamera",
-        position={"x": 0, "y": 2, "z": 0},
-        rotation={"x": 60, "y": 0, "z": 0},
-        fieldOfView=90,
-    )
+    pose = {"position": {"x": 0, "y": 2, "z": 0}, "rotation": {"x": 60, "y": 0, "z": 0}}
+    kitchen.step("AddThirdPartyCamera", **pose, fieldOfView=90)
     properties = kitchen.step("GetMapViewCameraProperties").metadata["actionReturn"]
     event = kitchen.step(action="AddThirdPartyCamera", **properties)
-    assert len(event.third_party_camera_frames) == 2
-    assert len(event.third_party_depth_frames) == 2
-    assert len(event.third_party_instance_masks) == 2
-    above = event.third_party_instance_masks[1]
-    assert {name.split("|")[0] for name in above if "|" in name} >= {
-        "CounterTop",
-        "Fridge",
-        "DiningTable",
-    }
-    moved = kitchen.step(
-        "UpdateThirdPartyCamera", thirdPartyCameraId=0, rotation={"x": 60, "y": 90, "z": 0}
-    )
-    assert not np.array_equal(
-        moved.third_party_camera_frames[0], event.third_party_camera_frames[0]
-    )
-    assert np.array_equal(moved.third_party_camera_frames[1], event.third_party_camera_frames[1])
-    assert not kitchen.step("UpdateThirdPartyCamera", thirdPartyCameraId=7).metadata[
-        "lastActionSuccess"
-    ]
+    frames, masks = event.third_party_camera_frames, event.third_party_instance_masks
+    assert len(frames) == len(event.third_party_depth_frames) == len(masks) == 2
+    above = {name.split("|")[0] for name in masks[1] if "|" in name}
+    assert above >= {"CounterTop", "Fridge", "DiningTable"}
+    turned = {"thirdPartyCameraId": 0, "rotation": {"x": 60, "y": 90, "z": 0}}
+    moved = kitchen.step("UpdateThirdPartyCamera", **turned).third_party_camera_frames
+    assert not np.array_equal(moved[0], frames[0])
+    assert np.array_equal(moved[1], frames[1])
+    unknown = kitchen.step("UpdateThirdPartyCamera", thirdPartyCameraId=7)
+    assert not unknown.metadata["lastActionSuccess"]
     assert kitchen.reset("kitchen-1").third_party_camera_frames == []
 
 
 def test_map_view_is_to_scale(kitchen):
-    kitchen.reset("kitchen-1")
     event = kitchen.step("ToggleMapView")
     table = next(o for o in event.metadata["objects"] if o["objectType"] == "DiningTable")
     bounds = event.metadata["sceneBounds"]["size"]
@@ -56,7 +41,6 @@ def test_resolution_changes(kitchen):
 
 
 def test_frames_can_be_left_out(kitchen):
-    kitchen.reset("kitchen-1")
     event = kitchen.step("Pass", renderImage=False, renderDepthImage=False)
     assert event.frame is None
     assert event.depth_frame is None
@@ -64,16 +48,10 @@ def test_frames_can_be_left_out(kitchen):
 
 
 def test_a_camera_keeps_what_is_not_given(kitchen):
-    kitchen.reset("kitchen-1")
-    kitchen.step(
-        "AddThirdPartyCamera",
-        position={"x": 1, "y": 2, "z": 0},
-        rotation={"x": 30, "y": 40, "z": 50},
-        fieldOfView=45,
-    )
-    event = kitchen.step(
-        "UpdateThirdPartyCamera", position={"x": 0.5, "z": 0.2}, rotation={"y": 90}, fieldOfView=55
-    )
+    pose = {"position": {"x": 1, "y": 2, "z": 0}, "rotation": {"x": 30, "y": 40, "z": 50}}
+    kitchen.step("AddThirdPartyCamera", **pose, fieldOfView=45)
+    changes = {"position": {"x": 0.5, "z": 0.2}, "rotation": {"y": 90}}
+    event = kitchen.step("UpdateThirdPartyCamera", **changes, fieldOfView=55)
     camera = event.metadata["thirdPartyCameras"][0]
     assert camera["position"] == {"x": 0.5, "y": 2, "z": 0.2}
     assert camera["rotation"] == {"x": 30, "y": 90, "z": 50}
@@ -85,14 +63,12 @@ def test_a_camera_keeps_what_is_not_given(kitchen):
 
 
 def test_a_camera_becomes_orthographic_and_back(kitchen):
-    kitchen.reset("kitchen-1")
     above = {"position": {"x": 0, "y": 2.5, "z": 0}, "rotation": {"x": 90, "y": 0, "z": 0}}
     plain = kitchen.step("AddThirdPartyCamera", **above).third_party_camera_frames[0]
 
     def seen(**lens):
-        return kitchen.step(
-            "UpdateThirdPartyCamera", thirdPartyCameraId=0, **lens
-        ).third_party_camera_frames[0]
+        event = kitchen.step("UpdateThirdPartyCamera", thirdPartyCameraId=0, **lens)
+        return event.third_party_camera_frames[0]
 
     flat = seen(orthographic=True, orthographicSize=2.0)
     assert not np.array_equal(flat, plain)
@@ -103,7 +79,7 @@ def test_a_camera_becomes_orthographic_and_back(kitchen):
 
 def test_the_usual_view_from_above_looks_into_the_rooms(kitchen):
     """The recipe of ProcTHOR's scripts, and the same without the lines about perspective."""
-    event = kitchen.reset("kitchen-1")
+    event = kitchen.last_event
     pose = kitchen.step("GetMapViewCameraProperties").metadata["actionReturn"]
     bounds = event.metadata["sceneBounds"]["size"]
     high = {**pose["position"], "y": pose["position"]["y"] + 1.1 * max(bounds["x"], bounds["z"])}
@@ -111,15 +87,14 @@ def test_the_usual_view_from_above_looks_into_the_rooms(kitchen):
     flat = {key: pose[key] for key in ("orthographic", "orthographicSize")}
     perspective = {"fieldOfView": 50, "orthographic": False}
     for extra in (perspective, flat):
-        event = kitchen.step("AddThirdPartyCamera", **lens, **extra, skyboxColor="white",
-                             raise_for_failure=True)  # fmt: skip
+        more = {**extra, "skyboxColor": "white", "raise_for_failure": True}
+        event = kitchen.step("AddThirdPartyCamera", **lens, **more)
         seen = event.third_party_instance_masks[-1]
         assert {name.split("|")[0] for name in seen} >= {"CounterTop", "Fridge", "Floor"}
         assert "Ceiling" not in seen
 
 
 def test_clipping_planes_cut_the_picture(kitchen):
-    kitchen.reset("kitchen-1")
     above = {"position": {"x": 0, "y": 2.5, "z": 0}, "rotation": {"x": 90, "y": 0, "z": 0}}
 
     def depth(event):

@@ -8,7 +8,7 @@ from .conftest import need_data
 
 
 def test_first_state_has_frame_depth_and_ids(kitchen):
-    event = kitchen.reset("kitchen-1")
+    event = kitchen.last_event
     assert event.frame.shape == (300, 300, 3)
     assert event.depth_frame.shape == (300, 300)
     assert event.metadata["sceneName"] == "kitchen-1"
@@ -19,12 +19,11 @@ def test_first_state_has_frame_depth_and_ids(kitchen):
 
 
 def test_moves_and_turns(kitchen):
-    before = kitchen.reset("kitchen-1").metadata["agent"]
+    before = kitchen.last_event.metadata["agent"]
     after = kitchen.step("RotateRight").metadata["agent"]
     assert after["rotation"]["y"] == (before["rotation"]["y"] + 90) % 360
-    cells = {
-        (p["x"], p["z"]) for p in kitchen.step("GetReachablePositions").metadata["actionReturn"]
-    }
+    listed = kitchen.step("GetReachablePositions").metadata["actionReturn"]
+    cells = {(p["x"], p["z"]) for p in listed}
     assert (before["position"]["x"], before["position"]["z"]) in cells
     moved = kitchen.step("MoveAhead")
     at = moved.metadata["agent"]["position"]
@@ -35,7 +34,6 @@ def test_moves_and_turns(kitchen):
 
 
 def test_unknown_action_and_argument_raise_in_the_client(kitchen):
-    kitchen.reset("kitchen-1")
     with pytest.raises(ValueError, match="Invalid action"):
         kitchen.step("FlyAhead")
     with pytest.raises(ValueError, match="speedy"):
@@ -46,7 +44,6 @@ def test_unknown_action_and_argument_raise_in_the_client(kitchen):
 
 
 def test_look_limits(kitchen):
-    kitchen.reset("kitchen-1")
     assert kitchen.step("LookDown", degrees=15).metadata["agent"]["cameraHorizon"] == 15
     kitchen.step("LookDown")
     kitchen.step("LookDown", degrees=15)
@@ -89,7 +86,7 @@ def test_damaged_data_are_named_when_a_scene_is_loaded(launch, tmp_path):
 
 
 def test_the_quality_of_the_controller_decides_on_smooth_edges(launch, kitchen):
-    smooth = kitchen.reset("kitchen-1")
+    smooth = kitchen.last_event
     jagged = launch("kitchen-1", quality="Low").last_event
     assert np.array_equal(smooth.depth_frame, jagged.depth_frame)
     assert np.array_equal(smooth.instance_segmentation_frame, jagged.instance_segmentation_frame)
@@ -104,7 +101,7 @@ def test_same_seed_same_bytes(kitchen):
 
 
 def test_the_shortest_ways_of_ai2thor_s_metrics(kitchen):
-    objects = kitchen.reset("kitchen-1").metadata["objects"]
+    objects = kitchen.last_event.metadata["objects"]
     start = kitchen.last_event.metadata["agent"]["position"]
     turn = {"x": 0, "y": 90, "z": 0}
     fridge = next(o for o in objects if o["objectType"] == "Fridge")

@@ -18,20 +18,22 @@ from .harness import Bench
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A data folder with one floor plan: a procedural kitchen as the metadata reports it."""
-    bench = Bench(size=40)
-    entries = bench.reset("kitchen-1")["objects"]
+    bench = Bench.at("kitchen-1", size=40)
+    entries = bench.metadata["objects"]
     for entry in entries:  # the public form has boxes without corner points
         entry["axisAlignedBoundingBox"].pop("cornerPoints")
     (tmp_path / "thor_scenes").mkdir()
     (tmp_path / "alfred" / "layouts").mkdir(parents=True)
-    with gzip.open(tmp_path / "thor_scenes" / "objects.jsonl.gz", "wt", encoding="utf-8") as file:
-        file.write(json.dumps({"scene": "FloorPlan901", "objects": entries}) + "\n")
-        file.write(json.dumps({"scene": "FloorPlan902", "objects": entries}) + "\n")
-    np.save(
-        tmp_path / "alfred" / "layouts" / "FloorPlan901-layout.npy",
-        np.array(list(bench.sim.world.nav)),
-    )
+    scenes = ({"scene": f"FloorPlan{number}", "objects": entries} for number in (901, 902))
+    write_objects(tmp_path, "\n".join(map(json.dumps, scenes)))
+    cells = np.array(list(bench.sim.world.nav))
+    np.save(tmp_path / "alfred" / "layouts" / "FloorPlan901-layout.npy", cells)
     return tmp_path
+
+
+def write_objects(folder: Path, lines: str) -> None:
+    path = folder / "thor_scenes" / "objects.jsonl.gz"
+    path.write_bytes(gzip.compress(f"{lines}\n".encode()))
 
 
 def supplement(folder: Path, **entry: object) -> Path:
@@ -48,11 +50,9 @@ def test_a_scene_survives_being_written_and_read(folder):
     for name, item in before.items():
         for key in ("objectType", "pickupable", "openable", "isOpen", "isToggled", "mass"):
             assert after[name][key] == item[key], (name, key)
-        for axis in "xyz":
-            for part in ("center", "size"):
-                old = item["axisAlignedBoundingBox"][part][axis]
-                new = after[name]["axisAlignedBoundingBox"][part][axis]
-                assert new == pytest.approx(old, abs=2e-3), (name, part)
+        old, new = (objects[name]["axisAlignedBoundingBox"] for objects in (before, after))
+        for part in ("center", "size"):
+            assert new[part] == pytest.approx(old[part], abs=2e-3), (name, part)
     lying = [n for n, o in before.items() if o["parentReceptacles"] and o["pickupable"]]
     same = [n for n in lying if after[n]["parentReceptacles"] == before[n]["parentReceptacles"]]
     assert len(same) == len(lying)
@@ -86,8 +86,7 @@ def test_missing_data_are_named(folder, tmp_path):
     ],
 )
 def test_malformed_objects_are_named(folder, line):
-    with gzip.open(folder / "thor_scenes" / "objects.jsonl.gz", "wt", encoding="utf-8") as file:
-        file.write(line + "\n")
+    write_objects(folder, line)
     with pytest.raises(DataError):
         Catalogue(folder).load("FloorPlan901")
 
@@ -124,8 +123,7 @@ def test_malformed_supplements_are_named(tmp_path, content):
 
 
 def test_poses_rearrange_the_loose_objects(folder):
-    bench = Bench(Catalogue(folder), size=40)
-    bench.reset("FloorPlan901")
+    bench = Bench.at("FloorPlan901", catalogue=Catalogue(folder), size=40)
     mug = bench.object(bench.first("Mug"))
     table = bench.object(bench.first("DiningTable"))["axisAlignedBoundingBox"]
     top = table["center"]["y"] + table["size"]["y"] / 2
@@ -145,9 +143,8 @@ def test_poses_rearrange_the_loose_objects(folder):
     assert sorted(o["objectType"] for o in loose) == ["AlarmClock", "Mug", "Mug"]
     ids = {o["objectId"] for o in loose}
     assert "AlarmClock|+00.50|+00.10|+00.50" in ids
-    assert {o["parentReceptacles"][0].split("|")[0] for o in loose if o["objectType"] == "Mug"} == {
-        "DiningTable"
-    }
+    mugs = [o for o in loose if o["objectType"] == "Mug"]
+    assert {o["parentReceptacles"][0].split("|")[0] for o in mugs} == {"DiningTable"}
     for place in (None, "", [0, 1, 0], {"x": math.inf}, {"x": 10**400}, {"w": 1}, {"x": "1"}):
         bench.refused("SetObjectPoses", objectPoses=[{"objectName": "Mug_1", "position": place}])
     bench.refused("SetObjectPoses", objectPoses=[{"objectName": "Mug_1"}])
@@ -155,17 +152,14 @@ def test_poses_rearrange_the_loose_objects(folder):
 
 
 def test_toggles_and_states_of_all(folder):
-    bench = Bench(Catalogue(folder), size=40)
-    bench.reset("FloorPlan901")
+    bench = Bench.at("FloorPlan901", catalogue=Catalogue(folder), size=40)
     bench.ok("SetObjectToggles", objectToggles=[{"objectType": "LightSwitch", "isOn": False}])
     assert not bench.object(bench.first("LightSwitch"))["isToggled"]
-    bench.ok("SetStateOfAllObjects", StateChange="CanBeDirty", forceAction=True)
+    bench.force("SetStateOfAllObjects", StateChange="CanBeDirty")
     assert all(o["isDirty"] for o in bench.metadata["objects"] if o["dirtyable"])
     bench.ok("SetStateOfAllObjects", StateChange="CanBeFilled", forceAction=False)
     assert not any(o["isFilledWithLiquid"] for o in bench.metadata["objects"])
-    bench.ok(
-        "SetObjectStates",
-        SetObjectStates={"objectType": "Drawer", "stateChange": "openable", "isOpen": True},
-    )
+    opened = {"objectType": "Drawer", "stateChange": "openable", "isOpen": True}
+    bench.ok("SetObjectStates", SetObjectStates=opened)
     assert all(o["isOpen"] for o in bench.metadata["objects"] if o["objectType"] == "Drawer")
     bench.refused("SetStateOfAllObjects", StateChange="CanBeMagic")

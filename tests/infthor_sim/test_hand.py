@@ -8,10 +8,9 @@ from .harness import Bench
 
 @pytest.fixture
 def bench() -> Bench:
-    new = Bench(size=40)
-    new.reset("kitchen-1")
+    new = Bench.at("kitchen-1", size=40)
     new.ok("RotateLook", rotation={"y": 180})
-    new.ok("PickupObject", objectId=new.first("SoapBottle"), forceAction=True)
+    new.force("PickupObject", new.first("SoapBottle"))
     return new
 
 
@@ -49,7 +48,7 @@ def test_an_object_can_be_teleported_from_the_hand_and_picked_up_again(bench):
              allowTeleportOutOfHand=True)  # fmt: skip
     assert bench.metadata["inventoryObjects"] == []
     assert bench.metadata["hand"]["localPosition"] == {"x": 0, "y": -0.16, "z": 0.38}
-    bench.ok("PickupObject", objectId=bottle, forceAction=True)
+    bench.force("PickupObject", bottle)
 
 
 def test_the_hand_of_an_arm_agent_is_zero():
@@ -139,7 +138,7 @@ def test_a_held_object_stands_upright_with_its_origin_at_the_hand(bench):
     bench.ok("Teleport", horizon=0, rotation={"y": 90})
     item = bench.sim.world.objects[knife]
     item.rotation = np.array([10.0, 33.0, 90.0])
-    bench.ok("PickupObject", objectId=knife, forceAction=True)
+    bench.force("PickupObject", knife)
     metadata = bench.ok("Teleport", horizon=0, rotation={"y": 90})
     pose = metadata["heldObjectPose"]
     assert pose["localPosition"] == pytest.approx({"x": 0.0, "y": -0.16, "z": 0.38})

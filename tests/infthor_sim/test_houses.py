@@ -1,6 +1,5 @@
 """ProcTHOR houses: through CreateHouse, as the Controller sends them."""
 
-import copy
 import gzip
 import json
 from typing import Any
@@ -20,21 +19,13 @@ def point(x: float, z: float, y: float = 0.0) -> dict[str, float]:
 
 def wall(room: str, x0: float, z0: float, x1: float, z1: float) -> dict[str, Any]:
     polygon = [point(x0, z0), point(x1, z1), point(x1, z1, 2.7), point(x0, z0, 2.7)]
-    return {
-        "id": f"wall|{room}|{x0}|{z0}|{x1}|{z1}",
-        "roomId": room,
-        "polygon": polygon,
-        "material": {"name": "A"},
-    }
+    name = f"wall|{room}|{x0}|{z0}|{x1}|{z1}"
+    return {"id": name, "roomId": room, "polygon": polygon, "material": {"name": "A"}}
 
 
 def room(name: str, room_type: str, *corners: tuple[float, float]) -> dict[str, Any]:
-    return {
-        "id": name,
-        "roomType": room_type,
-        "floorPolygon": [point(*c) for c in corners],
-        "ceilings": [],
-    }
+    floor = [point(*c) for c in corners]
+    return {"id": name, "roomType": room_type, "floorPolygon": floor, "ceilings": []}
 
 
 def furniture(
@@ -71,21 +62,11 @@ def house() -> dict[str, Any]:
         furniture("DiningTable|2|2", "Dining_Table_21_2", 1.0, 0.4, 2.0, 0, [apple]),
         furniture("Bed|3|1", "Bed_1", 7.5, 0.45, 2.9, 180),
     ]
-    agent = {
-        "position": point(2.5, 2.5, 0.95),
-        "rotation": {"x": 0, "y": 270, "z": 0},
-        "horizon": 30,
-        "standing": True,
-    }
-    return {
-        "rooms": [kitchen, bedroom],
-        "walls": walls,
-        "doors": [door],
-        "windows": [],
-        "objects": objects,
-        "metadata": {"agent": agent, "schema": "1.0.0"},
-        "proceduralParameters": {},
-    }
+    agent = {"position": point(2.5, 2.5, 0.95), "rotation": {"x": 0, "y": 270, "z": 0}}
+    agent |= {"horizon": 30, "standing": True}
+    parts = {"rooms": [kitchen, bedroom], "walls": walls, "doors": [door], "windows": []}
+    about = {"metadata": {"agent": agent, "schema": "1.0.0"}, "proceduralParameters": {}}
+    return {**parts, "objects": objects, **about}
 
 
 def furnished_house() -> dict[str, Any]:
@@ -105,8 +86,7 @@ def furnished_house() -> dict[str, Any]:
 
 
 def test_objects_of_a_house_keep_their_ids():
-    bench = Bench(size=20)
-    bench.reset("Procedural")
+    bench = Bench.at("Procedural", size=20)
     bench.ok("CreateHouse", house=furnished_house())
     before = {o["objectId"] for o in bench.metadata["objects"]}
     loose = [
@@ -119,11 +99,9 @@ def test_objects_of_a_house_keep_their_ids():
     bench.ok("InitialRandomSpawn", randomSeed=3)
     assert {o["objectId"] for o in bench.metadata["objects"]} == before
     bench.ok("SetObjectPoses", objectPoses=[loose[0], loose[0]])
-    named = [o for o in bench.metadata["objects"] if o["pickupable"]]
-    assert [o["objectId"] for o in named] == [
-        loose[0]["objectName"],
-        f"{loose[0]['objectName']}_copy_1",
-    ]
+    named = [o["objectId"] for o in bench.metadata["objects"] if o["pickupable"]]
+    first = loose[0]["objectName"]
+    assert named == [first, f"{first}_copy_1"]
 
 
 def test_a_house_through_the_controller(launch):
@@ -131,25 +109,16 @@ def test_a_house_through_the_controller(launch):
     event = controller.last_event
     check(event.metadata)
     objects = {o["objectId"]: o for o in event.metadata["objects"]}
-    assert set(objects) >= {
-        "Fridge|2|1",
-        "DiningTable|2|2",
-        "Bed|3|1",
-        "Apple|surface|2|4",
-        "room|2",
-        "room|3",
-    }
+    assert set(objects) >= {"Fridge|2|1", "DiningTable|2|2", "Bed|3|1", "room|2", "room|3"}
     assert objects["Apple|surface|2|4"]["parentReceptacles"] == ["DiningTable|2|2"]
     assert event.metadata["agent"]["position"]["x"] == pytest.approx(2.5, abs=0.13)
     assert event.metadata["agent"]["cameraHorizon"] == 30
-    cells = {
-        (p["x"], p["z"]) for p in controller.step("GetReachablePositions").metadata["actionReturn"]
-    }
+    listed = controller.step("GetReachablePositions").metadata["actionReturn"]
+    cells = {(p["x"], p["z"]) for p in listed}
     assert (6.0, 1.5) in cells, "the doorway joins the rooms"
     assert (4.0, 5.0) not in cells, "outside the L"
-    assert controller.step("OpenObject", objectId="Fridge|2|1", forceAction=True).metadata[
-        "lastActionSuccess"
-    ]
+    opened = controller.step("OpenObject", objectId="Fridge|2|1", forceAction=True)
+    assert opened.metadata["lastActionSuccess"]
 
 
 def test_without_its_doorway_the_rooms_are_apart():
@@ -161,68 +130,42 @@ def test_without_its_doorway_the_rooms_are_apart():
 
 def test_assets_have_their_sizes_where_the_folder_has_them(tmp_path):
     (tmp_path / "procthor").mkdir()
-    with gzip.open(
-        tmp_path / "procthor" / "asset-database.json.gz", "wt", encoding="utf-8"
-    ) as file:
-        json.dump(
-            {"Fridge": [{"assetId": "Fridge_11", "boundingBox": {"x": 0.8, "y": 1.7, "z": 0.7}}]},
-            file,
-        )
+    path = tmp_path / "procthor" / "asset-database.json.gz"
+    fridge = {"assetId": "Fridge_11", "boundingBox": {"x": 0.8, "y": 1.7, "z": 0.7}}
+    path.write_bytes(gzip.compress(json.dumps({"Fridge": [fridge]}).encode()))
     world = Catalogue(tmp_path).house(house())
     assert world.objects["Fridge|2|1"].box_size.tolist() == [0.8, 1.7, 0.7]
-    with gzip.open(
-        tmp_path / "procthor" / "asset-database.json.gz", "wt", encoding="utf-8"
-    ) as file:
-        file.write("[1]")
+    path.write_bytes(gzip.compress(b"[1]"))
     with pytest.raises(DataError, match="asset-database"):
         Catalogue(tmp_path).house(house())
 
 
-def without_rooms(bad):
-    del bad["rooms"]
+MALFORMED = {
+    "without rooms": lambda bad: bad.pop("rooms"),
+    "without walls": lambda bad: bad.pop("walls"),
+    # Python has such an integer, and no such float
+    "beyond numbers": lambda bad: bad["walls"][0]["polygon"][0].update(x=10**400),
+    "a name that no message carries": lambda bad: bad["objects"][0].update(id="Fridge|\ud800"),
+}
 
 
-def without_walls(bad):
-    del bad["walls"]
-
-
-def with_a_wall_beyond_numbers(bad):
-    bad["walls"][0]["polygon"][0]["x"] = 10**400  # Python has such an integer, and no such float
-
-
-def with_a_name_that_no_message_carries(bad):
-    bad["objects"][0]["id"] = "Fridge|\ud800"
-
-
-@pytest.mark.parametrize(
-    "break_it",
-    [
-        without_rooms,
-        without_walls,
-        with_a_wall_beyond_numbers,
-        with_a_name_that_no_message_carries,
-    ],
-)
-def test_malformed_houses_are_refused(break_it):
-    bench = Bench(size=20)
-    bench.ok("Reset", sceneName="Procedural")
-    bench.ok("Initialize", fastActionEmit=False)
-    bad = copy.deepcopy(house())
-    break_it(bad)
+@pytest.mark.parametrize("fault", MALFORMED)
+def test_malformed_houses_are_refused(fault):
+    bench = Bench.at("Procedural", size=20)
+    bad = house()
+    MALFORMED[fault](bad)
     assert "ProcTHOR" in bench.refused("CreateHouse", house=bad)
     bench.ok("CreateHouse", house=house())
 
 
 @pytest.mark.parametrize("far", [1e30, float("nan"), -201.0])
 def test_floors_without_end_are_refused_at_once(far):
-    bad = copy.deepcopy(house())
+    bad = house()
     bad["rooms"][1]["floorPolygon"][2]["z"] = far
     with pytest.raises(DataError, match="a floor reaches to"):
         Catalogue().house(bad)
 
 
 def test_an_error_may_quote_what_no_message_carries():
-    bench = Bench(size=20)
-    bench.ok("Reset", sceneName="Procedural")
-    bench.ok("Initialize", fastActionEmit=False)
+    bench = Bench.at("Procedural", size=20)
     assert "\\ud800" in bench.refused("CreateHouse", house="\ud800")

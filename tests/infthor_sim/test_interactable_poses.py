@@ -19,29 +19,24 @@ ANSWERS = {
 
 
 def answer(bench: Bench, object_type: str, **arguments: object) -> tuple[int, str]:
-    poses = bench.ok("GetInteractablePoses", objectId=bench.first(object_type), **arguments)[
-        "actionReturn"
-    ]
+    poses = bench.ok("GetInteractablePoses", bench.first(object_type), **arguments)["actionReturn"]
     return len(poses), hashlib.sha256(json.dumps(poses).encode()).hexdigest()[:16]
 
 
 @pytest.mark.parametrize("scene", ["kitchen-1", "bathroom-1", "bedroom-2"])
 def test_answers_are_what_they_were(scene):
-    bench = Bench(size=300)
-    bench.reset(scene)
+    bench = Bench.at(scene, size=300)
     kinds = {kind: value for (where, kind), value in ANSWERS.items() if where == scene}
     assert {kind: answer(bench, kind) for kind in kinds} == kinds
 
 
 def test_a_camera_off_the_middle_of_its_agent_moves_as_it_turns():
-    bench = Bench(size=60)
-    bench.reset("kitchen-3", agentMode="stretch")
+    bench = Bench.at("kitchen-3", agentMode="stretch", size=60)
     turns = {"horizons": [-13, 0, 22.5], "rotations": [0, 33, -90, 405]}
     assert answer(bench, "Fridge", **turns) == (282, "9a833d8af6c6aec7")
 
 
 @pytest.mark.parametrize("empty", ["horizons", "rotations", "standings", "positions"])
 def test_nothing_is_seen_from_nowhere(empty):
-    bench = Bench(size=20)
-    bench.reset("kitchen-1")
+    bench = Bench.at("kitchen-1", size=20)
     assert answer(bench, "Fridge", **{empty: []})[0] == 0

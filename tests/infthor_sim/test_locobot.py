@@ -27,13 +27,13 @@ def test_its_camera_is_low_narrow_and_tilts_little(robot):
     robot.ok("LookDown")
     assert "beyond 30 degrees" in robot.refused("LookDown")
     assert "must be in [-30:30]" in robot.refused("Teleport", horizon=45)
-    found = robot.ok("GetInteractablePoses", objectId=robot.first("Sofa"), standings=[True])
+    found = robot.ok("GetInteractablePoses", robot.first("Sofa"), standings=[True])
     assert {pose["horizon"] for pose in found["actionReturn"]} <= {-30.0, 0.0, 30.0}
 
 
 @pytest.mark.parametrize("action", ["PickupObject", "OpenObject", "PushObject", "Crouch"])
 def test_it_can_do_nothing_to_objects(robot, action):
-    assert robot.refused(action, objectId=robot.first("Sofa")) == f"Invalid action: {action}"
+    assert robot.refused(action, robot.first("Sofa")) == f"Invalid action: {action}"
 
 
 def test_it_moves_sideways_only_if_allowed(robot):
@@ -129,6 +129,6 @@ def test_what_the_expert_cannot_do():
     fridge = bench.first("Fridge")
     inside = bench.object(fridge)["axisAlignedBoundingBox"]["center"]
     egg = {"objectId": bench.first("Egg")}
-    bench.ok("TeleportObject", **egg, position=inside, rotation={}, forceAction=True)
+    bench.force("TeleportObject", **egg, position=inside, rotation={})
     with pytest.raises(AssertionError, match="is not visible from the end of the way to it"):
         follow(bench, **egg)

@@ -9,8 +9,7 @@ from .harness import Bench
 
 @pytest.fixture(scope="module")
 def bench() -> Bench:
-    new = Bench(size=20)
-    new.reset("bathroom-1")
+    new = Bench.at("bathroom-1", size=20)
     return new
 
 
@@ -50,14 +49,11 @@ def test_wording(bench, call, message, code):
 
 
 def test_unknown_arguments_are_named_with_the_accepted_ones(kitchen):
-    kitchen.reset("kitchen-1")
     with pytest.raises(ValueError, match="called with invalid argument: 'z'") as raised:
         kitchen.step("PutObject", x=0.0, y=0.0, z=1.0, forceAction=False, placeStationary=True)
     message = str(raised.value)
-    assert (
-        "Expected arguments: String objectId = , float x = , float y = , Boolean forceAction = "
-        "False" in message
-    )
+    expected = "String objectId = , float x = , float y = , Boolean forceAction = False"
+    assert f"Expected arguments: {expected}" in message
     assert "Your arguments: 'x', 'y', 'z', 'forceAction', 'placeStationary'" in message
     with pytest.raises(ValueError, match="invalid arguments: 'noise', 'pace'"):
         kitchen.step("MoveAhead", noise=1, pace=2)
@@ -79,13 +75,12 @@ def test_an_error_has_a_code_only_where_unity_has_one(bench):
 
 
 def test_flow_images_are_refused(kitchen):
-    kitchen.reset("kitchen-1")
     with pytest.raises(ValueError, match="renderFlowImage is not offered"):
         kitchen.step("Pass", renderFlowImage=True)
 
 
 def test_the_transport_can_be_tried(kitchen):
-    event = kitchen.reset("kitchen-1")
+    event = kitchen.last_event
     echoed = kitchen.step("TestFastEmit", rvalue="foo")
     assert echoed.metadata["actionReturn"] == "foo"
     assert echoed.metadata["objects"] is event.metadata["objects"]

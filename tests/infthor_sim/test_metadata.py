@@ -37,9 +37,7 @@ def test_every_kind_of_scene(scene):
     assert all(_ID.fullmatch(i) for i in ids)
 
 
-def test_nulls_where_not_applicable():
-    bench = Bench()
-    bench.reset("kitchen-1")
+def test_nulls_where_not_applicable(bench):
     apple, fridge = bench.object(bench.first("Apple")), bench.object(bench.first("Fridge"))
     assert apple["receptacleObjectIds"] is None
     assert apple["objectOrientedBoundingBox"] is not None
@@ -61,13 +59,13 @@ def test_boxes_contain_the_position_of_upright_things():
 def test_ids_are_printed_as_unity_prints_them():
     from infthor_sim.geometry import object_id
 
-    assert object_id("AlarmClock", (2.6857, 1.2324, 1.3974)) == "AlarmClock|+02.69|+01.23|+01.40"
-    assert (
-        object_id("CellPhone", (-1.96499991, 0.593926966, 0.9192637))
-        == "CellPhone|-01.97|+00.59|+00.92"
-    )
-    assert object_id("Cloth", (0.705, -0.00154149532, -2.75)) == "Cloth|+00.71|00.00|-02.75"
-    assert object_id("Floor", (0.0, 0.0, 0.0)) == "Floor|+00.00|+00.00|+00.00"
+    for position, printed in (
+        ((2.6857, 1.2324, 1.3974), "+02.69|+01.23|+01.40"),
+        ((-1.96499991, 0.593926966, 0.9192637), "-01.97|+00.59|+00.92"),
+        ((0.705, -0.00154149532, -2.75), "+00.71|00.00|-02.75"),
+        ((0.0, 0.0, 0.0), "+00.00|+00.00|+00.00"),
+    ):
+        assert object_id("Cloth", position) == f"Cloth|{printed}"
 
 
 def test_the_scene_has_the_name_of_its_physics_scene():
@@ -79,33 +77,27 @@ def test_the_scene_has_the_name_of_its_physics_scene():
 
 
 @pytest.mark.parametrize("object_type", ["Fridge", "Drawer", "Cabinet", "Microwave"])
-def test_a_box_holds_the_open_door(object_type):
-    bench = Bench(size=20)
-    bench.reset("kitchen-1")
+def test_a_box_holds_the_open_door(bench, object_type):
     name = bench.first(object_type)
     closed = bench.object(name)["axisAlignedBoundingBox"]
-    bench.ok("OpenObject", objectId=name, openness=0.5, forceAction=True)
+    bench.force("OpenObject", name, openness=0.5)
     half = bench.object(name)["axisAlignedBoundingBox"]
-    bench.ok("OpenObject", objectId=name, forceAction=True)
+    bench.force("OpenObject", name)
     wide = bench.object(name)["axisAlignedBoundingBox"]
     assert closed["size"] != half["size"] != wide["size"]
     low = np.min(wide["cornerPoints"], axis=0)
     assert (low <= np.min(closed["cornerPoints"], axis=0)).all()
-    bench.ok("CloseObject", objectId=name, forceAction=True)
+    bench.force("CloseObject", name)
     assert bench.object(name)["axisAlignedBoundingBox"] == closed
 
 
-def test_open_object_takes_the_old_name_of_openness():
-    bench = Bench(size=20)
-    bench.reset("kitchen-1")
+def test_open_object_takes_the_old_name_of_openness(bench):
     fridge = bench.first("Fridge")
     for magnitude, openness in ((0.65, 0.65), (0, 1.0)):
-        bench.ok("OpenObject", objectId=fridge, moveMagnitude=magnitude, forceAction=True)
+        bench.force("OpenObject", fridge, moveMagnitude=magnitude)
         assert bench.object(fridge)["openness"] == openness
     for wrong in (-0.5, 1.5):
-        assert "must be in" in bench.refused(
-            "OpenObject", objectId=fridge, openness=wrong, forceAction=True
-        )
+        assert "must be in" in bench.refused("OpenObject", fridge, openness=wrong, forceAction=True)
 
 
 def test_time_passes_with_actions():
@@ -114,7 +106,7 @@ def test_time_passes_with_actions():
     assert start == 0.04  # Reset and Initialize
     assert bench.ok("GetReachablePositions")["currentTime"] == start
     assert bench.ok("Pass")["currentTime"] == 0.06
-    bench.refused("PickupObject", objectId="Mug|none")
+    bench.refused("PickupObject", "Mug|none")
     assert bench.metadata["currentTime"] == 0.08
     for _ in range(50):
         bench.ok("RotateRight")
@@ -134,21 +126,12 @@ def test_the_size_of_the_map_is_told_once():
 
 
 def test_old_keys_are_there_and_empty(kitchen):
-    metadata = kitchen.reset("kitchen-1").metadata
+    metadata = kitchen.last_event.metadata
     assert metadata["actionIntReturn"] == metadata["actionFloatReturn"] == 0
     assert metadata["visibleRange"] is metadata["colorBounds"] is None
-    for key in (
-        "distances",
-        "normals",
-        "flatSurfacesOnGrid",
-        "isOpenableGrid",
-        "segmentedObjectIds",
-        "objectIdsInBox",
-        "actionFloatsReturn",
-        "actionStringsReturn",
-        "actionVector3sReturn",
-    ):
-        assert metadata[key] == []
+    lists = {"distances", "normals", "flatSurfacesOnGrid", "isOpenableGrid", "segmentedObjectIds"}
+    lists |= {"objectIdsInBox", "actionFloatsReturn", "actionStringsReturn", "actionVector3sReturn"}
+    assert all(metadata[key] == [] for key in lists)
 
 
 def test_every_action_is_described():

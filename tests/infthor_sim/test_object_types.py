@@ -12,8 +12,6 @@ from infthor_sim.object_types import (
     type_named,
 )
 from infthor_sim.objects import default_object
-from infthor_sim.pictures.instances import instance_color
-from infthor_sim.player.fifo import FieldType
 from infthor_sim.render.shapes.catalogue import SHAPES, shape
 
 from .harness import Bench
@@ -29,17 +27,14 @@ CRATE = ObjectType("Crate", (0.4, 0.3, 0.4), receptacle=True, takes=("food", "Wh
 def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
     for declared in (WHISK, CRATE):
         monkeypatch.setitem(OBJECT_TYPES, declared.name, declared)
-    new = Bench(size=150)
-    new.reset("kitchen-1", renderInstanceSegmentation=True)
+    new = Bench.at("kitchen-1", renderInstanceSegmentation=True, size=150)
     return new
 
 
 def lay_on_table(bench: Bench, object_type: str) -> tuple[str, str]:
     """Puts an object of a new type on the table and keeps the first mug; ids of both."""
-    mug, table = (
-        bench.object(bench.first("Mug")),
-        bench.object(bench.first("DiningTable"))["axisAlignedBoundingBox"],
-    )
+    mug = bench.object(bench.first("Mug"))
+    table = bench.object(bench.first("DiningTable"))["axisAlignedBoundingBox"]
     middle = {**table["center"], "y": table["center"]["y"] + table["size"]["y"] / 2}
     poses = [
         {"objectName": mug["name"], "position": mug["position"], "rotation": mug["rotation"]},
@@ -56,13 +51,12 @@ def test_a_record_makes_a_thing_that_is_drawn_picked_up_and_put_where_its_catego
     assert (item["pickupable"], item["mass"], item["salientMaterials"]) == (True, 0.1, ["Metal"])
     assert list(item["axisAlignedBoundingBox"]["size"].values()) == pytest.approx(WHISK.size)
     bench.stand_before(whisk)
-    pixels = np.frombuffer(bench.frames[FieldType.IDS], dtype=np.uint8).reshape(-1, 4)[:, :3]
-    assert (pixels == instance_color(whisk)).all(axis=1).any()
-    bench.ok("PickupObject", objectId=whisk)
+    assert bench.shows(whisk).any()
+    bench.ok("PickupObject", whisk)
     assert "cannot be placed" in bench.refused(
-        "PutObject", objectId=bench.first("Toaster"), forceAction=True
+        "PutObject", bench.first("Toaster"), forceAction=True
     )
-    bench.ok("PutObject", objectId=mug, forceAction=True)
+    bench.force("PutObject", mug)
     assert bench.object(whisk)["parentReceptacles"] == [mug]
 
 
@@ -71,19 +65,18 @@ def test_a_record_makes_a_receptacle_that_takes_what_it_names(bench):
     crate = default_object("Crate", world.agent.position * (1, 0, 1))
     world.add(crate)
     whisk, mug = lay_on_table(bench, "Whisk")
-    bench.ok("PickupObject", objectId=mug, forceAction=True)
-    assert "cannot be placed" in bench.refused(
-        "PutObject", objectId=crate.object_id, forceAction=True
-    )
+    bench.force("PickupObject", mug)
+    assert "cannot be placed" in bench.refused("PutObject", crate.object_id, forceAction=True)
     bench.ok("DropHandObject")
-    bench.ok("PickupObject", objectId=whisk, forceAction=True)
-    bench.ok("PutObject", objectId=crate.object_id, forceAction=True)
+    bench.force("PickupObject", whisk)
+    bench.force("PutObject", crate.object_id)
     assert bench.object(crate.object_id)["receptacleObjectIds"] == [whisk]
     assert world.objects[whisk].bounds()[0][1] < crate.bounds()[1][1], "it stands inside"
 
 
 def test_a_type_without_a_look_of_its_own_is_a_box_that_fills_its_size():
     item = default_object("Gizmo", np.zeros(3))
+    assert len(shape(item)) == 1
     item.type, item.box_size = WHISK, np.array(WHISK.size)
     (part,) = shape(item)
     assert np.asarray(part.half) * 2 == pytest.approx(WHISK.size)

@@ -10,13 +10,6 @@ from infthor_sim.physics.receptacles import surfaces
 from .harness import Bench
 
 
-@pytest.fixture
-def bench() -> Bench:
-    new = Bench(size=40)
-    new.reset("kitchen-1")
-    return new
-
-
 def bottom(bench: Bench, object_id: str) -> float:
     return min(
         corner[1] for corner in bench.object(object_id)["axisAlignedBoundingBox"]["cornerPoints"]
@@ -24,12 +17,8 @@ def bottom(bench: Bench, object_id: str) -> float:
 
 
 def free_point(bench: Bench, receptacle: str, object_id: str) -> dict[str, float]:
-    for point in bench.ok("GetSpawnCoordinatesAboveReceptacle", objectId=receptacle)[
-        "actionReturn"
-    ]:
-        if bench.step("PlaceObjectAtPoint", objectId=object_id, position=point)[
-            "lastActionSuccess"
-        ]:
+    for point in bench.ok("GetSpawnCoordinatesAboveReceptacle", receptacle)["actionReturn"]:
+        if bench.step("PlaceObjectAtPoint", object_id, position=point)["lastActionSuccess"]:
             return point
     raise AssertionError(f"no room on {receptacle}")
 
@@ -40,9 +29,9 @@ def test_an_object_stands_on_a_point_of_a_receptacle(bench):
     assert bottom(bench, mug) == pytest.approx(point["y"], abs=1e-3)
     assert bench.object(mug)["parentReceptacles"] == [table]
     apple = bench.first("Apple")
-    assert "not clear" in bench.refused("PlaceObjectAtPoint", objectId=apple, position=point)
+    assert "not clear" in bench.refused("PlaceObjectAtPoint", apple, position=point)
     outside = {"x": 40, "y": 0, "z": 0}
-    assert "not clear" in bench.refused("PlaceObjectAtPoint", objectId=apple, position=outside)
+    assert "not clear" in bench.refused("PlaceObjectAtPoint", apple, position=outside)
 
 
 @pytest.mark.parametrize(
@@ -61,16 +50,14 @@ def test_vessels_are_hollow(bench, vessel, kind):
     for new in (around, item):
         bench.sim.world.add(new)
     (cavity,) = surfaces(around)
-    bench.ok("PlaceObjectAtPoint", objectId=item.object_id, position=to_xyz(cavity.center))
+    bench.ok("PlaceObjectAtPoint", item.object_id, position=to_xyz(cavity.center))
     assert bench.object(item.object_id)["parentReceptacles"] == [around.object_id]
     assert bottom(bench, item.object_id) == pytest.approx(cavity.center[1], abs=1e-4)
     rim = cavity.center + np.array([around.box_size[0] / 2, 0.0, 0.0])
-    assert around.name in bench.refused(
-        "PlaceObjectAtPoint", objectId=item.object_id, position=to_xyz(rim)
-    )
+    assert around.name in bench.refused("PlaceObjectAtPoint", item.object_id, position=to_xyz(rim))
     below = cavity.center - [0.0, 0.05, 0.0]
     assert around.name in bench.refused(
-        "PlaceObjectAtPoint", objectId=item.object_id, position=to_xyz(below)
+        "PlaceObjectAtPoint", item.object_id, position=to_xyz(below)
     )
 
 
@@ -80,40 +67,34 @@ def test_a_closed_box_is_solid_and_so_is_what_is_too_small(bench):
     for new in (carton, bowl):
         bench.sim.world.add(new)
     inside = to_xyz(surfaces(carton)[0].center)
-    bench.ok("PlaceObjectAtPoint", objectId=bowl.object_id, position=inside)
-    bench.ok("PlaceObjectAtPoint", objectId=bowl.object_id, position={**inside, "y": 2.0})
-    bench.ok("CloseObject", objectId=carton.object_id, forceAction=True)
-    assert carton.name in bench.refused(
-        "PlaceObjectAtPoint", objectId=bowl.object_id, position=inside
-    )
+    bench.ok("PlaceObjectAtPoint", bowl.object_id, position=inside)
+    bench.ok("PlaceObjectAtPoint", bowl.object_id, position={**inside, "y": 2.0})
+    bench.force("CloseObject", carton.object_id)
+    assert carton.name in bench.refused("PlaceObjectAtPoint", bowl.object_id, position=inside)
     bread = default_object("Bread", np.array([0.0, 2.2, 0.0]))
     bench.sim.world.add(bread)
     within = to_xyz(surfaces(bowl)[0].center)
-    assert bowl.name in bench.refused(
-        "PlaceObjectAtPoint", objectId=bread.object_id, position=within
-    )
+    assert bowl.name in bench.refused("PlaceObjectAtPoint", bread.object_id, position=within)
 
 
 def test_a_held_object_can_be_placed(bench):
     apple = bench.first("Apple")
-    bench.ok("PickupObject", objectId=apple, forceAction=True)
+    bench.force("PickupObject", apple)
     free_point(bench, bench.first("DiningTable"), apple)
     assert bench.metadata["inventoryObjects"] == []
 
 
 def test_points_above_a_receptacle(bench):
     table = bench.first("DiningTable")
-    points = bench.ok("GetSpawnCoordinatesAboveReceptacle", objectId=table)["actionReturn"]
+    points = bench.ok("GetSpawnCoordinatesAboveReceptacle", table)["actionReturn"]
     low, high = bench.sim.world.objects[table].bounds()
     assert len(points) > 50
     assert all(low[0] <= p["x"] <= high[0] and low[2] <= p["z"] <= high[2] for p in points)
     bench.stand_before(table)
-    seen = bench.ok("GetSpawnCoordinatesAboveReceptacle", objectId=table, anywhere=False)[
-        "actionReturn"
-    ]
+    seen = bench.ok("GetSpawnCoordinatesAboveReceptacle", table, anywhere=False)["actionReturn"]
     assert len(seen) < len(points)
     assert "not a receptacle" in bench.refused(
-        "GetSpawnCoordinatesAboveReceptacle", objectId=bench.first("Apple")
+        "GetSpawnCoordinatesAboveReceptacle", bench.first("Apple")
     )
 
 
@@ -122,27 +103,19 @@ def test_a_teleported_object_falls_unless_it_is_kinematic(bench):
     agent = bench.metadata["agent"]["position"]
     high = {"x": agent["x"], "y": 2.0, "z": agent["z"]}
     still = {"x": 0, "y": 0, "z": 0}
-    bench.ok("TeleportObject", objectId=apple, position=high, rotation=still, forceKinematic=True)
+    bench.ok("TeleportObject", apple, position=high, rotation=still, forceKinematic=True)
     assert bench.object(apple)["position"] == pytest.approx(high)
-    bench.ok("TeleportObject", objectId=apple, rotation=still, **high)
+    bench.ok("TeleportObject", apple, rotation=still, **high)
     assert bottom(bench, apple) == pytest.approx(0, abs=0.01)
     wall = {"x": 50, "y": 2.0, "z": 0}
-    assert "in the way" in bench.refused(
-        "TeleportObject", objectId=apple, position=wall, rotation=still
-    )
-    bench.ok(
-        "TeleportObject",
-        objectId=apple,
-        positions=[wall, high],
-        rotation=still,
-        forceKinematic=True,
-    )
+    assert "in the way" in bench.refused("TeleportObject", apple, position=wall, rotation=still)
+    bench.ok("TeleportObject", apple, positions=[wall, high], rotation=still, forceKinematic=True)
     assert bench.object(apple)["position"] == pytest.approx(high)
 
 
 def test_a_held_object_is_teleported_on_demand_only(bench):
     apple = bench.first("Apple")
-    bench.ok("PickupObject", objectId=apple, forceAction=True)
+    bench.force("PickupObject", apple)
     place = {
         "objectId": apple,
         "position": {"x": 0, "y": 2, "z": 0},
@@ -158,13 +131,7 @@ def test_furniture_can_be_teleported(bench):
     fridge = bench.first("Fridge")
     pose = bench.object(fridge)
     aside = {**pose["position"], "x": pose["position"]["x"] + 0.1}
-    bench.ok(
-        "TeleportObject",
-        objectId=fridge,
-        position=aside,
-        rotation=pose["rotation"],
-        forceAction=True,
-    )
+    bench.force("TeleportObject", fridge, position=aside, rotation=pose["rotation"])
     assert bench.object(fridge)["position"] == pytest.approx(aside)
 
 
@@ -172,24 +139,24 @@ def test_a_disabled_object_is_gone_until_it_is_enabled(bench):
     mug, table = bench.first("Mug"), bench.first("DiningTable")
     free_point(bench, table, mug)
     before = bench.object(mug)
-    bench.ok("DisableObject", objectId=mug)
+    bench.ok("DisableObject", mug)
     assert mug not in {o["objectId"] for o in bench.metadata["objects"]}
     assert mug not in bench.object(table)["receptacleObjectIds"]
-    bench.refused("PickupObject", objectId=mug, forceAction=True)
-    bench.ok("EnableObject", objectId=mug)
+    bench.refused("PickupObject", mug, forceAction=True)
+    bench.ok("EnableObject", mug)
     assert bench.object(mug)["position"] == before["position"]
     assert bench.object(mug)["parentReceptacles"] == [table]
-    bench.ok("EnableObject", objectId=mug)
-    bench.refused("EnableObject", objectId="Mug|+09.00|+09.00|+09.00")
+    bench.ok("EnableObject", mug)
+    bench.refused("EnableObject", "Mug|+09.00|+09.00|+09.00")
 
 
 def test_contents_of_a_disabled_receptacle_return_to_it(bench):
     world = bench.sim.world
     drawer = next(o for o in world.objects.values() if o.object_type == "Drawer" and o.contents)
     inside = list(drawer.contents)
-    bench.ok("DisableObject", objectId=drawer.object_id)
+    bench.ok("DisableObject", drawer.object_id)
     assert all(bench.object(content)["parentReceptacles"] is None for content in inside)
-    bench.ok("EnableObject", objectId=drawer.object_id)
+    bench.ok("EnableObject", drawer.object_id)
     assert set(inside) <= set(bench.object(drawer.object_id)["receptacleObjectIds"])
 
 
@@ -197,7 +164,7 @@ def test_contents_of_a_disabled_receptacle_return_to_it(bench):
 def test_a_push_goes_the_way_of_its_angle(bench, angle):
     apple, place = in_the_open(bench)
     bench.ok("RotateLook", rotation={"y": 90})
-    bench.ok("DirectionalPush", objectId=apple, pushAngle=angle, moveMagnitude=15, forceAction=True)
+    bench.force("DirectionalPush", apple, pushAngle=angle, moveMagnitude=15)
     now = bench.object(apple)["position"]
     way = np.array([now["x"] - place["x"], now["z"] - place["z"]])
     direction = np.array([np.sin(np.radians(90 + angle)), np.cos(np.radians(90 + angle))])
@@ -217,7 +184,7 @@ def in_the_open(bench: Bench) -> tuple[str, dict[str, float]]:
         key=lambda c: sum(world.nav.count_free_ahead(*c, yaw) for yaw in (0.0, 90.0, 180.0, 270.0)),
     )
     still = {"x": 0, "y": 0, "z": 0}
-    bench.ok("TeleportObject", objectId=apple, x=x, y=1.0, z=z, rotation=still, forceAction=True)
+    bench.force("TeleportObject", apple, x=x, y=1.0, z=z, rotation=still)
     return apple, bench.object(apple)["position"]
 
 
@@ -226,7 +193,7 @@ def test_a_stronger_push_goes_farther_and_nothing_goes_through_walls(bench):
     ways = []
     for force in (5, 15, 100000):
         apple, place = in_the_open(bench)
-        bench.ok("PushObject", objectId=apple, moveMagnitude=force, forceAction=True)
+        bench.force("PushObject", apple, moveMagnitude=force)
         now = bench.object(apple)["position"]
         ways.append(np.hypot(now["x"] - place["x"], now["z"] - place["z"]))
         assert low[0] <= now["x"] <= high[0]
@@ -240,9 +207,7 @@ def test_pushed_off_the_edge_it_falls(bench):
     free_point(bench, table, apple)
     level = bottom(bench, apple)
     for angle in (0, 90, 180, 270):
-        bench.ok(
-            "DirectionalPush", objectId=apple, pushAngle=angle, moveMagnitude=60, forceAction=True
-        )
+        bench.force("DirectionalPush", apple, pushAngle=angle, moveMagnitude=60)
         if bottom(bench, apple) < level - 0.2:
             assert bench.object(apple)["parentReceptacles"] != [table]
             return
@@ -251,19 +216,19 @@ def test_pushed_off_the_edge_it_falls(bench):
 
 def test_what_cannot_be_pushed(bench):
     assert "Pickupable or Moveable" in bench.refused(
-        "PushObject", objectId=bench.first("Fridge"), forceAction=True
+        "PushObject", bench.first("Fridge"), forceAction=True
     )
     apple = bench.first("Apple")
-    bench.refused("PullObject", objectId=apple, moveMagnitude=0, forceAction=True)
-    bench.ok("PickupObject", objectId=apple, forceAction=True)
-    assert "Throw" in bench.refused("PullObject", objectId=apple, forceAction=True)
+    bench.refused("PullObject", apple, moveMagnitude=0, forceAction=True)
+    bench.force("PickupObject", apple)
+    assert "Throw" in bench.refused("PullObject", apple, forceAction=True)
 
 
 def test_a_push_leaves_things_in_what_is_closed(bench):
     world = bench.sim.world
     inside = next(o for o in world.objects.values() if world.is_hidden(o) and o.type.pickupable)
     outer = inside.parent
-    bench.ok("PushObject", objectId=inside.object_id, moveMagnitude=500, forceAction=True)
+    bench.force("PushObject", inside.object_id, moveMagnitude=500)
     assert bench.object(inside.object_id)["parentReceptacles"] == [outer]
 
 
@@ -271,7 +236,7 @@ def test_a_thing_teleported_into_the_tray_of_an_open_drawer_is_in_it_and_goes_wi
     world = bench.sim.world
     drawer = next(o for o in world.objects.values() if o.object_type == "Drawer" and o.contents)
     item = next(o for o in world.objects.values() if o.object_id in drawer.contents)
-    bench.ok("OpenObject", objectId=drawer.object_id, openness=1.0, forceAction=True)
+    bench.force("OpenObject", drawer.object_id, openness=1.0)
     out = bench.object(item.object_id)
     aside = {**out["position"], "y": out["position"]["y"] + 1.0}
     for position in (aside, out["position"]):
@@ -284,14 +249,13 @@ def test_a_thing_teleported_into_the_tray_of_an_open_drawer_is_in_it_and_goes_wi
         == out["parentReceptacles"]
         == [drawer.object_id]
     )
-    bench.ok("CloseObject", objectId=drawer.object_id, forceAction=True)
+    bench.force("CloseObject", drawer.object_id)
     assert bench.object(item.object_id)["position"] != out["position"]
 
 
 @pytest.mark.parametrize("scene", ["kitchen-2", "kitchen-3", "kitchen-5"])
 def test_a_push_takes_what_is_in_its_way_along_and_nothing_through_it(scene):
-    bench = Bench(size=60)
-    bench.reset(scene)
+    bench = Bench.at(scene, size=60)
     world = bench.sim.world
     table = world.objects[bench.first("DiningTable")]
     low, high = table.bounds()
@@ -308,13 +272,7 @@ def test_a_push_takes_what_is_in_its_way_along_and_nothing_through_it(scene):
         world.attach(item, table)
     gap = second.bounds()[0][2] - first.bounds()[1][2]
     angle = -bench.metadata["agent"]["rotation"]["y"]  # towards +z
-    bench.ok(
-        "DirectionalPush",
-        objectId=first.object_id,
-        pushAngle=angle,
-        moveMagnitude=20,
-        forceAction=True,
-    )
+    bench.force("DirectionalPush", first.object_id, pushAngle=angle, moveMagnitude=20)
     first = world.objects["Apple|pushed"]
     second = world.objects["Tomato|pushed"]
     assert gap > 0.02
@@ -330,14 +288,14 @@ def test_nothing_is_put_into_closed_furniture_unless_forced(bench, kind):
     name = bench.object(furniture)["name"]
     assert bench.refused("TeleportObject", **pose, rotation={}).startswith(name)
     assert f"({name} is in the way)" in bench.refused("PlaceObjectAtPoint", **pose)
-    bench.ok("TeleportObject", **pose, rotation={}, forceAction=True)
+    bench.force("TeleportObject", **pose, rotation={})
 
 
 def test_what_is_dropped_ahead_lands_in_front_of_the_agent(bench):
     potato = bench.first("Potato")
     assert "Nothing in agent's hand" in bench.refused("DropHeldObjectAhead")
-    bench.ok("PickupObject", objectId=potato, forceAction=True)
-    bench.ok("DropHeldObjectAhead", forceAction=True, autoSimulation=False, randomMagnitude=0.0)
+    bench.force("PickupObject", potato)
+    bench.force("DropHeldObjectAhead", autoSimulation=False, randomMagnitude=0.0)
     away = (
         np.array(list(bench.object(potato)["position"].values())) - bench.sim.world.agent.position
     )

@@ -14,13 +14,6 @@ from .harness import Bench
 from .numpy_renderer import NUMPY
 
 
-@pytest.fixture
-def bench() -> Bench:
-    new = Bench(size=60)
-    new.reset("kitchen-1")
-    return new
-
-
 def positions(bench: Bench, **arguments: object) -> set[tuple[float, float]]:
     return {
         (p["x"], p["z"]) for p in bench.ok("GetReachablePositions", **arguments)["actionReturn"]
@@ -58,7 +51,7 @@ def test_reachable_positions_in_the_directions_of_the_agent(bench):
 
 def test_every_interactable_pose_sees_the_object(bench):
     fridge = bench.first("Fridge")
-    poses = bench.ok("GetInteractablePoses", objectId=fridge, horizons=[0, 30])["actionReturn"]
+    poses = bench.ok("GetInteractablePoses", fridge, horizons=[0, 30])["actionReturn"]
     assert len(poses) > 20
     assert set(poses[0]) == {"x", "y", "z", "rotation", "standing", "horizon"}
     for pose in poses[:: len(poses) // 8]:
@@ -83,7 +76,7 @@ def test_interactable_poses_are_those_whose_inner_picture_shows_the_object(
         one.sim.display.rasterizer = rasterizer
     places = bench.ok("GetReachablePositions")["actionReturn"][::24]
     for target in map(bench.first, kinds):
-        poses = bench.ok("GetInteractablePoses", objectId=target, positions=places)["actionReturn"]
+        poses = bench.ok("GetInteractablePoses", target, positions=places)["actionReturn"]
         slow = []
         for pose in product(
             places, (-30.0, 0.0, 30.0, 60.0), (0.0, 90.0, 180.0, 270.0), (True, False)
@@ -98,13 +91,11 @@ def test_interactable_poses_are_those_whose_inner_picture_shows_the_object(
 
 def test_interactable_poses_can_be_narrowed(bench):
     fridge = bench.first("Fridge")
-    every = bench.ok("GetInteractablePoses", objectId=fridge, maxPoses=9)["actionReturn"]
-    assert (
-        bench.ok("GetInteractablePoses", objectId=fridge, maxPoses=5)["actionReturn"] == every[:5]
-    )
+    every = bench.ok("GetInteractablePoses", fridge, maxPoses=9)["actionReturn"]
+    assert bench.ok("GetInteractablePoses", fridge, maxPoses=5)["actionReturn"] == every[:5]
     some = bench.ok(
         "GetInteractablePoses",
-        objectId=fridge,
+        fridge,
         rotations=[0, 45],
         horizons=[0],
         standings=[True],
@@ -112,18 +103,18 @@ def test_interactable_poses_can_be_narrowed(bench):
     )["actionReturn"]
     assert all(p["rotation"] in (0, 45) and p["horizon"] == 0 and p["standing"] for p in some)
     place = {key: every[0][key] for key in "xyz"}
-    here = bench.ok("GetInteractablePoses", objectId=fridge, positions=[place])["actionReturn"]
+    here = bench.ok("GetInteractablePoses", fridge, positions=[place])["actionReturn"]
     assert here
     assert all(place.items() <= pose.items() for pose in here)
     inside = next(
         o.object_id for o in bench.sim.world.objects.values() if bench.sim.world.is_hidden(o)
     )
-    assert bench.ok("GetInteractablePoses", objectId=inside)["actionReturn"] == []
+    assert bench.ok("GetInteractablePoses", inside)["actionReturn"] == []
 
 
 def test_outlines_from_above(bench):
     table = bench.first("DiningTable")
-    hull = np.array(bench.ok("Get2DSemanticHull", objectId=table)["actionReturn"])
+    hull = np.array(bench.ok("Get2DSemanticHull", table)["actionReturn"])
     corners = np.array(bench.object(table)["axisAlignedBoundingBox"]["cornerPoints"])[:, [0, 2]]
     assert hull.shape == (4, 2)
     assert sorted(map(tuple, hull.round(3))) == sorted({tuple(c) for c in corners.round(3)})
@@ -173,7 +164,7 @@ def test_replies_list_the_filtered_objects_only(bench):
     listed = bench.ok("SetObjectFilter", objectIds=kept)["objects"]
     assert {o["objectId"] for o in listed} == set(kept)
     assert bench.ok("SetObjectFilter", objectIds=[])["objects"] == []
-    bench.ok("OpenObject", objectId=kept[0], forceAction=True)
+    bench.force("OpenObject", kept[0])
     assert [o["objectId"] for o in bench.ok("ResetObjectFilter")["objects"]] == every
     assert bench.object(kept[0])["isOpen"]
     bench.ok("SetObjectFilter", objectIds=[])

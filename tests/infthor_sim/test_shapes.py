@@ -76,7 +76,7 @@ def allowed(item: SimObject) -> tuple[Array, Array]:
 
 
 @pytest.mark.parametrize("object_type", sorted(OBJECT_TYPES))
-def test_shape_stays_in_its_box(object_type: str) -> None:
+def test_shape_stays_in_its_box(object_type):
     item = default_object(object_type, np.zeros(3))
     item.hinge = -1
     for state in states(item):
@@ -106,7 +106,7 @@ def looks(item: SimObject, pitch: float, yaw: float) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("object_type", sorted(t.name for t in OBJECT_TYPES.values() if t.hinged))
 @pytest.mark.parametrize("style", range(4))
-def test_outside_looks_the_same_open_and_closed(object_type: str, style: int) -> None:
+def test_outside_looks_the_same_open_and_closed(object_type, style):
     item = default_object(object_type, np.zeros(3))
     item.hinge, item.style = -1, style
     opened = as_open(item, 1.0)
@@ -127,9 +127,7 @@ def test_outside_looks_the_same_open_and_closed(object_type: str, style: int) ->
 ))  # fmt: skip
 @given(share_x=st.floats(-0.55, 0.55), share_z=st.floats(-0.55, 0.55), grown=st.floats(0.8, 1.5))
 @settings(max_examples=10, deadline=None)
-def test_contents_stand_on_what_is_drawn(
-    object_type: str, share_x: float, share_z: float, grown: float
-) -> None:
+def test_contents_stand_on_what_is_drawn(object_type, share_x, share_z, grown):
     """Where contents stand is a drawn floor, at most a few millimetres above or below."""
     usual = default_object(object_type, np.zeros(3)).box_size
     item = default_object(object_type, np.zeros(3), size=usual * grown)
@@ -153,7 +151,7 @@ def test_contents_stand_on_what_is_drawn(
         )
 
 
-def test_a_drawer_holds_what_may_lie_in_it() -> None:
+def test_a_drawer_holds_what_may_lie_in_it():
     """No wall of an open drawer reaches over the area in which its contents are put."""
     item = as_open(default_object("Drawer", np.zeros(3)), 1.0)
     (inside,) = surfaces(item)
@@ -174,7 +172,7 @@ def test_a_drawer_holds_what_may_lie_in_it() -> None:
 
 
 @pytest.mark.parametrize("object_type", ["CD", "KeyChain", "SoapBar"])
-def test_things_of_one_model_are_drawn_apart(object_type: str) -> None:
+def test_things_of_one_model_are_drawn_apart(object_type):
     """Ten objects of one style have at least four looks, always the same by their ids."""
     looks_by_id = []
     for _ in range(2):

@@ -1,26 +1,14 @@
 import copy
 import json
-from typing import Any
 
 import pytest
 
-from infthor_sim.scenes.catalogue import Catalogue
-
-from .harness import INIT, Bench
+from .harness import Bench
 
 
 @pytest.fixture
 def bench() -> Bench:
-    bench = Bench(Catalogue(None, None), size=100)
-    act(bench, action="Reset", sceneName="kitchen-2")
-    act(bench, action="Initialize", **INIT)
-    return bench
-
-
-def act(bench: Bench, **call: Any) -> Any:
-    outcome = bench.server.run(call)[0]
-    assert not outcome.error, outcome.error
-    return outcome
+    return Bench.at("kitchen-2")
 
 
 def state(bench: Bench) -> tuple[str, bytes, bytes]:
@@ -40,49 +28,49 @@ def state(bench: Bench) -> tuple[str, bytes, bytes]:
 
 def change(bench: Bench) -> None:
     """Move, open everything, spill everything, and put things elsewhere."""
-    act(bench, action="RotateRight")
-    act(bench, action="InitialRandomSpawn", randomSeed=3)
+    bench.ok("RotateRight")
+    bench.ok("InitialRandomSpawn", randomSeed=3)
     for item in list(bench.sim.world.objects.values()):
         if item.type.openable:
-            act(bench, action="OpenObject", objectId=item.object_id, forceAction=True)
+            bench.force("OpenObject", item.object_id)
             return
 
 
-def test_what_was_saved_comes_back_whole_and_more_than_once(bench: Bench) -> None:
-    act(bench, action="SaveState")
+def test_what_was_saved_comes_back_whole_and_more_than_once(bench):
+    bench.ok("SaveState")
     before = state(bench)
     for _ in range(2):
         change(bench)
         assert state(bench) != before
-        act(bench, action="RestoreState")
+        bench.ok("RestoreState")
         assert state(bench) == before
 
 
-def test_after_coming_back_the_same_actions_have_the_same_outcome(bench: Bench) -> None:
-    act(bench, action="SaveState")
+def test_after_coming_back_the_same_actions_have_the_same_outcome(bench):
+    bench.ok("SaveState")
     change(bench)
     after = copy.deepcopy(state(bench))
-    act(bench, action="RestoreState")
+    bench.ok("RestoreState")
     change(bench)
     assert state(bench) == after
 
 
-def test_nothing_saved_and_a_saved_state_of_another_scene_are_refused(bench: Bench) -> None:
-    assert "no saved state" in bench.server.run({"action": "RestoreState"})[0].error
-    act(bench, action="SaveState")
-    act(bench, action="Reset", sceneName="kitchen-3")
-    assert "no saved state" in bench.server.run({"action": "RestoreState"})[0].error
+def test_nothing_saved_and_a_saved_state_of_another_scene_are_refused(bench):
+    assert "no saved state" in bench.refused("RestoreState")
+    bench.ok("SaveState")
+    bench.ok("Reset", sceneName="kitchen-3")
+    assert "no saved state" in bench.refused("RestoreState")
 
 
-def test_slots_are_kept_apart(bench: Bench) -> None:
-    act(bench, action="SaveState", slot=0)
+def test_slots_are_kept_apart(bench):
+    bench.ok("SaveState", slot=0)
     first = state(bench)
     change(bench)
-    act(bench, action="SaveState", slot=1)
+    bench.ok("SaveState", slot=1)
     second = state(bench)
     assert first != second
-    act(bench, action="RestoreState", slot=0)
+    bench.ok("RestoreState", slot=0)
     assert state(bench) == first
-    act(bench, action="RestoreState", slot=1)
+    bench.ok("RestoreState", slot=1)
     assert state(bench) == second
-    assert "no saved state" in bench.server.run({"action": "RestoreState", "slot": 2})[0].error
+    assert "no saved state" in bench.refused("RestoreState", slot=2)

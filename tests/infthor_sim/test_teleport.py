@@ -5,13 +5,6 @@ import pytest
 from .harness import Bench
 
 
-@pytest.fixture
-def bench() -> Bench:
-    new = Bench(size=40)
-    new.reset("kitchen-1")
-    return new
-
-
 def there(bench: Bench) -> dict[str, float]:
     """A cell other than the agent's."""
     here = bench.metadata["agent"]["position"]
@@ -32,7 +25,7 @@ def test_a_place_off_the_floor_is_refused_unless_forced(bench, off):
     assert "too large a change" in message
     assert "y component" in message
     assert bench.metadata["agent"] == before
-    bench.ok("Teleport", position={**place, "y": place["y"] + off}, forceAction=True)
+    bench.force("Teleport", position={**place, "y": place["y"] + off})
     assert bench.metadata["agent"]["position"]["y"] == pytest.approx(place["y"] + off, abs=1e-5)
 
 
@@ -43,9 +36,8 @@ def test_coordinates_may_be_given_one_by_one(bench):
     assert agent["position"] == pytest.approx(place, abs=1e-5)
     assert (agent["rotation"]["y"], agent["cameraHorizon"], agent["isStanding"]) == (90, 30, False)
     bench.refused("Teleport", x=place["x"], z=place["z"])
-    assert (
-        bench.metadata["errorMessage"] == "action: Teleport is missing the following arguments: y"
-    )
+    missing = "action: Teleport is missing the following arguments: y"
+    assert bench.metadata["errorMessage"] == missing
     bench.refused(
         "TeleportFull", position=place, x=0, rotation={"y": 90}, horizon=30, standing=True
     )
@@ -59,7 +51,7 @@ def test_what_a_teleport_does_not_name_stays(bench):
 
 
 def test_rotate_look(kitchen):
-    before = kitchen.reset("kitchen-1").metadata["agent"]
+    before = kitchen.last_event.metadata["agent"]
     after = kitchen.step("RotateLook", rotation=90, horizon=31).metadata["agent"]
     assert after["position"] == before["position"]
     assert after["rotation"] == {"x": 0, "y": 90, "z": 0}
@@ -74,20 +66,11 @@ def test_a_move_needs_a_positive_length(bench, move):
 
 
 def test_a_move_takes_all_of_unitys_arguments(bench):
-    terms = {
-        "speed": 2.0,
-        "returnToStart": True,
-        "disableRendering": True,
-        "manualInteract": False,
-        "objectId": "",
-        "maxAgentsDistance": -1.0,
-        "allowAgentsToIntersect": False,
-        "forceAction": False,
-    }
-    assert not bench.step("MoveAhead", moveMagnitude=0.25, **terms)["errorCode"]
-    assert not bench.step("RotateLeft", speed=2.0, returnToStart=True, disableRendering=True)[
-        "errorCode"
-    ]
+    of_all = {"speed": 2.0, "returnToStart": True, "disableRendering": True}
+    of_moves = {"manualInteract": False, "objectId": "", "maxAgentsDistance": -1.0}
+    of_moves |= {"allowAgentsToIntersect": False, "forceAction": False}
+    assert not bench.step("MoveAhead", moveMagnitude=0.25, **of_all, **of_moves)["errorCode"]
+    assert not bench.step("RotateLeft", **of_all)["errorCode"]
 
 
 def test_a_leash_keeps_the_agent_near_an_object(bench):
@@ -96,7 +79,6 @@ def test_a_leash_keeps_the_agent_near_an_object(bench):
     far = bench.object(fridge)["distance"]
     moves = ("MoveAhead", "MoveBack", "MoveLeft", "MoveRight")
     refused = [
-        bench.step(move, objectId=fridge, maxAgentsDistance=far / 2)["errorMessage"]
-        for move in moves
+        bench.step(move, fridge, maxAgentsDistance=far / 2)["errorMessage"] for move in moves
     ]
     assert all("beyond the max distance" in message for message in refused)

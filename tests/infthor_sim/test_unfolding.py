@@ -23,8 +23,7 @@ CASES = {
 
 @pytest.fixture
 def bench() -> Bench:
-    new = Bench(size=40)
-    new.reset("bedroom-1")
+    new = Bench.at("bedroom-1", size=40)
     return new
 
 
@@ -41,14 +40,14 @@ def test_boxes_change_with_openness_and_back(bench, kind):
     target = item.object_id
     assert (item.state.openness > 0) == (kind in STARTS_OPEN)
     if kind in STARTS_OPEN:
-        bench.ok("CloseObject", objectId=target, forceAction=True)
+        bench.force("CloseObject", target)
     else:
         bench.ok("Pass")
     before = [item.box_center.copy(), item.box_size.copy()]
     shut = box(bench, target)
     assert shut[1] - shut[0] == pytest.approx(closed, abs=2e-4)
     for openness in (1.0, 0.5, 0.3):
-        bench.ok("OpenObject", objectId=target, openness=openness, forceAction=True)
+        bench.force("OpenObject", target, openness=openness)
         now = box(bench, target)
         expected = np.array(closed) + openness * (np.array(opened) - closed)
         assert now[1] - now[0] == pytest.approx(expected, abs=3e-4)
@@ -57,7 +56,7 @@ def test_boxes_change_with_openness_and_back(bench, kind):
         oriented = bench.object(target)["objectOrientedBoundingBox"]
         if oriented is not None:
             assert np.ptp(oriented["cornerPoints"], axis=0) == pytest.approx(expected, abs=3e-4)
-    bench.ok("CloseObject", objectId=target, forceAction=True)
+    bench.force("CloseObject", target)
     assert item.box_center == pytest.approx(before[0], abs=1e-9)
     assert item.box_size == pytest.approx(before[1], abs=1e-9)
 
@@ -69,7 +68,7 @@ def test_the_picture_fills_the_box_and_no_more(bench, kind, front):
     item.front = front
     bench.sim.world.add(item)
     for openness in (0.5, 1.0):
-        bench.step("CloseObject", objectId=item.object_id, forceAction=True)
+        bench.step("CloseObject", item.object_id, forceAction=True)
         for _ in range(2):  # closed, then open
             parts = rows(shape(item), item.position, item.matrix, 0)
             low, high = item.bounds()
@@ -77,7 +76,7 @@ def test_the_picture_fills_the_box_and_no_more(bench, kind, front):
             assert (centers > low - 0.012).all()
             assert (centers < high + 0.012).all()
             assert (2 * parts[:, HALF : HALF + 3].max() <= 1.15 * max(item.box_size)).all()
-            bench.step("OpenObject", objectId=item.object_id, openness=openness, forceAction=True)
+            bench.step("OpenObject", item.object_id, openness=openness, forceAction=True)
 
 
 def test_an_open_laptop_takes_the_room_above_it(bench):
@@ -87,7 +86,7 @@ def test_an_open_laptop_takes_the_room_above_it(bench):
         bench.sim.world.add(item)
     pen.place_bottom(np.array([0.0, 1.35, 0.0]))
     assert occupant(bench.sim.world, pen) == laptop.name
-    bench.ok("CloseObject", objectId=laptop.object_id, forceAction=True)
+    bench.force("CloseObject", laptop.object_id)
     assert occupant(bench.sim.world, pen) != laptop.name
 
 
@@ -98,7 +97,7 @@ def test_a_lid_stands_up_while_it_is_open(bench, kind, share):
     bench.ok("Pass")
     shut = box(bench, item.object_id)
     for openness in (1.0, 0.5):
-        bench.ok("OpenObject", objectId=item.object_id, openness=openness, forceAction=True)
+        bench.force("OpenObject", item.object_id, openness=openness)
         low, high = box(bench, item.object_id)
         rise = share * item.front_size[2] * np.sin(np.radians(85 * openness))
         assert low == pytest.approx(shut[0], abs=2e-4)
@@ -107,5 +106,5 @@ def test_a_lid_stands_up_while_it_is_open(bench, kind, share):
             bench.object(item.object_id)["objectOrientedBoundingBox"]["cornerPoints"]
         )
         assert np.ptp(oriented, axis=0) == pytest.approx(high - low, abs=3e-4)
-    bench.ok("CloseObject", objectId=item.object_id, forceAction=True)
+    bench.force("CloseObject", item.object_id)
     assert np.array(box(bench, item.object_id)) == pytest.approx(np.array(shut), abs=1e-9)

@@ -11,16 +11,9 @@ from .harness import Bench
 from .test_invariants import consistent
 
 
-@pytest.fixture
-def bench() -> Bench:
-    new = Bench()
-    new.reset("kitchen-1")
-    return new
-
-
 def take(bench: Bench, object_type: str) -> str:
     found = bench.first(object_type)
-    bench.ok("PickupObject", objectId=found, forceAction=True)
+    bench.force("PickupObject", found)
     return found
 
 
@@ -33,11 +26,9 @@ def test_pick_up_carry_and_put(bench):
     where = held["position"]
     bench.ok("RotateRight")
     assert bench.object(mug)["position"] != where
-    assert "already" in bench.refused(
-        "PickupObject", objectId=bench.first("Apple"), forceAction=True
-    )
+    assert "already" in bench.refused("PickupObject", bench.first("Apple"), forceAction=True)
     counter = bench.first("CounterTop")
-    bench.ok("PutObject", objectId=counter, forceAction=True)
+    bench.force("PutObject", counter)
     assert bench.metadata["inventoryObjects"] == []
     assert bench.object(mug)["parentReceptacles"] == [counter]
     assert mug in bench.object(counter)["receptacleObjectIds"]
@@ -47,14 +38,14 @@ def test_pick_up_carry_and_put(bench):
 def test_a_put_needs_a_fitting_open_receptacle(bench):
     fridge = bench.first("Fridge")
     take(bench, "Apple")
-    assert "CLOSED" in bench.refused("PutObject", objectId=fridge, forceAction=True)
+    assert "CLOSED" in bench.refused("PutObject", fridge, forceAction=True)
     assert bench.metadata["errorCode"] == "ReceptacleNotOpen"
-    bench.ok("OpenObject", objectId=fridge, forceAction=True)
+    bench.force("OpenObject", fridge)
     assert "cannot be placed" in bench.refused(
-        "PutObject", objectId=bench.first("Toaster"), forceAction=True
+        "PutObject", bench.first("Toaster"), forceAction=True
     )
-    bench.ok("PutObject", objectId=fridge, forceAction=True)
-    assert "isn't holding" in bench.refused("PutObject", objectId=fridge, forceAction=True)
+    bench.force("PutObject", fridge)
+    assert "isn't holding" in bench.refused("PutObject", fridge, forceAction=True)
 
 
 def test_a_receptacle_fills_up(bench):
@@ -69,8 +60,8 @@ def test_a_receptacle_fills_up(bench):
             ]
             if not pans:
                 continue
-            bench.ok("PickupObject", objectId=pans[0], forceAction=True)
-            if not bench.step("PutObject", objectId=burner, forceAction=True)["lastActionSuccess"]:
+            bench.force("PickupObject", pans[0])
+            if not bench.step("PutObject", burner, forceAction=True)["lastActionSuccess"]:
                 assert bench.metadata["errorMessage"] == "No valid positions to place object found"
                 return
     pytest.fail("a burner took several pans")
@@ -80,14 +71,12 @@ def test_far_and_hidden_things_are_out_of_reach(bench):
     inside = next(o for o in bench.sim.world.objects.values() if bench.sim.world.is_hidden(o))
     bench.stand_before(inside.parent)
     message = "Target object not found within the specified visibility."
-    assert bench.refused("PickupObject", objectId=inside.object_id) == message
-    bench.ok("OpenObject", objectId=inside.parent)
-    bench.ok("CloseObject", objectId=inside.parent)
+    assert bench.refused("PickupObject", inside.object_id) == message
+    bench.ok("OpenObject", inside.parent)
+    bench.ok("CloseObject", inside.parent)
     assert not bench.object(inside.object_id)["visible"]
-    assert "is not the objectId" in bench.refused(
-        "PickupObject", objectId="Mug|+09.00|+09.00|+09.00"
-    )
-    assert "CanPickup" in bench.refused("PickupObject", objectId=inside.parent)
+    assert "is not the objectId" in bench.refused("PickupObject", "Mug|+09.00|+09.00|+09.00")
+    assert "CanPickup" in bench.refused("PickupObject", inside.parent)
 
 
 def test_contents_come_along_with_a_drawer_and_a_plate(bench):
@@ -95,78 +84,72 @@ def test_contents_come_along_with_a_drawer_and_a_plate(bench):
     drawer = next(o for o in world.objects.values() if o.object_type == "Drawer" and o.contents)
     inside = world.objects[drawer.contents[0]]
     before = inside.position.copy()
-    bench.ok("OpenObject", objectId=drawer.object_id, forceAction=True, openness=0.5)
+    bench.force("OpenObject", drawer.object_id, openness=0.5)
     halfway = inside.position.copy()
-    bench.ok("OpenObject", objectId=drawer.object_id, forceAction=True)
+    bench.force("OpenObject", drawer.object_id)
     assert (inside.position - before) == pytest.approx((halfway - before) * 2)
     assert abs(halfway - before).sum() > 0.1
-    bench.ok("CloseObject", objectId=drawer.object_id, forceAction=True)
+    bench.force("CloseObject", drawer.object_id)
     assert inside.position == pytest.approx(before)
     plate, apple = bench.first("Plate"), bench.first("Apple")
-    bench.ok("PickupObject", objectId=apple, forceAction=True)
-    bench.ok("PutObject", objectId=plate, forceAction=True)
+    bench.force("PickupObject", apple)
+    bench.force("PutObject", plate)
     offset = world.objects[apple].center - world.objects[plate].center
-    bench.ok("PickupObject", objectId=plate, forceAction=True)
+    bench.force("PickupObject", plate)
     assert (world.objects[apple].center - world.objects[plate].center)[1] == pytest.approx(
         offset[1]
     )
-    bench.ok("PutObject", objectId=bench.first("DiningTable"), forceAction=True)
+    bench.force("PutObject", bench.first("DiningTable"))
     assert bench.object(apple)["parentReceptacles"] == [plate]
 
 
 def test_slices_are_new_objects(bench):
     apple = bench.first("Apple")
     home = bench.object(apple)["parentReceptacles"]
-    bench.ok("SliceObject", objectId=apple, forceAction=True)
+    bench.force("SliceObject", apple)
     slices = [o for o in bench.metadata["objects"] if o["objectType"] == "AppleSliced"]
     assert len(slices) >= 2
     assert all(s["objectId"].startswith(f"{apple}|AppleSliced_") and s["isSliced"] for s in slices)
     assert all(s["parentReceptacles"] == home for s in slices)
     assert apple not in {o["objectId"] for o in bench.metadata["objects"]}
-    assert "CanBeSliced" in bench.refused(
-        "SliceObject", objectId=bench.first("Mug"), forceAction=True
-    )
+    assert "CanBeSliced" in bench.refused("SliceObject", bench.first("Mug"), forceAction=True)
 
 
 def test_microwave_heats_and_fridge_cools(bench):
     microwave, fridge = bench.first("Microwave"), bench.first("Fridge")
     potato = take(bench, "Potato")
-    bench.ok("OpenObject", objectId=microwave, forceAction=True)
-    bench.ok("PutObject", objectId=microwave, forceAction=True)
-    assert "closed" in bench.refused("ToggleObjectOn", objectId=microwave, forceAction=True)
-    bench.ok("CloseObject", objectId=microwave, forceAction=True)
-    bench.ok("ToggleObjectOn", objectId=microwave, forceAction=True)
+    bench.force("OpenObject", microwave)
+    bench.force("PutObject", microwave)
+    assert "closed" in bench.refused("ToggleObjectOn", microwave, forceAction=True)
+    bench.force("CloseObject", microwave)
+    bench.force("ToggleObjectOn", microwave)
     assert bench.object(potato)["temperature"] == "Hot"
     assert bench.object(potato)["isCooked"]
-    bench.refused("OpenObject", objectId=microwave, forceAction=True)
-    bench.ok("ToggleObjectOff", objectId=microwave, forceAction=True)
-    bench.ok("OpenObject", objectId=microwave, forceAction=True)
-    bench.ok("PickupObject", objectId=potato, forceAction=True)
-    bench.ok("OpenObject", objectId=fridge, forceAction=True)
-    bench.ok("PutObject", objectId=fridge, forceAction=True)
-    bench.ok("CloseObject", objectId=fridge, forceAction=True)
+    bench.refused("OpenObject", microwave, forceAction=True)
+    bench.force("ToggleObjectOff", microwave)
+    bench.force("OpenObject", microwave)
+    bench.force("PickupObject", potato)
+    bench.force("OpenObject", fridge)
+    bench.force("PutObject", fridge)
+    bench.force("CloseObject", fridge)
     assert bench.object(potato)["temperature"] == "Cold"
 
 
 def test_tap_cleans_and_fills_and_coffee_machine_fills(bench):
-    faucet, basin, machine = (
-        bench.first("Faucet"),
-        bench.first("SinkBasin"),
-        bench.first("CoffeeMachine"),
-    )
+    faucet, basin, machine = map(bench.first, ("Faucet", "SinkBasin", "CoffeeMachine"))
     mug = bench.first("Mug")
-    bench.ok("DirtyObject", objectId=mug, forceAction=True)
-    bench.ok("PickupObject", objectId=mug, forceAction=True)
-    bench.ok("PutObject", objectId=basin, forceAction=True)
+    bench.force("DirtyObject", mug)
+    bench.force("PickupObject", mug)
+    bench.force("PutObject", basin)
     assert bench.object(mug)["isDirty"]
-    bench.ok("ToggleObjectOn", objectId=faucet, forceAction=True)
+    bench.force("ToggleObjectOn", faucet)
     assert not bench.object(mug)["isDirty"]
     assert bench.object(mug)["fillLiquid"] == "water"
-    bench.ok("ToggleObjectOff", objectId=faucet, forceAction=True)
-    bench.ok("EmptyLiquidFromObject", objectId=mug, forceAction=True)
-    bench.ok("PickupObject", objectId=mug, forceAction=True)
-    bench.ok("PutObject", objectId=machine, forceAction=True)
-    bench.ok("ToggleObjectOn", objectId=machine, forceAction=True)
+    bench.force("ToggleObjectOff", faucet)
+    bench.force("EmptyLiquidFromObject", mug)
+    bench.force("PickupObject", mug)
+    bench.force("PutObject", machine)
+    bench.force("ToggleObjectOn", machine)
     assert bench.object(mug)["fillLiquid"] == "coffee"
 
 
@@ -174,16 +157,16 @@ def test_knobs_light_burners_that_cook(bench):
     knob = bench.first("StoveKnob")
     burner = bench.object(knob)["controlledObjects"][0]
     pan, potato = bench.first("Pan"), bench.first("Potato")
-    bench.ok("PickupObject", objectId=potato, forceAction=True)
-    bench.ok("PutObject", objectId=pan, forceAction=True)
+    bench.force("PickupObject", potato)
+    bench.force("PutObject", pan)
     if bench.object(pan)["parentReceptacles"] != [burner]:
-        bench.ok("PickupObject", objectId=pan, forceAction=True)
-        bench.ok("PutObject", objectId=burner, forceAction=True)
-    assert "StoveKnob" in bench.refused("ToggleObjectOn", objectId=burner, forceAction=True)
-    bench.ok("ToggleObjectOn", objectId=knob, forceAction=True)
+        bench.force("PickupObject", pan)
+        bench.force("PutObject", burner)
+    assert "StoveKnob" in bench.refused("ToggleObjectOn", burner, forceAction=True)
+    bench.force("ToggleObjectOn", knob)
     assert bench.object(burner)["isToggled"]
     assert bench.object(potato)["isCooked"]
-    assert "already" in bench.refused("ToggleObjectOn", objectId=knob, forceAction=True)
+    assert "already" in bench.refused("ToggleObjectOn", knob, forceAction=True)
 
 
 @pytest.mark.parametrize(
@@ -194,10 +177,10 @@ def test_knobs_light_burners_that_cook(bench):
 )  # fmt: skip
 def test_direct_changes_of_state(bench, action, object_type, flag):
     target = bench.first(object_type)
-    bench.ok(action, objectId=target, forceAction=True)
+    bench.force(action, target)
     assert bench.object(target)[flag]
-    bench.refused(action, objectId=target, forceAction=True)
-    bench.refused(action, objectId=bench.first("Fridge"), forceAction=True)
+    bench.refused(action, target, forceAction=True)
+    bench.refused(action, bench.first("Fridge"), forceAction=True)
 
 
 def test_a_dropped_cup_breaks_and_lies_on_something(bench):
@@ -211,10 +194,9 @@ def test_a_dropped_cup_breaks_and_lies_on_something(bench):
 
 
 def test_an_open_fridge_stands_in_the_way():
-    bench = Bench()
-    bench.reset("kitchen-1")
+    bench = Bench.at("kitchen-1")
     fridge = bench.first("Fridge")
-    bench.ok("OpenObject", objectId=fridge, forceAction=True)
+    bench.force("OpenObject", fridge)
     world = bench.sim.world
     from infthor_sim.physics.obstacles import blocking_object, door_leaf
 
@@ -222,7 +204,7 @@ def test_an_open_fridge_stands_in_the_way():
     middle = (low + high) / 2
     middle[1] = world.agent.position[1]
     assert blocking_object(world, middle) == world.objects[fridge].name
-    bench.ok("CloseObject", objectId=fridge, forceAction=True)
+    bench.force("CloseObject", fridge)
     assert blocking_object(world, middle) is None
 
 
@@ -241,23 +223,18 @@ def test_teleport_refuses_what_collides(bench, position):
 
 def test_shortest_path_leads_to_the_fridge(bench):
     fridge = bench.first("Fridge")
-    corners = bench.ok("GetShortestPath", objectId=fridge)["actionReturn"]["corners"]
+    corners = bench.ok("GetShortestPath", fridge)["actionReturn"]["corners"]
     steps = itertools.pairwise(corners)
-    assert all(
-        abs(a["x"] - b["x"]) + abs(a["z"] - b["z"]) == pytest.approx(0.25, abs=1e-6)
-        for a, b in steps
-    )
+    for a, b in steps:
+        assert abs(a["x"] - b["x"]) + abs(a["z"] - b["z"]) == pytest.approx(0.25, abs=1e-6)
     end, goal = corners[-1], bench.object(fridge)["position"]
     assert abs(end["x"] - goal["x"]) + abs(end["z"] - goal["z"]) < 1.5
 
 
 def test_random_placement_follows_its_seed(bench):
     def places() -> list[tuple[str, object]]:
-        return [
-            (o["objectId"], o["parentReceptacles"])
-            for o in bench.metadata["objects"]
-            if o["pickupable"]
-        ]
+        loose = [o for o in bench.metadata["objects"] if o["pickupable"]]
+        return [(o["objectId"], o["parentReceptacles"]) for o in loose]
 
     start = places()
     bench.ok("InitialRandomSpawn", randomSeed=3)
@@ -278,7 +255,7 @@ def test_random_placement_follows_its_seed(bench):
 
 
 def test_random_placement_gives_ids_by_the_new_positions(bench):
-    bench.ok("PickupObject", objectId=bench.first("Egg"), forceAction=True)
+    bench.force("PickupObject", bench.first("Egg"))
     bench.ok("RandomizeColors")
     looks = bench.sim.world.appearance
     before = [(o["name"], o["objectId"]) for o in bench.metadata["objects"]]
@@ -304,8 +281,7 @@ def test_random_placement_gives_ids_by_the_new_positions(bench):
 
 
 def test_random_placement_keeps_what_an_arm_holds():
-    bench = Bench(size=20)
-    bench.reset("kitchen-9", agentMode="arm")
+    bench = Bench.at("kitchen-9", agentMode="arm", size=20)
     world = bench.sim.world
     bowl = next(o for o in world.objects.values() if o.object_type == "Bowl")
     pick_up(world, world.arm, [bowl])
@@ -329,7 +305,7 @@ def test_physics_actions_move_nothing(mode):
     ):
         assert bench.ok(action, **arguments)["objects"] == before
     assert "timeStep between" in bench.refused("AdvancePhysicsStep", timeStep=0.1)
-    bench.refused("MakeObjectBreakable", objectId="Mug|none")
+    bench.refused("MakeObjectBreakable", "Mug|none")
 
 
 def test_a_pile_of_plates_is_carried_however_high_it_is(bench):

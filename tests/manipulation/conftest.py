@@ -4,6 +4,7 @@ share."""
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,6 +17,7 @@ from ..episodes.pool import Pool, pool, shared_simulators  # noqa: F401 - fixtur
 from ..episodes.preparing import make_preparer
 from ..helpers.trajectories import MUG, cut_trajectory, write_trajectories
 from .arena import Arena
+from .scripted import ScriptedPolicy
 
 
 @pytest.fixture(scope="session")
@@ -53,6 +55,18 @@ def data(tmp_path: Path) -> Path:
 def prepare_run(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
     """Prepares a run on that, see `make_preparer`."""
     return make_preparer("planner-arm", tasks=("manipulathor",), data=data, output=tmp_path / "out")
+
+
+@pytest.fixture
+def policy(monkeypatch: pytest.MonkeyPatch) -> Callable[..., ScriptedPolicy]:
+    """Has runs load a scripted policy."""
+
+    def make(gives: Callable[[int], Any]) -> ScriptedPolicy:
+        policy = ScriptedPolicy(gives)
+        monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: policy)
+        return policy
+
+    return make
 
 
 @pytest.fixture

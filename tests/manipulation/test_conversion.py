@@ -3,6 +3,7 @@ does."""
 
 import math
 
+import numpy as np
 import pytest
 
 from infthor_eval.manipulation.conversion import Conversion
@@ -18,29 +19,18 @@ def step(translation=STILL, rotation=STILL, gripper=1.0):
     return ArmDelta(translation, rotation, gripper)
 
 
-def tuple_of(vector: Vector):
-    return vector.x, vector.y, vector.z
+def array_of(vector: Vector):
+    return np.array([vector.x, vector.y, vector.z])
 
 
 @pytest.fixture(scope="module")
 def simulator():
     """In the middle of an empty room of four by four metres: nothing is in the arm's way."""
     corners = [{"x": x, "y": 0, "z": z} for x, z in ((0, 0), (0, 4), (4, 4), (4, 0))]
-    room = {
-        "id": "room|1",
-        "roomType": "Kitchen",
-        "floorPolygon": corners,
-        "ceilings": [],
-        "children": [],
-    }
-    house = {
-        "rooms": [room],
-        "walls": [],
-        "objects": [],
-        "doors": [],
-        "windows": [],
-        "proceduralParameters": {},
-    }
+    room = {"id": "room|1", "roomType": "Kitchen", "floorPolygon": corners}
+    nothing = {"walls": [], "objects": [], "doors": [], "windows": []}
+    house = {"rooms": [room | {"ceilings": [], "children": []}], **nothing}
+    house |= {"proceduralParameters": {}}
     with Simulator(embedded_launch(), image=False, instances=False, agentMode="arm") as simulator:
         simulator.reset(house)
         yield simulator
@@ -55,22 +45,15 @@ def arm(simulator):
         def face(self, rotation):
             simulator.reset(None)
             stand = simulator.view.agent.position
-            there = {"x": 2.0, "y": stand.y, "z": 2.0}
-            view = simulator.step(
-                "TeleportFull",
-                position=there,
-                rotation={"y": rotation},
-                horizon=0,
-                standing=True,
-                forceAction=True,
-            )
+            pose = {"position": {"x": 2.0, "y": stand.y, "z": 2.0}, "rotation": {"y": rotation}}
+            full = {"horizon": 0, "standing": True, "forceAction": True}
+            view = simulator.step("TeleportFull", **pose, **full)
             assert view.success, view.error
             return self.now()
 
         def now(self):
             arm = simulator.view.arm
-            wrist, center = tuple_of(arm.wrist), tuple_of(arm.sphere_center)
-            return wrist, tuple(b - a for a, b in zip(wrist, center, strict=True))
+            return array_of(arm.wrist), array_of(arm.sphere_center) - array_of(arm.wrist)
 
         def does(self, *deltas, conversion=None):
             for delta in deltas:
@@ -86,28 +69,22 @@ def arm(simulator):
 # along +z and its left is -x; at 90 degrees it looks along +x and its left is +z.
 MOVES = [
     (0, (1, 0, 0), (0, 0, 1)),
-    (0, (-1, 0, 0), (0, 0, -1)),
     (0, (0, 1, 0), (-1, 0, 0)),
-    (0, (0, -1, 0), (1, 0, 0)),
     (0, (0, 0, 1), (0, 1, 0)),
-    (0, (0, 0, -1), (0, -1, 0)),
     (90, (1, 0, 0), (1, 0, 0)),
-    (90, (-1, 0, 0), (-1, 0, 0)),
     (90, (0, 1, 0), (0, 0, 1)),
-    (90, (0, -1, 0), (0, 0, -1)),
     (90, (0, 0, 1), (0, 1, 0)),
-    (90, (0, 0, -1), (0, -1, 0)),
 ]
 
 
+@pytest.mark.parametrize("length", [0.08, -0.08], ids=["forth", "back"])
 @pytest.mark.parametrize(("facing", "direction", "moved"), MOVES)
-def test_a_unit_move_moves_the_hand_along_its_axis_by_its_length(arm, facing, direction, moved):
-    length = 0.08
+def test_a_unit_move_moves_the_hand_along_its_axis_by_its_length(
+    arm, facing, direction, moved, length
+):
     before, looking = arm.face(facing)
     after, still_looking = arm.does(step(tuple(length * part for part in direction)))
-    assert tuple(b - a for a, b in zip(before, after, strict=True)) == pytest.approx(
-        tuple(length * part for part in moved), abs=1e-4
-    )
+    assert after - before == pytest.approx(length * np.array(moved), abs=1e-4)
     assert still_looking == pytest.approx(looking, abs=1e-4)
 
 
@@ -128,7 +105,7 @@ TURNS = [
 def in_world(shares, facing):
     """A direction of the robot's frame, by the words above."""
     ahead, left, up = shares
-    return {0: (-left, up, ahead), 90: (ahead, up, left)}[facing]
+    return np.array({0: (-left, up, ahead), 90: (ahead, up, left)}[facing])
 
 
 @pytest.mark.parametrize("facing", [0, 90])
@@ -139,11 +116,9 @@ def test_a_unit_turn_turns_the_hand_about_its_axis_by_its_angle(arm, facing, rot
     wrist, looking = arm.face(facing)
     length = math.hypot(*looking)
     assert length == pytest.approx(0.07, abs=1e-4)  # the palm, and the radius of 0.06 m
-    assert looking == pytest.approx(
-        tuple(length * part for part in in_world((1, 0, 0), facing)), abs=1e-3
-    )
+    assert looking == pytest.approx(length * in_world((1, 0, 0), facing), abs=1e-3)
     after, now = arm.does(step(rotation=rotation))
-    assert now == pytest.approx(tuple(length * part for part in in_world(looks, facing)), abs=1e-4)
+    assert now == pytest.approx(length * in_world(looks, facing), abs=1e-4)
     assert after == pytest.approx(wrist, abs=1e-3)  # it turns on the spot
 
 
@@ -157,9 +132,7 @@ def test_a_roll_lifts_the_hands_left_side_as_a_right_handed_turn_about_forward_d
     arm.face(facing)
     _, looking = arm.does(step(rotation=(roll * math.pi / 2, 0, 0)), step(rotation=(0, 0, 0.4)))
     length = math.hypot(*looking)
-    assert looking == pytest.approx(
-        tuple(length * part for part in in_world((C, 0, up), facing)), abs=1e-4
-    )
+    assert looking == pytest.approx(length * in_world((C, 0, up), facing), abs=1e-4)
 
 
 def test_a_step_too_long_is_cut_in_its_direction(arm):
@@ -167,9 +140,7 @@ def test_a_step_too_long_is_cut_in_its_direction(arm):
     assert call["offset"] == pytest.approx({"x": 0.0, "y": -0.08, "z": 0.06})
     before, _ = arm.face(0)
     after, _ = arm.does(step((0.3, 0.0, -0.4)))
-    assert tuple(b - a for a, b in zip(before, after, strict=True)) == pytest.approx(
-        (0, -0.08, 0.06), abs=1e-4
-    )
+    assert after - before == pytest.approx([0, -0.08, 0.06], abs=1e-4)
 
 
 def test_a_short_step_is_not_cut_and_the_scale_comes_before_the_cut():
@@ -211,10 +182,8 @@ def test_an_arm_that_meets_the_floor_goes_back_or_stays_there(arm, simulator, ba
     """The scale and the cut of ten metres let one step reach the floor."""
     arm.face(0)
     simulator.step("MoveArmBase", y=0)
-    (before, _), (call,) = (
-        arm.now(),
-        Conversion(10.0, 10.0, return_to_start=back).calls(step((0, 0, -0.06))),
-    )
+    before, _ = arm.now()
+    (call,) = Conversion(10.0, 10.0, return_to_start=back).calls(step((0, 0, -0.06)))
     view = simulator.step(**call)
     assert not view.success and view.error.startswith("Collided")
     after, _ = arm.now()

@@ -4,6 +4,7 @@ them."""
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from infthor_eval.episodes.records import InfeasibleError
@@ -32,6 +33,11 @@ def actor(name):
     return BASELINES[name](0).arm_actor()
 
 
+def play_all(room, name, kind, **settings):
+    """The episodes of a kind, run by a baseline."""
+    return [room.play(actor(name), episode.index, **settings) for episode in room.of(kind)]
+
+
 def gripper(value):
     return ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), value)
 
@@ -40,13 +46,9 @@ def gripper(value):
 
 
 def test_who_stands_still_gets_just_what_lies_in_the_sphere_at_the_start(room):
-    played = [
-        room.play(actor("still"), episode.index) for episode in room.of(ManipulationKind.PICKUP)
-    ]
-    assert [record.done for record in played] == [record.starts_inside for record in played]
-    assert [record.starts_inside for record in played] == [
-        record.start_distance <= 0.5 for record in played
-    ]
+    played = play_all(room, "still", ManipulationKind.PICKUP)
+    for record in played:
+        assert record.done == record.starts_inside == (record.start_distance <= 0.5)
     # The book, a ball and a pen before it.
     assert [record.index for record in played if record.done] == [51, 67, 100]
     assert all(len(record.steps) == 1 for record in played)
@@ -56,45 +58,31 @@ def test_who_stands_still_gets_just_what_lies_in_the_sphere_at_the_start(room):
 
 
 def test_the_planner_picks_up_and_puts_all(room):
-    picked = [
-        room.play(actor("planner-arm"), episode.index)
-        for episode in room.of(ManipulationKind.PICKUP)
-    ]
+    picked = play_all(room, "planner-arm", ManipulationKind.PICKUP)
     assert [record.ended for record in picked] == ["done"] * 5
     assert all(record.reward == record.max_reward == 2 for record in picked)
-    put = [
-        room.play(actor("planner-arm"), episode.index) for episode in room.of(ManipulationKind.PUT)
-    ]
+    put = play_all(room, "planner-arm", ManipulationKind.PUT)
     assert [record.ended for record in put] == ["done"] * 5
 
 
 def test_the_planner_puts_into_open_drawers(arena):
-    kitchen = arena("kitchen-2-seed4", 99)
-    put = [
-        kitchen.play(actor("planner-arm"), episode.index)
-        for episode in kitchen.of(ManipulationKind.PUT)
-    ]
+    put = play_all(arena("kitchen-2-seed4", 99), "planner-arm", ManipulationKind.PUT)
     assert [record.ended for record in put] == ["done"] * 3
     assert all(len(record.steps) < 10 for record in put)
 
 
 def test_a_larger_sphere_takes_no_success_from_the_planner(room):
     radii = (0.06, 0.1, 0.2, 0.35, 0.5)
-    successes = {
-        radius: [room.play(actor("planner-arm"), episode.index, radius=radius).done
-                 for episode in room.of(ManipulationKind.PICKUP)]
-        for radius in radii
-    }  # fmt: skip
-    rates = [sum(successes[radius]) for radius in radii]
+    played = [play_all(room, "planner-arm", ManipulationKind.PICKUP, radius=it) for it in radii]
+    rates = [sum(record.done for record in records) for records in played]
     assert rates == sorted(rates)
     assert rates[0] > 0 and rates[-1] == 5
 
 
 def test_equal_seeds_move_alike_and_other_seeds_and_episodes_do_not(room):
     def moved(index, seed):
-        return [
-            step.delta for step in room.play(actor("random-arm"), index, seed, max_steps=4).steps
-        ]
+        steps = room.play(actor("random-arm"), index, seed, max_steps=4).steps
+        return [step.delta for step in steps]
 
     first = moved(AGAIN, 7)
     assert len(first) == 4 and len(set(first)) == 4
@@ -247,12 +235,8 @@ def over(environment, item, aside=0.0):
         "y": top + 0.1 + held.axis_aligned_bounding_box.size.y / 2 + wrist.y - now[1],
         "z": goal[2] + wrist.z - now[2],
     }
-    return {
-        "action": "MoveArm",
-        "position": place,
-        "coordinateSpace": "world",
-        "returnToStart": False,
-    }
+    where = {"position": place, "coordinateSpace": "world"}
+    return {"action": "MoveArm", **where, "returnToStart": False}
 
 
 def test_released_over_the_receptacle_counts(room):
@@ -292,18 +276,12 @@ def test_distances_are_from_the_spheres_centre_to_the_targets_box(room):
         environment, begun = room.begin(index)
         target = environment.start.receptacle_id or environment.start.object_id
         for outcome in (begun, environment.step(ArmDelta((0.05, 0, 0.02), (0, 0.1, 0), 0.49))):
-            box, center = (
-                outcome.view.objects[target].axis_aligned_bounding_box,
-                outcome.view.arm.sphere_center,
-            )
-            nearest = (
-                min(max(getattr(center, axis), getattr(box.center, axis) - getattr(box.size,
-                                                                                   axis) / 2),
-                    getattr(box.center, axis) + getattr(box.size, axis) / 2)
-                for axis in "xyz"
-            )  # fmt: skip
-            assert outcome.distance == pytest.approx(math.dist(point_of(center), tuple(nearest)))
-            assert outcome.distance == distance_to(point_of(center), outcome.view.objects[target])
+            item, center = outcome.view.objects[target], point_of(outcome.view.arm.sphere_center)
+            box = item.axis_aligned_bounding_box
+            middle, half = np.array(point_of(box.center)), np.array(point_of(box.size)) / 2
+            nearest = np.clip(center, middle - half, middle + half)
+            assert outcome.distance == pytest.approx(math.dist(center, nearest))
+            assert outcome.distance == distance_to(center, item)
 
 
 def test_an_egg_that_cracks_before_it_is_taken_ends_nothing(arena):
@@ -322,15 +300,10 @@ def test_an_egg_that_cracks_before_it_is_taken_ends_nothing(arena):
 
 
 def test_closest_is_the_smallest_of_the_start_and_all_steps(room):
-    for name, index in (
-        ("planner-arm", BOOK),
-        ("random-arm", BOOK),
-        ("still", BOOK),
-        ("random-arm", INTO_DRAWER),
-    ):
+    names = ("planner-arm", "random-arm", "still")
+    for name, index in (*((name, BOOK) for name in names), ("random-arm", INTO_DRAWER)):
         record = room.play(actor(name), index, max_steps=6)
-        assert record.closest == min(
-            [record.start_distance, *(step.distance for step in record.steps)]
-        )
+        distances = [step.distance for step in record.steps]
+        assert record.closest == min([record.start_distance, *distances])
     still = room.play(actor("still"), BOOK)
     assert still.closest == still.start_distance == still.steps[0].distance

@@ -6,7 +6,6 @@ from infthor_eval.runs import execute
 from model_adapters import ArmDelta
 
 from ..helpers.trajectories import MUG, cut_trajectory, write_trajectories
-from .scripted import ScriptedPolicy
 
 pytestmark = pytest.mark.usefixtures("shared_simulators")
 
@@ -16,16 +15,14 @@ OPEN = ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.9)
 
 
 @pytest.fixture
-def picking(prepare_run, monkeypatch, tmp_path):
+def picking(prepare_run, policy, tmp_path):
     """The record of a pick-up of a clock beside the expert, by a policy that holds its hand still
     and open."""
     data = write_trajectories(tmp_path / "clock", cut_trajectory(MUG, 6))
 
     def picking(model=TWIN, **changes):
         if model == TWIN:
-            monkeypatch.setattr(
-                "infthor_eval.runs.work.binding.load", lambda *_: ScriptedPolicy(lambda _: [OPEN])
-            )
+            policy(lambda _: [OPEN])
         *_, record = execute(prepare_run(model, tasks=(PICK,), data=data, **changes)).records
         assert not record.failure and not record.excluded
         return record.payload
@@ -61,10 +58,8 @@ def test_the_hand_begins_at_rest_low_or_high(picking):
     assert heights["low"] < heights["rest"] - 0.05 < heights["rest"] + 0.05 < heights["high"]
 
 
-def test_a_put_counts_at_rest_or_when_it_is_released(prepare_run, monkeypatch):
-    monkeypatch.setattr(
-        "infthor_eval.runs.work.binding.load", lambda *_: ScriptedPolicy(lambda _: [OPEN])
-    )
+def test_a_put_counts_at_rest_or_when_it_is_released(prepare_run, policy):
+    policy(lambda _: [OPEN])
 
     def put(**changes):
         (record,) = execute(prepare_run(TWIN, tasks=(PUT,), **changes)).records

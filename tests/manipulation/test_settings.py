@@ -4,12 +4,13 @@ import pytest
 
 from infthor_eval.cli.options.run import expand_suite_options
 from infthor_eval.errors import DataError, UsageError
+from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import Grasp
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.trajectories import ArmEpisode
 
-from ..helpers.refusals import read_one_line
+from ..helpers.refusals import assert_raises_one_line, read_one_line
 from .arena import task_of
 
 PICK = ArmEpisode(4, ManipulationKind.PICKUP, "AppleSliced")
@@ -31,11 +32,9 @@ PUT = ArmEpisode(9, ManipulationKind.PUT, "ButterKnife", "SinkBasin")
 ])  # fmt: skip
 def test_what_a_policy_is_told(data, kind, template, episode, expected):
     settings = {} if template is None else {"instruction": template}
-    assert task_of(data, kind=kind, **settings).instruction(episode) == expected
-    assert (
-        task_of(data, ManipulationOptions(instruction=template), kind=kind).instruction(episode)
-        == expected
-    )
+    by_file = task_of(data, kind=kind, **settings)
+    by_option = task_of(data, ManipulationOptions(instruction=template), kind=kind)
+    assert by_file.instruction(episode) == by_option.instruction(episode) == expected
 
 
 @pytest.mark.parametrize("template", [
@@ -95,31 +94,19 @@ def test_frame_ablations_for_frames_that_do_not_exist_are_refused(frames):
 
 
 def test_settings_have_defaults_and_all_of_them_act(data):
-    plain = task_of(data)
-    assert plain.settings.grasp == Grasp(0.5, takes_all=False, at_palm=False, threshold=0.5)
-    assert (plain.settings.conversion.translation_scale, plain.settings.conversion.max_step) == (
-        1.0,
-        0.1,
-    )
-    assert plain.settings.conversion.rotation and plain.settings.conversion.return_to_start
-    assert plain.settings.camera == (300, 60.0)
-    assert (plain.settings.max_steps, plain.settings.reward) == (60, 2.0)
+    plain = task_of(data).settings
+    assert plain.grasp == Grasp(0.5, takes_all=False, at_palm=False, threshold=0.5)
+    assert plain.conversion == Conversion(1.0, 0.1, rotation=True, return_to_start=True)
+    assert (plain.camera, plain.max_steps, plain.reward) == ((300, 60.0), 60, 2.0)
     changed = task_of(
         data, radius=0.06, grasps="all", hold="palm", gripper_threshold=0.7, translation_scale=2,
         max_step=0.05,
         rotation=False, return_to_start=False, image_size=224, field_of_view=90, max_steps=9,
         reward=1,
-    )  # fmt: skip
-    assert changed.settings.grasp == Grasp(0.06, takes_all=True, at_palm=True, threshold=0.7)
-    assert (
-        changed.settings.conversion.translation_scale,
-        changed.settings.conversion.max_step,
-    ) == (2, 0.05)
-    assert (
-        not changed.settings.conversion.rotation and not changed.settings.conversion.return_to_start
-    )
-    assert changed.settings.camera == (224, 90)
-    assert (changed.settings.max_steps, changed.settings.reward) == (9, 1)
+    ).settings  # fmt: skip
+    assert changed.grasp == Grasp(0.06, takes_all=True, at_palm=True, threshold=0.7)
+    assert changed.conversion == Conversion(2, 0.05, rotation=False, return_to_start=False)
+    assert (changed.camera, changed.max_steps, changed.reward) == ((224, 90), 9, 1)
 
 
 @pytest.mark.parametrize(("settings", "expected"), [
@@ -142,9 +129,7 @@ def test_settings_have_defaults_and_all_of_them_act(data):
     ({"bundled": "nothing"}, "the installation lacks its data folder 'sets/nothing'"),
 ])  # fmt: skip
 def test_a_setting_that_would_not_act_is_refused(data, settings, expected):
-    with pytest.raises((DataError, UsageError)) as caught:
-        task_of(data, **settings)
-    assert expected in read_one_line(caught)
+    assert_raises_one_line(lambda: task_of(data, **settings), expected)
 
 
 # -- trajectories

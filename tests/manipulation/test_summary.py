@@ -35,13 +35,8 @@ def step(distance=1.0, *refusals):
 
 
 def episode(trajectory, index, ended="done", task=PICK, failure=None, excluded=None, **payload):
-    record = ArmRecord(
-        index=index,
-        kind="pickup" if task == PICK else "put",
-        instruction="",
-        ended=ended,
-        **payload,
-    )
+    kind = "pickup" if task == PICK else "put"
+    record = ArmRecord(index=index, kind=kind, instruction="", ended=ended, **payload)
     return UnitRecord(
         task=task, id=f"{trajectory}/{index:04d}", cluster=trajectory, fingerprint="f",
         payload=record,
@@ -49,22 +44,11 @@ def episode(trajectory, index, ended="done", task=PICK, failure=None, excluded=N
     )  # fmt: skip
 
 
+MET_TWICE = step(1.0, COLLIDED, COLLIDED)
+MET_AND_EMPTY = step(1.0, COLLIDED, "no objects in the sphere")
 RECORDS = [
-    episode(
-        "a",
-        1,
-        starts_inside=True,
-        closest=0.1,
-        reward=2.0,
-        steps=(step(), step(1.0, COLLIDED, COLLIDED)),
-    ),
-    episode(
-        "a",
-        5,
-        "step limit",
-        closest=0.4,
-        steps=(step(1.0, COLLIDED, "no objects in the sphere"),) * 4,
-    ),
+    episode("a", 1, starts_inside=True, closest=0.1, reward=2.0, steps=(step(), MET_TWICE)),
+    episode("a", 5, "step limit", closest=0.4, steps=(MET_AND_EMPTY,) * 4),
     episode("b", 2, "gave up", starts_inside=True, closest=0.7),
     episode("b", 3, "", failure="out of memory"),
     episode("b", 9, "", excluded="no such scene"),
@@ -85,9 +69,8 @@ def run(name="a policy", records=RECORDS, **changes):
 
 
 def table(title, *runs):
-    (matching,) = [
-        table for table in ManipulationSuite().tables(runs) if table.title.startswith(title)
-    ]
+    tables = ManipulationSuite().tables(runs)
+    (matching,) = [table for table in tables if table.title.startswith(title)]
     return matching
 
 
@@ -122,10 +105,9 @@ def test_the_numbers_of_puts():
 
 
 def test_a_put_may_count_when_it_is_released():
+    replace = msgspec.structs.replace
     records = [
-        msgspec.structs.replace(
-            record, payload=msgspec.structs.replace(record.payload, put_criterion="release")
-        )
+        replace(record, payload=replace(record.payload, put_criterion="release"))
         for record in RECORDS
     ]
     task = summed(records).tasks[PUT]
@@ -209,21 +191,15 @@ def test_episodes_and_endings_have_a_row_per_task():
     assert put["in the sphere at the start, %"] == "-"  # it is in the hand
     assert (pick["closest, m"], pick["steps"], pick["collisions"]) == ("0.40", "2.0", "2.0")
     pick, put = own(table("How episodes ended", run()))
-    assert (pick["step limit"], pick["released elsewhere"], put["released elsewhere"]) == (
-        "1",
-        "0",
-        "1",
-    )
+    assert pick["step limit"] == "1"
+    assert (pick["released elsewhere"], put["released elsewhere"]) == ("0", "1")
 
 
 def test_success_above_the_floor_is_that_of_the_same_episodes():
     endings = {("a", 1): "done", ("a", 2): "done", ("b", 1): "gave up", ("b", 2): "done"}
     policy = [episode(*key, ended) for key, ended in endings.items()]
-    still = [
-        episode("a", 1),
-        *(episode(*key, "gave up") for key in [("a", 2), ("b", 1)]),
-        episode("b", 7),
-    ]
+    gave_up = (episode(*key, "gave up") for key in [("a", 2), ("b", 1)])
+    still = [episode("a", 1), *gave_up, episode("b", 7)]
     own_row, floor = own(table("Low-level", run(records=policy), run("still", still)))
     # Of the three that both have: 2 against 1.
     assert own_row["Pick-up above still"].startswith("33.3 of 3 answered [")
@@ -243,10 +219,8 @@ def test_what_is_left_out_is_told_with_its_reason():
         "2 left out: no such scene",  # a pick-up and a put
     )
     assert own(printed_table)[0]["skipped"] == "2"
-    assert (
-        table("Low-level", run(broken=broken), run("other", broken=broken)).notes
-        == printed_table.notes
-    )
+    both = table("Low-level", run(broken=broken), run("other", broken=broken))
+    assert both.notes == printed_table.notes
 
 
 def test_many_reasons_are_counted_at_the_end():

@@ -1,18 +1,27 @@
 """Runs of plans on trajectories that are cut down, in simulators that all tests share, maybe by a
 scripted model."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from infthor_eval.runs import PreparedRun, RunOutcome, execute
+from infthor_eval.thor.launch import embedded_launch
+from infthor_eval.thor.simulator import Simulator
 
 from ..episodes.interrupted import simulator_calls  # noqa: F401 - a fixture
 from ..episodes.pool import pool, shared_simulators  # noqa: F401 - fixtures
 from ..episodes.preparing import make_preparer
 from ..helpers.trajectories import FORK, cut_trajectory, write_trajectories
 from .scripting import ScriptedModel
+
+
+@pytest.fixture(scope="module")
+def simulator() -> Iterator[Simulator]:
+    """A simulator of its own for a module's tests, which keeps copies and segments nothing."""
+    with Simulator(embedded_launch(), instances=False, max_copies=64) as simulator:
+        yield simulator
 
 
 @pytest.fixture

@@ -67,19 +67,10 @@ def _with_task(
     own = {"high_pddl_idx": [first, first + 1], "low_pddl_idx": list(low), "subgoal": text}
     parts = [before, own, *rest]
     document["sub_trajs"] = [part | {"sub_traj_idx": number} for number, part in enumerate(parts)]
-    info = {
-        "goal": "put object",
-        "movable": held,
-        "pickup": None,
-        "receptacle": place,
-        "scene": "1",
-    }
+    info = {"goal": "put object", "movable": held, "pickup": None, "receptacle": place}
     # Its parameters are those of the task before it, as the generator leaves them.
-    task = {
-        "task_info": info,
-        "task_desc": text,
-        "pddl_params": document["sub_tasks"][0]["pddl_params"],
-    }
+    params = document["sub_tasks"][0]["pddl_params"]
+    task = {"task_info": info | {"scene": "1"}, "task_desc": text, "pddl_params": params}
     document["sub_tasks"].insert(1, task)
     return document
 

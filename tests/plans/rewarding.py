@@ -26,6 +26,13 @@ def run(rules, target, start, events, task=ELSEWHERE, grid=None, treatments=None
     return rewards
 
 
+def check(target, start, steps, task=ELSEWHERE, **more):
+    """Hold that each step (action, object, world after it, reward, how it leaves the plan) gives
+    what is said; where nothing is said, nothing is given and the plan goes on."""
+    expected = [(*step[3:], *(0.0, GOES_ON)[len(step) - 3 :]) for step in steps]
+    assert run(DEFAULT, target, start, [step[:3] for step in steps], task, **more) == expected
+
+
 PICKUP = PlanTarget(PlanKind.PICKUP, MUG)
 PUT = PlanTarget(PlanKind.PUT, MUG, OTHER_TABLE)
 ON_THE_LID = PlanTarget(PlanKind.PUT, MUG, TOILET)

@@ -1,6 +1,6 @@
 """A model without weights that says what it is told to say."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from infthor_eval.formats.frames import FrameRef
@@ -10,12 +10,19 @@ from infthor_eval.plans.actors.habits import expert_texts
 from infthor_eval.plans.plan import plans_of, tasks_of
 from model_adapters import Capabilities, Part, Reply, Transcript, check_turns
 
+from ..helpers.prompts import join_parts
+
 FIRST_GOAL = "<|goal|>Your main goal: put a fork in the drawer<|goal|>"  # of FORK, in a prompt
 CAPABILITIES = Capabilities(token_ids=False, sampling=True, choices=True)
 
 
-class Talk(Transcript):
+def count_tokens(parts: Iterable[Part]) -> int:
     """A word counts as a token, and so does a frame."""
+    return sum(1 if isinstance(part, FrameRef) else len(part.split()) for part in parts)
+
+
+class Talk(Transcript):
+    """A conversation of it."""
 
     def __init__(self, model):
         super().__init__()
@@ -29,7 +36,7 @@ class Talk(Transcript):
 
     @property
     def n_tokens(self):
-        return sum(1 if isinstance(part, FrameRef) else len(part.split()) for part in self.parts)
+        return count_tokens(self.parts)
 
     def reply(self, decoding):
         check_turns(self._model.name, self._model.capabilities, self.turns)
@@ -67,20 +74,27 @@ class ScriptedModel:
 
 def plan_in_prompt(parts: Sequence[Part]) -> str:
     """The plan that is to be carried out."""
-    text = "".join(part if isinstance(part, str) else "" for part in parts)
-    return text.rpartition("<|plan|>Plan: ")[2].partition("<|plan|>")[0]
+    return join_parts(parts).rpartition("<|plan|>Plan: ")[2].partition("<|plan|>")[0]
 
 
 def goal_in_prompt(parts: Sequence[Part]) -> str:
     """The goal that it serves."""
-    text = "".join(part if isinstance(part, str) else "" for part in parts)
-    return text.rpartition("<|goal|>Your main goal: ")[2].partition("<|goal|>")[0]
+    return join_parts(parts).rpartition("<|goal|>Your main goal: ")[2].partition("<|goal|>")[0]
 
 
 def actions_in_prompt(parts: Sequence[Part]) -> list[str]:
     """The actions of that plan up to now."""
-    text = "".join(part if isinstance(part, str) else "" for part in parts)
-    return text.rpartition("<|plan|>")[2].split("<|act|>")[1:-1:2]
+    return join_parts(parts).rpartition("<|plan|>")[2].split("<|act|>")[1:-1:2]
+
+
+def beginnings(model: ScriptedModel) -> list[list[Part]]:
+    """What was asked before each plan."""
+    return [parts for parts, _ in model.requests if not actions_in_prompt(parts)]
+
+
+def prompts(model: ScriptedModel) -> list[str]:
+    """What was asked, as texts."""
+    return [join_parts(parts) for parts, _ in model.requests]
 
 
 def frames_in_prompt(parts: Sequence[Part]) -> list[FrameRef]:

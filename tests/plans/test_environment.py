@@ -16,13 +16,8 @@ from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 from ..helpers.bundled import BUNDLED, bundled_name
+from ..helpers.prompts import join_parts
 from ..helpers.trajectories import LAMP, read_trajectory
-
-
-@pytest.fixture(scope="module")
-def simulator():
-    with Simulator(embedded_launch(), instances=False, max_copies=64) as simulator:
-        yield simulator
 
 
 def trajectory(scene: str = "kitchen-2") -> Trajectory:
@@ -120,11 +115,7 @@ def test_the_history_is_the_sequence_that_models_are_trained_on(simulator, tmp_p
     environment.reset(last)
     play(environment, last)
     past = environment.past(last)
-    text = "".join(
-        part if isinstance(part, str) else "<image>"
-        for segment in past.all
-        for part in segment.parts()
-    )
+    text = "".join(join_parts(segment.parts()) for segment in past.all)
     text_file = (BUNDLED / "metadata" / recorded.traj_id / "traj.txt").read_text().strip()
     assert text_file.startswith(text)
     assert text_file[len(text) :].startswith("<|act|>")
@@ -167,9 +158,8 @@ def test_a_disk_that_was_full_in_between_changes_nothing_that_is_remembered(
         pasts.append(environment.past(1))
     sound, full = pasts
     assert sound.state == full.state
-    assert [len(segment.steps) for segment in sound.all] == [
-        len(segment.steps) for segment in full.all
-    ]
+    n_steps, again = ([len(segment.steps) for segment in past.all] for past in pasts)
+    assert n_steps == again
 
 
 def test_an_expert_that_is_refused_here_is_named_and_the_plans_before_go_on(simulator):
@@ -181,17 +171,15 @@ def test_an_expert_that_is_refused_here_is_named_and_the_plans_before_go_on(simu
     environment = PlanEnvironment(recorded, simulator)
     assert play(environment, 4)[-1].info.ended == Ended.DONE
     for plan in (5, 6):
-        with pytest.raises(
-            ExpertRefusedError, match=r"OpenObject Wardrobe, in plan 5\) is refused here"
-        ):
+        expected = r"OpenObject Wardrobe, in plan 5\) is refused here"
+        with pytest.raises(ExpertRefusedError, match=expected):
             environment.reset(plan)
     environment.reset(0)
 
 
 def test_a_task_without_a_goal_is_named(tmp_path):
-    document = json.loads(
-        (BUNDLED / "metadata" / bundled_name("kitchen-2") / "traj_data.json").read_text()
-    )
+    folder = BUNDLED / "metadata" / bundled_name("kitchen-2")
+    document = json.loads((folder / "traj_data.json").read_text())
     document["sub_tasks"][0]["task_info"]["goal"] = ""
     path = tmp_path / "trajectory.json"
     path.write_text(json.dumps(document))

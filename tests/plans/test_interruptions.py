@@ -23,9 +23,8 @@ from ..helpers.waiting import wait_until
 
 def read_results(output):
     (folder,) = (path.parent for path in output.rglob("journal"))
-    return drop_times(read_run(folder, RECORDS)[1]), json.loads(
-        (folder / "results.json").read_text()
-    )["summary"]
+    results = json.loads((folder / "results.json").read_text())
+    return drop_times(read_run(folder, RECORDS)[1]), results["summary"]
 
 
 def start(data, output, *more):

@@ -38,11 +38,8 @@ def test_plans_that_the_expert_cannot_do_here_count_for_nobody(
             "the expert's action 15 (OpenObject Wardrobe, in plan 2) is refused here: "
         )
         assert number == 2
-        assert {name: rate.n for name, rate in task.success.items()} == {
-            "Go to": 1,
-            "Pick up": 1,
-            "total": 2,
-        }
+        n_plans = {name: rate.n for name, rate in task.success.items()}
+        assert n_plans == {"Go to": 1, "Pick up": 1, "total": 2}
         assert cells(outcome, "Plans completed")["excluded"] == "2"
         (table, *_) = outcome.run.suite.tables([outcome.summary])
         assert f"2 left out: {reason}" in table.notes
@@ -50,12 +47,11 @@ def test_plans_that_the_expert_cannot_do_here_count_for_nobody(
 
 def test_a_plan_about_what_is_not_there_counts_for_nobody(prepare_run, tmp_path):
     document = cut_trajectory(FORK)
-    document["plan"]["high_pddl"][3]["planner_action"]["receptacleObjectId"] = (
-        "Elephant|+00.00|+00.00|+00.00"
-    )
+    nowhere = "Elephant|+00.00|+00.00|+00.00"
+    document["plan"]["high_pddl"][3]["planner_action"]["receptacleObjectId"] = nowhere
     outcome = execute(prepare_run(data=write_trajectories(tmp_path / "elephant", document)))
     task = summary(outcome)
-    assert task.excluded == {"the scene has no object for 'Elephant|+00.00|+00.00|+00.00'": 1}
+    assert task.excluded == {f"the scene has no object for '{nowhere}'": 1}
     assert (task.n_plans, task.n_failed, task.endings) == (3, 0, {"done": 3})
 
 
@@ -75,10 +71,8 @@ def test_where_all_is_left_out_the_exit_code_says_so(run_cli, tmp_path):
     document = cut_trajectory(MUG, 2)
     document["scene"]["floor_plan"] = "FloorPlan7"
     data = write_trajectories(tmp_path / "elsewhere", document)
-    arguments = option_words(
-        model="scripted", tasks="infthor_plans", data=str(data), out=str(tmp_path / "o")
-    )
-    code, out, err = run_cli("run", *arguments)
+    words = option_words(model="scripted", tasks="infthor_plans", data=data, out=tmp_path / "o")
+    code, out, err = run_cli("run", *words)
     assert code == 1
     assert "scene FloorPlan7" in out and "--scenes DIR" in " ".join(out.split())
     assert "no result: every sample is excluded" in err
@@ -133,10 +127,8 @@ def test_files_that_cannot_be_read_are_skipped_too(prepare_run, data):
     task = summary(outcome)
     assert (sum(task.skipped.values()), task.n_trajectories) == (3, 2)
     assert cells(outcome, "Plans completed")["skipped"] == "3"
-    assert all(
-        any(name in reason for reason in task.skipped)
-        for name in ("a.jsonl.gz", "c.json", "d.jsonl:2")
-    )
+    for name in ("a.jsonl.gz", "c.json", "d.jsonl:2"):
+        assert any(name in reason for reason in task.skipped)
 
 
 def test_nothing_to_evaluate_is_refused_in_one_line(prepare_run, tmp_path):

@@ -3,7 +3,6 @@ the history."""
 
 import pytest
 
-from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.plans.environment import PlanEnvironment
@@ -12,19 +11,13 @@ from infthor_eval.plans.plan import PlanKind, plans_of, tasks_of
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.runs import execute
 from infthor_eval.thor.frames import FrameFolder
-from infthor_eval.thor.launch import embedded_launch
-from infthor_eval.thor.simulator import Simulator
 
+from ..helpers.prompts import join_parts
 from ..helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
+from .outcomes import endings
 from .put_away import PEN, pen_put_away, put_away_without_actions, read
 
 PUT = 4  # the plan that puts the pen away; 22 actions, the last of which puts it
-
-
-@pytest.fixture(scope="module")
-def simulator():
-    with Simulator(embedded_launch(), instances=False, max_copies=32) as simulator:
-        yield simulator
 
 
 def by_expert(environment, plan):
@@ -46,11 +39,8 @@ def test_it_is_a_task_with_one_plan_about_the_very_objects():
     assert tasks[1].task == Task(TaskType.PUT_AWAY, "Pen", "DiningTable")
     assert [plan.task for plan in plans] == [0] * 4 + [1] + [2] * 4
     plan = plans[PUT]
-    assert (plan.kind, plan.text, plan.in_task) == (
-        PlanKind.PUT,
-        "put the Pen in the DiningTable",
-        True,
-    )
+    assert (plan.kind, plan.in_task) == (PlanKind.PUT, True)
+    assert plan.text == "put the Pen in the DiningTable"
     assert plan.low[1] - plan.low[0] == 22
     assert (plan.object_id, plan.receptacle_id) == (
         "Pen|-02.05|+00.75|-00.82",
@@ -86,9 +76,8 @@ def test_baselines_are_evaluated_on_it(prepare_run, tmp_path):
     assert pen_plans[PUT].goal == "put the Pen on the DiningTable"
     for name in ("random", "scripted", "history"):
         others = execute(prepare_run(name, data=data))
-        assert [record.payload.index for record in others.records if record.cluster == PEN] == list(
-            range(9)
-        )
+        of_pen = [record.payload.index for record in others.records if record.cluster == PEN]
+        assert of_pen == list(range(9))
         assert not any(record.excluded for record in others.records)
 
 
@@ -107,48 +96,37 @@ def test_the_published_history_has_its_goal_and_its_plan(simulator, tmp_path):
     environment = PlanEnvironment(read(pen_put_away()), simulator, frames=FrameFolder(tmp_path))
     environment.reset(PUT + 1)
     parts = PublishedHistory().recall(environment.past(PUT + 1), len)
-    prompt = "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
-    begins = "<|goal|>Your main goal: put the Pen on the DiningTable<|goal|><image>"
-    assert (
-        f"{begins}<|plan|>Plan: put the Pen in the "
-        "DiningTable<|plan|><|act|><|act|>RotateLeft<|act|>" in prompt
+    prompt = join_parts(parts)
+    goal = "<|goal|>Your main goal: put the Pen on the DiningTable<|goal|><image>"
+    plan = "<|plan|>Plan: put the Pen in the DiningTable<|plan|><|act|>"
+    assert f"{goal}{plan}<|act|>RotateLeft<|act|>" in prompt
+    put, then = (
+        "<|act|>PutObject Pen DiningTable<|act|><image>",
+        "<|goal|>Your main goal: look at a mug",
     )
-    assert (
-        "<|act|>PutObject Pen DiningTable<|act|><image><|goal|>Your main goal: look at a mug"
-        in prompt
-    )
+    assert f"{put}{then}" in prompt
 
 
 # -- files of before July 2026: the sub-goal without an action
 
+ENDS = "the published script ends at sub-goal 4, which has no actions"
+
 
 def test_without_actions_it_is_no_plan_and_the_others_are():
     trajectory = read(put_away_without_actions())
-    assert [task.task.task_type for task in tasks_of(trajectory)] == [
-        TaskType.PLACE,
-        TaskType.PUT_AWAY,
-        TaskType.PLACE_TWO,
-    ]
+    types = [task.task.task_type for task in tasks_of(trajectory)]
+    assert types == [TaskType.PLACE, TaskType.PUT_AWAY, TaskType.PLACE_TWO]
     plans = plans_of(trajectory, Words.PUBLISHED)
-    assert [(plan.high, plan.task) for plan in plans] == [
-        (0, 0),
-        (1, 0),
-        (2, 0),
-        (3, 0),
-        (5, 2),
-        (6, 2),
-    ]
+    of_first, of_last = [(high, 0) for high in range(4)], [(high, 2) for high in (5, 6)]
+    assert [(plan.high, plan.task) for plan in plans] == of_first + of_last
 
 
 @pytest.mark.usefixtures("shared_simulators")
 def test_without_actions_the_default_goes_on_and_the_published_loop_is_over(prepare_run, tmp_path):
     data = write_trajectories(tmp_path / "old", put_away_without_actions())
-    assert [record.payload.ended for record in execute(prepare_run(data=data)).records] == [
-        "done"
-    ] * 6
+    assert endings(execute(prepare_run(data=data))) == ["done"] * 6
     outcome = execute(prepare_run(data=data, rewards="published", history="published"))
-    ends = "the published script ends at sub-goal 4, which has no actions"
-    assert [record.excluded for record in outcome.records] == [None] * 4 + [ends] * 2
+    assert [record.excluded for record in outcome.records] == [None] * 4 + [ENDS] * 2
 
 
 @pytest.mark.usefixtures("shared_simulators")
@@ -156,10 +134,8 @@ def test_without_actions_the_default_goes_on_and_the_published_loop_is_over(prep
 def test_final_scripts_go_on_but_after_the_last_task_before_it(
     prepare_run, tmp_path, name, n_plans, is_last
 ):
-    data = write_trajectories(
-        tmp_path / "final", put_away_without_actions(name, n_plans, final=True)
-    )
+    document = put_away_without_actions(name, n_plans, final=True)
+    data = write_trajectories(tmp_path / "final", document)
     published = {"protocol": "published", "rewards": "published"}
     first, *_ = execute(prepare_run(tasks=("infthor_final",), data=data, **published)).records
-    ends = "the published script ends at sub-goal 4, which has no actions"
-    assert (first.excluded, first.payload.ended) == ((ends, "") if is_last else (None, "done"))
+    assert (first.excluded, first.payload.ended) == ((ENDS, "") if is_last else (None, "done"))

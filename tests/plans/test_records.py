@@ -7,15 +7,8 @@ import pytest
 
 from infthor_eval.plans.records import PlanRecord
 
-PLAN = {
-    "type": "plan",
-    "index": 0,
-    "kind": "GotoLocation",
-    "plan": "go to the mug",
-    "goal": "",
-    "task": 0,
-}
-PLAN |= {"first_step": 0, "n_expert_steps": 3}
+PLAN = {"type": "plan", "index": 0, "kind": "GotoLocation", "plan": "go to the mug", "goal": ""}
+PLAN |= {"task": 0, "first_step": 0, "n_expert_steps": 3}
 
 
 @pytest.mark.parametrize(

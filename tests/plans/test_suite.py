@@ -5,8 +5,10 @@ import json
 import pytest
 
 from infthor_eval.episodes.records import NOT_ATTEMPTED
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.exports.lm_eval import export
 from infthor_eval.formats.published import PublishedRow, PublishedTable
+from infthor_eval.plans.actors import baselines
 from infthor_eval.runs import execute
 
 from ..helpers.command_line import assert_refused, option_words
@@ -47,23 +49,15 @@ def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepare_run, 
     assert all(plan.reward == plan.max_reward for plan in plans.values())
     assert [key for key, plan in plans.items() if plan.goal_reached] == [(FORK, 3)]
     assert [step.reward for step in plans[FORK, 3].steps] == [2, 7, 2]
-    assert [plan.goal for plan in payloads(outcome)] == ["put a mug on the desk"] * 2 + [
-        "put a fork in the drawer"
-    ] * 4
+    goals = ["put a mug on the desk"] * 2 + ["put a fork in the drawer"] * 4
+    assert [plan.goal for plan in payloads(outcome)] == goals
     assert [plan.first_step for plan in payloads(outcome)] == [0, 9, 0, 12, 15, 16]
     task = summary(outcome)
     assert (task.n_plans, task.n_trajectories, task.n_failed, task.n_actions) == (6, 2, 0, 24)
-    assert (
-        task.reward.mean
-        == task.max_reward.mean
-        == pytest.approx(((6 + 2 + 4.2 + 11) + (5.4 + 2)) / 2)
-    )
-    assert {name: (rate.mean, rate.n) for name, rate in task.success.items()} == {
-        "Go to": (1, 3),
-        "Pick up": (1, 2),
-        "Put": (1, 1),
-        "total": (1, 6),
-    }
+    assert task.reward.mean == task.max_reward.mean
+    assert task.reward.mean == pytest.approx(((6 + 2 + 4.2 + 11) + (5.4 + 2)) / 2)
+    rates = {name: (rate.mean, rate.n) for name, rate in task.success.items()}
+    assert rates == {"Go to": (1, 3), "Pick up": (1, 2), "Put": (1, 1), "total": (1, 6)}
     assert (task.goals.mean, task.goals.n) == (0.5, 2)  # the mug's task is cut off
     assert task.endings == {"done": 6}
     row = cells(outcome, "Plans completed")
@@ -73,8 +67,6 @@ def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepare_run, 
 
 
 def test_what_is_exported_has_a_sample_for_each_plan(prepare_run):
-    from infthor_eval.exports.lm_eval import export
-
     outcome = execute(prepare_run())
     export(outcome)
     (path,) = outcome.folder.rglob("samples_infthor_plans_*.jsonl")
@@ -120,22 +112,15 @@ def test_equal_seeds_act_alike_and_other_seeds_do_not(prepare_run, tmp_path):
 def test_what_a_baseline_does_in_a_trajectory_depends_on_no_other(prepare_run, data, tmp_path):
     alone = payloads(execute(prepare_run("random")))
     write_trajectories(data / "more", cut_trajectory(MUG, 1))
-    beside = [
-        record
-        for record in execute(prepare_run("random", output=tmp_path / "b")).records
-        if record.cluster == FORK
-    ]
-    assert [record.payload for record in beside] == alone
+    beside = execute(prepare_run("random", output=tmp_path / "b")).records
+    assert [record.payload for record in beside if record.cluster == FORK] == alone
 
 
 def test_habits_are_learnt_in_other_scenes_alone(prepare_run, data, tmp_path):
     alone = payloads(execute(prepare_run("history")))
     assert {step.action for plan in alone for step in plan.steps} == {"NoOp"}
     write_trajectories(data / "more", cut_trajectory(MUG, 4))
-    learnt = [
-        record.payload
-        for record in execute(prepare_run("history", output=tmp_path / "b")).records[4:]
-    ]
+    learnt = payloads(execute(prepare_run("history", output=tmp_path / "b")))[4:]
     assert learnt[0].steps[0].action == "MoveAhead"
     assert learnt[1].steps[0].message.startswith("PickupObject Fork: ")  # the cabinet is closed
     assert learnt[1].ended == "not in view"
@@ -148,9 +133,8 @@ def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_publishe
     prepare_run, tmp_path, monkeypatch
 ):
     row = PublishedRow("a paper's model", (), 7.0, (10.0, 20.0, 30.0, 25.0))
-    table = PublishedTable(
-        "Table 5", "here", "plans", "", "success", ("Go to", "Pick up", "Put", "total"), (row,)
-    )
+    columns = ("Go to", "Pick up", "Put", "total")
+    table = PublishedTable("Table 5", "here", "plans", "", "success", columns, (row,))
     monkeypatch.setattr("infthor_eval.plans.tables.published_tables", {"plans": (table,)}.get)
     data = write_trajectories(
         tmp_path / "final", cut_trajectory(FORK, 6, final=True), cut_trajectory(MUG, 2)
@@ -173,32 +157,20 @@ def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_publishe
     )
     (table, *_) = theirs.run.suite.tables([theirs.summary])
     (published,) = [row for row in table.rows if row.is_published]
-    assert published.cells == (
-        "a paper's model",
-        "published, Table 5",
-        "10.0",
-        "20.0",
-        "30.0*",
-        "25.0",
-    )
+    success = ("10.0", "20.0", "30.0*", "25.0")
+    assert published.cells == ("a paper's model", "published, Table 5", *success)
     plain = execute(prepare_run(data=data))
     assert len(plain.records) == 8
     assert not any(row.is_published for row in plain.run.suite.tables([plain.summary])[0].rows)
 
 
 def test_where_no_trajectory_has_a_final_task_that_is_said(prepare_run, run_cli, data, tmp_path):
-    with pytest.raises(
-        UsageError, match="infthor_final: no trajectory there has a final task"
-    ) as caught:
+    said = "infthor_final: no trajectory there has a final task"
+    with pytest.raises(UsageError, match=said) as caught:
         prepare_run(tasks=("infthor_final",))
     read_one_line(caught)
-    assert_refused(
-        run_cli(
-            *option_words(
-                model="planner", tasks="infthor_final", data=data, out=tmp_path / "o", limit=3
-            )
-        )
-    )
+    words = option_words(model="planner", tasks="infthor_final", data=data, limit=3)
+    assert_refused(run_cli(*words, "--out", tmp_path / "o"), said)
 
 
 def test_a_model_that_draws_nothing_is_refused_before_it_is_asked_to(run_cli, data, tmp_path):
@@ -225,10 +197,8 @@ def test_where_a_failure_ends_the_episode_later_plans_are_not_come_to_and_earn_n
     first, *others = outcome.records
     assert first.payload.ended == "refused by the simulator"  # it walks on and on
     assert {record.payload.ended for record in others} == {NOT_ATTEMPTED}
-    assert all(
-        (plan.steps, plan.reward, plan.max_reward) == ((), 0, None)
-        for plan in payloads(outcome)[1:]
-    )
+    for plan in payloads(outcome)[1:]:
+        assert (plan.steps, plan.reward, plan.max_reward) == ((), 0, None)
     task = summary(outcome)
     assert (task.n_plans, task.endings) == (4, {NOT_ATTEMPTED: 3, "refused by the simulator": 1})
     assert task.success["total"].mean == 0
@@ -241,9 +211,6 @@ def test_where_a_failure_ends_the_episode_later_plans_are_not_come_to_and_earn_n
 def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(
     prepare_run, monkeypatch
 ):
-    from infthor_eval.errors import ModelError
-    from infthor_eval.plans.actors import baselines
-
     act = baselines._ExpertActor.act
 
     def fails(actor):
@@ -255,12 +222,8 @@ def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(
         patched.setattr(baselines._ExpertActor, "act", fails)
         broken = execute(prepare_run(after_failure="stop"))
     # Nobody knows whether the plans after it would have been reached: they are not wrong.
-    assert [(record.state, record.payload.ended) for record in broken.records] == [
-        ("answered", "done"),
-        ("failed", ""),
-        ("not asked", ""),
-        ("not asked", ""),
-    ]
+    ends = [("answered", "done"), ("failed", ""), ("not asked", ""), ("not asked", "")]
+    assert [(record.state, record.payload.ended) for record in broken.records] == ends
     assert broken.records[1].payload.max_reward == 2
     task = summary(broken)
     assert (task.n_failed, task.n_not_asked) == (1, 2)

@@ -56,9 +56,8 @@ def test_what_does_not_apply_is_told(text, world, words):
 
 
 def test_put_names_the_receptacle():
-    call = ground(
-        parse_action("PutObject Mug Fridge"), view(MUG, FRIDGE, inventory=[MUG.object_id])
-    )
+    holding = view(MUG, FRIDGE, inventory=[MUG.object_id])
+    call = ground(parse_action("PutObject Mug Fridge"), holding)
     assert call == {"action": "PutObject", "objectId": FRIDGE.object_id}
 
 
@@ -90,15 +89,11 @@ def test_what_is_possible_counts_every_object_in_view():
     calls = applicable_calls(view(*drawers, mug, hidden), degrees=15.0)
     assert [call["action"] for call in calls].count("OpenObject") == 3
     assert {"action": "LookUp", "degrees": 15.0} in calls
-    assert {call["objectId"] for call in calls if call["action"] == "PickupObject"} == {
-        mug.object_id
-    }
+    picked = {call["objectId"] for call in calls if call["action"] == "PickupObject"}
+    assert picked == {mug.object_id}
     assert not [call for call in calls if call["action"] == "PutObject"]
     texts = [str(text) for text in applicable_actions(view(*drawers, mug, hidden))]
     assert texts.count("OpenObject Drawer") == 1
     held = view(*drawers, mug, inventory=[mug.object_id])
-    assert [
-        str(text_of_call(call, held))
-        for call in applicable_calls(held)
-        if call["action"] == "PutObject"
-    ] == ["PutObject Mug Drawer"] * 3
+    puts = [call for call in applicable_calls(held) if call["action"] == "PutObject"]
+    assert [str(text_of_call(call, held)) for call in puts] == ["PutObject Mug Drawer"] * 3

@@ -26,24 +26,21 @@ def grasp(simulator: Simulator, thing: ThorObject) -> bool:
     places = simulator.query("GetReachablePositions").result
     box = thing.axis_aligned_bounding_box
     top = box.center.y + box.size.y / 2 + 0.045
-    for place in sorted(
-        places, key=lambda p: abs(math.hypot(p["x"] - box.center.x, p["z"] - box.center.z) - 0.6)
-    )[:8]:
-        aside, ahead = box.center.x - place["x"], box.center.z - place["z"]
+
+    def way_to(place: dict[str, float]) -> tuple[float, float]:
+        return box.center.x - place["x"], box.center.z - place["z"]
+
+    for place in sorted(places, key=lambda p: abs(math.hypot(*way_to(p)) - 0.6))[:8]:
+        aside, ahead = way_to(place)
         away = math.hypot(aside, ahead)
         turn = {"y": math.degrees(math.atan2(aside, ahead))}
         simulator.step("TeleportFull", position=place, rotation=turn, horizon=20, standing=True)
         simulator.step("MoveArm", position={"x": 0, "y": 0, "z": 0.4})
         simulator.step("MoveArmBase", y=min(top + 0.25, 1.8), normalizedY=False)
-        wrist = {
-            "x": box.center.x - 0.07 * aside / away,
-            "y": top,
-            "z": box.center.z - 0.07 * ahead / away,
-        }
+        x, z = box.center.x - 0.07 * aside / away, box.center.z - 0.07 * ahead / away
         for lift in (0.15, 0.0):
-            moved = simulator.step(
-                "MoveArm", position={**wrist, "y": top + lift}, coordinateSpace="world"
-            )
+            wrist = {"x": x, "y": top + lift, "z": z}
+            moved = simulator.step("MoveArm", position=wrist, coordinateSpace="world")
         if moved.success and thing.object_id in moved.arm.pickupable:
             return simulator.step("PickupObject", objectIdCandidates=[thing.object_id]).success
     return False
@@ -53,9 +50,8 @@ def test_a_thing_is_picked_up_carried_and_put_down(simulator):
     view = simulator.reset("kitchen-1")
     assert view.arm.joints[-1].name == "robot_arm_4_jnt" and view.arm.held == []
     assert view.arm.joints[0].position.y == pytest.approx(0.898, abs=1e-3)
-    plate = next(
-        o for o in view.objects.values() if o.object_type == "Plate" and o.position.y > 0.9
-    )
+    plates = (o for o in view.objects.values() if o.object_type == "Plate")
+    plate = next(o for o in plates if o.position.y > 0.9)
     assert grasp(simulator, plate)
     view = simulator.step("MoveArmRelative", offset={"y": 0.1})
     assert view.inventory == (plate.object_id,) == tuple(view.arm.held)
@@ -63,10 +59,8 @@ def test_a_thing_is_picked_up_carried_and_put_down(simulator):
     assert view.objects[plate.object_id].position.y > plate.position.y + 0.09
     mark = simulator.mark()
     down = simulator.step("ReleaseObject")
-    assert (
-        down.inventory == ()
-        and down.objects[plate.object_id].parent_receptacles == plate.parent_receptacles
-    )
+    assert down.inventory == ()
+    assert down.objects[plate.object_id].parent_receptacles == plate.parent_receptacles
     assert simulator.rewind(mark, exactly=True).arm == view.arm
     again = simulator.step("Pass")
     assert again.arm == view.arm and again.objects[plate.object_id] == view.objects[plate.object_id]
@@ -77,10 +71,8 @@ def test_a_refused_movement_says_why(simulator):
     simulator.step("MoveArmBase", y=0)
     low = simulator.step("MoveArm", position={"x": 0, "y": -2, "z": 0.5})
     assert not low.success and low.error.startswith("Collided with static ")
-    assert (
-        simulator.step("MoveArm", position={"x": 0, "y": 0, "z": 0.5}, pace=3).error_code
-        == "InvalidArgument"
-    )
+    unknown = simulator.step("MoveArm", position={"x": 0, "y": 0, "z": 0.5}, pace=3)
+    assert unknown.error_code == "InvalidArgument"
 
 
 def test_a_recorded_scene_is_restored_for_the_arm_as_for_the_default_agent(simulator):
@@ -92,13 +84,8 @@ def test_a_recorded_scene_is_restored_for_the_arm_as_for_the_default_agent(simul
     ]
     at = view.agent.position
     start = InitAction(at.x, at.y, at.z, rotation=90.0, horizon=30.0)
-    scene = Scene(
-        "kitchen-1",
-        start,
-        object_poses=poses,
-        object_toggles=[Toggle("Faucet", True)],
-        dirty_and_empty=True,
-    )
+    states = {"object_toggles": [Toggle("Faucet", True)], "dirty_and_empty": True}
+    scene = Scene("kitchen-1", start, object_poses=poses, **states)
     restored = restore(simulator, scene)
     assert restored.refused == restored.dropped == []
     by_arm = simulator.view
@@ -111,26 +98,9 @@ def test_a_recorded_scene_is_restored_for_the_arm_as_for_the_default_agent(simul
 
 
 def test_a_house_built_from_its_description_has_the_arm_too(simulator):
-    house = {
-        "rooms": [],
-        "walls": [],
-        "objects": [],
-        "doors": [],
-        "windows": [],
-        "proceduralParameters": {},
-    }
     floor = [{"x": x, "y": 0, "z": z} for x, z in ((0, 0), (0, 4), (4, 4), (4, 0))]
-    house["rooms"] = [
-        {
-            "id": "room|1",
-            "roomType": "Kitchen",
-            "floorPolygon": floor,
-            "ceilings": [],
-            "children": [],
-        }
-    ]
-    view = simulator.reset(house)
-    assert (
-        view.arm is not None
-        and simulator.step("MoveArm", position={"x": 0, "y": 0.1, "z": 0.5}).success
-    )
+    room = {"id": "room|1", "roomType": "Kitchen", "floorPolygon": floor}
+    nothing = {"walls": [], "objects": [], "doors": [], "windows": []}
+    house = {"rooms": [room | {"ceilings": [], "children": []}], **nothing}
+    assert simulator.reset(house | {"proceduralParameters": {}}).arm is not None
+    assert simulator.step("MoveArm", position={"x": 0, "y": 0.1, "z": 0.5}).success

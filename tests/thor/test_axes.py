@@ -26,7 +26,6 @@ def test_a_thing_that_lies_flat_is_turned_about_the_vertical(object_type, turn):
 
 
 def test_a_thing_that_stands_is_turned_about_its_own_axis():
-    turned = modern_rotation("Knife", {"x": 90.0, "y": 0.0, "z": 0.0})
-    assert np.allclose(
-        _matrix(turned)[:, 1], _matrix({"x": 90.0, "y": 0.0, "z": 0.0})[:, 1], atol=1e-5
-    )
+    standing = {"x": 90.0, "y": 0.0, "z": 0.0}
+    turned = modern_rotation("Knife", standing)
+    assert np.allclose(_matrix(turned)[:, 1], _matrix(standing)[:, 1], atol=1e-5)

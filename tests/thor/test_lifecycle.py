@@ -38,54 +38,50 @@ def test_an_episode_survives_the_death_of_its_simulator():
     assert np.array_equal(frames[0][1], frames[1][1])
 
 
-def test_a_query_is_no_part_of_the_episode():
-    with Simulator(embedded_launch()) as simulator:
-        before = simulator.reset(SCENE)
-        assert simulator.query("GetReachablePositions").result
-        assert simulator.view is before
-        assert simulator.mark().episode == ()
+def test_a_query_is_no_part_of_the_episode(simulator):
+    before = simulator.reset(SCENE)
+    assert simulator.query("GetReachablePositions").result
+    assert simulator.view is before
+    assert simulator.mark().episode == ()
 
 
 @pytest.mark.parametrize(
     "actions", [["MoveAhead", "RotateRight", "LookDown"], ["RotateLeft", "Crouch", "MoveAhead"]]
 )
-def test_rewinding_brings_the_world_back(actions):
-    with Simulator(embedded_launch()) as simulator:
-        simulator.reset(SCENE)
-        there = simulator.step("RotateRight")
-        mark = simulator.mark()
-        for action in actions:
-            simulator.step(action)
-        back = simulator.rewind(mark)
-        assert back.agent == there.agent
-        after = [simulator.step("MoveAhead"), simulator.step("RotateRight")]
+def test_rewinding_brings_the_world_back(actions, simulator):
+    simulator.reset(SCENE)
+    there = simulator.step("RotateRight")
+    mark = simulator.mark()
+    for action in actions:
+        simulator.step(action)
+    back = simulator.rewind(mark)
+    assert back.agent == there.agent
+    after = [simulator.step("MoveAhead"), simulator.step("RotateRight")]
+    simulator.rewind(mark)
+    again = [simulator.step("MoveAhead"), simulator.step("RotateRight")]
+    assert all(one.agent == other.agent for one, other in zip(after, again, strict=True))
+    # Walking adds rounding errors that a teleport does not: single pixels at edges may differ.
+    assert all(
+        np.mean(one.frame != other.frame) < 1e-3 for one, other in zip(after, again, strict=True)
+    )
+
+
+def test_the_last_two_marks_are_gone_back_to_without_repeating_the_episode(monkeypatch, simulator):
+    simulator.reset(SCENE)
+    monkeypatch.setattr(simulator, "reset", lambda _: pytest.fail("the episode was repeated"))
+    marks, views = [], []
+    for action in ("Crouch", "RotateRight"):
+        simulator.step(action)
+        views.append(simulator.step("MoveAhead"))
+        marks.append(simulator.mark())
+    simulator.step("Stand")
+    for mark, view in reversed(list(zip(marks, views, strict=True))):
         simulator.rewind(mark)
-        again = [simulator.step("MoveAhead"), simulator.step("RotateRight")]
-        assert all(one.agent == other.agent for one, other in zip(after, again, strict=True))
-        # Walking adds rounding errors that a teleport does not: single pixels at edges may differ.
-        assert all(
-            np.mean(one.frame != other.frame) < 1e-3
-            for one, other in zip(after, again, strict=True)
-        )
-
-
-def test_the_last_two_marks_are_gone_back_to_without_repeating_the_episode(monkeypatch):
-    with Simulator(embedded_launch()) as simulator:
-        simulator.reset(SCENE)
-        monkeypatch.setattr(simulator, "reset", lambda _: pytest.fail("the episode was repeated"))
-        marks, views = [], []
-        for action in ("Crouch", "RotateRight"):
-            simulator.step(action)
-            views.append(simulator.step("MoveAhead"))
-            marks.append(simulator.mark())
-        simulator.step("Stand")
-        for mark, view in reversed(list(zip(marks, views, strict=True))):
-            simulator.rewind(mark)
-            again = simulator.query("Pass")
-            assert again.agent == view.agent
-            assert np.array_equal(again.frame, view.frame)
-            simulator.step("RotateLeft")
-        assert simulator.rewind(marks[0]).agent == views[0].agent
+        again = simulator.query("Pass")
+        assert again.agent == view.agent
+        assert np.array_equal(again.frame, view.frame)
+        simulator.step("RotateLeft")
+    assert simulator.rewind(marks[0]).agent == views[0].agent
 
 
 def test_nothing_is_drawn_to_rewind():
@@ -96,11 +92,7 @@ def test_nothing_is_drawn_to_rewind():
         simulator.rewind(mark, exactly=True)
         event = simulator._controller.last_event
         assert event.metadata["lastAction"] == "RestoreState"
-        assert (event.frame, event.depth_frame, event.instance_segmentation_frame) == (
-            None,
-            None,
-            None,
-        )
+        assert event.frame is event.depth_frame is event.instance_segmentation_frame is None
 
 
 @pytest.mark.parametrize("exactly", [False, True])
@@ -112,7 +104,10 @@ def test_any_mark_of_the_scene_can_be_gone_to_from_any_moment(exactly):
             simulator.step(action)
             marks.append(simulator.mark())
         calls = []
-        simulator._controller.step = _counted(simulator._controller.step, calls)
+        step = simulator._controller.step
+        simulator._controller.step = lambda *args, **kwargs: (
+            calls.append(args) or step(*args, **kwargs)
+        )
         for number in (0, 4, 2, 3, 1, 4):
             view = simulator.rewind(marks[number], exactly=exactly)
             assert view is marks[number].view
@@ -139,11 +134,8 @@ def test_without_copies_the_way_is_gone_again():
 
 
 @pytest.mark.parametrize("scene", ["FloorPlan9999", "nowhere"])
-def test_an_unknown_scene_is_one_line(scene):
-    with (
-        Simulator(embedded_launch()) as simulator,
-        pytest.raises(SimulatorError, match=scene) as caught,
-    ):
+def test_an_unknown_scene_is_one_line(simulator, scene):
+    with pytest.raises(SimulatorError, match=scene) as caught:
         simulator.reset(scene)
     assert "\n" not in str(caught.value)
 
@@ -180,14 +172,6 @@ def resident():
     """Resident memory of this process, MB."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
-def _counted(step, calls):
-    def counted(*args, **kwargs):
-        calls.append(args)
-        return step(*args, **kwargs)
-
-    return counted
 
 
 def test_the_pipes_of_a_killed_process_go_with_the_next_one(tmp_path):

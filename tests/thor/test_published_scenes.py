@@ -13,6 +13,7 @@ import pytest
 
 from infthor_eval.thor import published_scenes
 
+from ..helpers.command_line import assert_refused
 from ..infthor_sim.harness import Bench
 
 OBJECTS = "dev/data/objects_metadata_samples/FloorPlan1_physics.json"
@@ -22,6 +23,12 @@ CELLS = "gen/layouts/FloorPlan1-layout.npy"
 class Quiet(http.server.SimpleHTTPRequestHandler):
     def log_message(self, *arguments: object) -> None:
         """Say nothing."""
+
+
+def array_file(array: np.ndarray) -> bytes:
+    content = io.BytesIO()
+    np.save(content, array)
+    return content.getvalue()
 
 
 def put(root: Path, end: str, content: bytes) -> None:
@@ -35,12 +42,10 @@ def put(root: Path, end: str, content: bytes) -> None:
 @pytest.fixture
 def root(tmp_path) -> Path:
     """The files of a kitchen as the two repositories have them."""
-    bench = Bench(size=40)
-    entries = bench.reset("kitchen-1")["objects"]
+    bench = Bench.at("kitchen-1", size=40)
+    entries = bench.metadata["objects"]
     put(tmp_path, OBJECTS, json.dumps({o["objectId"]: o for o in entries}).encode())
-    cells = io.BytesIO()
-    np.save(cells, np.array(list(bench.sim.world.nav)))
-    put(tmp_path, CELLS, cells.getvalue())
+    put(tmp_path, CELLS, array_file(np.array(list(bench.sim.world.nav))))
     return tmp_path
 
 
@@ -54,9 +59,16 @@ def host(root) -> Iterator[str]:
     server.server_close()
 
 
-def test_a_fetched_floor_plan_runs(host, tmp_path, run_cli):
+@pytest.fixture
+def fetch(host, tmp_path, run_cli):
+    """Fetches a floor plan; gives the exit code, standard output and standard error."""
+    words = ("--out", tmp_path / "scenes", "--endpoint", host)
+    return lambda name="FloorPlan1": run_cli("scenes", "fetch", name, *words)
+
+
+def test_a_fetched_floor_plan_runs(fetch, tmp_path, run_cli):
     folder = tmp_path / "scenes"
-    code, out, err = run_cli("scenes", "fetch", "FloorPlan1", "--out", folder, "--endpoint", host)
+    code, out, err = fetch()
     assert code == 0, err
     assert out.startswith("FloorPlan1: ")
     assert run_cli("ls", "scenes", "--data", folder)[1].count("FloorPlan1") >= 1
@@ -73,37 +85,20 @@ def test_a_fetched_floor_plan_runs(host, tmp_path, run_cli):
         (OBJECTS, b'{"a": {"objectId": 1}}', "not metadata of objects"),
         (CELLS, b"no array", "not an array"),
         (CELLS, b"", "not an array"),
+        pytest.param(CELLS, array_file(np.zeros(3)), "not positions (n, 2)", id="positions"),
     ],
 )
-def test_what_is_no_floor_plan_is_one_line(root, host, tmp_path, run_cli, end, content, expected):
+def test_what_is_no_floor_plan_is_one_line(root, fetch, end, content, expected):
     put(root, end, content)
-    code, _, err = run_cli(
-        "scenes", "fetch", "FloorPlan1", "--out", tmp_path / "scenes", "--endpoint", host
-    )
-    assert code == 2
-    assert expected in err
-    assert len(err.strip().splitlines()) == 1
+    assert_refused(fetch(), expected)
 
 
-def test_positions_of_another_form_are_refused(root, host, tmp_path, run_cli):
-    cells = io.BytesIO()
-    np.save(cells, np.zeros(3))
-    put(root, CELLS, cells.getvalue())
-    _, _, err = run_cli(
-        "scenes", "fetch", "FloorPlan1", "--out", tmp_path / "s", "--endpoint", host
-    )
-    assert "not positions (n, 2)" in err
-
-
-def test_a_file_that_is_not_there_is_named(host, tmp_path, run_cli):
-    code, _, err = run_cli(
-        "scenes", "fetch", "FloorPlan2", "--out", tmp_path / "scenes", "--endpoint", host
-    )
-    assert code == 2
-    assert "FloorPlan2_physics.json: cannot be downloaded (HTTP Error 404" in err
-
-
-def test_only_published_floor_plans_are_asked_for(tmp_path, run_cli):
-    code, _, err = run_cli("scenes", "fetch", "FloorPlan31", "--out", tmp_path / "scenes")
-    assert code == 2
-    assert "FloorPlan31: not published; there are FloorPlan1 to 30" in err
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("FloorPlan2", "FloorPlan2_physics.json: cannot be downloaded (HTTP Error 404"),
+        ("FloorPlan31", "FloorPlan31: not published; there are FloorPlan1 to 30"),
+    ],
+)
+def test_what_is_not_there_or_not_published_is_named(fetch, name, expected):
+    assert_refused(fetch(name), expected)

@@ -39,12 +39,8 @@ def test_put_names_the_receptacle_alone():
     api = ApiAction(
         "PutObject", "Mug|+01.01|+00.90|+00.00", "Fridge|+02.10|+00.00|+00.00", force_action=True
     )
-    assert call(api) == {
-        "action": "PutObject",
-        "objectId": FRIDGE.object_id,
-        "forceAction": True,
-        "placeStationary": True,
-    }
+    put = {"action": "PutObject", "objectId": FRIDGE.object_id}
+    assert call(api) == {**put, "forceAction": True, "placeStationary": True}
 
 
 def test_an_object_that_the_scene_lacks():

@@ -24,9 +24,7 @@ def n_seen(view: SimulatorView) -> int:
 @pytest.mark.parametrize(
     "scene", ["kitchen-1", "living-room-4", "bedroom-5", "bathroom-3", "house-3"]
 )
-def test_it_shows_several_times_as_many_objects_as_the_first_frame(
-    simulator: Simulator, scene: str
-) -> None:
+def test_it_shows_several_times_as_many_objects_as_the_first_frame(simulator, scene):
     first = simulator.reset(scene)
     places = [Vector(**place) for place in simulator.query("GetReachablePositions").result]
     pose = find_room_view(simulator, places, SIZE * SIZE)
@@ -42,7 +40,7 @@ def test_it_shows_several_times_as_many_objects_as_the_first_frame(
     assert largest < 0.4 * SIZE * SIZE
 
 
-def test_the_same_scene_has_the_same_view(simulator: Simulator) -> None:
+def test_the_same_scene_has_the_same_view(simulator):
     poses = []
     for _ in range(2):
         simulator.reset("bathroom-1")
@@ -51,6 +49,6 @@ def test_the_same_scene_has_the_same_view(simulator: Simulator) -> None:
     assert poses[0] == poses[1]
 
 
-def test_without_a_place_to_go_it_is_the_agents_own_view(simulator: Simulator) -> None:
+def test_without_a_place_to_go_it_is_the_agents_own_view(simulator):
     simulator.reset("bathroom-1")
     assert find_room_view(simulator, [], SIZE * SIZE) == simulator.view.agent

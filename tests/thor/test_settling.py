@@ -5,13 +5,14 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import pytest
 from msgspec.structs import asdict
 
 from infthor_eval.formats.trajectory import InitAction, ObjectPose, Scene
 from infthor_eval.thor.restore import restore, settle
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import ThorObject, Vector
+from infthor_eval.thor.view import ThorObject
 
 from .views import view
 
@@ -49,15 +50,7 @@ class RecordingSimulator:
 
 def _objects(entries: list[dict]) -> list[ThorObject]:
     return [
-        ThorObject(
-            entry["objectId"],
-            entry["objectId"].split("|")[0],
-            entry["name"],
-            Vector(**entry["position"]),
-            Vector(**entry["rotation"]),
-            pickupable=entry["pickupable"],
-            is_picked_up=entry["isPickedUp"],
-        )
+        msgspec.convert({"objectType": entry["objectId"].split("|")[0], **entry}, ThorObject)
         for entry in entries
     ]
 
@@ -68,13 +61,8 @@ def _in_published_form(call: dict) -> dict:
     if action == "SetObjectPoses":
         return {"action": action}
     if action == "TeleportObject":
-        return {
-            "action": action,
-            "objectId": call["objectId"],
-            **call["position"],
-            "rotation": call["rotation"]["y"],
-            "forceAction": call["forceAction"],
-        }
+        same = {name: call[name] for name in ("action", "objectId", "forceAction")}
+        return {**same, **call["position"], "rotation": call["rotation"]["y"]}
     return call
 
 
@@ -84,7 +72,7 @@ def test_the_calls_and_the_deviation_are_the_published_ones(case):
     reference = view(*_objects(case["reference"]), inventory=case["reference_held"])
     refused, deviation = settle(simulator, case["poses"], reference)
     expected = [
-        {**call, "action": _MODERN.get(call["action"], call["action"])} for call in case["calls"]
+        call | {"action": _MODERN.get(call["action"], call["action"])} for call in case["calls"]
     ]
     for call in expected:
         call.pop("forceVisible", None)  # not an argument of 5.x
@@ -146,14 +134,9 @@ class DriftingSimulator:
         return piece.object_id
 
     def _teleport(self, key: str, position: dict, obj: ThorObject) -> None:
-        reply = self._simulator.step(
-            "TeleportObject",
-            objectId=key,
-            position=position,
-            rotation=asdict(obj.rotation),
-            forceAction=True,
-            forceKinematic=True,
-        )
+        pose = {"position": position, "rotation": asdict(obj.rotation)}
+        forced = {"forceAction": True, "forceKinematic": True}
+        reply = self._simulator.step("TeleportObject", objectId=key, **pose, **forced)
         assert reply.success, reply.error
 
 

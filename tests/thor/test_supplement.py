@@ -24,24 +24,15 @@ def trajectory(*names, objects=()):
 
 
 def test_the_path_turns_with_the_agent():
-    moved = trajectory(
-        "MoveAhead", "RotateLeft", "MoveAhead", "RotateRight", "MoveBack", "MoveRight"
-    )
-    assert agent_path(moved) == [
-        (0.5, -1.0),
-        (0.75, -1.0),
-        (0.75, -0.75),
-        (0.5, -0.75),
-        (0.5, -1.0),
-    ]
+    actions = ("MoveAhead", "RotateLeft", "MoveAhead", "RotateRight", "MoveBack", "MoveRight")
+    path = [(0.5, -1.0), (0.75, -1.0), (0.75, -0.75), (0.5, -0.75), (0.5, -1.0)]
+    assert agent_path(trajectory(*actions)) == path
 
 
 def test_the_file_unites_the_trajectories(tmp_path):
     one = trajectory("MoveAhead", objects=[("OpenObject", "Fridge|1|2|3", None)])
-    two = trajectory(
-        "MoveBack",
-        objects=[("PutObject", "Mug|1|2|3", "Sink|4|5|6"), ("PickupObject", "Mug|1|2|3", None)],
-    )
+    put, pick = ("PutObject", "Mug|1|2|3", "Sink|4|5|6"), ("PickupObject", "Mug|1|2|3", None)
+    two = trajectory("MoveBack", objects=[put, pick])
     write_supplement([one, two], tmp_path / "s.json")
     assert json.loads((tmp_path / "s.json").read_text()) == {
         "FloorPlan1": {

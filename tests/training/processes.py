@@ -24,20 +24,7 @@ from infthor_eval.training.network import SequenceModel, freeze
 from infthor_eval.training.ranks import Ranks, assign_ranks, sum_gradients
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
-from .twins import PAD, everywhere, loaded, sequence
-
-__all__ = [
-    "CASES",
-    "N_RANKS",
-    "RESULTS",
-    "Case",
-    "CaseResult",
-    "batch_of",
-    "gradients_of",
-    "model_of",
-    "train",
-    "work",
-]
+from .twins import PAD, everywhere, gradients_of, loaded, sequence
 
 N_RANKS = 4
 RESULTS = "results.pt"
@@ -108,13 +95,6 @@ def batch_of(case: Case, frames: list[FrameRef]) -> Batch:
     return collate([encoded if case.answer_only else everywhere(encoded)], checkpoint.family, PAD)
 
 
-def gradients_of(model: SequenceModel) -> dict[str, Tensor]:
-    """The gradients that there are."""
-    return {
-        name: one.grad.clone() for name, one in model.named_parameters() if one.grad is not None
-    }
-
-
 def train(
     checkpoint: LoadedCheckpoint, folder: Path, frames: list[FrameRef], ranks: Ranks
 ) -> list[Progress]:
@@ -140,13 +120,8 @@ def work(rank: int, folder: Path, frames: list[FrameRef]) -> None:
     """Do a process's part of everything; the first one writes down what came of it."""
     torch.set_num_threads(1)
     os.environ.setdefault("GLOO_SOCKET_IFNAME", "lo")
-    dist.init_process_group(
-        "gloo",
-        f"file://{folder / 'meeting'}",
-        timedelta(seconds=120),
-        world_size=N_RANKS,
-        rank=rank,
-    )
+    place = f"file://{folder / 'meeting'}"
+    dist.init_process_group("gloo", place, timedelta(seconds=120), world_size=N_RANKS, rank=rank)
     results: dict[Any, Any] = {}
     grids = {n_context: assign_ranks(n_context) for n_context in (2, 4)}
     for case in CASES:

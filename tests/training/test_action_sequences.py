@@ -21,6 +21,7 @@ from infthor_eval.training.encoding import SkippedSequence, TrainingSequence
 from model_adapters.hf.prompting.prompt import Frame
 
 from ..helpers.prompts import join_parts
+from .twins import trained_texts
 
 _ACTION = re.compile(r"<\|act\|>(.*?)<\|act\|>")
 
@@ -35,32 +36,18 @@ def names_in(root):
     return sorted(path.name for path in (root / "metadata").iterdir())
 
 
-def text_of_ids(encoder, pieces):
-    """Text of what loss is taken on, by the tokenizer alone."""
-    return encoder._tokenizer.decode(pieces, skip_special_tokens=False)
-
-
-def trained_text(encoder, sequence):
-    runs = itertools.groupby(
-        zip(sequence.pieces, sequence.has_loss, strict=True), key=lambda pair: pair[1]
-    )
-    return [text_of_ids(encoder, [piece for piece, _ in run]) for trained, run in runs if trained]
-
-
 def test_a_recorded_history_says_what_the_replay_wrote(bundled_set):
     for name in names_in(bundled_set):
         parts = segment_parts(segments_of(bundled_set, name))
-        assert (
-            join_parts(parts) == (bundled_set / "metadata" / name / "traj.txt").read_text().strip()
-        )
+        written = (bundled_set / "metadata" / name / "traj.txt").read_text().strip()
+        assert join_parts(parts) == written
         frames = [part for part in parts if isinstance(part, FrameRef)]
         all_frames = NiehSet(bundled_set).frames(name)
         # One frame per action, the last one of it, and the first; those at the start of a task come
         # again.
         assert set(frames) <= set(all_frames)
-        assert [frame for frame, _ in itertools.groupby(frames)] == sorted(
-            set(frames), key=lambda frame: frame.path
-        )
+        in_order = sorted(set(frames), key=lambda frame: frame.path)
+        assert [frame for frame, _ in itertools.groupby(frames)] == in_order
 
 
 def test_windows_have_every_action_once_and_each_begins_as_a_trajectory_does(bundled_set, encoder):
@@ -71,15 +58,13 @@ def test_windows_have_every_action_once_and_each_begins_as_a_trajectory_does(bun
         assert len(windows_of_history) > 1
         assert all(window.n_tokens <= 5000 for window in windows_of_history)
         for window in windows_of_history:
-            text = encoder._tokenizer.decode(
-                [piece for piece in window.pieces if isinstance(piece, int)]
-            )
+            ids = [piece for piece in window.pieces if isinstance(piece, int)]
+            text = encoder._tokenizer.decode(ids)
             goal = re.match(r"<\|goal\|>Your main goal: (.*?)<\|goal\|>", text)
             assert goal[1] in goals
-        actions = [text for window in windows_of_history for text in trained_text(encoder, window)]
-        assert actions == [
-            f"{ACT}{action}{ACT}" for segment in history for action, _ in segment.steps
-        ]
+        actions = [text for window in windows_of_history for text in trained_texts(encoder, window)]
+        done = [action for segment in history for action, _ in segment.steps]
+        assert actions == [f"{ACT}{action}{ACT}" for action in done]
 
 
 def test_windows_cannot_hold_another_plan(bundled_set, encoder):
@@ -89,10 +74,8 @@ def test_windows_cannot_hold_another_plan(bundled_set, encoder):
     ends = itertools.accumulate(window_plans(window) for window in windows_of_history)
     for window, end in zip(windows_of_history[:-1], ends, strict=False):
         more = encoder.pieces(list(history[end].parts()))
-        assert (
-            window.n_tokens + sum(1 if isinstance(piece, int) else len(piece.ids) for piece in more)
-            > 5000
-        )
+        n_more = sum(1 if isinstance(piece, int) else len(piece.ids) for piece in more)
+        assert window.n_tokens + n_more > 5000
 
 
 def window_plans(window):
@@ -136,20 +119,14 @@ def test_ids_and_labels_of_a_short_history(tmp_path, encoder, bundled_set):
     ids = encoder._tokenizer
     goal, plan, act = ids.convert_tokens_to_ids(["<|goal|>", "<|plan|>", ACT])
     start, end = ids.convert_tokens_to_ids(["<|vision_start|>", "<|vision_end|>"])
-    words = {
-        text: ids(text)["input_ids"]
+    wash, go, move = (
+        ids(text)["input_ids"]
         for text in ("Your main goal: wash a mug", "Plan: go to the sink", "MoveAhead")
-    }
-    expected = [goal, *words["Your main goal: wash a mug"], goal, start, first, end]
-    expected += [plan, *words["Plan: go to the sink"], plan]
-    trained = [act, *words["MoveAhead"], act]
-    assert [piece.ref if isinstance(piece, Frame) else piece for piece in window.pieces] == [
-        *expected,
-        *trained,
-        start,
-        second,
-        end,
-    ]
+    )
+    expected = [goal, *wash, goal, start, first, end, plan, *go, plan]
+    trained = [act, *move, act]
+    pieces = [piece.ref if isinstance(piece, Frame) else piece for piece in window.pieces]
+    assert pieces == [*expected, *trained, start, second, end]
     assert window.has_loss == (False,) * len(expected) + (True,) * len(trained) + (False,) * 3
     assert (window.n_loss_tokens, len(window.frames)) == (len(trained), 2)
 
@@ -185,23 +162,12 @@ def test_a_sequence_of_130k_tokens_is_built_and_its_labels_are_right(bundled_set
     actions = ("MoveAhead", "RotateLeft", "PickupObject Mug", "PutObject Mug Fridge", "LookDown")
     cycle = zip(itertools.cycle(actions), itertools.cycle(frames))
     history = [
-        PlanSegment(
-            f"plan {number}",
-            "goal" if number == 0 else None,
-            frames[0],
-            tuple(itertools.islice(cycle, 11)),
-        )
-        for number in range(100)
+        PlanSegment(f"plan {number}", goal, frames[0], tuple(itertools.islice(cycle, 11)))
+        for number, goal in enumerate(["goal", *[None] * 99])
     ]
     window, *rest = windows(encoder, "long", history, 131_072)
     assert 128_000 < window.n_tokens <= 131_072
     assert len(rest) == 1
     text = join_parts(segment_parts(history[: window_plans(window)]))
-    assert trained_text(encoder, window) == [
-        f"{ACT}{action}{ACT}" for action in _ACTION.findall(text)
-    ]
-    assert not any(
-        trained
-        for piece, trained in zip(window.pieces, window.has_loss, strict=True)
-        if not isinstance(piece, int)
-    )
+    done = [f"{ACT}{action}{ACT}" for action in _ACTION.findall(text)]
+    assert trained_texts(encoder, window) == done  # and no frame, which has no text

@@ -1,6 +1,7 @@
 """Sequences side by side: what is expanded, padded, labelled and numbered."""
 
 from dataclasses import replace
+from itertools import compress
 
 import pytest
 import torch
@@ -32,9 +33,7 @@ def two(
     ]
 
 
-def test_frames_are_expanded_and_the_end_is_padded(
-    model: LoadedCheckpoint, two: list[TrainingSequence]
-) -> None:
+def test_frames_are_expanded_and_the_end_is_padded(model, two):
     batch = collate(two, model.family, PAD)
     long, short = (one.n_tokens for one in two)
     assert batch["input_ids"].shape == (2, long)
@@ -44,42 +43,30 @@ def test_frames_are_expanded_and_the_end_is_padded(
     assert batch["attention_mask"].tolist() == [[1] * long, [1] * short + [0] * (long - short)]
 
 
-def test_nothing_is_masked_where_nothing_is_padded(
-    model: LoadedCheckpoint, two: list[TrainingSequence]
-) -> None:
+def test_nothing_is_masked_where_nothing_is_padded(model, two):
     assert collate([two[0], two[0]], model.family, PAD)["attention_mask"] is None
 
 
-def test_labels_are_the_tokens_that_loss_is_taken_on(
-    model: LoadedCheckpoint, two: list[TrainingSequence]
-) -> None:
+def test_labels_are_the_tokens_that_loss_is_taken_on(model, two):
     batch = collate(two, model.family, PAD)
     for one, labels in zip(two, batch["labels"], strict=True):
-        learned = [
-            piece for piece, trained in zip(one.pieces, one.has_loss, strict=True) if trained
-        ]
+        learned = list(compress(one.pieces, one.has_loss))
         assert labels[labels != IGNORED].tolist() == learned
     assert n_labels(batch) == sum(one.n_loss_tokens for one in two)
     at = batch["labels"] != IGNORED
     assert torch.equal(batch["labels"][at], batch["input_ids"][at])
 
 
-def test_slots_are_where_frames_put_their_features(
-    model: LoadedCheckpoint, two: list[TrainingSequence]
-) -> None:
+def test_slots_are_where_frames_put_their_features(model, two):
     batch = collate(two, model.family, PAD)
-    assert [frame.digest for frame in batch["frames"]] == [
-        frame.digest for one in two for frame in one.frames
-    ]
-    assert batch["slots"].sum() == sum(
-        frame.ids.count(model.family.slot_id) for frame in batch["frames"]
-    )
-    assert (batch["input_ids"][batch["slots"]] == model.family.slot_id).all()
+    digests = [frame.digest for one in two for frame in one.frames]
+    assert [frame.digest for frame in batch["frames"]] == digests
+    slot = model.family.slot_id
+    assert batch["slots"].sum() == sum(frame.ids.count(slot) for frame in batch["frames"])
+    assert (batch["input_ids"][batch["slots"]] == slot).all()
 
 
-def test_a_batch_has_the_positions_of_its_sequences(
-    model: LoadedCheckpoint, two: list[TrainingSequence]
-) -> None:
+def test_a_batch_has_the_positions_of_its_sequences(model, two):
     batch = collate(two, model.family, PAD)
     for row, one in enumerate(two):
         ids = torch.tensor(list(token_ids(one.pieces)))
@@ -89,16 +76,12 @@ def test_a_batch_has_the_positions_of_its_sequences(
         assert not positions[..., len(ids) :].any()
 
 
-def test_the_first_token_is_predicted_by_nothing(
-    model: LoadedCheckpoint, two: list[TrainingSequence]
-) -> None:
+def test_the_first_token_is_predicted_by_nothing(model, two):
     everywhere = replace(two[1], has_loss=tuple(isinstance(piece, int) for piece in two[1].pieces))
     assert n_labels(collate([everywhere], model.family, PAD)) == everywhere.n_loss_tokens - 1
 
 
-def test_a_sequence_without_labels_is_refused(
-    model: LoadedCheckpoint, two: list[TrainingSequence]
-) -> None:
+def test_a_sequence_without_labels_is_refused(model, two):
     masked = replace(two[1], has_loss=(False,) * len(two[1].has_loss))
     with pytest.raises(DataError, match="short: no token has loss"):
         collate([two[0], masked], model.family, PAD)

@@ -5,7 +5,6 @@ The golden file has a small trajectory made by hand, and for each sequence the t
 order, and the texts with loss (`tests/goldens/README.md`).
 """
 
-import gzip
 import itertools
 import json
 from pathlib import Path
@@ -26,7 +25,9 @@ from infthor_eval.training.recipe import ActionData, Recipe, read_recipe
 from infthor_eval.training.starting_model import load_starting_model
 from model_adapters.hf.prompting.prompt import Frame
 
+from ..helpers.files import read_json_lines
 from ..helpers.prompts import join_parts
+from .twins import trained_texts
 
 GOLDEN = Path(__file__).parents[1] / "goldens" / "final_sequences.jsonl.gz"
 SIZE = 28
@@ -34,8 +35,7 @@ SIZE = 28
 
 @pytest.fixture(scope="module")
 def golden():
-    with gzip.open(GOLDEN, "rt") as lines:
-        return [json.loads(line) for line in lines]
+    return read_json_lines(GOLDEN)
 
 
 @pytest.fixture(scope="module")
@@ -85,17 +85,6 @@ def read_sequence(encoder, sequence):
     return text, [piece.ref.path.name for piece in sequence.pieces if isinstance(piece, Frame)]
 
 
-def trained(encoder, sequence):
-    runs = itertools.groupby(
-        zip(sequence.pieces, sequence.has_loss, strict=True), key=lambda pair: pair[1]
-    )
-    return [
-        encoder._tokenizer.decode([piece for piece, _ in run])
-        for with_loss, run in runs
-        if with_loss
-    ]
-
-
 def written(turns):
     """Turns as Qwen's template writes them."""
     image = "<|vision_start|><image><|vision_end|>"
@@ -138,9 +127,8 @@ def test_sequences_are_those_of_the_published_classes(golden, make_set, encoder,
         )
         assert frames[:-1] == line["frames"][:-1]
         assert form == "frames" or frames[-1] == line["frames"][-1]
-        assert trained(encoder, sequence) == [
-            text_of_loss.removesuffix("\n") for text_of_loss in line["trained"]
-        ]
+        of_loss = [text_of_loss.removesuffix("\n") for text_of_loss in line["trained"]]
+        assert trained_texts(encoder, sequence) == of_loss
 
 
 def test_the_current_frame_is_the_one_before_the_action_where_the_published_class_takes_another(
@@ -148,15 +136,13 @@ def test_the_current_frame_is_the_one_before_the_action_where_the_published_clas
 ):
     """Its loop over N retrieved frames overwrites the number of the action with N - 1."""
     trajectory = golden[0]["trajectory"]
-    last = {image["low_idx"]: image["image_name"] for image in trajectory["images"]} | {
-        -1: "000000000.png"
-    }
+    last = {image["low_idx"]: image["image_name"] for image in trajectory["images"]}
+    last[-1] = "000000000.png"
     published = [line["frames"][-1] for line in golden if line.get("form") == "frames"]
     data = read_training_data(recipe("frames"), encoder, [make_set()])
     ours = [read_sequence(encoder, sequence)[1][-1] for sequence in data.sequences]
-    actions = {
-        int(action): entry["top20"] for action, entry in trajectory["retrieved_image"].items()
-    }
+    retrieved = trajectory["retrieved_image"]
+    actions = {int(action): entry["top20"] for action, entry in retrieved.items()}
     assert ours == [last[action - 1] for action in actions]
     assert published == [
         last[(len(names) - 1 if names else action) - 1] for action, names in actions.items()
@@ -167,21 +153,13 @@ def test_the_current_frame_is_the_one_before_the_action_where_the_published_clas
 @pytest.mark.parametrize(
     ("form", "changes", "reason"),
     [
-        (
-            "text",
-            {"state_summary": None},
-            "the trajectory has no state_summary, which actions of the form text need",
-        ),
+        ("text", {"state_summary": None}, "no state_summary, which actions of the form text need"),
         (
             "frames",
             {"retrieved_image": None},
-            "the trajectory has no retrieved_image, which actions of the form frames",
+            "no retrieved_image, which actions of the form frames",
         ),
-        (
-            "frames",
-            {"retrieved_image": {"2": {"top5": []}}},
-            "retrieved_image is no list top20 for each action",
-        ),
+        ("frames", {"retrieved_image": {"2": {"top5": []}}}, "is no list top20 for each action"),
         ("frames", {"images": [1]}, "images is no list of low_idx and image_name"),
     ],
 )
@@ -221,15 +199,9 @@ def test_what_is_too_long_is_left_out_and_told(make_set, encoder):
 @pytest.mark.parametrize(
     ("settings", "expected"),
     [
-        (
-            {"prompt": "plain"},
-            "actions of the form goals follow a system prompt; set prompt to chat",
-        ),
+        ({"prompt": "plain"}, "of the form goals follow a system prompt; set prompt to chat"),
         ({"actions.form": "plans"}, "sequences of plans have no turns; set prompt to plain"),
-        (
-            {"words": "natural"},
-            "actions of the form goals are in the published words; leave words out",
-        ),
+        ({"words": "natural"}, "of the form goals are in the published words; leave words out"),
         ({"actions.form": "goal"}, "Invalid enum value 'goal'"),
     ],
 )
@@ -242,16 +214,11 @@ def test_the_recipes_have_the_published_settings():
     forms = {name: read_recipe(f"final_{name}") for name in ("goals", "text", "frames")}
     for name, settings in forms.items():
         assert settings.actions == ActionData(form=name)
-        assert (settings.optimizer.lr, settings.optimizer.warmup_ratio, settings.epochs) == (
-            1e-5,
-            0.03,
-            3,
-        )
-        assert (
-            settings.model_args["min_pixels"] == settings.model_args["max_pixels"] == str(336 * 336)
-        )
+        optimizer, sizes = settings.optimizer, settings.model_args
+        assert (optimizer.lr, optimizer.warmup_ratio, settings.epochs) == (1e-5, 0.03, 3)
+        assert sizes["min_pixels"] == sizes["max_pixels"] == str(336 * 336)
     assert (forms["goals"].max_tokens, forms["goals"].parallel.context) == (131072, 16)
     assert forms["text"].max_steps == forms["frames"].max_steps == 60000
-    assert msgspec.structs.replace(
-        forms["text"], title="", source="", actions=None, questions={}
-    ) == (msgspec.structs.replace(forms["frames"], title="", source="", actions=None, questions={}))
+    own = {"title": "", "source": "", "actions": None, "questions": {}}
+    text, frames = (msgspec.structs.replace(forms[name], **own) for name in ("text", "frames"))
+    assert text == frames

@@ -1,6 +1,7 @@
 """Training runs as a whole: what they write, that they go on where they ended, and what they
 refuse."""
 
+import itertools
 import json
 import os
 import shutil
@@ -21,7 +22,6 @@ from infthor_eval.training.recipe import read_recipe
 from model_adapters import Decoding, load
 
 from ..conftest import QUESTIONS
-from ..helpers.processes import cli_words
 from ..helpers.waiting import wait_until
 from .twins import read_weights
 
@@ -44,6 +44,19 @@ def data(make_nieh_set):
 
 
 @pytest.fixture
+def train_by_command(recipe, data, tmp_path, run_cli):
+    """Trains by the command, with settings; gives its exit code and the lines of its errors."""
+
+    def train_by_command(**settings):
+        words = ["train", "--recipe", recipe, "--data", data, "--out", tmp_path / "out"]
+        changes = (("--set", f"{name}={value}") for name, value in settings.items())
+        code, _, err = run_cli(*words, *itertools.chain(*changes))
+        return code, err.splitlines()
+
+    return train_by_command
+
+
+@pytest.fixture
 def recipe(tmp_path):
     path = tmp_path / "small.yaml"
     path.write_text(RECIPE)
@@ -56,8 +69,14 @@ def train(recipe, data, out, **changes):
     return fine_tune(run, out, steps.append), steps
 
 
-def command(recipe, data, out, *more):
-    return cli_words("train", "--recipe", recipe, "--data", data, "--out", out, *more)
+def load_trained(checkpoint):
+    options = {"pretrained": str(checkpoint), "dtype": "float32", "max_tokens": "0"}
+    return load("qwen2.5-vl", options, seed=0)
+
+
+def by_steps(states):
+    """Checkpoints, the last one last."""
+    return sorted(states.glob("checkpoint-*"), key=lambda folder: int(folder.name[11:]))
 
 
 def same(first, second):
@@ -70,9 +89,7 @@ def test_a_trained_model_answers_as_it_was_trained_to_behind_its_familys_adapter
     checkpoint, steps = train(recipe, data, tmp_path / "out", epochs=40, save_every=1000)
     assert [done.step for done in steps] == list(range(1, steps[-1].n_steps + 1))
     assert steps[-1].loss < steps[0].loss / 20
-    model = load(
-        "qwen2.5-vl", {"pretrained": str(checkpoint), "dtype": "float32", "max_tokens": "0"}, seed=0
-    )
+    model = load_trained(checkpoint)
     samples = find_samples({"data": str(data), "context": "clues"})
     for sample in samples.samples:
         talk = model.conversation()
@@ -122,22 +139,19 @@ def test_a_run_that_is_killed_ends_with_the_weights_of_one_that_is_not(recipe, d
 
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), RuntimeError("no room")])
 def test_a_full_disk_at_a_checkpoint_is_one_line_and_the_run_goes_on_later(
-    recipe, data, tmp_path, run_cli, monkeypatch, error
+    tmp_path, train_by_command, monkeypatch, error
 ):
     def full(*_):
         raise error
 
-    words = ["train", "--recipe", recipe, "--data", data, "--out", tmp_path / "out"]
-    words += ["--set", "max_steps=1", "--set", "save_every=1"]
     with monkeypatch.context() as patched:
         patched.setattr("torch.save", full)
-        code, _, err = run_cli(*words)
+        code, (*others, line) = train_by_command(max_steps=1, save_every=1)
     assert code == 2
-    assert "Traceback" not in err
-    line = err.splitlines()[-1]
+    assert not any("Traceback" in other for other in others)
     assert f"{tmp_path}/out/states: a checkpoint cannot be written (" in line
     assert "make room there and run the same command again" in line
-    assert run_cli(*words)[0] == 0
+    assert train_by_command(max_steps=1, save_every=1)[0] == 0
     assert (tmp_path / "out" / "checkpoint" / "config.json").is_file()
 
 
@@ -150,33 +164,28 @@ def test_a_full_disk_at_a_checkpoint_is_one_line_and_the_run_goes_on_later(
     ],
 )
 def test_a_checkpoint_that_cannot_be_written_is_none(
-    recipe, data, tmp_path, run_cli, monkeypatch, written, error
+    tmp_path, train_by_command, monkeypatch, written, error
 ):
     def full(*_, **__):
         raise error
 
-    words = ["train", "--recipe", recipe, "--data", data, "--out", tmp_path / "out"]
-    words += ["--set", "max_steps=1"]
     with monkeypatch.context() as patched:
         patched.setattr(f"transformers.{written}.save_pretrained", full)
-        code, _, err = run_cli(*words)
+        code, lines = train_by_command(max_steps=1)
     assert code == 2
-    assert "checkpoint: the checkpoint cannot be written (Error while" in err.splitlines()[-1]
+    assert "checkpoint: the checkpoint cannot be written (Error while" in lines[-1]
     assert not list((tmp_path / "out" / "checkpoint").iterdir())
-    assert run_cli(*words)[0] == 0
+    assert train_by_command(max_steps=1)[0] == 0
     assert (tmp_path / "out" / "checkpoint" / "config.json").is_file()
 
 
-def test_a_folder_is_one_runs(recipe, data, tmp_path, run_cli):
+def test_a_folder_is_one_runs(recipe, data, tmp_path, train_by_command):
     train(recipe, data, tmp_path / "out", max_steps=1)
     about = json.loads((tmp_path / "out" / "training.json").read_text())
     assert (about["sequences"], about["recipe"]["max_steps"]) == (5, 1)
-    words = ["train", "--recipe", recipe, "--data", data, "--out", tmp_path / "out"]
-    code, _, err = run_cli(*words, "--set", "max_steps=2")
-    assert (code, err.strip().splitlines()[-1]) == (
-        2,
-        f"infthor-eval: {tmp_path}/out is a run of another recipe; give another folder with --out",
-    )
+    code, lines = train_by_command(max_steps=2)
+    refusal = f"{tmp_path}/out is a run of another recipe; give another folder with --out"
+    assert (code, lines[-1]) == (2, f"infthor-eval: {refusal}")
 
 
 def test_adapters_are_trained_and_merged(recipe, data, tmp_path):
@@ -199,10 +208,7 @@ def test_a_model_is_trained_under_a_rope_of_lengths_and_keeps_it(recipe, data, t
     )
     config = json.loads((checkpoint / "config.json").read_text())
     assert config["text_config"]["rope_parameters"]["rope_type"] == rope
-    model = load(
-        "qwen2.5-vl", {"pretrained": str(checkpoint), "dtype": "float32", "max_tokens": "0"}, seed=0
-    )
-    talk = model.conversation()
+    talk = load_trained(checkpoint).conversation()
     talk.append("Where is the mug?")
     assert talk.reply(Decoding(max_new_tokens=2)).n_context_tokens > 0
 
@@ -257,7 +263,7 @@ def test_a_damaged_checkpoint_is_one_line_and_the_one_before_is_taken(
     monkeypatch.chdir(tmp_path)
     train(recipe, data, tmp_path / "out", epochs=2, save_every=2)
     whole = tmp_path / "out" / "states"
-    *_, before, last = sorted(whole.glob("checkpoint-*"), key=lambda it: int(it.name[11:]))
+    *_, before, last = by_steps(whole)
     for name, (file, damage) in DAMAGED.items():
         states = shutil.copytree(whole, tmp_path / name)
         assert fine_tuning._last_whole_checkpoint(states) == str(states / last.name)
@@ -274,7 +280,7 @@ def test_a_run_goes_on_from_the_one_before(recipe, data, tmp_path, capsys):
     train(recipe, data, tmp_path / "out", epochs=2, save_every=2)
     weights = read_weights(tmp_path / "out")
     shutil.rmtree(tmp_path / "out" / "checkpoint")
-    last = max((tmp_path / "out" / "states").glob("checkpoint-*"), key=lambda it: int(it.name[11:]))
+    last = by_steps(tmp_path / "out" / "states")[-1]
     _half(last / "optimizer.pt")
     _, steps = train(recipe, data, tmp_path / "out", epochs=2, save_every=2)
     assert steps[0].step == int(last.name[11:]) - 1

@@ -14,19 +14,8 @@ from infthor_eval.training.batches import IGNORED, n_labels
 from infthor_eval.training.context_parallel import SequenceSplit
 from infthor_eval.training.ranks import Ranks
 
-from .processes import (
-    CASES,
-    N_RANKS,
-    RESULTS,
-    Case,
-    CaseResult,
-    batch_of,
-    gradients_of,
-    model_of,
-    train,
-    work,
-)
-from .twins import loaded, write_frames
+from .processes import CASES, N_RANKS, RESULTS, Case, CaseResult, batch_of, model_of, train, work
+from .twins import gradients_of, loaded, write_frames
 
 TOLERANCE, DOUBLE = 1e-5, 1e-9  # of single and of double precision
 
@@ -75,16 +64,14 @@ def _assert_equal(
 
 
 @pytest.mark.parametrize("n_context", [2, 4])
-def test_a_cut_sequence_has_the_loss_and_gradients_of_the_whole(
-    results: Any, alone: tuple[Case, CaseResult], n_context: int
-) -> None:
+def test_a_cut_sequence_has_the_loss_and_gradients_of_the_whole(results, alone, n_context):
     case, expected = alone
     result: CaseResult = results[case, n_context]
     assert sum(result.shares) == pytest.approx(expected.shares[0], rel=TOLERANCE)
     _assert_equal(result.gradients, expected.gradients)
 
 
-def test_the_cases_are_the_hard_ones(results: Any, frames: list[FrameRef]) -> None:
+def test_the_cases_are_the_hard_ones(results, frames):
     batch = batch_of(CASES[0], frames)
     n_tokens = batch["input_ids"].shape[1]
     assert n_tokens % 4
@@ -101,19 +88,14 @@ def test_the_cases_are_the_hard_ones(results: Any, frames: list[FrameRef]) -> No
     assert shares[1:] == [0, 0, 0]
 
 
-def test_data_groups_of_cut_sequences_train_as_one_process(
-    results: Any, frames: list[FrameRef], folder: Path
-) -> None:
+def test_data_groups_of_cut_sequences_train_as_one_process(results, frames, folder):
     expected = train(loaded("qwen2.5-vl"), folder / "alone", frames, Ranks())
     assert len(expected) == 2
     for result, one in zip(results["loop"], expected, strict=True):
         assert result.loss == pytest.approx(one.loss, rel=DOUBLE)
         assert result.gradient_norm == pytest.approx(one.gradient_norm, rel=DOUBLE)
-        assert (result.step, result.n_steps, result.learning_rate) == (
-            one.step,
-            one.n_steps,
-            one.learning_rate,
-        )
+        for name in ("step", "n_steps", "learning_rate"):
+            assert getattr(result, name) == getattr(one, name)
     ours, theirs = (_moments(folder / name) for name in ("loop", "alone"))
     _assert_equal(ours, theirs, DOUBLE)
 
@@ -125,23 +107,21 @@ def _moments(folder: Path) -> dict[str, Tensor]:
     return {str(number): moments["exp_avg"] for number, moments in optimizer["state"].items()}
 
 
-def test_nothing_is_left_behind(results: Any) -> None:
+def test_nothing_is_left_behind(results):
     assert results["left behind"] == []
 
 
-def test_weights_in_shards_are_written_whole(results: Any) -> None:
+def test_weights_in_shards_are_written_whole(results):
     assert results["out of shards"] is True
 
 
-def test_what_cannot_be_cut_is_refused(results: Any) -> None:
+def test_what_cannot_be_cut_is_refused(results):
     assert "attends in windows of 8 tokens" in results["refused"]["sliding"]
-    assert (
-        results["refused"]["three"]
-        == "4 processes cannot share sequences by 3; give a divisor of 4"
-    )
+    three = results["refused"]["three"]
+    assert three == "4 processes cannot share sequences by 3; give a divisor of 4"
 
 
-def test_labels_are_counted_over_the_whole_sequence(frames: list[FrameRef]) -> None:
+def test_labels_are_counted_over_the_whole_sequence(frames):
     batch = batch_of(CASES[0], frames)
     text = int((~batch["slots"]).sum())
     assert n_labels(batch) == text - 1

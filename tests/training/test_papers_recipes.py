@@ -59,22 +59,15 @@ def launcher(n_processes: int) -> list[str]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
+    run = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", str(n_processes)]
     place = ["--master-addr", "127.0.0.1", "--master-port", str(port)]
-    return [
-        sys.executable,
-        "-m",
-        "torch.distributed.run",
-        "--nproc-per-node",
-        str(n_processes),
-        *place,
-        "--no-python",
-    ]
+    return [*run, *place, "--no-python"]
 
 
 @pytest.mark.parametrize(
     ("name", "n_processes"), [("infthor_32k", 1), ("infthor_64k", 2), ("infthor_130k", 4)]
 )
-def test_it_trains(bundled_set: Path, tmp_path: Path, name: str, n_processes: int) -> None:
+def test_it_trains(bundled_set, tmp_path, name, n_processes):
     recipe = scaled(name, n_processes)
     training = started(recipe, n_processes, bundled_set, tmp_path / "out")
     output, _ = training.communicate(timeout=PATIENCE_S)
@@ -86,8 +79,8 @@ def test_it_trains(bundled_set: Path, tmp_path: Path, name: str, n_processes: in
 
 
 def test_processes_that_share_sequences_and_are_killed_end_with_the_weights_of_others(
-    bundled_set: Path, tmp_path: Path
-) -> None:
+    bundled_set, tmp_path
+):
     recipe = msgspec.structs.replace(
         scaled("infthor_64k", 2), max_tokens=1024, max_steps=6, save_every=2
     )

@@ -19,6 +19,20 @@ LABEL = "llava_onevison_7b_32k"  # that of the published READMEs
 REPOSITORY = "PEARLS-Lab/infini-thor"
 
 
+# Beginnings of names now, and in the transformers of the published trainer.
+LLAVA_IN_4_49 = {
+    "model.vision_tower.": "vision_tower.vision_model.",
+    "model.language_model.": "language_model.model.",
+    "lm_head.": "language_model.lm_head.",
+    "model.": "",
+}
+
+
+def old_name(name, renamed):
+    new, old = next((pair for pair in renamed.items() if name.startswith(pair[0])), ("", ""))
+    return old + name.removeprefix(new)
+
+
 def tiny(seed):
     return load_starting_model("llava-onevision-tiny", {}, "plain", seed)
 
@@ -53,16 +67,8 @@ def test_weights_are_taken_over_whatever_stands_before_their_names(tmp_path, pre
 @pytest.mark.parametrize(
     ("model", "renamed"),
     [
-        ("qwen2.5-vl-tiny", [("model.visual.", "visual."), ("model.language_model.", "model.")]),
-        (
-            "llava-onevision-tiny",
-            [
-                ("model.vision_tower.", "vision_tower.vision_model."),
-                ("model.language_model.", "language_model.model."),
-                ("lm_head.", "language_model.lm_head."),
-                ("model.", ""),
-            ],
-        ),
+        ("qwen2.5-vl-tiny", {"model.visual.": "visual.", "model.language_model.": "model."}),
+        ("llava-onevision-tiny", LLAVA_IN_4_49),
     ],
 )
 def test_weights_are_taken_over_by_the_names_of_the_transformers_of_the_published_trainer(
@@ -71,12 +77,8 @@ def test_weights_are_taken_over_by_the_names_of_the_transformers_of_the_publishe
     """As the hub's files name them: `visual.`, `model.layers.`; `language_model.model.layers.`,
     `vision_tower.`."""
     trained, other = (load_starting_model(model, {}, "plain", seed) for seed in (1, 0))
-
-    def old(name):
-        new, before = next((pair for pair in renamed if name.startswith(pair[0])), ("", ""))
-        return before + name.removeprefix(new)
-
-    state = {f"model.{old(name)}": tensor for name, tensor in trained.model.state_dict().items()}
+    state = trained.model.state_dict()
+    state = {f"model.{old_name(name, renamed)}": tensor for name, tensor in state.items()}
     dcp.save(state, checkpoint_id=tmp_path / "dcp", no_dist=True)
     imported = import_weights(other, tmp_path / "dcp")
     assert (imported.n_kept, imported.n_ignored) == (0, 0)
@@ -87,38 +89,25 @@ def test_weights_are_taken_over_by_the_names_of_the_transformers_of_the_publishe
 def test_a_chat_keeps_the_chat_template(tmp_path, run_cli):
     tiny_qwen = load_starting_model("qwen2.5-vl-tiny", {}, "chat", 0)
     folder = saved(tiny_qwen, tmp_path / "dcp", "model.")
-    words = (
-        "import-checkpoint",
-        folder,
-        *option_words(model="qwen2.5-vl-tiny", prompt="chat", out=tmp_path / "out"),
-    )
-    code, _, err = run_cli(*words)
+    words = option_words(model="qwen2.5-vl-tiny", prompt="chat", out=tmp_path / "out")
+    code, _, err = run_cli("import-checkpoint", folder, *words)
     assert code == 0, err
-    loaded = load(
-        "qwen2.5-vl", {"pretrained": str(tmp_path / "out"), "dtype": "float32"}, seed=0
-    ).loaded
+    options = {"pretrained": str(tmp_path / "out"), "dtype": "float32"}
+    loaded = load("qwen2.5-vl", options, seed=0).loaded
     assert loaded.template == tiny_qwen.template
 
 
 def test_the_command_writes_what_the_adapter_loads(tmp_path, run_cli):
     folder = saved(tiny(0), tmp_path / "dcp", "model.")
-    words = [
-        "import-checkpoint",
-        folder,
-        *option_words(model="llava-onevision-tiny", out=tmp_path / "out"),
-    ]
-    code, output, err = run_cli(*words)
+    words = option_words(model="llava-onevision-tiny", out=tmp_path / "out")
+    code, output, err = run_cli("import-checkpoint", folder, *words)
     assert (code, "0 kept, 0 other tensors ignored" in output) == (0, True), err
     options = {"pretrained": str(tmp_path / "out"), "dtype": "float32", "max_tokens": "0"}
     model = load("llava-onevision", options, seed=0)
     ours, theirs = model.loaded.model.state_dict(), tiny(0).model.state_dict()
     assert all(torch.equal(ours[name], theirs[name]) for name in theirs)
-    assert (
-        len(
-            model.loaded.tokenizer("<|act|>MoveAhead<|act|>", add_special_tokens=False)["input_ids"]
-        )
-        >= 3
-    )
+    tokenize = model.loaded.tokenizer
+    assert len(tokenize("<|act|>MoveAhead<|act|>", add_special_tokens=False)["input_ids"]) >= 3
 
 
 def test_what_is_none_or_anothers_is_one_line(tmp_path):
@@ -159,7 +148,8 @@ def test_a_checkpoint_runs_no_code(content, named, tmp_path, capsys):
 def _of_the_trainer(loaded, folder):
     """A checkpoint with everything that the published trainer stores, in a folder of the READMEs'
     layout, as `snapshot_download` leaves it."""
-    weights = {_name_in_4_49(name): tensor for name, tensor in loaded.model.state_dict().items()}
+    state = loaded.model.state_dict()
+    weights = {old_name(name, LLAVA_IN_4_49): tensor for name, tensor in state.items()}
     losses = io.BytesIO()
     torch.save([0.5], losses)
     moments = {
@@ -176,17 +166,6 @@ def _of_the_trainer(loaded, folder):
     }
     dcp.save(states, checkpoint_id=folder, no_dist=True)
     return folder
-
-
-def _name_in_4_49(name):
-    renamed = {
-        "model.vision_tower.": "vision_tower.vision_model.",
-        "model.language_model.": "language_model.model.",
-        "lm_head.": "language_model.lm_head.",
-        "model.": "",
-    }
-    new, old = next((pair for pair in renamed.items() if name.startswith(pair[0])), ("", ""))
-    return old + name.removeprefix(new)
 
 
 @pytest.fixture(scope="module")

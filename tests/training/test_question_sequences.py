@@ -12,11 +12,8 @@ from model_adapters import Turn
 
 
 def build(encoder, root, context="clues", limit=100_000, **settings):
-    return list(
-        question_sequences(
-            encoder, find_samples({"data": str(root), "context": context, **settings}), limit
-        )
-    )
+    samples = find_samples({"data": str(root), "context": context, **settings})
+    return list(question_sequences(encoder, samples, limit))
 
 
 @pytest.fixture(scope="session")
@@ -34,23 +31,18 @@ def test_questions_are_asked_as_the_evaluation_asks_them(bundled_set, chat_tiny,
             context, text = samples.request(sample)
             prompt = encoder._prompter.pieces([Turn("user", (*context, text))])
             assert list(sequence.pieces[: len(prompt)]) == prompt
-            assert sequence.has_loss == (False,) * len(prompt) + (True,) * (
-                len(sequence.pieces) - len(prompt)
-            )
             reply = sequence.pieces[len(prompt) :]
+            assert sequence.has_loss == (False,) * len(prompt) + (True,) * len(reply)
             assert reply[-1] == loaded.tokenizer.convert_tokens_to_ids("<|im_end|>")
-            assert loaded.tokenizer.decode(reply[:-1]) == ", ".join(
-                map(str, sample.question.answers)
-            )
+            answers = ", ".join(map(str, sample.question.answers))
+            assert loaded.tokenizer.decode(reply[:-1]) == answers
 
 
 def test_what_cannot_be_asked_is_told(make_nieh_set, encoder):
-    root = make_nieh_set(
-        [Question("traj_a", "Is it?", (1,), ("yes",)), Question("traj_a", "Is it?", (77,), ("no",))]
-    )
-    sequence, left = sorted(
-        build(encoder, root), key=lambda item: isinstance(item, SkippedSequence)
-    )
+    asked = ((1, "yes"), (77, "no"))
+    root = make_nieh_set([Question("traj_a", "Is it?", (at,), (answer,)) for at, answer in asked])
+    built = build(encoder, root)
+    sequence, left = sorted(built, key=lambda item: isinstance(item, SkippedSequence))
     assert isinstance(sequence, TrainingSequence)
     assert "clue 77 is outside" in left.reason
     (short, *_) = build(encoder, root, "trajectory", limit=100)

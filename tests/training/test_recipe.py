@@ -23,11 +23,8 @@ def test_the_papers_recipes_are_table_5():
         assert recipe.max_tokens == settings["context tokens"]
         assert recipe.parallel.context == settings["context parallel"]
         assert recipe.model_args["pretrained"] in row.checkpoints
-        assert (recipe.optimizer.lr, recipe.optimizer.warmup_ratio, recipe.epochs) == (
-            1e-5,
-            0.03,
-            3,
-        )
+        optimizer = recipe.optimizer
+        assert (optimizer.lr, optimizer.warmup_ratio, recipe.epochs) == (1e-5, 0.03, 3)
         assert set(recipe.freeze) == {"vision", "embeddings"}
         assert recipe.model == "llava-onevision"
 
@@ -62,19 +59,14 @@ def test_model_options_of_a_recipe_apply_to_its_own_model_alone(name):
 def test_train_takes_another_model_than_the_recipes(name, bundled_set, tmp_path, run_cli):
     data = tmp_path / "set"
     shutil.copytree(bundled_set / "metadata/bedroom-1-seed7", data / "metadata/bedroom-1-seed7")
-    questions = [
-        item for item in NiehSet(bundled_set).questions if item.traj_id == "bedroom-1-seed7"
-    ]
     if name == "questions":  # trajectories alone are enough for the others
+        asked = NiehSet(bundled_set).questions
+        questions = [item for item in asked if item.traj_id == "bedroom-1-seed7"]
         write_questions(data / "qa_set_small.csv", questions[:3])
-    code, _, err = run_cli(
-        *(
-            "train",
-            *option_words(recipe=name, data=data, out=tmp_path / "out", model="qwen2.5-vl-tiny"),
-        ),
-        *("--model-args", "dtype=float32", "--set", "max_steps=1", "--set", "sequences_per_step=1"),
-        *("--set", "max_tokens=4000"),
-    )
+    words = option_words(recipe=name, data=data, out=tmp_path / "out", model="qwen2.5-vl-tiny")
+    words += ["--model-args", "dtype=float32", "--set", "max_steps=1"]
+    words += ["--set", "sequences_per_step=1", "--set", "max_tokens=4000"]
+    code, _, err = run_cli("train", *words)
     assert code == 0, err
     assert (tmp_path / "out/checkpoint/model.safetensors").is_file()
     assert "%|" not in err  # no progress bar of transformers

@@ -6,7 +6,7 @@ from infthor_eval.errors import UsageError
 from infthor_eval.training.schedule import LoopSettings
 
 
-def test_an_epoch_has_every_sequence_once_and_an_order_of_its_own() -> None:
+def test_an_epoch_has_every_sequence_once_and_an_order_of_its_own():
     settings = LoopSettings(learning_rate=1, epochs=2, sequences_per_step=3)
     assert settings.n_steps(8) == 6
     steps = [settings.sequences_of(step, 8) for step in range(6)]
@@ -17,7 +17,7 @@ def test_an_epoch_has_every_sequence_once_and_an_order_of_its_own() -> None:
     assert [settings.sequences_of(step, 8) for step in range(6)] == steps
 
 
-def test_another_seed_is_another_order() -> None:
+def test_another_seed_is_another_order():
     orders = [
         LoopSettings(learning_rate=1, seed=seed, sequences_per_step=20).sequences_of(0, 20)
         for seed in (0, 1)
@@ -25,7 +25,7 @@ def test_another_seed_is_another_order() -> None:
     assert orders[0] != orders[1]
 
 
-def test_a_number_of_steps_takes_the_place_of_epochs() -> None:
+def test_a_number_of_steps_takes_the_place_of_epochs():
     settings = LoopSettings(learning_rate=1, max_steps=7, sequences_per_step=4)
     assert settings.n_steps(8) == 7
     assert len(settings.sequences_of(6, 8)) == 4
@@ -42,7 +42,7 @@ PUBLISHED = {
 
 
 @pytest.mark.parametrize("warmup_ratio", PUBLISHED)
-def test_the_learning_rate_is_that_of_the_published_schedule(warmup_ratio: float) -> None:
+def test_the_learning_rate_is_that_of_the_published_schedule(warmup_ratio):
     settings = LoopSettings(learning_rate=0.5, warmup_ratio=warmup_ratio)
     rates = [settings.learning_rate_of(step, 10) for step in range(10)]
     assert rates == pytest.approx([0.5 * share for share in PUBLISHED[warmup_ratio]])
@@ -60,6 +60,6 @@ def test_the_learning_rate_is_that_of_the_published_schedule(warmup_ratio: float
         ({"sequences_per_step": 0}, "sequences_per_step=0"),
     ],
 )
-def test_values_out_of_range_are_refused(settings: dict[str, object], message: str) -> None:
+def test_values_out_of_range_are_refused(settings, message):
     with pytest.raises(UsageError, match=message):
         LoopSettings(**{"learning_rate": 1e-5, **settings})

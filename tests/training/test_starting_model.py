@@ -1,6 +1,5 @@
 """The model that a training starts from: rotary frequencies that depend on the length."""
 
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -31,7 +30,7 @@ def _frequencies(base: float, width: int) -> torch.Tensor:
 
 
 @pytest.mark.parametrize("n_tokens", [ORIGINAL, 65_536, 131_072])
-def test_dynamic_frequencies_are_those_of_the_recipes_length(n_tokens: int) -> None:
+def test_dynamic_frequencies_are_those_of_the_recipes_length(n_tokens):
     """By hand, as the published trainer's call of transformers 4.49 has them."""
     rotary, plain = (_rotary(_start(rope, n_tokens)) for rope in ("dynamic:4", None))
     width, base = 2 * len(plain.inv_freq), plain.config.rope_parameters["rope_theta"]
@@ -43,17 +42,15 @@ def test_dynamic_frequencies_are_those_of_the_recipes_length(n_tokens: int) -> N
 
 @pytest.mark.parametrize(("n_tokens", "divisor"), [(ORIGINAL, 1), (65_536, 4)])
 def test_longrope_divides_the_frequencies_where_the_recipes_length_is_beyond_the_original(
-    n_tokens: int, divisor: int
-) -> None:
+    n_tokens, divisor
+):
     rotary, plain = (_rotary(_start(rope, n_tokens)) for rope in ("longrope:4", None))
     torch.testing.assert_close(rotary.inv_freq, plain.inv_freq / divisor)
     assert rotary.attention_scaling == 1.0
 
 
 @pytest.mark.parametrize("rope", ["dynamic:4", "longrope:4"])
-def test_the_loss_is_that_under_these_frequencies_whatever_was_computed_before(
-    rope: str, tmp_path: Path
-) -> None:
+def test_the_loss_is_that_under_these_frequencies_whatever_was_computed_before(rope, tmp_path):
     def loss(rope: str | None, max_tokens: int) -> float:
         loaded = _start(rope, max_tokens)
         item = sequence(loaded, write_frames(tmp_path, 1), "a mug on the desk")

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,9 @@ from safetensors.torch import load_file
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.training.encoding import Encoder, TrainingSequence
+from infthor_eval.training.network import SequenceModel
 from model_adapters import load
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
-
-__all__ = ["FAMILIES", "PAD", "everywhere", "loaded", "read_weights", "sequence", "write_frames"]
 
 FAMILIES = ("qwen2.5-vl", "llava-onevision", "deepseek-vl", "pixtral")
 PAD = 0
@@ -35,9 +35,8 @@ def write_frames(folder: Path, count: int) -> list[FrameRef]:
     refs = []
     for index in range(count):
         path = folder / f"{index}.png"
-        Image.fromarray(draw.integers(0, 256, (4, 4, 3), dtype=np.uint8)).resize((84, 84)).save(
-            path
-        )
+        noise = draw.integers(0, 256, (4, 4, 3), dtype=np.uint8)
+        Image.fromarray(noise).resize((84, 84)).save(path)
         refs.append(FrameRef(path))
     return refs
 
@@ -55,6 +54,20 @@ def sequence(
 def everywhere(encoded: TrainingSequence) -> TrainingSequence:
     """The same sequence with loss on every token of text."""
     return replace(encoded, has_loss=tuple(isinstance(piece, int) for piece in encoded.pieces))
+
+
+def trained_texts(encoder: Encoder, encoded: TrainingSequence) -> list[str]:
+    """The texts that loss is taken on, each without a break, by the tokenizer alone."""
+    runs = groupby(zip(encoded.pieces, encoded.has_loss, strict=True), key=lambda pair: pair[1])
+    return [
+        encoder._tokenizer.decode([piece for piece, _ in run]) for has_loss, run in runs if has_loss
+    ]
+
+
+def gradients_of(model: SequenceModel) -> dict[str, torch.Tensor]:
+    """The gradients that there are."""
+    named = model.named_parameters()
+    return {name: one.grad.clone() for name, one in named if one.grad is not None}
 
 
 def read_weights(out: Path) -> dict[str, torch.Tensor]:

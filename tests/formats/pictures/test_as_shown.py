@@ -64,7 +64,7 @@ def _chunk(name: bytes, content: bytes) -> bytes:
     return struct.pack(">I", len(content)) + name + content + struct.pack(">I", check)
 
 
-def test_16_bits_of_grey_are_read_as_8(save: Save) -> None:
+def test_16_bits_of_grey_are_read_as_8(save):
     frame = save(Image.fromarray(GREY16))
     assert (_pixels(frame) == (GREY16 >> 8)[..., None]).all()
     assert frame.conversions == "16-bit grey"
@@ -74,7 +74,7 @@ def test_16_bits_of_grey_are_read_as_8(save: Save) -> None:
 
 
 @pytest.mark.parametrize("kind", ["PNG", "WEBP"])
-def test_nothing_shows_of_colours_under_transparency(save: Save, kind: str) -> None:
+def test_nothing_shows_of_colours_under_transparency(save, kind):
     layer = np.dstack([RGB, ALPHA])
     layer[0, :, 3], layer[1, :, 3] = 0, 255
     frame = save(Image.fromarray(layer), kind, lossless=True, exact=True)
@@ -85,7 +85,7 @@ def test_nothing_shows_of_colours_under_transparency(save: Save, kind: str) -> N
     assert (np.asarray(Image.open(io.BytesIO(frame.png()))) == _pixels(frame)).all()
 
 
-def test_grey_with_transparency_and_palettes_lie_on_white(save: Save) -> None:
+def test_grey_with_transparency_and_palettes_lie_on_white(save):
     grey = save(Image.fromarray(np.dstack([RGB[..., 0], ALPHA])))  # LA
     assert _pixels(grey) == pytest.approx(_on_white(RGB[..., :1].repeat(3, 2), ALPHA), abs=1)
     palette = Image.fromarray(RGB).quantize(16)
@@ -101,9 +101,7 @@ def test_grey_with_transparency_and_palettes_lie_on_white(save: Save) -> None:
 
 @pytest.mark.parametrize("kind", ["PNG", "JPEG", "WEBP"])
 @pytest.mark.parametrize("orientation", range(2, 9))
-def test_pictures_are_turned_as_their_exif_data_say(
-    save: Save, kind: str, orientation: int
-) -> None:
+def test_pictures_are_turned_as_their_exif_data_say(save, kind, orientation):
     frame = save(SMOOTH, kind, exif=_turned(orientation))
     with Image.open(frame.path) as stored:
         expected = ImageOps.exif_transpose(stored).convert("RGB")
@@ -115,18 +113,15 @@ def test_pictures_are_turned_as_their_exif_data_say(
     assert Image.open(io.BytesIO(content)).tobytes() == expected.tobytes()
 
 
-def test_blank_frames_have_the_size_that_is_shown(save: Save) -> None:
+def test_blank_frames_have_the_size_that_is_shown(save):
     assert blank_like(save(SMOOTH, exif=_turned(6))).size == (HEIGHT, WIDTH)
 
 
-def test_what_needs_nothing_is_left_as_it_is(save: Save) -> None:
+def test_what_needs_nothing_is_left_as_it_is(save):
     palette = Image.fromarray(RGB).quantize(16)
     late = save(SMOOTH)  # browsers have drawn the picture when they come to it
-    late.path.write_bytes(
-        late.path.read_bytes()[:-12]
-        + _chunk(b"eXIf", _turned(6).tobytes()[6:])
-        + _chunk(b"IEND", b"")
-    )
+    late_data = _chunk(b"eXIf", _turned(6).tobytes()[6:]) + _chunk(b"IEND", b"")
+    late.path.write_bytes(late.path.read_bytes()[:-12] + late_data)
     for frame in (
         save(SMOOTH),
         save(SMOOTH, "JPEG"),
@@ -134,10 +129,7 @@ def test_what_needs_nothing_is_left_as_it_is(save: Save) -> None:
         save(palette),
         save(SMOOTH.convert("L")),
         save(SMOOTH.convert("1")),
-        save(SMOOTH, exif=_turned(1)),
-        save(SMOOTH, exif=_turned(9)),
-        save(SMOOTH, exif=b"no data"),
-        save(SMOOTH, exif=b"MM"),
+        *(save(SMOOTH, exif=exif) for exif in (_turned(1), _turned(9), b"no data", b"MM")),
         save(SMOOTH, "JPEG", exif=b"Exif\0\0no data"),
         late,
     ):
@@ -150,7 +142,7 @@ def test_what_needs_nothing_is_left_as_it_is(save: Save) -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_a_browser_shows_the_same(save: Save, browser: Any) -> None:
+def test_a_browser_shows_the_same(save, browser):
     layer = Image.fromarray(np.dstack([RGB, ALPHA]))
     frames = [
         save(Image.fromarray(GREY16)),

@@ -13,18 +13,14 @@ from infthor_eval.formats.replies.logs import read_reply_log
 
 _HEADER = json.dumps({"eval": {"task": "t", "model": "m/n"}})
 _SAMPLE = {"id": "q", "output": {"choices": [{"message": {"content": "yes"}}]}}
+_KNOWN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
 _ZSTANDARD = 93
 
 
 def _write(folder, content, method, declared=None):
     """Write a log with one sample, which says that it is of another length."""
     path = folder / "a.eval"
-    known = method in (
-        zipfile.ZIP_STORED,
-        zipfile.ZIP_DEFLATED,
-        zipfile.ZIP_BZIP2,
-        zipfile.ZIP_LZMA,
-    )
+    known = method in _KNOWN
     packed = content if known else pyarrow.compress(content, "zstd", asbytes=True)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("header.json", _HEADER)
@@ -53,10 +49,7 @@ def test_other_packings_are_refused(tmp_path, method):
         list(read_reply_log(path))
 
 
-@pytest.mark.parametrize(
-    "method",
-    [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA, _ZSTANDARD],
-)
+@pytest.mark.parametrize("method", [*_KNOWN, _ZSTANDARD])
 @pytest.mark.parametrize("declared", [0, 200, 1 << 20])
 def test_a_member_that_is_longer_than_it_says_fills_no_memory(tmp_path, method, declared):
     path = _write(tmp_path, json.dumps(_SAMPLE).encode() + b" " * (16 << 20), method, declared)

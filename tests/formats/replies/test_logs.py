@@ -82,18 +82,9 @@ def test_what_exports_say_beside_their_format(read):
     told = {"question_id": "q7", "task": "t", "context": "clues", "variant": "depth=0.4"}
     told |= {"repeat": "2", "frames": "0-2,7", "frame_ablation": "blank"}
     (reply,) = read({**EVALUATED, "sample_id": "q7 depth=0.4 (2)", "metadata": told})
-    assert reply == LoggedReply(
-        1,
-        "yes",
-        "q7",
-        frames=(0, 1, 2, 7),
-        model="m/n",
-        task="t",
-        context="clues",
-        frame_ablation="blank",
-        variant="depth=0.4",
-        repeat=2,
-    )
+    said = {"model": "m/n", "task": "t", "context": "clues", "frame_ablation": "blank"}
+    said |= {"variant": "depth=0.4", "repeat": 2, "frames": (0, 1, 2, 7)}
+    assert reply == LoggedReply(1, "yes", "q7", **said)
 
 
 @pytest.mark.parametrize(

@@ -24,87 +24,64 @@ from infthor_eval.storage.folders import packaged_folder
 from infthor_sim.object_types import OBJECT_TYPES
 
 PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
-# One published question of each form and its answer, and the same in our form, names and answers.
+# One published question of each form and its answer, and our form and names. Our answers are
+# theirs in lower case.
 WORDS = [
-    (
-        "Is there any Window in this room?",
-        "Yes",
-        "Is there any {} in this room?",
-        ("window",),
-        "yes",
-    ),
-    ("Have you seen an Apple?", "Yes", "Have you seen {}?", ("an apple",), "yes"),
-    ("Have you seen a TVStand?", "Yes", "Have you seen {}?", ("a TV stand",), "yes"),
-    ("Was Box open?", "Yes", "Was {} open?", ("the box",), "yes"),
+    ("Is there any Window in this room?", "Yes", "Is there any {} in this room?", ("window",)),
+    ("Have you seen an Apple?", "Yes", "Have you seen {}?", ("an apple",)),
+    ("Have you seen a TVStand?", "Yes", "Have you seen {}?", ("a TV stand",)),
+    ("Was Box open?", "Yes", "Was {} open?", ("the box",)),
     (
         "Where was CellPhone before you put it to SideTable?",
         "CoffeeTable",
         "Where was {} before you put it {}?",
         ("the cell phone", "on the side table"),
-        "coffeetable",
     ),
     (
         "Where did you move the RemoteControl from the TVStand?",
         "Sofa",
         "Where did you move {} from {}?",
         ("the remote control", "the TV stand"),
-        "sofa",
     ),
-    ("Where is CD now?", "SideTable", "Where is {} now?", ("the CD",), "sidetable"),
-    ("What did you slice?", "Apple", "What did you slice?", (), "apple"),
+    ("Where is CD now?", "SideTable", "Where is {} now?", ("the CD",)),
+    ("What did you slice?", "Apple", "What did you slice?", ()),
     (
         "What objects were in DiningTable when you slice Potato?",
         "Potato",
         "What objects were {} when you sliced {}?",
         ("on the dining table", "the potato"),
-        "potato",
     ),
-    ("What objects were in Fridge?", "Egg", "What objects were {}?", ("in the fridge",), "egg"),
+    ("What objects were in Fridge?", "Egg", "What objects were {}?", ("in the fridge",)),
     (
         "What object did you put on the Drawer?",
         "KeyChain",
         "What object did you put {}?",
         ("in the drawer",),
-        "keychain",
     ),
-    (
-        "What objects are on the SideTable?",
-        "Pen",
-        "What objects are {}?",
-        ("on the side table",),
-        "pen",
-    ),
-    (
-        "How many objects were on the Fridge?",
-        2,
-        "How many objects were {}?",
-        ("in the fridge",),
-        "2",
-    ),
-    ("Is KeyChain in the Drawer?", "No", "Is {} {}?", ("the key chain", "in the drawer"), "no"),
+    ("What objects are on the SideTable?", "Pen", "What objects are {}?", ("on the side table",)),
+    ("How many objects were on the Fridge?", 2, "How many objects were {}?", ("in the fridge",)),
+    ("Is KeyChain in the Drawer?", "No", "Is {} {}?", ("the key chain", "in the drawer")),
     (
         "Is RemoteControl on the DiningTable?",
         "Yes",
         "Is {} {}?",
         ("the remote control", "on the dining table"),
-        "yes",
     ),
     (
         "How many times did you move Newspaper?",
         2,
         "How many times did you move {}?",
         ("the newspaper",),
-        "2",
     ),
 ]
 
 
 @pytest.mark.parametrize(
-    ("text", "answer", "form", "names", "ours"), WORDS, ids=[words[0] for words in WORDS]
+    ("text", "answer", "form", "names"), WORDS, ids=[words[0] for words in WORDS]
 )
-def test_each_form_has_the_published_words(text, answer, form, names, ours):
+def test_each_form_has_the_published_words(text, answer, form, names):
     subjects = (str(answer), "Mug")
-    candidate = Candidate(type_of(text), form, names, (3, 7), (ours,), subjects)
+    candidate = Candidate(type_of(text), form, names, (3, 7), (str(answer).lower(),), subjects)
     question = in_published_words(candidate, "a")
     assert (question.text, question.answers, question.clues) == (text, (answer,), (3, 7))
     assert type_of(text) == type_of(candidate.text) != ""
@@ -126,12 +103,8 @@ def test_all_candidates_of_table_3_are_the_same_questions_in_both_words():
         for candidate in candidates_of(history, frozenset({"Apple", "Statue"}), random.Random(0)):
             ours, published = candidate.question("a"), in_published_words(candidate, "a")
             assert (published.clues, published.absence) == (ours.clues, ours.absence)
-            assert (
-                published.question_type
-                == ours.question_type
-                == type_of(ours.text)
-                == type_of(published.text)
-            )
+            types = {published.question_type, type_of(ours.text), type_of(published.text)}
+            assert types == {ours.question_type}
             assert [str(answer).lower() for answer in published.answers] == list(ours.answers)
             n += 1
     assert n > 80
@@ -162,13 +135,8 @@ def test_every_published_question_is_in_words_that_we_write():
         for row in csv.DictReader(file.open(encoding="utf-8"))
     ]
     assert len(rows) == 1303
-    unlike = [
-        row["question"]
-        for row in rows
-        if not any(pattern.fullmatch(row["question"]) for pattern in patterns)
-    ]
+    asked = [row["question"] for row in rows]
+    unlike = [text for text in asked if not any(pattern.fullmatch(text) for pattern in patterns)]
     assert unlike == ["Is Knife in the agent?"]
-    assert all(
-        re.fullmatch(r"\['(Yes|No)'\]|\[\d+\]|\[('[A-Z]\w+'(, )?)+\]", row["answer"])
-        for row in rows
-    )
+    answers = re.compile(r"\['(Yes|No)'\]|\[\d+\]|\[('[A-Z]\w+'(, )?)+\]")
+    assert all(answers.fullmatch(row["answer"]) for row in rows)

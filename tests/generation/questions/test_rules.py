@@ -19,19 +19,7 @@ from infthor_eval.generation.replay_summary import summarise
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.household.wording import with_the
 from infthor_eval.nieh.scoring import score
-from infthor_eval.thor.launch import embedded_launch
-from infthor_eval.thor.simulator import Simulator
 
-QUESTION_TYPES = {
-    "object_presence",
-    "open_state",
-    "location_tracing",
-    "slicing",
-    "container_content",
-    "put_action",
-    "final_state",
-    "movement_counting",
-}
 FURTHER_TYPES = {
     "container_content_further",
     "location_tracing_further",
@@ -70,21 +58,31 @@ TABLE_3 = {
     ),
     "movement_counting": (r"How many times did you move the .+\?",),
 }
+QUESTION_TYPES = TABLE_3.keys()
+
+
+def of_types(generated, *types):
+    """The questions of some types."""
+    return [question for question in generated.questions if question.question_type in types]
 
 
 @pytest.fixture(scope="module")
-def replayed(tmp_path_factory):
+def replayed(tmp_path_factory, simulator):
     folder = tmp_path_factory.mktemp("set")
     jobs = [
         TrajectorySettings(f"kitchen-{number}", seed, 110, 1)
         for number, seed in ((2, 2), (3, 4), (5, 4))
     ]
-    with Simulator(embedded_launch()) as simulator:
-        generate_set(jobs, simulator, folder / "trajectories")
-        assert summarise(
-            replay_set(select([folder / "trajectories"]), simulator, folder)
-        ).complete == len(jobs)
+    generate_set(jobs, simulator, folder / "trajectories")
+    replayed = replay_set(select([folder / "trajectories"]), simulator, folder)
+    assert summarise(replayed).complete == len(jobs)
     return folder
+
+
+@pytest.fixture(scope="module")
+def logs(replayed):
+    """The steps of each trajectory by its name."""
+    return {folder.name: read_steps(folder) for folder in (replayed / "metadata").iterdir()}
 
 
 @pytest.fixture(scope="module")
@@ -102,47 +100,30 @@ def test_the_checker_agrees_with_every_question(everything):
 
 def test_without_further_forms_all_are_in_the_words_of_table_3(replayed, everything):
     questions = generate_questions(replayed, per_trajectory=1000, by_subject=False).questions
-    assert (
-        QUESTION_TYPES - RARE
-        <= {question.question_type for question in questions}
-        <= QUESTION_TYPES
-    )
+    types = {question.question_type for question in questions}
+    assert QUESTION_TYPES - RARE <= types <= QUESTION_TYPES
     for question in questions:
         forms = TABLE_3[question.question_type]
         assert any(re.fullmatch(form, question.text) for form in forms), question
-    for question in everything.questions:
-        if question.question_type in FURTHER_TYPES:
-            assert not any(
-                re.fullmatch(form, question.text) for forms in TABLE_3.values() for form in forms
-            ), question
+    every = "|".join(form for forms in TABLE_3.values() for form in forms)
+    for question in of_types(everything, *FURTHER_TYPES):
+        assert not re.fullmatch(every, question.text), question
 
 
 def test_a_put_has_two_clues_that_follow_each_other(everything):
-    puts = [
-        question.clues
-        for question in everything.questions
-        if question.question_type == "put_action"
-    ]
+    puts = [question.clues for question in of_types(everything, "put_action")]
     assert puts and all(len(clues) == 2 and clues[1] == clues[0] + 1 for clues in puts)
 
 
 def test_what_was_moved_once_is_not_counted(everything):
-    counted = [
-        question
-        for question in everything.questions
-        if question.question_type == "movement_counting"
-    ]
+    counted = of_types(everything, "movement_counting")
     assert counted and all(
         int(question.answers[0]) == len(question.clues) > 1 for question in counted
     )
 
 
 def test_the_number_of_frames_tells_nothing_about_further_counts(everything):
-    counted = [
-        question
-        for question in everything.questions
-        if question.question_type == "movement_counting_further"
-    ]
+    counted = of_types(everything, "movement_counting_further")
     usual = [question for question in counted if len(question.clues) == 16]
     assert len({question.answers for question in usual}) > 2
     for question in counted:
@@ -153,8 +134,7 @@ def test_the_number_of_frames_tells_nothing_about_further_counts(everything):
         assert count < n_clues
 
 
-def test_what_was_put_is_in_the_hand_in_the_frame_before(everything, replayed):
-    logs = {folder.name: read_steps(folder) for folder in (replayed / "metadata").iterdir()}
+def test_what_was_put_is_in_the_hand_in_the_frame_before(everything, logs):
     puts = [
         question
         for question in everything.questions
@@ -172,17 +152,11 @@ def test_what_was_put_is_in_the_hand_in_the_frame_before(everything, replayed):
     assert n_shown > 10
 
 
-def test_a_frame_shows_the_moment_that_a_question_asks_about(everything, replayed):
-    logs = {folder.name: read_steps(folder) for folder in (replayed / "metadata").iterdir()}
-    verbs = {
-        "first opened": "OpenObject",
-        "picked up": "PickupObject",
-        "put": "PutObject",
-        "sliced": "SliceObject",
-    }
-    verbs["turned on"] = "ToggleObjectOn"
-    questions = [question for question in everything.questions if " when you " in question.text]
-    questions = [question for question in questions if question.question_type.endswith("_further")]
+def test_a_frame_shows_the_moment_that_a_question_asks_about(everything, logs):
+    verbs = {"first opened": "OpenObject", "picked up": "PickupObject", "put": "PutObject"}
+    verbs |= {"sliced": "SliceObject", "turned on": "ToggleObjectOn"}
+    further = of_types(everything, *FURTHER_TYPES)
+    questions = [question for question in further if " when you " in question.text]
     assert len({question.question_type for question in questions}) == 2
     for question in questions:
         moment = question.text.partition(" when you ")[2]
@@ -201,23 +175,14 @@ def test_gold_answers_score_full_marks(everything):
     for question in everything.questions:
         reply = ", ".join(str(answer) for answer in question.answers)
         for scorer in ("reference", "strict"):
-            assert score(reply, question.answers, scorer=scorer) == 1.0, (
-                question.text,
-                question.answers,
-            )
+            assert score(reply, question.answers, scorer=scorer) == 1.0, question
 
 
-def test_the_checker_notices_what_is_wrong(everything, replayed):
-    checkers = {
-        folder.name: Checker(read_steps(folder), DEFAULT_SHARE)
-        for folder in (replayed / "metadata").iterdir()
-    }
-    presence = [
-        question for question in everything.questions if question.question_type != "object_presence"
-    ]
-    for question in presence:
-        if question.question_type == "movement_counting_further":
-            continue  # one frame more or less without an occasion does no harm
+def test_the_checker_notices_what_is_wrong(everything, logs):
+    checkers = {name: Checker(steps, DEFAULT_SHARE) for name, steps in logs.items()}
+    # Of further counts, one frame more or less without an occasion does no harm.
+    others = {"object_presence", "movement_counting_further"}
+    for question in of_types(everything, *(QUESTION_TYPES | FURTHER_TYPES) - others):
         checker = checkers[question.traj_id]
         assert not checker.verdict(replace(question, answers=("teapot",))).right
         first = 0 if 0 not in question.clues else 1
@@ -229,22 +194,16 @@ def test_the_checker_notices_what_is_wrong(everything, replayed):
 def test_choice_is_balanced_and_seeded(replayed):
     generated = [generate_questions(replayed, seed=seed, per_trajectory=25) for seed in (0, 0, 1)]
     assert generated[0].questions == generated[1].questions != generated[2].questions
-    assert len(generated[0].questions) <= 25 * len(
-        {question.traj_id for question in generated[0].questions}
-    )
-    yes = [question for question in generated[0].questions if question.answers == ("yes",)]
-    no = [question for question in generated[0].questions if question.answers == ("no",)]
-    assert abs(len(yes) - len(no)) <= 5
+    questions = generated[0].questions
+    assert len(questions) <= 25 * len({question.traj_id for question in questions})
+    answers = Counter(question.answers for question in questions)
+    assert abs(answers["yes",] - answers["no",]) <= 5
     assert set(generated[0].by_type()) >= QUESTION_TYPES - RARE
-    assert len(generated[0].questions) < len(
-        generate_questions(replayed, by_subject=False).questions
-    )
+    assert len(questions) < len(generate_questions(replayed, by_subject=False).questions)
 
 
 def test_absences_are_flagged_and_look_like_presences(everything):
-    presence = [
-        question for question in everything.questions if question.question_type == "object_presence"
-    ]
+    presence = of_types(everything, "object_presence")
     assert {question.absence for question in presence} == {True, False}
     for question in everything.questions:
         assert question.absence == (
@@ -264,14 +223,11 @@ def test_no_answer_follows_from_the_form_or_the_object_of_a_question(replayed):
         most = counts.most_common(1)[0][1]
         assert most <= counts.total() - most + 1, (form, counts)
     on_object = defaultdict(Counter)
-    for question in generated.questions:
-        if question.question_type == "object_presence":  # both trajectories are in a kitchen
-            on_object[re.sub(r"Is there any|Have you seen an?|in this room|\W", "", question.text)][
-                question.answers
-            ] += 1
-    assert on_object and all(
-        abs(counts["yes",] - counts["no",]) <= 1 for counts in on_object.values()
-    )
+    for question in of_types(generated, "object_presence"):  # both trajectories are in a kitchen
+        thing = re.sub(r"Is there any|Have you seen an?|in this room|\W", "", question.text)
+        on_object[thing][question.answers] += 1
+    counts = on_object.values()
+    assert counts and all(abs(count["yes",] - count["no",]) <= 1 for count in counts)
 
 
 def _form(text):
@@ -317,10 +273,7 @@ def test_a_log_that_contradicts_itself_is_skipped_and_the_others_are_asked_about
     path.write_text(json.dumps(steps))
     generated = generate_questions(tmp_path / "set", per_trajectory=10)
     (line,) = generated.skipped
-    assert (
-        "kitchen-3-seed4: its log is inconsistent (no 'Mug|+09.00|+09.00|+09.00'); replay" in line
-    )
-    assert {question.traj_id for question in generated.questions} == {
-        "kitchen-2-seed2",
-        "kitchen-5-seed4",
-    }
+    reason = "its log is inconsistent (no 'Mug|+09.00|+09.00|+09.00'); replay"
+    assert f"kitchen-3-seed4: {reason}" in line
+    names = {question.traj_id for question in generated.questions}
+    assert names == {"kitchen-2-seed2", "kitchen-5-seed4"}

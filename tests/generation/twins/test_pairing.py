@@ -92,14 +92,10 @@ def test_equal_answers_are_no_pair():
     assert not paired(put(MUG, DESK), put(MUG, DESK), "Mug")
 
 
-def test_answers_that_the_scorer_takes_for_each_other_are_no_pair():
+@pytest.mark.parametrize("mark", [1.0, 0.5])
+def test_answers_that_the_scorer_takes_for_each_other_or_not_for_right_are_no_pair(mark):
     worlds = put(MUG, DESK), put(MUG, FRIDGE)
-    assert not paired(*worlds, "Mug", scorer=lambda reply, answers: 1.0)
-
-
-def test_answers_without_full_marks_are_no_pair():
-    worlds = put(MUG, DESK), put(MUG, FRIDGE)
-    assert not paired(*worlds, "Mug", scorer=lambda reply, answers: 0.5)
+    assert not paired(*worlds, "Mug", scorer=lambda reply, answers: mark)
 
 
 def test_a_side_effect_is_not_asked_for():

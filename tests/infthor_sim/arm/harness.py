@@ -12,8 +12,7 @@ from ..harness import Bench
 
 
 def arm_bench(scene: str = "kitchen-1", size: int = 40, **init: Any) -> Bench:
-    bench = Bench(size=size)
-    bench.reset(scene, **{"agentMode": "arm", **init})
+    bench = Bench.at(scene, **{"agentMode": "arm", **init}, size=size)
     assert bench.metadata["lastActionSuccess"], bench.metadata["errorMessage"]
     return bench
 
@@ -42,18 +41,11 @@ def hand_to(bench: Bench, object_id: str) -> None:
     low, high = item.bounds()
     middle = (low + high) / 2
     target = np.array([middle[0], high[1] + 0.045, middle[2]])
-    height = float(bench.sim.world.agent.position[1])
     cells = sorted(bench.sim.world.nav, key=lambda c: abs(math.dist(c, middle[[0, 2]]) - 0.6))
     for x, z in cells[:15]:
         yaw = math.degrees(math.atan2(middle[0] - x, middle[2] - z))
         equip(bench.sim.world, bench.sim.settings.agent_mode)
-        bench.ok(
-            "TeleportFull",
-            position={"x": x, "y": height, "z": z},
-            rotation={"y": yaw},
-            horizon=20,
-            standing=True,
-        )
+        bench.teleport(x, z, yaw, 20)
         share = min(max((target[1] + 0.25 - 0.451) / 1.35, 0.0), 1.0)
         if not bench.step("MoveArmBase", y=share)["lastActionSuccess"]:
             continue

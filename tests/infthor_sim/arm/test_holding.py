@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from infthor_sim.geometry import euler_matrix
+from infthor_sim.physics.receptacles import surfaces
 
 from ..harness import Bench
 from .harness import arm_bench, hand_to, loose, wrist
@@ -14,6 +15,15 @@ def held_pose(bench: Bench, object_id: str) -> tuple[np.ndarray, np.ndarray]:
     world = bench.sim.world
     item, frame = world.objects[object_id], world.arm.wrist(world.agent)
     return frame.local(item.position), frame.turn.T @ euler_matrix(item.rotation)
+
+
+def holding(object_type: str) -> tuple[Bench, str]:
+    """An arm that has picked up a thing, and its id."""
+    bench = arm_bench()
+    thing = loose(bench, object_type)
+    hand_to(bench, thing)
+    bench.ok("PickupObject")
+    return bench, thing
 
 
 def test_what_is_in_the_sphere_is_picked_up_and_goes_along():
@@ -133,16 +143,14 @@ def test_things_fall_into_open_drawers_and_onto_closed_ones_not():
     bench = arm_bench()
     drawer = bench.sim.world.objects[bench.first("Drawer")]
     potato = loose(bench, "Potato")
-    bench.ok("OpenObject", objectId=drawer.object_id, forceAction=True)
-    from infthor_sim.physics.receptacles import surfaces
-
+    bench.force("OpenObject", drawer.object_id)
     (tray,) = surfaces(drawer)
     ahead = (
         drawer.matrix @ euler_matrix((0, drawer.front, 0)) @ np.array([0, 0, tray.half[1] - 0.06])
     )
     fallen = drop_over(bench, potato, tray.center + ahead + up(0.4))
     assert fallen["parentReceptacles"] == [drawer.object_id]
-    bench.ok("CloseObject", objectId=drawer.object_id, forceAction=True)
+    bench.force("CloseObject", drawer.object_id)
     assert not bench.object(potato)["visible"]
 
 
@@ -159,9 +167,9 @@ def test_things_fall_into_an_open_cupboard_below_a_sink_and_past_it_into_the_sin
         and (item.bounds()[0] < middle).all()
         and (item.bounds()[1] > middle).all()
     )
-    bench.ok("OpenObject", objectId=cupboard.object_id, forceAction=True)
+    bench.force("OpenObject", cupboard.object_id)
     for thing in list(cupboard.contents):
-        bench.ok("RemoveFromScene", objectId=thing)
+        bench.ok("RemoveFromScene", thing)
     potato = loose(bench, "Potato")
     within = np.array([middle[0], cupboard.center[1] - 0.1, middle[2]])
     assert drop_over(bench, potato, within)["parentReceptacles"] == [cupboard.object_id]
@@ -173,8 +181,6 @@ def test_a_thing_falls_into_a_bowl_whose_floor_is_a_little_below_that_of_the_sin
     world = bench.sim.world
     basin, bowl = world.objects[bench.first("SinkBasin")], world.objects[bench.first("Bowl")]
     low, high = basin.bounds()
-    from infthor_sim.physics.receptacles import surfaces
-
     floor = float(surfaces(basin)[0].center[1])
     bowl.place_bottom(np.array([(low + high)[0] / 2, floor, (low + high)[2] / 2]))
     bowl.place_bottom(
@@ -202,10 +208,7 @@ def test_a_thing_lands_on_another_and_on_the_floor():
 
 
 def test_held_things_collide():
-    bench = arm_bench()
-    plate = loose(bench, "Plate")
-    hand_to(bench, plate)
-    bench.ok("PickupObject")
+    bench, plate = holding("Plate")
     bench.ok("MoveArmRelative", offset={"y": 0.1})
     at = wrist(bench)
     message = bench.refused("MoveArmRelative", offset={"y": -0.2}, returnToStart=False)
@@ -218,10 +221,7 @@ def test_held_things_collide():
 
 
 def test_restoring_a_scene_empties_the_arm():
-    bench = arm_bench()
-    potato = loose(bench, "Potato")
-    hand_to(bench, potato)
-    bench.ok("PickupObject")
+    bench, potato = holding("Potato")
     item = bench.object(potato)
     pose = {"objectName": item["name"], "position": item["position"], "rotation": item["rotation"]}
     bench.ok("SetObjectPoses", objectPoses=[pose])
@@ -230,19 +230,10 @@ def test_restoring_a_scene_empties_the_arm():
 
 
 def test_teleporting_takes_along_what_is_held():
-    bench = arm_bench()
-    potato = loose(bench, "Potato")
-    hand_to(bench, potato)
-    bench.ok("PickupObject")
+    bench, potato = holding("Potato")
     before = held_pose(bench, potato)
     x, z = next(iter(bench.sim.world.nav))
-    bench.ok(
-        "TeleportFull",
-        position={"x": x, "y": 0.9009992, "z": z},
-        rotation={"y": 30},
-        horizon=0,
-        standing=True,
-    )
+    bench.teleport(x, z, 30)
     assert held_pose(bench, potato)[0] == pytest.approx(before[0], abs=1e-6)
 
 
@@ -262,7 +253,7 @@ def test_a_far_fall_breaks_objects_unless_their_type_is_unbreakable(spared, agai
     if spared:
         bench.ok("MakeObjectsOfTypeUnbreakable", objectType="Plate")
     if again:
-        bench.ok("MakeObjectBreakable", objectId=plate)
+        bench.ok("MakeObjectBreakable", plate)
     x, z = max(bench.sim.world.nav, key=lambda c: bench.sim.world.nav.count_free_ahead(*c, 0.0))
     drop_over(bench, plate, np.array([x, 1.4, z]))
     assert bench.object(plate)["isBroken"] == (again or not spared)
@@ -279,7 +270,7 @@ def test_a_new_start_of_the_agent_lets_go_of_what_an_arm_holds_and_of_nothing_in
     bench.ok("MoveArmRelative", offset={"y": 0.1})
     bench.ok("Initialize", agentMode="default", visibilityDistance=1.5)
     assert bench.object(plate)["parentReceptacles"] == on and not bench.object(plate)["isPickedUp"]
-    bench.ok("PickupObject", objectId=plate, forceAction=True)
+    bench.force("PickupObject", plate)
     held = bench.ok("Initialize", agentMode="default", visibilityDistance=1.5)["inventoryObjects"]
     assert [o["objectId"] for o in held] == [plate]
     bench.ok("Initialize", agentMode="arm")

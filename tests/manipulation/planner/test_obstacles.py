@@ -36,9 +36,8 @@ def test_gaps_between_level_boxes(x, gap):
 def test_a_turned_box_reaches_as_far_as_its_corner():
     half = np.sqrt(0.5)
     rotations_about = np.array([(half, 0.0, half), (0.0, 1.0, 0.0), (-half, 0.0, half)])
-    assert clearances(part(0.26, 0.0, 0.0, rotations_about), CUBE)[0, 0, 0] == pytest.approx(
-        0.16 - 0.1 * np.sqrt(2)
-    )
+    gap = clearances(part(0.26, 0.0, 0.0, rotations_about), CUBE)[0, 0, 0]
+    assert gap == pytest.approx(0.16 - 0.1 * np.sqrt(2))
 
 
 def test_of_a_thing_the_nearest_box_counts():
@@ -56,24 +55,16 @@ def test_under_a_corner_counter_there_is_room():
     counter = thing("CounterTop|1", 0.5, 0.4, 0.5, (1.0, 0.8, 1.0))
     boxes = columns(counter, Places(np.concatenate([arm, leg]), 0.05, 0.8))
     assert len(boxes) == 2
-    assert (
-        holds(boxes, 0.9, 0.4, 0.2)
-        and holds(boxes, 0.2, 0.4, 0.9)
-        and not holds(boxes, 0.9, 0.4, 0.9)
-    )
+    assert holds(boxes, 0.9, 0.4, 0.2) and holds(boxes, 0.2, 0.4, 0.9)
+    assert not holds(boxes, 0.9, 0.4, 0.9)
     assert max(box.high[1] for box in boxes) == pytest.approx(0.8)
 
 
 def test_around_turned_lattices_there_is_one_box():
     flat = lattice(np.arange(-0.2, 0.21, 0.05), np.arange(-0.2, 0.21, 0.05))
-    turned = np.stack(
-        [flat[:, 0] * 0.8 - flat[:, 2] * 0.6, flat[:, 1], flat[:, 0] * 0.6 + flat[:, 2] * 0.8],
-        axis=1,
-    )
-    assert (
-        len(columns(thing("Desk|1", 0.0, 0.4, 0.0, (0.6, 0.8, 0.6)), Places(turned, 0.05, 0.8)))
-        == 1
-    )
+    turned = flat @ np.array([(0.8, 0, 0.6), (0, 1, 0), (-0.6, 0, 0.8)])
+    desk = thing("Desk|1", 0.0, 0.4, 0.0, (0.6, 0.8, 0.6))
+    assert len(columns(desk, Places(turned, 0.05, 0.8))) == 1
 
 
 @pytest.mark.parametrize(
@@ -85,9 +76,6 @@ def test_a_cavity_is_open_in_front_but_for_its_door(hinge, left, right):
     boxes = cavity(fridge, places, Entry(2, -1, -0.175), hinge)
     assert not holds(boxes, 0.0, 0.6, 0.0) and not holds(boxes, 0.0, 0.6, -0.4)
     assert holds(boxes, 0.0, 0.79, 0.0) and holds(boxes, 0.0, 1.19, 0.0)  # a board, the roof
-    assert (
-        holds(boxes, 0.22, 0.6, 0.0)
-        and holds(boxes, -0.22, 0.6, 0.0)
-        and holds(boxes, 0.0, 0.6, 0.17)
-    )
+    assert holds(boxes, 0.22, 0.6, 0.0) and holds(boxes, -0.22, 0.6, 0.0)
+    assert holds(boxes, 0.0, 0.6, 0.17)
     assert (holds(boxes, -0.2, 0.6, -0.25), holds(boxes, 0.2, 0.6, -0.25)) == (left, right)

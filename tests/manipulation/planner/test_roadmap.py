@@ -83,9 +83,8 @@ def test_angles_are_those_that_a_hand_is_turned_by():
 
 
 def test_a_free_way_is_one_movement_of_each_kind(linkage):
-    moves, _ = Terrain(linkage, obstacles_of(()), []).movements(
-        linkage.now, pose(x=0.1, base=1.2, yaw=30)
-    )
+    free = Terrain(linkage, obstacles_of(()), [])
+    moves, _ = free.movements(linkage.now, pose(x=0.1, base=1.2, yaw=30))
     assert sorted(move.kind for move in moves) == [MoveKind.LIFT, MoveKind.REACH, MoveKind.TURN]
     assert moves[-1].pose.world()[0] == pytest.approx([0.1, 1.2, 0.7])
 
@@ -119,9 +118,8 @@ def test_a_roadmap_goes_around_what_is_straight_ahead(linkage):
 @pytest.mark.parametrize("costs", [(0.0, 1.0), (1.0, 0.0)])
 def test_of_several_ends_the_cheapest_is_come_to(linkage, costs):
     ends = Poses.join([pose(x=0.1), pose(x=-0.1)])
-    (move,) = Roadmap(
-        Terrain(linkage, obstacles_of(()), []), draws(20), ends, np.array(costs)
-    ).find_path()
+    free = Terrain(linkage, obstacles_of(()), [])
+    (move,) = Roadmap(free, draws(20), ends, np.array(costs)).find_path()
     assert move.pose.wrists[0, 0] == ends.wrists[costs.index(0.0), 0]
 
 
@@ -151,8 +149,5 @@ def test_what_is_in_a_thing_may_get_out_of_it_but_not_deeper(linkage):
 @pytest.mark.parametrize("escapes", [False, True])
 def test_through_what_it_is_in_an_arm_escapes_only_where_that_is_believed(linkage, escapes):
     board = wall((-0.2, 0.9, 0.86), (0.2, 0.995, 1.4))  # what is held is 2.5 cm deep in it
-    down = pose(base=0.8)
-    assert (
-        bool(Terrain(linkage, board, [], escapes=escapes).movements(linkage.now, down)[0])
-        == escapes
-    )
+    terrain = Terrain(linkage, board, [], escapes=escapes)
+    assert bool(terrain.movements(linkage.now, pose(base=0.8))[0]) == escapes

@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -25,12 +26,7 @@ def cupboard(kind="Fridge", origin=0.0):
     box = thing(
         f"{kind}|1", 0.0, 0.9, 1.4, (0.44, 1.0, 0.8), pickupable=False, openable=True, is_open=True
     )
-    return SimpleNamespace(
-        **{
-            **{f: getattr(box, f) for f in box.__struct_fields__},
-            "position": Vector(origin, 0.9, 1.8),
-        }
-    )
+    return msgspec.structs.replace(box, position=Vector(origin, 0.9, 1.8))
 
 
 def surroundings(linkage, item, *others, places=None):
@@ -68,17 +64,15 @@ LEFT, RIGHT = ((-0.2, 1.1, 1.3), (0.2, 1.1, 1.3))
 ])  # fmt: skip
 def test_a_door_hangs_where_the_origin_is_or_where_such_doors_do(linkage, kind, origin, door):
     around = surroundings(linkage, cupboard(kind, origin))
-    assert [point for point in (LEFT, RIGHT) if is_solid(around, Belief.RECEPTACLE, *point)] == [
-        door
-    ]
+    solid = [point for point in (LEFT, RIGHT) if is_solid(around, Belief.RECEPTACLE, *point)]
+    assert solid == [door]
 
 
 def test_what_is_met_where_there_should_be_nothing_tells_of_the_other_side(linkage):
     around = surroundings(linkage, cupboard())
     assert around.add_collision(at(*LEFT), MESSAGE.format("Fridge|1"))
-    assert is_solid(around, Belief.RECEPTACLE, *LEFT) and not is_solid(
-        around, Belief.RECEPTACLE, *RIGHT
-    )
+    assert is_solid(around, Belief.RECEPTACLE, *LEFT)
+    assert not is_solid(around, Belief.RECEPTACLE, *RIGHT)
     assert not around.add_collision(at(*RIGHT), MESSAGE.format("Sofa|1"))
     assert is_solid(around, Belief.RECEPTACLE, *LEFT)
 
@@ -104,9 +98,8 @@ def test_what_was_met_fills_its_box(linkage):
     around = surroundings(linkage, cupboard(), sofa)
     assert not is_solid(around, Belief.COLLIDED, 0.8, 0.5, 0.9)
     around.add_collision(at(0.6, 0.5, 0.9), MESSAGE.format("Sofa|1"))
-    assert is_solid(around, Belief.COLLIDED, 0.8, 0.5, 0.9) and not is_solid(
-        around, Belief.RECEPTACLE, 0.8, 0.5, 0.9
-    )
+    assert is_solid(around, Belief.COLLIDED, 0.8, 0.5, 0.9)
+    assert not is_solid(around, Belief.RECEPTACLE, 0.8, 0.5, 0.9)
 
 
 def test_what_the_arm_or_the_places_are_in_is_not_filled(linkage):
@@ -117,9 +110,8 @@ def test_what_the_arm_or_the_places_are_in_is_not_filled(linkage):
     around = surroundings(linkage, cupboard(), around_arm, around_places, places={
         "CounterTop|1": lattice(np.arange(-0.9, -0.5, 0.05), np.arange(0.6, 1.1, 0.05), (1.0,))
     })  # fmt: skip
-    assert not is_solid(around, Belief.WHOLE, 0.3, 0.5, 0.8) and is_solid(
-        around, Belief.WHOLE, -0.7, 0.5, 0.8
-    )
+    assert not is_solid(around, Belief.WHOLE, 0.3, 0.5, 0.8)
+    assert is_solid(around, Belief.WHOLE, -0.7, 0.5, 0.8)
     assert not is_solid(around, Belief.WHOLE, 0.4, 1.0, 1.7)
 
 

@@ -28,22 +28,18 @@ def curve_of(curves, label, facet=ALL):
     return run.curves[facet]
 
 
+def bound_last(*labels):
+    """Runs by their labels, of which the last is the bound."""
+    return [(label, label == labels[-1]) for label in labels]
+
+
 def means(curve):
     return [estimate.mean for estimate in curve.means]
 
 
 def test_reward_adds_up_over_the_experts_steps_and_the_expert_takes_over_what_failed():
     curves = arm_curves(
-        [
-            make_arm_run(
-                "m",
-                [
-                    make_episode_record("a", 5, done=False),
-                    make_episode_record("a", 10),
-                    make_episode_record("a", 20, "put"),
-                ],
-            )
-        ]
+        [make_arm_run("m", [make_episode_record("a", 5, done=False), *EPISODES[:2]])]
     )
     curve = curve_of(curves, "m")
     assert (curve.places, means(curve)) == ((0, 5, 10, 20), [0, 0, 2, 4])
@@ -53,11 +49,8 @@ def test_reward_adds_up_over_the_experts_steps_and_the_expert_takes_over_what_fa
 def test_both_kinds_are_drawn_together_and_each_by_itself_over_the_same_trajectories():
     curves = arm_curves([make_arm_run("m", EPISODES)])
     assert list(curves.facets) == [ALL, "pickup", "put"]
-    assert [facet.title for facet in curves.facets.values()] == [
-        "Pick-up and put",
-        "Pick-up",
-        "Put",
-    ]
+    titles = [facet.title for facet in curves.facets.values()]
+    assert titles == ["Pick-up and put", "Pick-up", "Put"]
     both, pickups, puts = (curve_of(curves, "m", facet) for facet in curves.facets)
     assert (both.places, means(both)) == ((0, 10, 20, 30), [0, 1, 2, 3])
     assert (pickups.places, means(pickups)) == ((0, 10, 30), [0, 1, 2])
@@ -104,12 +97,8 @@ def test_excluded_and_failed_episodes_are_left_out_of_all_runs():
 
 
 def test_a_run_that_was_stopped_amid_a_trajectory_does_not_draw_it():
-    curves = arm_curves(
-        [
-            make_arm_run("m", EPISODES),
-            make_arm_run("n", [EPISODES[0], EPISODES[2], make_episode_record("c", 3, "put")]),
-        ]
-    )
+    stopped = [EPISODES[0], EPISODES[2], make_episode_record("c", 3, "put")]
+    curves = arm_curves([make_arm_run("m", EPISODES), make_arm_run("n", stopped)])
     assert curves.n_trajectories == 1
     assert means(curve_of(curves, "m")) == [0, 2]
     assert curves.notes[0].startswith("1 of 3 trajectories are drawn")
@@ -117,10 +106,7 @@ def test_a_run_that_was_stopped_amid_a_trajectory_does_not_draw_it():
 
 def test_the_planner_is_the_bound_and_comes_last():
     curves = arm_curves([make_arm_planner_run(FAILED_PUT), make_arm_run("m", EPISODES)])
-    assert [(run.label, run.is_bound) for run in curves.runs] == [
-        ("m", False),
-        ("planner-arm", True),
-    ]
+    assert [(run.label, run.is_bound) for run in curves.runs] == bound_last("m", "planner-arm")
 
 
 def test_of_several_planners_none_is_the_bound():
@@ -129,11 +115,8 @@ def test_of_several_planners_none_is_the_bound():
         make_arm_planner_run(FAILED_PUT, "p", radius=0.06),
     ]
     curves = arm_curves(label_by_radius(planners))
-    assert [(run.label, run.is_bound) for run in curves.runs] == [
-        ("p, 0.5 m", False),
-        ("p, 0.06 m", False),
-        (AT_MOST, True),
-    ]
+    labels = bound_last("p, 0.5 m", "p, 0.06 m", AT_MOST)
+    assert [(run.label, run.is_bound) for run in curves.runs] == labels
     assert "the runs differ in the radius of the hand's sphere: 0.06, 0.5 m" in curves.notes
     assert [run.label for run in label_by_radius(planners[:1])] == ["p"]
 

@@ -8,23 +8,12 @@ from infthor_eval.manipulation.recorded.radii import success_by_radius
 from ...helpers.arm_runs import make_arm_planner_run, make_arm_run, make_episode_record
 
 
-def episodes(done: int, inside: int = 0, **more):
+def episodes(done: int, inside: int = 0):
     """Four pick-ups and four puts of two trajectories, of each kind so many with success."""
-    pick_ups = [
-        make_episode_record(
-            name,
-            10 * number,
-            done=number + 2 * (name == "b") < done,
-            inside=number + 2 * (name == "b") < inside,
-        )
-        for name in "ab"
-        for number in range(2)
-    ]
-    return pick_ups + [
-        make_episode_record(name, 10 * number + 5, "put", done=number + 2 * (name == "b") < done)
-        for name in "ab"
-        for number in range(2)
-    ]
+    places = list(enumerate((name, 10 * number) for name in "ab" for number in range(2)))
+    pick_ups = [make_episode_record(*at, done=n < done, inside=n < inside) for n, at in places]
+    puts = [make_episode_record(name, at + 5, "put", done=n < done) for n, (name, at) in places]
+    return pick_ups + puts
 
 
 def means(points):

@@ -20,8 +20,10 @@ from ..scripting import (
     ScriptedModel,
     actions_in_prompt,
     as_expert,
+    beginnings,
     frames_in_prompt,
     plan_in_prompt,
+    prompts,
 )
 
 pytestmark = pytest.mark.usefixtures("shared_simulators")
@@ -44,9 +46,8 @@ def test_a_model_reads_the_sequence_that_it_was_trained_on(run_scripted, data):
     outcome, model = run_scripted(as_expert(data))
     (trajectory,) = iter_trajectories(data)
     plans = plans_of(trajectory, Words.PUBLISHED)
-    beginnings = [parts for parts, _ in model.requests if not actions_in_prompt(parts)]
     whole = FIRST_GOAL + "<image>"
-    for plan, parts in zip(plans, beginnings, strict=True):
+    for plan, parts in zip(plans, beginnings(model), strict=True):
         assert join_parts(parts) == f"{whole}<|plan|>Plan: {plan.text}<|plan|><|act|>"
         whole += f"<|plan|>Plan: {plan.text}<|plan|>"
         whole += "".join(
@@ -58,12 +59,12 @@ def test_a_model_reads_the_sequence_that_it_was_trained_on(run_scripted, data):
             action = actions_in_prompt(after)[-1]
             assert join_parts(after) == f"{join_parts(before)}{action}<|act|><image><|act|>"
             assert frames_in_prompt(after)[:-1] == frames_in_prompt(before)
-    assert {
-        (decoding.max_new_tokens, decoding.temperature, decoding.stop)
-        for _, decoding in model.requests
-    } == {(10, 1.0, ("<|act|>",))}
+    decodings = [decoding for _, decoding in model.requests]
+    assert {(it.max_new_tokens, it.temperature, it.stop) for it in decodings} == {
+        (10, 1.0, ("<|act|>",))
+    }
     # Each action has draws of its own.
-    assert len({decoding.seed for _, decoding in model.requests}) == len(model.requests)
+    assert len({decoding.seed for decoding in decodings}) == len(decodings)
     tokens = [record.tokens for record in outcome.records]
     assert [(count.reply, count.cached) for count in tokens] == [
         (len(record.payload.steps), 0) for record in outcome.records
@@ -77,9 +78,6 @@ def test_the_history_is_the_true_one_whatever_the_model_did(run_scripted, data, 
         output=tmp_path / "b",
     )
 
-    def beginnings(model):
-        return [parts for parts, _ in model.requests if not actions_in_prompt(parts)]
-
     def seen(model):
         return [
             [join_parts(parts), *(frame.digest for frame in frames_in_prompt(parts))]
@@ -92,10 +90,9 @@ def test_the_history_is_the_true_one_whatever_the_model_did(run_scripted, data, 
 
 def test_the_journal_has_what_was_asked_before_each_plan_once(run_scripted, data):
     outcome, model = run_scripted(as_expert(data))
-    beginnings = [parts for parts, _ in model.requests if not actions_in_prompt(parts)]
     run = Run.open(outcome.folder)
     requests = [Sample(run, record).request_text(lambda _: "<image>") for record in run.records]
-    assert [f"{request}<|act|>" for request in requests] == list(map(join_parts, beginnings))
+    assert [f"{request}<|act|>" for request in requests] == list(map(join_parts, beginnings(model)))
     stored = [run.requests(record)[-1] for record in run.records]
     frames = [part.places for it in stored for part in it.parts if isinstance(part, StoredFrames)]
     assert frames == [((place, place),) for place in range(len(frames))]
@@ -136,10 +133,7 @@ def test_a_reply_with_white_space_around_it_is_the_action_and_goes_into_the_hist
     _, model = run_scripted(
         lambda parts, _: " RotateRight \n" if len(actions_in_prompt(parts)) < 2 else "", limit=1
     )
-    first = [parts for parts, _ in model.requests[:3]]
-    assert join_parts(first[2]).endswith(
-        "<|act|>RotateRight<|act|><image><|act|>RotateRight<|act|><image><|act|>"
-    )
+    assert prompts(model)[2].endswith("<|act|>RotateRight<|act|><image>" * 2 + "<|act|>")
 
 
 def test_a_model_that_fails_fails_its_plan_alone(run_scripted):
@@ -149,12 +143,8 @@ def test_a_model_that_fails_fails_its_plan_alone(run_scripted):
         return "RotateLeft" if not actions_in_prompt(parts) else ""
 
     outcome, _ = run_scripted(say)
-    assert [record.failure and record.failure.split(" (")[0] for record in outcome.records] == [
-        None,
-        f"{QWEN} fails on the request",
-        None,
-        None,
-    ]
+    failures = [record.failure and record.failure.split(" (")[0] for record in outcome.records]
+    assert failures == [None, f"{QWEN} fails on the request", None, None]
     assert outcome.records[1].payload.max_reward == 2
 
 
@@ -163,9 +153,8 @@ def test_replies_are_held_to_what_is_possible_where_that_is_asked(run_scripted, 
     for _, decoding in model.requests:
         assert {"MoveAhead", "RotateLeft", "NoOp"} <= set(decoding.choices)
         assert decoding.max_new_tokens >= 64
-    assert not {"no action", "unknown object", "not in view", "not possible"} & set(
-        endings(outcome)
-    )
+    faults = {ended for _, ended, _ in FAULTS}
+    assert not faults & set(endings(outcome))
 
 
 @pytest.mark.parametrize(("trained", "n_warnings"), [("natural", 1), ("published", 0), (None, 0)])
@@ -199,22 +188,17 @@ def test_a_preamble_is_told_before_everything_else(run_scripted, task_files, dat
         "dataset_kwargs: {preamble: 'You are a robot. '}\n"
     )
     _, model = run_scripted(lambda *_: "")
-    assert all(
-        join_parts(parts).startswith(f"You are a robot. {FIRST_GOAL}<image>")
-        for parts, _ in model.requests
-    )
+    begin = f"You are a robot. {FIRST_GOAL}<image>"
+    assert all(prompt.startswith(begin) for prompt in prompts(model))
 
 
 def test_grey_frames_take_the_places_of_all(run_scripted, data):
     _, plain = run_scripted(as_expert(data))
     outcome, blank = run_scripted(as_expert(data), frames="blank")
     run = Run.open(outcome.folder)
-    assert [join_parts(parts) for parts, _ in blank.requests] == [
-        join_parts(parts) for parts, _ in plain.requests
-    ]
-    assert (
-        len({frame.digest for parts, _ in blank.requests for frame in frames_in_prompt(parts)}) == 1
-    )
+    assert prompts(blank) == prompts(plain)
+    shown = [frame for parts, _ in blank.requests for frame in frames_in_prompt(parts)]
+    assert len({frame.digest for frame in shown}) == 1
     assert frames_in_prompt(blank.requests[0][0])[0].load().size == (300, 300)
     told = [Sample(run, record).request_text(repr) for record in run.records]
     assert all("frames (blank)" in text for text in told)

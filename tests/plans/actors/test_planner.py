@@ -15,18 +15,10 @@ from infthor_eval.plans.rewards import PlanReward, max_reward
 from infthor_eval.plans.targets import PlanTarget, target_of
 from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.thor.grounding import Grounding
-from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.recorded import translate
 from infthor_eval.thor.restore import restore
-from infthor_eval.thor.simulator import Simulator
 
 SET = packaged_folder("sets/nieh_mini")
-
-
-@pytest.fixture(scope="module")
-def simulator():
-    with Simulator(embedded_launch(), instances=False, renderImage=False) as simulator:
-        yield simulator
 
 
 def recorded_goal(plan, grid):
@@ -44,12 +36,8 @@ def test_every_plan_is_carried_out(simulator, name):
     rules = reward_rules("default")
     restored = restore(simulator, trajectory.scene)
     assert not restored.refused and not restored.dropped
-    grounding, tasks, plans = (
-        Grounding(simulator.view),
-        tasks_of(trajectory),
-        plans_of(trajectory, Words.PUBLISHED),
-    )
-    treatments = Treatments()
+    grounding, treatments = Grounding(simulator.view), Treatments()
+    tasks, plans = tasks_of(trajectory), plans_of(trajectory, Words.PUBLISHED)
     for plan in plans:
         begins = plan.index == 0 or plans[plan.index - 1].task != plan.task
         treatments = Treatments() if begins else treatments

@@ -98,9 +98,8 @@ def test_histories_of_a_tiny_model(prepare_run, tmp_path, watched, make_clip):
         watched.clear()
         outcome = execute(prepare_run(QWEN, data=data, greedy=True, history=history, **more))
         assert not any(record.failure for record in outcome.records)
-        firsts = [
-            reply.n_context_tokens for parts, reply in watched if not actions_in_prompt(parts)
-        ]
+        begun = [reply for parts, reply in watched if not actions_in_prompt(parts)]
+        firsts = [reply.n_context_tokens for reply in begun]
         assert len(firsts) == len(outcome.records) == 4  # one of five belongs to no task
         if history == "full":
             whole = firsts

@@ -12,16 +12,11 @@ from infthor_eval.plans.history.recalled import MemoryChoice
 from infthor_eval.plans.history.retrieved import retrieved_steps
 from infthor_eval.plans.history.segments import PlanSegment
 
+from ...helpers.refusals import read_one_line
 from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
 
 # The first frame is in no entry. Action 1 has two frames, of which the last one shows its outcome.
-IMAGES = [
-    (0, "000000001.png"),
-    (1, "000000002.png"),
-    (1, "000000003.png"),
-    (2, "000000004.png"),
-    (9, "000000011.png"),
-]
+IMAGES = [(at, f"{n:09d}.png") for at, n in ((0, 1), (1, 2), (1, 3), (2, 4), (9, 11))]
 
 
 @pytest.fixture
@@ -44,40 +39,28 @@ def test_names_are_looked_up_in_images_with_the_suffix_of_either_format(trajecto
     assert retrieved_steps(read, 3, 2) == [0, 1]
 
 
+NOTHING = "(nothing was retrieved before this action)"
+
+
 @pytest.mark.parametrize(
     ("retrieved", "expected"),
     [
-        (
-            None,
-            'retrieved_image["3"]["top20"] is not in the file (nothing was retrieved before this '
-            "action); take",
-        ),
-        (
-            {"2": {"top20": []}},
-            "(nothing was retrieved before this action); take --history frames:20",
-        ),
-        (
-            {"3": {"top5": [], "top10": []}},
-            "is not in the file (it has top10, top5); take --history frames:20",
-        ),
-        (
-            {"3": {"top20": ["000000099.png"]}},
-            "'000000099.png' is in no entry of images; restore the file",
-        ),
+        (None, f'retrieved_image["3"]["top20"] is not in the file {NOTHING}; take'),
+        ({"2": {"top20": []}}, f"{NOTHING}; take --history frames:20"),
+        ({"3": {"top5": [], "top10": []}}, "(it has top10, top5); take --history frames:20"),
+        ({"3": {"top20": ["000000099.png"]}}, "'000000099.png' is in no entry of images; restore"),
         (
             {"3": {"top20": ["000000011.png"]}},
-            "'000000011.png' is taken after that action; restore the file",
+            "'000000011.png' is taken after that action; restore",
         ),
         ({"3": {"top20": [1]}}, "is no list of frame names (Expected `str`, got `int`"),
         ({"3": [1]}, "is no list of frame names (Expected `object`, got `array`"),
     ],
 )
 def test_what_is_missing_or_wrong_is_told_with_its_place(trajectory, retrieved, expected):
-    with pytest.raises(DataError) as caught:
+    with pytest.raises(DataError, match=f"trajectory {FORK}: ") as caught:
         retrieved_steps(trajectory(retrieved), 3, 20)
-    assert expected in str(caught.value)
-    assert f"trajectory {FORK}: " in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert expected in read_one_line(caught)
 
 
 def test_images_of_another_form_are_told(trajectory):
@@ -97,9 +80,8 @@ def test_they_are_shown_in_the_files_order_and_the_published_size(trajectory, tm
     segments = [PlanSegment("go", "a goal", frames[0], steps)]
     read = trajectory({"3": {"top2": ["000000002.png", "000000000.png"]}})
     past = Past(segments, PlanSegment("pick", None, frames[3]), trajectory=read)
-    first, second, goal, present, plan = history_named("retrieved:2", MemoryChoice()).recall(
-        past, lambda _: None
-    )
+    history = history_named("retrieved:2", MemoryChoice())
+    first, second, goal, present, plan = history.recall(past, lambda _: None)
     assert (goal, plan) == ("<|goal|>Your main goal: a goal<|goal|>", "<|plan|>Plan: pick<|plan|>")
     assert present == frames[3]
     for resized, number in ((first, 2), (second, 0)):
@@ -107,6 +89,4 @@ def test_they_are_shown_in_the_files_order_and_the_published_size(trajectory, tm
         assert resized.size == (336, 336)
         assert ImageChops.difference(resized.load(), expected).getbbox() is None
     with pytest.raises(DataError, match="file is not known, which --history retrieved:K reads"):
-        history_named("retrieved:2", MemoryChoice()).recall(
-            Past(segments, past.present), lambda _: None
-        )
+        history.recall(Past(segments, past.present), lambda _: None)

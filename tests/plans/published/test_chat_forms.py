@@ -11,11 +11,10 @@ from infthor_eval.plans.history.past import Past
 from infthor_eval.plans.history.recalled import MemoryChoice
 from infthor_eval.plans.history.segments import PlanSegment
 from infthor_eval.plans.published.final_protocol import chat_form, present_parts
-from infthor_eval.runs import execute
 
 from ...helpers.prompts import join_parts
-from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
-from ..scripting import ScriptedModel
+from ..outcomes import endings
+from ..scripting import prompts
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "goldens" / "chat_prompts.json").read_text())
 OF_PLANS = [item for item in GOLDEN if "plans" in item]
@@ -71,26 +70,17 @@ def test_other_histories_are_no_chat():
 
 
 @pytest.mark.usefixtures("shared_simulators")
-def test_every_plan_is_asked_from_the_true_state(prepare_run, monkeypatch, tmp_path):
-    model = ScriptedModel(lambda *_: "fly")
-    monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
-    data = write_trajectories(tmp_path / "trajectories", cut_trajectory(FORK))
-    outcome = execute(
-        prepare_run("qwen2.5-vl-tiny", tasks=("infthor_plans",), data=data, history="plans")
-    )
-    assert [record.payload.ended for record in outcome.records] == ["no action"] * 4
-    prompts = [join_parts(parts) for parts, _ in model.requests]
+def test_every_plan_is_asked_from_the_true_state(run_scripted):
+    outcome, model = run_scripted(lambda *_: "fly", history="plans")
+    assert endings(outcome) == ["no action"] * 4
     plans = [record.payload.plan for record in outcome.records]
     expected = ["No history is available.", *("; ".join(plans[:n]) + ";" for n in (1, 2, 3))]
-    assert prompts == [
+    assert prompts(model) == [
         f"Action history: {history}\nCurrent state: <image> Next action: " for history in expected
     ]
-    assert {(decoding.max_new_tokens, decoding.stop) for _, decoding in model.requests} == {
-        (32, ())
-    }
-    outcome = execute(
-        prepare_run("qwen2.5-vl-tiny", tasks=("infthor_plans",), data=data, history="goals")
-    )
-    assert join_parts(model.requests[-1][0]).endswith("<image><|act|>")
-    assert (model.requests[-1][1].max_new_tokens, model.requests[-1][1].stop) == (32, ("<|act|>",))
-    assert "<|plan|>" not in join_parts(model.requests[-1][0])
+    assert all((it.max_new_tokens, it.stop) == (32, ()) for _, it in model.requests)
+    _, model = run_scripted(lambda *_: "fly", history="goals")
+    assert prompts(model)[-1].endswith("<image><|act|>")
+    assert "<|plan|>" not in prompts(model)[-1]
+    decoding = model.requests[-1][1]
+    assert (decoding.max_new_tokens, decoding.stop) == (32, ("<|act|>",))

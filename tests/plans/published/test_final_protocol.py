@@ -10,15 +10,14 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.plans.actors.habits import expert_texts
 from infthor_eval.plans.plan import plans_of
-from infthor_eval.runs import execute
 
-from ...helpers.prompts import join_parts
 from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
-from ..scripting import ScriptedModel
+from ..outcomes import payloads
+from ..scripting import count_tokens, frames_in_prompt, prompts
 
 pytestmark = pytest.mark.usefixtures("shared_simulators")
 
-QWEN = "qwen2.5-vl-tiny"
+WITH_FRAMES = ".\nPrevious states: <image><image><image>Current state: <image> Next action: "
 FIRST = "<|goal|>Your main goal: put a fork in the drawer<|goal|><image>"
 
 
@@ -39,63 +38,68 @@ def experts(final):
 
 
 @pytest.fixture
-def run_scripted(prepare_run, monkeypatch, final):
-    """Runs a model that says these texts one after the other; gives the payloads and the model."""
+def change_file(final):
+    """Changes what the trajectory's file says; `change` is given the final task's first action."""
+    path = final / f"{FORK}.json"
 
-    def run_scripted(replies, **changes):
+    def change_file(change):
+        document = json.loads(path.read_text())
+        first = document["sub_trajs"][-1]["low_pddl_idx"][0]
+        path.write_text(json.dumps(document | change(first)))
+
+    return change_file
+
+
+@pytest.fixture
+def run_final(run_scripted, final):
+    """Runs a model that says these texts one after the other; gives payloads, model and outcome."""
+
+    def run_final(replies, **changes):
         rest = iter(replies)
-        model = ScriptedModel(lambda *_: next(rest))
-        monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
-        settings = {
-            "tasks": ("infthor_final",),
-            "data": final,
-            "protocol": "published",
-            "rewards": "published",
-        }
-        outcome = execute(prepare_run(QWEN, **settings | changes))
-        return [record.payload for record in outcome.records], model, outcome
+        settings = {"tasks": ("infthor_final",), "data": final}
+        settings |= {"protocol": "published", "rewards": "published"}
+        outcome, model = run_scripted(lambda *_: next(rest), **settings | changes)
+        return payloads(outcome), model, outcome
 
-    return run_scripted
+    return run_final
 
 
-def test_the_interleaved_form_ends_after_its_first_plan(run_scripted, experts):
-    (first, second), model, outcome = run_scripted(experts[4])
+def test_the_interleaved_form_ends_after_its_first_plan(run_final, experts):
+    (first, second), model, outcome = run_final(experts[4])
     assert (first.ended, second.ended) == ("done", "not attempted")
     (task,) = outcome.summary.summary.tasks.values()
     assert (task.n_plans, task.n_tried, task.success["total"].mean) == (2, 1, 0.5)
     parts, decoding = model.requests[0]
-    prompt = join_parts(parts)
+    prompt = prompts(model)[0]
     assert prompt.startswith(f"{FIRST}<|act|><|act|>")
     assert "<|plan|>" not in prompt
     assert prompt.count("<|goal|>Your main goal: ") == 2
     assert prompt.endswith("<|goal|><image><|act|>")
-    frames = [part for part in parts if isinstance(part, FrameRef)]
+    frames = frames_in_prompt(parts)
     assert frames[0].digest == frames[-1].digest  # the scene's first frame stands behind each goal
     assert (decoding.max_new_tokens, decoding.temperature, decoding.stop) == (32, 0.0, ("<|act|>",))
     assert decoding.repetition_penalty is None
-    assert [
-        system_text.startswith("You are an embodied AI agent") for system_text in model.system_parts
-    ] == [True]
-    grown = join_parts(model.requests[1][0])
-    assert grown == f"{prompt}{experts[4][0]}<|act|><image><|act|>"
+    (system_text,) = model.system_parts
+    assert system_text.startswith("You are an embodied AI agent")
+    assert prompts(model)[1] == f"{prompt}{experts[4][0]}<|act|><image><|act|>"
 
 
-def test_a_failed_first_plan_ends_it_too(run_scripted):
-    (first, second), model, _ = run_scripted(["fly"])
+def test_a_failed_first_plan_ends_it_too(run_final):
+    (first, second), model, _ = run_final(["fly"])
     assert (first.ended, second.ended) == ("no action", "not attempted")
     assert len(model.requests) == 1
 
 
-def test_with_a_memory_the_next_plan_follows_in_the_world_as_it_is(run_scripted):
-    (first, second), model, _ = run_scripted(
+def test_with_a_memory_the_next_plan_follows_in_the_world_as_it_is(run_final):
+    (first, second), model, _ = run_final(
         ["RotateLeft", "fly", *["RotateRight"] * 201], history="text"
     )
     assert (first.ended, second.ended) == ("no action", "step limit")
     assert len(second.steps) == 201
-    prompts = [join_parts(parts) for parts, _ in model.requests]
+    asked = prompts(model)
     # The memory is not renewed.
-    assert len({prompt.partition("Current state: ")[0] for prompt in prompts}) == 1
-    for prompt in prompts:
+    assert len({prompt.partition("Current state: ")[0] for prompt in asked}) == 1
+    for prompt in asked:
         assert prompt.startswith("Your task is: put two slices of tomato")
         assert ".\nState: You are in the middle of a room. Your hands are free." in prompt
         assert prompt.endswith(";\nCurrent state: <image> Next action: ")
@@ -103,57 +107,40 @@ def test_with_a_memory_the_next_plan_follows_in_the_world_as_it_is(run_scripted)
     digests = [parts[-2].digest for parts, _ in model.requests]
     assert digests[0] != digests[1]  # it has turned left,
     assert digests[1] == digests[2]  # and the next plan begins there
-    assert any("Available actions: RotateLeft" in system_text for system_text in model.system_parts)
+    assert any("Available actions: RotateLeft" in text for text in model.system_parts)
 
 
-def test_the_state_in_the_file_is_taken_where_there_is_one(run_scripted, final):
-    path = final / f"{FORK}.json"
-    document = json.loads(path.read_text())
-    first = document["sub_trajs"][-1]["low_pddl_idx"][0]
-    path.write_text(json.dumps(document | {"state_summary": {str(first): "All is well"}}))
-    _, model, _ = run_scripted(["fly", "fly"], history="text")
-    assert "State: You are in the middle of a room. All is well;\n" in join_parts(
-        model.requests[0][0]
-    )
+def test_the_state_in_the_file_is_taken_where_there_is_one(run_final, change_file):
+    change_file(lambda first: {"state_summary": {str(first): "All is well"}})
+    _, model, _ = run_final(["fly", "fly"], history="text")
+    assert "State: You are in the middle of a room. All is well;\n" in prompts(model)[0]
 
 
-def test_frames_are_remembered_by_clip(run_scripted, make_clip):
-    _, model, _ = run_scripted(["fly", "fly"], history="frames:3", retriever=str(make_clip()))
-    prompt = join_parts(model.requests[0][0])
-    assert prompt.startswith("Your task is: ")
-    assert prompt.endswith(
-        ".\nPrevious states: <image><image><image>Current state: <image> Next action: "
-    )
+def test_frames_are_remembered_by_clip(run_final, make_clip):
+    _, model, _ = run_final(["fly", "fly"], history="frames:3", retriever=str(make_clip()))
+    assert prompts(model)[0].startswith("Your task is: ")
+    assert prompts(model)[0].endswith(WITH_FRAMES)
 
 
-def test_frames_that_the_file_names_are_remembered_in_the_published_size(run_scripted, final):
-    path = final / f"{FORK}.json"
-    document = json.loads(path.read_text())
-    first = document["sub_trajs"][-1]["low_pddl_idx"][0]
-    images = [{"low_idx": number, "image_name": f"{number + 1:09d}.png"} for number in range(first)]
-    retrieved = {str(first): {"top20": ["000000000.png", "000000002.png", "000000005.png"]}}
-    path.write_text(json.dumps(document | {"images": images, "retrieved_image": retrieved}))
-    _, model, _ = run_scripted(["fly", "fly"], history="retrieved:20")
-    parts = model.requests[0][0]
-    assert join_parts(parts).endswith(
-        ".\nPrevious states: <image><image><image>Current state: <image> Next action: "
-    )
-    assert [part.path.stem for part in parts if isinstance(part, FrameRef)][:3] == [
-        "000000000-336",
-        "000000002-336",
-        "000000005-336",
-    ]
-    assert [
-        system_text.count("previous states (history)") for system_text in model.system_parts
-    ] == [1]
+def test_frames_that_the_file_names_are_remembered_in_the_published_size(run_final, change_file):
+    def with_frames(first):
+        images = [
+            {"low_idx": number, "image_name": f"{number + 1:09d}.png"} for number in range(first)
+        ]
+        names = [f"{number:09d}.png" for number in (0, 2, 5)]
+        return {"images": images, "retrieved_image": {str(first): {"top20": names}}}
+
+    change_file(with_frames)
+    _, model, _ = run_final(["fly", "fly"], history="retrieved:20")
+    assert prompts(model)[0].endswith(WITH_FRAMES)
+    shown = [frame.path.stem for frame in frames_in_prompt(model.requests[0][0])]
+    assert shown[:3] == [f"{number:09d}-336" for number in (0, 2, 5)]
+    assert [text.count("previous states (history)") for text in model.system_parts] == [1]
 
 
-def test_a_file_that_names_no_frames_for_an_action_is_told_in_its_records(run_scripted, final):
-    path = final / f"{FORK}.json"
-    path.write_text(
-        json.dumps(json.loads(path.read_text()) | {"retrieved_image": {"0": {"top20": []}}})
-    )
-    _, model, outcome = run_scripted([], history="retrieved:20")
+def test_a_file_that_names_no_frames_for_an_action_is_told_in_its_records(run_final, change_file):
+    change_file(lambda _: {"retrieved_image": {"0": {"top20": []}}})
+    _, model, outcome = run_final([], history="retrieved:20")
     assert model.requests == []
     first, *others = outcome.records
     assert first.failure.startswith(f'trajectory {FORK}: retrieved_image["')
@@ -163,9 +150,9 @@ def test_a_file_that_names_no_frames_for_an_action_is_told_in_its_records(run_sc
     assert {record.state for record in others} <= {"not asked"}
 
 
-def test_files_that_name_no_frames_are_refused_before_the_work(run_scripted):
+def test_files_that_name_no_frames_are_refused_before_the_work(run_final):
     with pytest.raises(DataError, match="infthor_final: no trajectory there has retrieved_image"):
-        run_scripted([], history="retrieved:20")
+        run_final([], history="retrieved:20")
 
 
 @pytest.mark.parametrize(
@@ -173,65 +160,49 @@ def test_files_that_name_no_frames_are_refused_before_the_work(run_scripted):
     [
         (
             {"history": "last:100"},
-            "--protocol published has the histories full, text, retrieved:K and frames:K, not "
-            "last:100",
+            "has the histories full, text, retrieved:K and frames:K, not last:100",
         ),
-        (
-            {"tasks": ("infthor_plans",)},
-            "--protocol published is for final tasks; take --tasks infthor_final",
-        ),
+        ({"tasks": ("infthor_plans",)}, "is for final tasks; take --tasks infthor_final"),
     ],
 )
-def test_what_the_scripts_have_not_is_refused(run_scripted, changes, expected):
+def test_what_the_scripts_have_not_is_refused(run_final, changes, expected):
     with pytest.raises(UsageError) as caught:
-        run_scripted([], **changes)
-    assert str(caught.value) == expected
+        run_final([], **changes)
+    assert str(caught.value) == f"--protocol published {expected}"
 
 
-def test_a_run_that_was_stopped_goes_on_to_the_same_end(prepare_run, final, experts, monkeypatch):
-    rest = iter([*experts[4], "fly", *experts[4], "fly"])
-    model = ScriptedModel(lambda *_: next(rest))
-    monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
-    settings = {
-        "tasks": ("infthor_final",),
-        "data": final,
-        "protocol": "published",
-        "history": "text",
-    }
-    whole = execute(prepare_run(QWEN, **settings))
-    (journal,) = (whole.folder / "journal").glob("*.jsonl")
+def test_a_run_that_was_stopped_goes_on_to_the_same_end(run_final, experts):
+    replies = [*experts[4], "fly"]
+    whole, _, outcome = run_final(replies, history="text")
+    (journal,) = (outcome.folder / "journal").glob("*.jsonl")
     lines = journal.read_text().splitlines(keepends=True)
     journal.write_text("".join(lines[:-1]))
-    again = execute(prepare_run(QWEN, **settings))
-    assert [record.payload for record in again.records] == [
-        record.payload for record in whole.records
-    ]
+    assert run_final(replies, history="text")[0] == whole
 
 
 def test_how_far_back_a_clue_is_stands_in_the_record_in_frames_and_tokens(
-    run_scripted, experts, final
+    run_final, experts, final, change_file
 ):
     (trajectory,) = iter_trajectories(final)
     plan = plans_of(trajectory, Words.PUBLISHED)[4]
     name = trajectory.plan.high_pddl[plan.high].discrete_action.args[0]
     seen, first = plan.low[0] - 7, plan.low[0]
-    path = final / f"{FORK}.json"
     entries = [
         {"visible": [name.capitalize()] if number in (1, seen) else []}
         for number in range(first + 1)
     ]
     # Later than anybody may know.
     entries += [{"visible": [name]}] * (len(trajectory.plan.low_actions) - first)
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"object_log": entries}))
+    change_file(lambda _: {"object_log": entries})
 
     replies = [text for texts in experts[4:] for text in texts]
-    plans, model, outcome = run_scripted(replies, protocol="default", rewards="default")
+    plans, model, outcome = run_final(replies, protocol="default", rewards="default")
     # Two slices, both there.
     assert plans[0].ended == "done" and {plan.conditions[1] for plan in plans} == {4}
     # Tokens up to each frame: a word is one, a frame is one.
     n_tokens, after_goal, up_to = (0, False, [])
     for part in model.requests[0][0]:
-        n_tokens += 1 if isinstance(part, FrameRef) else len(part.split())
+        n_tokens += count_tokens([part])
         if isinstance(part, FrameRef) and (not up_to or not after_goal):
             up_to.append(n_tokens)
         after_goal = isinstance(part, str) and "<|goal|>" in part

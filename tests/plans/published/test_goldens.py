@@ -41,6 +41,8 @@ from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.summary import log_rows
 from infthor_eval.thor.view import ThorObject, Vector
 
+from ...helpers.prompts import join_parts
+
 GOLDENS = Path(__file__).parents[3] / "../shared/data/published_goldens"
 # Outputs of the same functions on inputs made for these tests.
 OURS = Path(__file__).parents[2] / "goldens"
@@ -60,15 +62,23 @@ def thing(record: dict[str, Any]) -> ThorObject:
     return msgspec.convert(required | record, ThorObject)
 
 
+def high_action(record: dict[str, Any]) -> HighAction:
+    return msgspec.convert({"high_idx": 0, **record}, HighAction)
+
+
+def without_frames(parts: Iterable[Any]) -> tuple[str, list[int]]:
+    """The text of parts with `<image>` for each frame, and the numbers of the frames."""
+    listed = list(parts)
+    frames = [int(str(part.path)) for part in listed if isinstance(part, FrameRef)]
+    return join_parts(listed), frames
+
+
 def test_every_text_is_the_published_one():
     put_away = (line for line in lines("put_away", OURS) if "text" in line)
     for line in chain(put_away, lines("plan_texts")):
         try:
             if "high_pddl" in line:
-                text = plan_text(
-                    msgspec.convert({"high_idx": 0, **line["high_pddl"]}, HighAction),
-                    Words.PUBLISHED,
-                )
+                text = plan_text(high_action(line["high_pddl"]), Words.PUBLISHED)
             else:
                 text = action_text(msgspec.convert(line["api_action"], ApiAction), Words.PUBLISHED)
         except (DataError, msgspec.ValidationError):
@@ -78,9 +88,8 @@ def test_every_text_is_the_published_one():
 
 def test_every_text_is_grounded_as_published():
     for line in chain(lines("unreported_properties", OURS), lines("plan_grounding")):
-        assert (
-            list(ground_published(line["action"], map(thing, line["objects"]))) == line["result"]
-        ), line
+        grounded = ground_published(line["action"], map(thing, line["objects"]))
+        assert list(grounded) == line["result"], line
 
 
 class _Story:
@@ -90,9 +99,7 @@ class _Story:
         self._objects: dict[str, ThorObject] = {}
 
     def state(self, record: dict[str, Any]) -> PublishedState:
-        self._objects = self._objects | {
-            item["objectId"]: thing(item) for item in record["objects"]
-        }
+        self._objects |= {item["objectId"]: thing(item) for item in record["objects"]}
         for key in record.get("gone", ()):
             del self._objects[key]
         held = tuple(item["objectId"] for item in record["inventoryObjects"])
@@ -120,7 +127,7 @@ def check_rewards(stories: Iterable[dict[str, Any]]) -> None:
         task = PublishedTask(
             RULES,
             msgspec.convert(line["task_info"], TaskInfo),
-            [msgspec.convert({"high_idx": 0, **high}, HighAction) for high in line["expert_plan"]],
+            list(map(high_action, line["expert_plan"])),
             line["num_subgoals"],
             PublishedPaths(graphs[grid]),
             story.state(line["start"]),
@@ -154,16 +161,18 @@ def frame(number: int) -> FrameRef:
     return FrameRef(Path(str(number)))
 
 
+# What the published loop logs of a step, in its order.
+LOGGED = ("step", "total_reward", "agent_reward", "action", "reward", "sub_goal", "plan")
+
+
 class _Loop:
     """Goes through a golden run of the published loop: the agent says what the line has, the expert
     repeats."""
 
     def __init__(self, line: dict[str, Any]) -> None:
         self.line, self.trajectory = line, read(line["trajectory"])
-        self.plans, self.tasks = (
-            plans_of(self.trajectory, Words.PUBLISHED),
-            tasks_of(self.trajectory),
-        )
+        self.plans = plans_of(self.trajectory, Words.PUBLISHED)
+        self.tasks = tasks_of(self.trajectory)
         self.objects = [thing(item) for item in line["objects"]]
         self.held = next(iter(line["inventory"]), None)
         self.prompts: list[Any] = []
@@ -177,11 +186,8 @@ class _Loop:
             goal = self.tasks[plan.task].text if begins else None
             segment = PlanSegment(plan.text, goal, frame(plan.low[0]))
             acts = plan.low[1] >= line["last_step"]
-            self.records.append(
-                self.act(plan, Past(segments, segment))
-                if acts
-                else self.record(plan, [], Ended.DONE)
-            )
+            done = self.act(plan, Past(segments, segment)) if acts else None
+            self.records.append(done or self.record(plan, [], Ended.DONE))
             refused = line["expert_refused"]
             if refused is not None and refused < plan.low[1]:
                 break
@@ -200,9 +206,7 @@ class _Loop:
         for number, (text, answer, reward, _, done) in enumerate(
             self.line["agent"][str(plan.high)], 1
         ):
-            frames = [int(str(part.path)) for part in parts if isinstance(part, FrameRef)]
-            prompt = "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
-            self.prompts.append([plan.high, prompt, frames])
+            self.prompts.append([plan.high, *without_frames(parts)])
             try:
                 call = published_call(text, self.objects, self.held)
             except LookupError:
@@ -239,18 +243,7 @@ def test_every_prompt_call_and_total_of_the_loop_is_the_published_one():
         loop = _Loop(line)
         assert loop.prompts == line["prompts"]
         assert loop.sent == line["sent"]
-        rows = [
-            [
-                row.step,
-                row.total_reward,
-                row.agent_reward,
-                row.action,
-                row.reward,
-                row.sub_goal,
-                row.plan,
-            ]
-            for row in log_rows(loop.records)
-        ]
+        rows = [[getattr(row, name) for name in LOGGED] for row in log_rows(loop.records)]
         assert list(map(_rounded, rows)) == [_rounded(logged[:7]) for logged in line["log"]]
 
 
@@ -271,23 +264,14 @@ def by_hand(document: dict[str, Any]) -> list[tuple[str, list[int]]]:
         if kind == "GotoLocation":
             return f"go to the {high['discrete_action']['args'][0]}"
         if kind == "PutObject":
-            return (
-                f"put the {name(planner['objectId'])} in the {name(planner['receptacleObjectId'])}"
-            )
-        verbs = {
-            "PickupObject": "pick up the",
-            "CoolObject": "cool the",
-            "SliceObject": "slice the",
-        }
-        return f"{verbs[kind]} {name(planner['objectId'])}"
+            item, place = name(planner["objectId"]), name(planner["receptacleObjectId"])
+            return f"put the {item} in the {place}"
+        verbs = {"PickupObject": "pick up", "CoolObject": "cool", "SliceObject": "slice"}
+        return f"{verbs[kind]} the {name(planner['objectId'])}"
 
     def done(call: dict[str, Any]) -> str:
-        return " ".join(
-            [
-                call["action"],
-                *(name(call[key]) for key in ("objectId", "receptacleObjectId") if key in call),
-            ]
-        )
+        ids = [call[key] for key in ("objectId", "receptacleObjectId") if key in call]
+        return " ".join([call["action"], *map(name, ids)])
 
     text, frames, n_done, before = "", [], 0, []
     for task, part in zip(document["sub_tasks"], document["sub_trajs"], strict=True):
@@ -321,11 +305,7 @@ def test_the_history_of_a_published_trajectory_is_the_published_one():
             plan.text, tasks[plan.task].text if begins else None, frame(plan.low[0])
         )
         parts = PublishedHistory().recall(Past(segments, segment), len)
-        assert (
-            "".join("<image>" if isinstance(part, FrameRef) else part for part in parts) + ACT
-            == text
-        )
-        assert [int(str(part.path)) for part in parts if isinstance(part, FrameRef)] == numbers
+        assert without_frames([*parts, ACT]) == (text, numbers)
         done = zip(expert_texts(trajectory, plan, Words.PUBLISHED), range(*plan.low), strict=True)
         segments.append(
             replace(segment, steps=tuple((action, frame(number + 1)) for action, number in done))

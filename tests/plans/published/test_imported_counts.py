@@ -9,6 +9,7 @@ import pytest
 from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import read_run
 
+from ...helpers.command_line import assert_refused
 from ...helpers.journals import write_run
 from ...helpers.plan_runs import make_plan_record, make_planner_run
 
@@ -32,6 +33,9 @@ def row(traj_id, goto=(0, 0), pick=(0, 0), put=(0, 0), more=0):
 ROWS = row("t0", (1, 2), (0, 1), (0, 1)) + row("t1") + row("t2", (0, 1), (1, 1), (0, 1))
 
 
+REPLY = '{"question_id": "q", "reply": ""}\n'
+
+
 @pytest.fixture
 def import_log(tmp_path, run_cli):
     """Imports a text as a log; returns exit code, what was said, and the run's folder."""
@@ -45,6 +49,12 @@ def import_log(tmp_path, run_cli):
         return code, out + err, next((tmp_path / "out").glob("*/*"), None)
 
     return import_log
+
+
+def summary_of(folder):
+    """What was found of the run's one task."""
+    (task,) = json.loads((folder / "results.json").read_text())["summary"]["tasks"].values()
+    return task
 
 
 @pytest.mark.parametrize("name", [LOG, f"{LOG}.gz"])
@@ -63,15 +73,14 @@ def test_a_log_becomes_a_run_of_its_plans(import_log, run_cli, name):
         ("t2/0001", "PickupObject", "done"),
         ("t2/0002", "PutObject", "not done"),
     ]
-    (task,) = json.loads((folder / "results.json").read_text())["summary"]["tasks"].values()
+    task = summary_of(folder)
     assert {name: (round(rate["mean"], 4), rate["n"]) for name,
             rate in task["success"].items()} == {
         "Go to": (0.3333, 3), "Pick up": (0.5, 2), "Put": (0.0, 2), "total": (0.2857, 7),
     }  # fmt: skip
     assert task["skipped"] == {"its set-up failed: the log counts no plan of it": 1}
-    scores = [
-        json.loads(line)["scores"] for line in (folder / "scores.jsonl").read_text().splitlines()
-    ]
+    lines = (folder / "scores.jsonl").read_text().splitlines()
+    scores = [json.loads(line)["scores"] for line in lines]
     assert scores[:2] == [{"success": 1.0}, {"success": 0.0}]
     before = (folder / "results.json").read_bytes()
     assert import_log(ROWS, name=name)[0] == 0
@@ -80,10 +89,8 @@ def test_a_log_becomes_a_run_of_its_plans(import_log, run_cli, name):
 
 def test_what_is_not_in_the_log_is_not_in_the_results(import_log):
     _, _, folder = import_log(ROWS)
-    (task,) = json.loads((folder / "results.json").read_text())["summary"]["tasks"].values()
-    assert [
-        task[name] for name in ("reward", "max_reward", "reward_share", "goals", "n_actions")
-    ] == [None] * 5
+    names = ("reward", "max_reward", "reward_share", "goals", "n_actions")
+    assert {summary_of(folder)[name] for name in names} == {None}
 
 
 def test_the_run_is_shown_and_compared_like_any_other(import_log, run_cli):
@@ -104,12 +111,9 @@ def test_a_page_says_that_there_is_nothing_to_draw(import_log, run_cli, tmp_path
 @pytest.mark.parametrize("words", [("watch",), ("report", "--figure", "7", "--out", "figure")])
 def test_what_needs_steps_says_that_there_are_none(import_log, run_cli, words):
     _, _, folder = import_log(ROWS)
-    code, out, err = run_cli(words[0], folder, *words[1:])
-    assert (code, out) == (2, "")
-    assert err.splitlines() == [
-        "infthor-eval: some-model-hf_yarn_4.0: imported counts have no steps and no rewards; give "
-        "runs made here"
-    ]
+    refusal = "imported counts have no steps and no rewards; give runs made here"
+    ended = run_cli(words[0], folder, *words[1:])
+    assert_refused(ended, f"infthor-eval: some-model-hf_yarn_4.0: {refusal}")
 
 
 def test_imported_counts_stand_beside_a_run_made_here(import_log, run_cli, tmp_path):
@@ -129,36 +133,20 @@ def test_lines_that_are_not_imported_are_counted_and_named(import_log):
     assert "some-model-hf_yarn_4.0: 2 row(s) not imported" in output
     assert f"{LOG}, line 4: counts plans of other kinds than goto, pick and put" in output
     assert f"{LOG}, line 5: has no counts of plans (" in output
-    (task,) = json.loads((folder / "results.json").read_text())["summary"]["tasks"].values()
-    assert sum(task["skipped"].values()) == 3
+    assert sum(summary_of(folder)["skipped"].values()) == 3
 
 
 @pytest.mark.parametrize(
-    ("content", "options", "name", "reason"),
+    ("content", "name", "reason"),
     [
-        (ROWS, (), "mine.log", "mine.log: its name has no model; give one with --model"),
-        (
-            row("t0"),
-            (),
-            LOG,
-            "none of its plans can be imported; give a log that counts goto, pick and put",
-        ),
-        (
-            '{"metric": {}}\n',
-            (),
-            LOG,
-            "no line has counts of plans (line 1 has no counts of plans (",
-        ),
-        (
-            '{"question_id": "q", "reply": ""}\n',
-            (),
-            LOG,
-            "has replies to questions; give their NIEH set with --data",
-        ),
+        (ROWS, "mine.log", "mine.log: its name has no model; give one with --model"),
+        (row("t0"), LOG, "can be imported; give a log that counts goto, pick and put"),
+        ('{"metric": {}}\n', LOG, "no line has counts of plans (line 1 has no counts of plans ("),
+        (REPLY, LOG, "has replies to questions; give their NIEH set with --data"),
     ],
 )
-def test_a_log_that_cannot_be_imported_is_one_line(import_log, content, options, name, reason):
-    code, output, folder = import_log(content, *options, name=name)
+def test_a_log_that_cannot_be_imported_is_one_line(import_log, content, name, reason):
+    code, output, folder = import_log(content, name=name)
     assert (code, folder, output.count("\n")) == (2, None, 1)
     assert reason in output
 
@@ -173,11 +161,8 @@ def test_the_published_logs_give_the_published_totals(tmp_path, run_cli):
     assert run_cli("import-replies", *logs, "--out", tmp_path)[0] == 0
     totals = {}
     for results in tmp_path.glob("*/*/results.json"):
-        success = json.loads(results.read_text())["summary"]["tasks"]["infthor_final"]["success"]
-        totals[results.parents[1].name] = (
-            round(100 * success["total"]["mean"], 1),
-            success["total"]["n"],
-        )
+        total = summary_of(results.parent)["success"]["total"]
+        totals[results.parents[1].name] = round(100 * total["mean"], 1), total["n"]
     assert totals == {
         "infini-ft_step-20000-hf": (9.2, 131),
         "infini-ft_step-20000-hf_dynamic_4.0": (9.9, 131),

@@ -29,9 +29,8 @@ def curve_of(curves, label, axis=Axis.STEPS):
 
 def replace_most(record):
     """The same plan, of which nothing more could be earned."""
-    return msgspec.structs.replace(
-        record, payload=msgspec.structs.replace(record.payload, max_reward=record.payload.reward)
-    )
+    payload = msgspec.structs.replace(record.payload, max_reward=record.payload.reward)
+    return msgspec.structs.replace(record, payload=payload)
 
 
 def means(curve):
@@ -106,15 +105,11 @@ def test_tokens_are_those_of_the_envelope_or_of_the_last_step():
 
 
 def test_a_run_that_tells_no_tokens_has_no_curve_over_them():
-    with_tokens, without_tokens = (
-        [make_plan_record("a", 0, (0, 10), 1.0, context=500)],
-        [make_plan_record("a", 0, (0, 10), 3.0)],
-    )
-    curves = plan_curves([make_plans_run("m", with_tokens), make_plans_run("n", without_tokens)])
-    assert [list(run.curves) for run in curves.runs[:2]] == [
-        [Axis.STEPS, Axis.TOKENS],
-        [Axis.STEPS],
-    ]
+    with_tokens = make_plans_run("m", [make_plan_record("a", 0, (0, 10), 1.0, context=500)])
+    without = make_plans_run("n", [make_plan_record("a", 0, (0, 10), 3.0)])
+    curves = plan_curves([with_tokens, without])
+    axes = [list(run.curves) for run in curves.runs[:2]]
+    assert axes == [[Axis.STEPS, Axis.TOKENS], [Axis.STEPS]]
     assert "context tokens are not reported: n" in curves.notes
 
 
@@ -122,15 +117,8 @@ def test_a_run_that_tells_no_tokens_has_no_curve_over_them():
 def test_the_bound_over_tokens_is_where_the_first_of_the_runs_has_each_plan(bound):
     def make_records(*contexts):
         return [
-            make_plan_record(
-                "a",
-                number,
-                (10 * number, 10 * number + 10),
-                1.0,
-                most=3.0 + number,
-                context=context,
-            )
-            for number, context in enumerate(contexts)
+            make_plan_record("a", n, (10 * n, 10 * n + 10), 1.0, most=3.0 + n, context=context)
+            for n, context in enumerate(contexts)
         ]
 
     runs = [
@@ -165,11 +153,8 @@ def test_of_several_planners_none_is_the_bound():
         make_planner_run(worse, label="two"),
     ]
     curves = plan_curves(planners)
-    assert [(run.label, run.is_bound) for run in curves.runs] == [
-        ("one", False),
-        ("two", False),
-        (AT_MOST, True),
-    ]
+    labels = [("one", False), ("two", False), (AT_MOST, True)]
+    assert [(run.label, run.is_bound) for run in curves.runs] == labels
     assert means(curve_of(curves, AT_MOST)) == [0, 0.5, 1.5, 3.5]
 
 

@@ -25,16 +25,10 @@ def world(pair, side, first, *, found=True, put=True, n_steps=4, n_opened=0, exc
     find = make_plan_record(name, 7, (0, 4), ended=ends[not found], excluded=excluded)
     bring = make_plan_record(name, 8, (4, 6), ended=ends[not put], excluded=excluded)
     twin = TwinRecord(pair=pair, base=base, finds=True, first=first, n_opened=n_opened)
-    steps = (StepRecord(),) * n_steps
-    return [
-        msgspec.structs.replace(
-            find, payload=msgspec.structs.replace(find.payload, twin=twin, steps=steps)
-        ),
-        msgspec.structs.replace(
-            bring,
-            payload=msgspec.structs.replace(bring.payload, twin=TwinRecord(pair=pair, base=base)),
-        ),
-    ]
+    steps, replace = (StepRecord(),) * n_steps, msgspec.structs.replace
+    found_in = replace(find.payload, twin=twin, steps=steps)
+    brought = replace(bring.payload, twin=TwinRecord(pair=pair, base=base))
+    return [replace(find, payload=found_in), replace(bring, payload=brought)]
 
 
 def results(*worlds):
