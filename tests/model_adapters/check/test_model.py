@@ -4,21 +4,14 @@ import hashlib
 import random
 import threading
 import time
-from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import (
     Capabilities,
     ContractError,
-    Decoding,
-    Mark,
-    Model,
-    Part,
     Reply,
     Transcript,
     Turn,
@@ -27,8 +20,6 @@ from model_adapters import (
     check_turns,
 )
 
-Method = Callable[..., Any]
-
 
 class HashModel:
     """A model that keeps every clause of the contract and looks at frames through their digests."""
@@ -36,34 +27,34 @@ class HashModel:
     name = "hash"
     capabilities = Capabilities()
 
-    def tokens_per_frame(self, frame: FrameRef) -> int | None:
+    def tokens_per_frame(self, frame):
         return 10 if self.capabilities.counts_tokens else None
 
-    def identity(self) -> dict[str, Any]:
+    def identity(self):
         return {"model": self.name}
 
-    def conversation(self) -> "HashConversation":
+    def conversation(self):
         return HashConversation(self.capabilities)
 
-    def close(self) -> None:
+    def close(self):
         pass
 
 
 class HashConversation(Transcript):
-    def __init__(self, capabilities: Capabilities = Capabilities()) -> None:  # noqa: B008 - it is frozen
+    def __init__(self, capabilities=Capabilities()):  # noqa: B008 - it is frozen
         super().__init__()
         self.capabilities = capabilities
 
     @property
-    def n_tokens(self) -> int | None:
+    def n_tokens(self):
         return _size(self.turns) if self.capabilities.counts_tokens else None
 
-    def reply(self, decoding: Decoding) -> Reply:
+    def reply(self, decoding):
         check_decoding("hash", self.capabilities, decoding)
         check_turns("hash", self.capabilities, self.turns)
         return self.hash_reply(decoding)
 
-    def hash_reply(self, decoding: Decoding) -> Reply:
+    def hash_reply(self, decoding):
         """The reply, whatever is asked."""
         text = self.text(decoding)
         ids = tuple(map(ord, text))
@@ -76,7 +67,7 @@ class HashConversation(Transcript):
         )
         return Reply(text, *counted, ids if self.capabilities.token_ids else None)
 
-    def text(self, decoding: Decoding) -> str:
+    def text(self, decoding):
         parts = [(turn.role, part) for turn in self.turns for part in turn.parts]
         key = "\n".join(
             f"{role}:{part if isinstance(part, str) else part.digest}" for role, part in parts
@@ -91,13 +82,13 @@ class HashConversation(Transcript):
         return whole[: decoding.max_new_tokens]
 
 
-def _size(turns: Sequence[Turn]) -> int:
+def _size(turns):
     return sum(
         len(part) if isinstance(part, str) else 10 for turn in turns for part in turn.parts
     ) + len(turns)
 
 
-def _able(**capabilities: Any) -> Model:
+def _able(**capabilities):
     return type("Able", (HashModel,), {"capabilities": Capabilities(**capabilities)})()
 
 
@@ -111,113 +102,107 @@ def _able(**capabilities: Any) -> Model:
         {"sampling": True, "choices": True, "max_in_flight": 8, "batch_size": 4},
     ],
 )
-def test_a_good_model_passes(capabilities: dict[str, Any]) -> None:
+def test_a_good_model_passes(capabilities):
     check_adapter(_able(**capabilities))
 
 
-def _model(**methods: Any) -> Model:
+def _model(**methods):
     talk = type("Talk", (HashConversation,), methods)
     return type("Broken", (HashModel,), {"conversation": lambda self: talk()})()
 
 
-def _reply_that_appends(self: Any, decoding: Decoding) -> Reply:
+def _reply_that_appends(self, decoding):
     reply = HashConversation.reply(self, decoding)
     self.append(reply.text)
     return reply
 
 
-def _reply_without_frames(self: Any, decoding: Decoding) -> Reply:
+def _reply_without_frames(self, decoding):
     blind = HashConversation()
     for turn in self.turns:
         blind.append(*(part for part in turn.parts if isinstance(part, str)), role=turn.role)
     return replace(blind.reply(decoding), n_context_tokens=self.n_tokens)
 
 
-def _reply_without_stop(self: Any, decoding: Decoding) -> Reply:
+def _reply_without_stop(self, decoding):
     return HashConversation.reply(self, replace(decoding, stop=()))
 
 
-def _reply_with_a_memory(self: Any, decoding: Decoding) -> Reply:
+def _reply_with_a_memory(self, decoding):
     self.calls = getattr(self, "calls", 0) + 1
     reply = HashConversation.reply(self, decoding)
     return replace(reply, text=reply.text + str(self.calls))
 
 
-def _reply_that_miscounts(self: Any, decoding: Decoding) -> Reply:
+def _reply_that_miscounts(self, decoding):
     reply = HashConversation.reply(self, decoding)
     return replace(reply, n_context_tokens=(reply.n_context_tokens or 0) + 1)
 
 
-def _reply_that_remembers_what_was_rewound(self: Any, decoding: Decoding) -> Reply:
+def _reply_that_remembers_what_was_rewound(self, decoding):
     reply = HashConversation.reply(self, decoding)
     return replace(reply, text=reply.text + "x" * getattr(self, "rewound", 0))
 
 
-def _reply_to_anything(self: Any, decoding: Decoding) -> Reply:
+def _reply_to_anything(self, decoding):
     check_decoding("hash", self.capabilities, decoding)
     return self.hash_reply(decoding)
 
 
-def _reply_to_the_assistant(self: Any, decoding: Decoding) -> Reply:
+def _reply_to_the_assistant(self, decoding):
     check_decoding("hash", self.capabilities, decoding)
     if not self.turns:
         raise ModelError("nothing")
     return self.hash_reply(decoding)
 
 
-def _reply_without_ids(self: Any, decoding: Decoding) -> Reply:
+def _reply_without_ids(self, decoding):
     return replace(HashConversation.reply(self, decoding), token_ids=None)
 
 
-def _reply_with_more_ids(self: Any, decoding: Decoding) -> Reply:
+def _reply_with_more_ids(self, decoding):
     return replace(HashConversation.reply(self, decoding), n_reply_tokens=0)
 
 
-def _reply_at_any_temperature(self: Any, decoding: Decoding) -> Reply:
+def _reply_at_any_temperature(self, decoding):
     return HashConversation.reply(self, replace(decoding, temperature=0.0))
 
 
-def _reply_with_any_choices(self: Any, decoding: Decoding) -> Reply:
+def _reply_with_any_choices(self, decoding):
     return HashConversation.reply(self, replace(decoding, choices=()))
 
 
-def _replies_to_the_first(
-    self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding
-) -> list[Reply]:
+def _replies_to_the_first(self, continuations, decoding):
     return Transcript.replies(self, continuations[:1], decoding)
 
 
-def _replies_backwards(
-    self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding
-) -> list[Reply]:
+def _replies_backwards(self, continuations, decoding):
     return Transcript.replies(self, continuations, decoding)[::-1]
 
 
-def _replies_that_append(
-    self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding
-) -> list[Reply]:
+def _replies_that_append(self, continuations, decoding):
     self.append(*continuations[0])
     return Transcript.replies(self, continuations, decoding)
 
 
-def _rewind_that_counts(self: Any, mark: Mark) -> None:
+def _rewind_that_counts(self, mark):
     self.rewound = 1
     HashConversation.rewind(self, mark)
 
 
-def _append_anything(self: Any, *parts: Part, role: Any = "user") -> None:
+def _append_anything(self, *parts, role="user"):
     HashConversation.append(self, *(part for part in parts if not isinstance(part, int)), role=role)
 
 
-def _append_in_any_role(self: Any, *parts: Part, role: Any = "user") -> None:
+def _append_in_any_role(self, *parts, role="user"):
     HashConversation.append(self, *parts, role="user" if role == "narrator" else role)
 
 
-def _turns_without_joints(self: Any, continuation: Sequence[Part]) -> tuple[Turn, ...]:
+def _turns_without_joints(self, continuation):
     return tuple(Turn(role, (part,)) for role, part in self._spoken)
 
 
-def _rewind_anywhere(self: Any, mark: Mark) -> None:
+def _rewind_anywhere(self, mark):
     del self._spoken[mark.n_parts :]
 
 
@@ -262,7 +247,7 @@ def _rewind_anywhere(self: Any, mark: Mark) -> None:
         ({"replies": _replies_that_append}, "replies.. changes the conversation"),
     ],
 )
-def test_a_broken_conversation_is_named(methods: dict[str, Any], clause: str) -> None:
+def test_a_broken_conversation_is_named(methods, clause):
     with pytest.raises(ContractError, match=clause) as caught:
         check_adapter(_model(**methods))
     assert "\n" not in str(caught.value)
@@ -275,13 +260,13 @@ def test_a_broken_conversation_is_named(methods: dict[str, Any], clause: str) ->
         (lambda self: {"a": (1,)}, "changes when written as JSON"),
     ],
 )
-def test_a_broken_identity_is_named(identity: Method, clause: str) -> None:
+def test_a_broken_identity_is_named(identity, clause):
     with pytest.raises(ContractError, match=clause):
         check_adapter(type("Broken", (HashModel,), {"identity": identity})())
 
 
 @pytest.mark.parametrize("count", [0, 11])
-def test_a_wrong_count_of_a_frames_tokens_is_named(count: int) -> None:
+def test_a_wrong_count_of_a_frames_tokens_is_named(count):
     broken = type("Broken", (HashModel,), {"tokens_per_frame": lambda self, frame: count})()
     with pytest.raises(ContractError, match="tokens_per_frame"):
         check_adapter(broken)
@@ -296,23 +281,21 @@ def test_a_wrong_count_of_a_frames_tokens_is_named(count: int) -> None:
         ({"max_in_flight": 0}, "max_in_flight is below 1"),
     ],
 )
-def test_capabilities_that_are_not_the_models_are_named(
-    claims: dict[str, Any], clause: str
-) -> None:
+def test_capabilities_that_are_not_the_models_are_named(claims, clause):
     broken = type("Broken", (HashModel,), {"capabilities": Capabilities(**claims)})()
     broken.conversation = HashConversation
     with pytest.raises(ContractError, match=clause):
         check_adapter(broken)
 
 
-def test_a_count_of_a_frames_tokens_by_a_model_that_counts_none_is_named() -> None:
+def test_a_count_of_a_frames_tokens_by_a_model_that_counts_none_is_named():
     broken = _able(counts_tokens=False)
-    broken.tokens_per_frame = lambda frame: 10  # type: ignore[method-assign]
+    broken.tokens_per_frame = lambda frame: 10
     with pytest.raises(ContractError, match=r"tokens_per_frame\(\) is not None"):
         check_adapter(broken)
 
 
-def _talking(capabilities: Capabilities, **methods: Any) -> Model:
+def _talking(capabilities, **methods):
     talk = type("Talk", (HashConversation,), methods)
     return type(
         "Broken",
@@ -321,15 +304,15 @@ def _talking(capabilities: Capabilities, **methods: Any) -> Model:
     )()
 
 
-def _text_of_no_seed(self: Any, decoding: Decoding) -> str:
+def _text_of_no_seed(self, decoding):
     return HashConversation.text(self, replace(decoding, temperature=0.0))
 
 
-def _text_of_no_choice(self: Any, decoding: Decoding) -> str:
+def _text_of_no_choice(self, decoding):
     return HashConversation.text(self, replace(decoding, choices=()))
 
 
-def _text_drawn_anew(self: Any, decoding: Decoding) -> str:
+def _text_drawn_anew(self, decoding):
     return HashConversation.text(
         self, replace(decoding, seed=decoding.seed + random.getrandbits(60))
     )
@@ -347,18 +330,16 @@ def _text_drawn_anew(self: Any, decoding: Decoding) -> str:
         (Capabilities(choices=True), _text_of_no_choice, "a reply is none of its choices"),
     ],
 )
-def test_a_claim_that_does_not_hold_is_named(
-    capabilities: Capabilities, text: Method, clause: str
-) -> None:
+def test_a_claim_that_does_not_hold_is_named(capabilities, text, clause):
     with pytest.raises(ContractError, match=clause):
         check_adapter(_talking(capabilities, text=text))
 
 
-def test_replies_that_hang_on_who_else_asks_are_named() -> None:
+def test_replies_that_hang_on_who_else_asks_are_named():
     flying = []
     lock = threading.Lock()
 
-    def text(self: Any, decoding: Decoding) -> str:
+    def text(self, decoding):
         with lock:
             flying.append(1)
         time.sleep(0.05)
@@ -372,9 +353,9 @@ def test_replies_that_hang_on_who_else_asks_are_named() -> None:
         check_adapter(_talking(Capabilities(max_in_flight=4), text=text))
 
 
-def test_what_is_missing_is_named() -> None:
+def test_what_is_missing_is_named():
     with pytest.raises(ContractError, match=r"object lacks a member of Model: .*tokens_per_frame"):
-        check_adapter(object())  # type: ignore[arg-type]
+        check_adapter(object())
     silent = type("Silent", (HashModel,), {"conversation": lambda self: Transcript()})()
     with pytest.raises(
         ContractError, match="Transcript lacks a member of Conversation: n_tokens, reply"

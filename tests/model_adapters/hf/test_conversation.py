@@ -1,19 +1,15 @@
 """What a conversation feeds to the model and gets from it, against transformers' own plain path."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import pytest
 import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from PIL import Image
 
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Part, check_adapter, load
+from model_adapters import check_adapter, load
 from model_adapters.hf.prompting.prompt import token_ids
 
 from ..asking import up_to, user
@@ -21,7 +17,7 @@ from ..asking import up_to, user
 NEW = 6
 
 
-def _inputs(model: Any, parts: Sequence[Part]) -> dict[str, torch.Tensor]:
+def _inputs(model, parts):
     """What transformers' processor makes of it: placeholders expanded in the text, then tokenised
     as a whole."""
     loaded = model._loaded
@@ -52,7 +48,7 @@ def _inputs(model: Any, parts: Sequence[Part]) -> dict[str, torch.Tensor]:
     }
 
 
-def _parts(frames: Sequence[FrameRef]) -> list[list[Part]]:
+def _parts(frames):
     return [
         [*frames[:4], "\nDid you see a mug?"],
         [
@@ -72,9 +68,7 @@ def _parts(frames: Sequence[FrameRef]) -> list[list[Part]]:
 
 
 @pytest.mark.parametrize("case", range(5))
-def test_ids_are_those_of_the_chat_template_on_the_whole(
-    tiny: Any, frames: list[FrameRef], case: int
-) -> None:
+def test_ids_are_those_of_the_chat_template_on_the_whole(tiny, frames, case):
     parts = _parts(frames)[case]
     talk = tiny.conversation()
     talk.append(*parts)
@@ -84,7 +78,7 @@ def test_ids_are_those_of_the_chat_template_on_the_whole(
 
 
 @pytest.mark.parametrize("case", range(5))
-def test_replies_are_those_of_generate(tiny: Any, frames: list[FrameRef], case: int) -> None:
+def test_replies_are_those_of_generate(tiny, frames, case):
     parts = _parts(frames)[case]
     talk = tiny.conversation()
     talk.append(*parts)
@@ -96,8 +90,8 @@ def test_replies_are_those_of_generate(tiny: Any, frames: list[FrameRef], case: 
     assert list(talk.reply(up_to(NEW)).token_ids) == expected
 
 
-def test_logits_are_those_of_a_plain_forward_pass(tiny: Any, frames: list[FrameRef]) -> None:
-    parts: list[Part] = ["Goal.", *frames[:3], "\nWhat now?", frames[3], "so?"]
+def test_logits_are_those_of_a_plain_forward_pass(tiny, frames):
+    parts = ["Goal.", *frames[:3], "\nWhat now?", frames[3], "so?"]
     pieces = tiny.pieces(user(*parts))
     prefix = tiny._prefix
     prefix.reset()
@@ -109,9 +103,9 @@ def test_logits_are_those_of_a_plain_forward_pass(tiny: Any, frames: list[FrameR
     torch.testing.assert_close(logits, expected, atol=1e-4, rtol=1e-4)
 
 
-def test_a_penalised_reply_is_that_of_generate(frames: list[FrameRef]) -> None:
-    model: Any = load("qwen2.5-vl-tiny", {}, seed=1)
-    parts: list[Part] = [*frames[:2], "\nWhat do you see?"]
+def test_a_penalised_reply_is_that_of_generate(frames):
+    model = load("qwen2.5-vl-tiny", {}, seed=1)
+    parts = [*frames[:2], "\nWhat do you see?"]
     inputs = _inputs(model, parts)
     config = model._loaded.model.generation_config
     config.repetition_penalty = 1.3
@@ -148,10 +142,8 @@ STEPS = st.lists(
 
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(steps=STEPS)
-def test_sharing_changes_no_reply(
-    tiny: Any, plain: Any, frames: list[FrameRef], steps: list[Any]
-) -> None:
-    def play(model: Any) -> list[Any]:
+def test_sharing_changes_no_reply(tiny, plain, frames, steps):
+    def play(model):
         talk, marks, heard = model.conversation(), [], []
         for step, value in [*steps, ("reply", 3)]:
             if step == "text":
@@ -177,7 +169,7 @@ def test_sharing_changes_no_reply(
     assert play(tiny) == play(plain)
 
 
-def test_the_second_question_pays_for_itself_only(tiny: Any, frames: list[FrameRef]) -> None:
+def test_the_second_question_pays_for_itself_only(tiny, frames):
     talk = tiny.conversation()
     talk.append(*frames)
     start = talk.mark()
@@ -190,27 +182,25 @@ def test_the_second_question_pays_for_itself_only(tiny: Any, frames: list[FrameR
     assert again.n_context_tokens - again.n_cached_tokens < 20
 
 
-def test_other_conversations_share_frames_too(tiny: Any, frames: list[FrameRef]) -> None:
+def test_other_conversations_share_frames_too(tiny, frames):
     for expected in (False, True):
         talk = tiny.conversation()
         talk.append(*frames[::-1], "\nAgain?")
         assert (talk.reply(up_to(1)).n_cached_tokens > 50) is expected
 
 
-def test_without_sharing_nothing_is_cached(plain: Any, frames: list[FrameRef]) -> None:
+def test_without_sharing_nothing_is_cached(plain, frames):
     talk = plain.conversation()
     talk.append(*frames)
     assert [talk.reply(up_to(1)).n_cached_tokens for _ in range(2)] == [0, 0]
 
 
-def test_features_are_computed_once_per_frame(
-    frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    model: Any = load("qwen2.5-vl-tiny", {}, seed=0)
-    decoded: list[Path] = []
+def test_features_are_computed_once_per_frame(frames, monkeypatch):
+    model = load("qwen2.5-vl-tiny", {}, seed=0)
+    decoded = []
     whole = FrameRef.load
 
-    def counting(self: FrameRef) -> Image.Image:
+    def counting(self):
         decoded.append(self.path)
         return whole(self)
 
@@ -223,10 +213,8 @@ def test_features_are_computed_once_per_frame(
 
 
 @pytest.mark.parametrize("megabytes", ["0", "1"])
-def test_any_size_of_the_feature_cache_gives_the_same_reply(
-    plain: Any, frames: list[FrameRef], megabytes: str
-) -> None:
-    model: Any = load("qwen2.5-vl-tiny", {"feature_cache_mb": megabytes}, seed=0)
+def test_any_size_of_the_feature_cache_gives_the_same_reply(plain, frames, megabytes):
+    model = load("qwen2.5-vl-tiny", {"feature_cache_mb": megabytes}, seed=0)
     replies = []
     for each in (model, plain):
         talk = each.conversation()
@@ -236,7 +224,7 @@ def test_any_size_of_the_feature_cache_gives_the_same_reply(
     assert model._embed._features._bytes <= int(megabytes) * 2**20
 
 
-def test_stop_strings_end_the_reply(tiny: Any, frames: list[FrameRef]) -> None:
+def test_stop_strings_end_the_reply(tiny, frames):
     talk = tiny.conversation()
     talk.append(frames[0], "\nSay something.")
     whole = talk.reply(up_to(20))
@@ -247,8 +235,8 @@ def test_stop_strings_end_the_reply(tiny: Any, frames: list[FrameRef]) -> None:
     assert cut.token_ids == whole.token_ids[: len(cut.token_ids)]
 
 
-def test_too_long_a_context_gives_tokens_and_limit(frames: list[FrameRef]) -> None:
-    model: Any = load("qwen2.5-vl-tiny", {"max_tokens": "60"}, seed=0)
+def test_too_long_a_context_gives_tokens_and_limit(frames):
+    model = load("qwen2.5-vl-tiny", {"max_tokens": "60"}, seed=0)
     talk = model.conversation()
     talk.append(frames[0])
     talk.reply(up_to(4))
@@ -259,12 +247,12 @@ def test_too_long_a_context_gives_tokens_and_limit(frames: list[FrameRef]) -> No
         talk.reply(up_to(4))
 
 
-def test_max_tokens_is_the_checkpoints_or_the_options(tiny: Any) -> None:
+def test_max_tokens_is_the_checkpoints_or_the_options(tiny):
     assert tiny.capabilities.max_tokens == 128_000
-    assert load("qwen2.5-vl-tiny", {"max_tokens": "0"}, seed=0).capabilities.max_tokens is None  # type: ignore[union-attr]
+    assert load("qwen2.5-vl-tiny", {"max_tokens": "0"}, seed=0).capabilities.max_tokens is None
 
 
-def test_a_text_with_the_image_token_is_refused(tiny: Any, frames: list[FrameRef]) -> None:
+def test_a_text_with_the_image_token_is_refused(tiny, frames):
     talk = tiny.conversation()
     talk.append(frames[0], "<|image_pad|>")
     with pytest.raises(ModelError, match="2 image placeholders for 1 frames"):
@@ -279,14 +267,14 @@ ERRORS = [
 
 @pytest.mark.parametrize("error", ERRORS)
 def test_out_of_memory_names_the_size_and_the_model_goes_on(
-    tiny: Any, plain: Any, frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch, error: Exception
-) -> None:
+    tiny, plain, frames, monkeypatch, error
+):
     talk = tiny.conversation()
     talk.append(*frames, "\nWhat?")
     forward = tiny._loaded.model.forward
     calls = []
 
-    def failing(*args: Any, **kwargs: Any) -> Any:
+    def failing(*args, **kwargs):
         calls.append(1)
         output = forward(*args, **kwargs)
         if len(calls) == 2:
@@ -304,15 +292,13 @@ def test_out_of_memory_names_the_size_and_the_model_goes_on(
     assert talk.reply(up_to(NEW)).token_ids == other.reply(up_to(NEW)).token_ids
 
 
-def test_an_interrupted_reply_leaves_nothing_half_encoded(
-    tiny: Any, plain: Any, frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_reply_leaves_nothing_half_encoded(tiny, plain, frames, monkeypatch):
     talk = tiny.conversation()
     talk.append(*frames, "\nWhat?")
     last = tiny._loaded.model.model.language_model.layers[1]
     forward, calls = last.forward, []
 
-    def interrupted(*args: Any, **kwargs: Any) -> Any:
+    def interrupted(*args, **kwargs):
         calls.append(1)
         if len(calls) == 2:
             raise KeyboardInterrupt
@@ -331,8 +317,8 @@ def test_an_interrupted_reply_leaves_nothing_half_encoded(
 
 @pytest.mark.parametrize("content", [b"not an image", None])
 def test_a_frame_that_cannot_be_read_is_a_data_error_and_the_model_goes_on(
-    tiny: Any, frames: list[FrameRef], tmp_path: Path, content: bytes | None
-) -> None:
+    tiny, frames, tmp_path, content
+):
     path = tmp_path / "broken.png"
     if content is not None:
         path.write_bytes(content)
@@ -347,9 +333,7 @@ def test_a_frame_that_cannot_be_read_is_a_data_error_and_the_model_goes_on(
     assert talk.reply(up_to(NEW)).token_ids == before.token_ids
 
 
-def test_a_frame_cut_off_in_the_middle_is_a_data_error(
-    tiny: Any, frames: list[FrameRef], tmp_path: Path
-) -> None:
+def test_a_frame_cut_off_in_the_middle_is_a_data_error(tiny, frames, tmp_path):
     path = tmp_path / "cut.png"
     path.write_bytes(frames[0].path.read_bytes()[:-200])
     talk = tiny.conversation()
@@ -358,6 +342,6 @@ def test_a_frame_cut_off_in_the_middle_is_a_data_error(
         talk.reply(up_to(NEW))
 
 
-def test_the_tiny_models_keep_their_contract(tiny: Any, plain: Any) -> None:
+def test_the_tiny_models_keep_their_contract(tiny, plain):
     check_adapter(tiny)
     check_adapter(plain, frame_size=(56, 56))

@@ -3,17 +3,13 @@ has no code for."""
 
 import json
 import shutil
-from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import pytest
 import torch
 from transformers import LlamaConfig, Qwen2VLConfig
 
 from infthor_eval.errors import ModelError, UsageError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.prompting.prompt import token_ids
@@ -25,14 +21,12 @@ from model_adapters.tiny.twin import HIDDEN
 from ...asking import up_to, user
 
 
-def _load(folder: Path, **options: str) -> Any:
+def _load(folder, **options):
     return load("hf-vlm", {"pretrained": str(folder), "device": "cpu", **options}, seed=0)
 
 
 @pytest.mark.parametrize("name", ["llava", "idefics3", "deepseek-vl-1.3b"])
-def test_an_unknown_family_shares_prefixes_and_replies_as_generate(
-    name: str, checkpoints: dict[str, Path], frames: list[FrameRef]
-) -> None:
+def test_an_unknown_family_shares_prefixes_and_replies_as_generate(name, checkpoints, frames):
     shared, whole = _load(checkpoints[name]), _load(checkpoints[name], share_prefix="false")
     assert isinstance(shared, TransformersModel)
     assert isinstance(whole, UncachedModel)
@@ -41,9 +35,7 @@ def test_an_unknown_family_shares_prefixes_and_replies_as_generate(
     _require_equal_replies(shared, whole, frames)
 
 
-def test_frames_are_split_as_the_option_says(
-    checkpoints: dict[str, Path], frames: list[FrameRef]
-) -> None:
+def test_frames_are_split_as_the_option_says(checkpoints, frames):
     by_default = _load(checkpoints["idefics3"])
     counts = {}
     for splitting, named in (("true", True), ("false", False)):
@@ -57,9 +49,7 @@ def test_frames_are_split_as_the_option_says(
         _load(checkpoints["llava"], image_splitting="true")
 
 
-def test_an_image_seen_in_both_directions_shares_prefixes(
-    checkpoints: dict[str, Path], frames: list[FrameRef]
-) -> None:
+def test_an_image_seen_in_both_directions_shares_prefixes(checkpoints, frames):
     shared = _load(checkpoints["gemma3"], chunk_tokens="40")
     whole = _load(checkpoints["gemma3"], share_prefix="false")
     assert isinstance(shared, TransformersModel)
@@ -74,7 +64,7 @@ def test_an_image_seen_in_both_directions_shares_prefixes(
         assert [one.token_ids for one in together] == [one.token_ids for one in alone]
 
 
-def _require_equal_replies(shared: Any, whole: Any, frames: list[FrameRef]) -> None:
+def _require_equal_replies(shared, whole, frames):
     """Compare replies behind a prefix, with those of transformers' `generate`."""
     replies = []
     for model in (shared, whole):
@@ -90,9 +80,7 @@ def _require_equal_replies(shared: Any, whole: Any, frames: list[FrameRef]) -> N
     assert shared.tokens_per_frame(frames[0]) == whole.tokens_per_frame(frames[0])
 
 
-def test_any_architecture_runs_without_sharing(
-    checkpoints: dict[str, Path], frames: list[FrameRef]
-) -> None:
+def test_any_architecture_runs_without_sharing(checkpoints, frames):
     model = _load(checkpoints["gemma3"], share_prefix="false", margins="true")
     parts = (frames[0], "\nWhat is it?")
     talk = model.conversation()
@@ -118,9 +106,7 @@ def test_any_architecture_runs_without_sharing(
     assert model.identity()["share_prefix"] is False
 
 
-def test_the_end_token_is_no_part_of_a_reply_without_sharing(
-    checkpoints: dict[str, Path], tmp_path: Path, frames: list[FrameRef]
-) -> None:
+def test_the_end_token_is_no_part_of_a_reply_without_sharing(checkpoints, tmp_path, frames):
     model = _load(checkpoints["llava"], share_prefix="false")
     talk = model.conversation()
     talk.append(frames[0], "\nWhat is it?")
@@ -132,12 +118,12 @@ def test_the_end_token_is_no_part_of_a_reply_without_sharing(
     assert ended.reply(up_to(6)).token_ids == whole[: whole.index(whole[3])]
 
 
-def test_samples_may_be_longer_than_the_context_limit(checkpoints: dict[str, Path]) -> None:
+def test_samples_may_be_longer_than_the_context_limit(checkpoints):
     for options in ({}, {"share_prefix": "false"}):
         assert _load(checkpoints["llava"], max_tokens="20", **options).capabilities.max_tokens == 20
 
 
-def test_known_families_need_no_processor(tmp_path: Path, frames: list[FrameRef]) -> None:
+def test_known_families_need_no_processor(tmp_path, frames):
     save_tiny_checkpoint(tmp_path / "qwen", seed=0)
     PixtralTiny.twin.save(tmp_path / "pixtral", seed=0)
     for folder in ("qwen", "pixtral"):
@@ -149,7 +135,7 @@ def test_known_families_need_no_processor(tmp_path: Path, frames: list[FrameRef]
         assert talk.reply(up_to(2)).n_context_tokens == talk.n_tokens
 
 
-def _qwen2_vl_config(ids: Mapping[str, int], vocab_size: int) -> Qwen2VLConfig:
+def _qwen2_vl_config(ids, vocab_size):
     newer = Qwen25VLTiny.twin.config(ids, vocab_size)
     text = newer.text_config.to_dict()
     del text["model_type"]
@@ -167,9 +153,7 @@ def _qwen2_vl_config(ids: Mapping[str, int], vocab_size: int) -> Qwen2VLConfig:
     )
 
 
-def test_qwen2_vl_runs_as_its_successor_and_as_transformers_has_it(
-    tmp_path: Path, frames: list[FrameRef]
-) -> None:
+def test_qwen2_vl_runs_as_its_successor_and_as_transformers_has_it(tmp_path, frames):
     replace(Qwen25VLTiny.twin, config=_qwen2_vl_config).save(tmp_path, seed=0)
     model = _load(tmp_path, chunk_tokens="30")
     parts = ("Goal.", *frames[:3], "\nWhat is it?")
@@ -187,20 +171,18 @@ def test_qwen2_vl_runs_as_its_successor_and_as_transformers_has_it(
     assert type(bare).__name__ == "Qwen2VLForConditionalGeneration"
 
 
-def test_no_checkpoint_is_a_usage_error() -> None:
+def test_no_checkpoint_is_a_usage_error():
     with pytest.raises(UsageError, match=r"hf-vlm needs pretrained=\.\.\."):
         load("hf-vlm", {}, seed=0)
 
 
-def test_a_model_without_images_is_refused(tmp_path: Path) -> None:
+def test_a_model_without_images_is_refused(tmp_path):
     LlamaConfig(vocab_size=10).save_pretrained(tmp_path)
     with pytest.raises(ModelError, match="is a llama checkpoint, which has no vision"):
         _load(tmp_path)
 
 
-def test_a_processor_that_disagrees_with_the_model_is_refused(
-    checkpoints: dict[str, Path], tmp_path: Path
-) -> None:
+def test_a_processor_that_disagrees_with_the_model_is_refused(checkpoints, tmp_path):
     folder = shutil.copytree(checkpoints["llava"], tmp_path / "llava")
     file = folder / "processor_config.json"
     settings = json.loads(file.read_text())
@@ -216,9 +198,7 @@ def test_a_processor_that_disagrees_with_the_model_is_refused(
         ("part.text", "drops the text 'The first view:'"),
     ],
 )
-def test_a_template_without_images_or_texts_is_refused(
-    checkpoints: dict[str, Path], tmp_path: Path, piece: str, complaint: str
-) -> None:
+def test_a_template_without_images_or_texts_is_refused(checkpoints, tmp_path, piece, complaint):
     folder = shutil.copytree(checkpoints["llava"], tmp_path / "llava")
     file = folder / "chat_template.jinja"
     file.write_text(file.read_text().replace(piece, "''"))
@@ -227,9 +207,7 @@ def test_a_template_without_images_or_texts_is_refused(
 
 
 @pytest.mark.parametrize("name", ["llava", "gemma3"])
-def test_what_is_read_has_the_same_hashes_with_and_without_sharing(
-    name: str, checkpoints: dict[str, Path], frames: list[FrameRef]
-) -> None:
+def test_what_is_read_has_the_same_hashes_with_and_without_sharing(name, checkpoints, frames):
     replies = []
     for options in ({"share_prefix": "true", "margins": "true"}, {"share_prefix": "false"}):
         talk = _load(checkpoints[name], **options).conversation()

@@ -6,9 +6,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 import torch
@@ -36,7 +34,6 @@ from transformers.models.siglip.image_processing_pil_siglip import SiglipImagePr
 
 import model_adapters
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import load
 from model_adapters.hf.uncached import expand_image_tokens, image_token
 
@@ -89,11 +86,11 @@ SIZE = {"height": 56, "width": 56}
 LLAMA = {"model_type": "llama", "initializer_range": 0.2, **TEXT}
 
 
-def _load(folder: Path, **options: str) -> Any:
+def _load(folder, **options):
     return load("hf-vlm", {"pretrained": str(folder), "device": "cpu", **options}, seed=0)
 
 
-def _janus(folder: Path) -> None:
+def _janus(folder):
     names = {"image_token": "<image>", "boi_token": "<boi>", "eoi_token": "<eoi>"}
     tokenizer = other_tokenizer(tuple(names.values()), **names)
     config = JanusConfig(
@@ -119,7 +116,7 @@ def _janus(folder: Path) -> None:
     save_parts(folder, JanusForConditionalGeneration(config), processor)
 
 
-def _idefics2(folder: Path) -> None:
+def _idefics2(folder):
     names = {"image_token": "<image>", "image_boundary_token": "<fake_token_around_image>"}
     tokenizer = other_tokenizer((*names.values(), "<end_of_utterance>"), **names)
     config = Idefics2Config(
@@ -146,7 +143,7 @@ def _idefics2(folder: Path) -> None:
     save_parts(folder, Idefics2ForConditionalGeneration(config), processor)
 
 
-def _mllama(folder: Path) -> None:
+def _mllama(folder):
     tokenizer = other_tokenizer(("<|python_tag|>", "<|image|>"), image_token="<|image|>")
     config = MllamaConfig(
         image_token_index=tokenizer.convert_tokens_to_ids("<|image|>"),
@@ -177,7 +174,7 @@ def _mllama(folder: Path) -> None:
     save_parts(folder, MllamaForConditionalGeneration(config), processor)
 
 
-def _paligemma(folder: Path) -> None:
+def _paligemma(folder):
     tokenizer = other_tokenizer(("<image>",), image_token="<image>")
     images = SiglipImageProcessorPil(size=SIZE)
     images.image_seq_length = 16
@@ -203,9 +200,7 @@ SLOTS = {_idefics2: 4 + 1, _mllama: 1, _paligemma: 16}  # and a marker between t
 
 
 @pytest.mark.parametrize("save", SLOTS, ids=lambda save: save.__name__)
-def test_a_frame_has_the_tokens_that_one_more_takes(
-    save: Callable[[Path], None], tmp_path: Path, frames: list[FrameRef]
-) -> None:
+def test_a_frame_has_the_tokens_that_one_more_takes(save, tmp_path, frames):
     torch.manual_seed(0)
     save(tmp_path)
     model = _load(tmp_path, share_prefix="false")
@@ -218,7 +213,7 @@ def test_a_frame_has_the_tokens_that_one_more_takes(
     assert {later - earlier for earlier, later in itertools.pairwise(counts)} == {SLOTS[save]}
 
 
-def test_a_generate_that_chooses_its_own_tokens_is_refused(tmp_path: Path) -> None:
+def test_a_generate_that_chooses_its_own_tokens_is_refused(tmp_path):
     torch.manual_seed(0)
     _janus(tmp_path)
     with pytest.raises(
@@ -227,9 +222,7 @@ def test_a_generate_that_chooses_its_own_tokens_is_refused(tmp_path: Path) -> No
         _load(tmp_path, share_prefix="false")
 
 
-def test_janus_replies_as_its_generate_with_shared_prefixes(
-    tmp_path: Path, frames: list[FrameRef]
-) -> None:
+def test_janus_replies_as_its_generate_with_shared_prefixes(tmp_path, frames):
     torch.manual_seed(0)
     _janus(tmp_path)
     model = _load(tmp_path)
@@ -241,16 +234,14 @@ def test_janus_replies_as_its_generate_with_shared_prefixes(
 
 
 @pytest.mark.parametrize("save", [_idefics2, _mllama, _paligemma], ids=lambda save: save.__name__)
-def test_an_architecture_that_would_be_run_wrongly_is_refused(
-    save: Callable[[Path], None], tmp_path: Path
-) -> None:
+def test_an_architecture_that_would_be_run_wrongly_is_refused(save, tmp_path):
     torch.manual_seed(0)
     save(tmp_path)
     with pytest.raises(ModelError, match=r"with shared prefixes.*; use share_prefix=false"):
         _load(tmp_path)
 
 
-def test_a_processor_expands_its_image_token_and_not_the_marker_of_its_begin() -> None:
+def test_a_processor_expands_its_image_token_and_not_the_marker_of_its_begin():
     names = {"image_token": "<image>", "boi_token": "<boi>", "eoi_token": "<eoi>"}
     tokenizer = other_tokenizer((*names.values(), "<line>"), **names, img_line_break_token="<line>")
     # Pixels as its own processor makes them, which needs torchvision.
@@ -262,9 +253,7 @@ def test_a_processor_expands_its_image_token_and_not_the_marker_of_its_begin() -
     assert ids.shape[1] == 1 + 3 * 3 + 1 + 1
 
 
-def test_a_model_that_only_fails_with_shared_prefixes_is_said_to_run_without(
-    tmp_path: Path, frames: list[FrameRef]
-) -> None:
+def test_a_model_that_only_fails_with_shared_prefixes_is_said_to_run_without(tmp_path, frames):
     torch.manual_seed(0)
     # Layers that attend and keep a state, too.
     sizes = {"mamba_d_ssm": 64, "mamba_n_heads": 4, "mamba_d_head": 16, "mamba_d_state": 8}
@@ -278,7 +267,7 @@ def test_a_model_that_only_fails_with_shared_prefixes_is_said_to_run_without(
     assert talk.reply(up_to(2)).n_context_tokens == talk.n_tokens
 
 
-def test_processors_that_need_torchvision_count_what_one_more_frame_takes() -> None:
+def test_processors_that_need_torchvision_count_what_one_more_frame_takes():
     if not PEERS.is_dir():
         pytest.skip("torchvision is not set aside in test-peers (make test does it)")
     root = Path(model_adapters.__file__).parents[1]

@@ -3,10 +3,7 @@
 import base64
 import itertools
 import json
-from collections.abc import Callable
 from io import BytesIO
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,25 +12,23 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
 from model_adapters.served.anthropic import Message
 from model_adapters.served.completion import decode_reply
 
 from ...asking import up_to
 from ..batches.server import serve_batches
-from ..conftest import Ask
 from .server import AnthropicServer, errored, message
 
 KEY = "sk-ant-0123456789abcdef0123456789"
 
 
-def _open(server: AnthropicServer, **options: object) -> Any:
+def _open(server, **options):
     settings = {"base_url": server.url, "model": "m", "retries": 1, **options}
     return load("anthropic", {name: str(value) for name, value in settings.items()}, 0)
 
 
-def _ask(server: AnthropicServer, *parts: Any, options: Any = None, **decoding: Any) -> Any:
+def _ask(server, *parts, options=None, **decoding):
     model = _open(server, **(options or {}))
     try:
         talk = model.conversation()
@@ -43,18 +38,18 @@ def _ask(server: AnthropicServer, *parts: Any, options: Any = None, **decoding: 
         model.close()
 
 
-def _kept(requests: list[Any], outcome: Any = None) -> Callable[[dict[str, Any]], Any]:
-    def answer(body: dict[str, Any]) -> Any:
+def _kept(requests, outcome=None):
+    def answer(body):
         requests.append(body)
         return outcome or message()
 
     return answer
 
 
-def test_it_keeps_the_contract() -> None:
+def test_it_keeps_the_contract():
     numbers = itertools.count()  # there is no seed: the same request may get another reply
 
-    def answer(body: dict[str, Any]) -> dict[str, Any]:
+    def answer(body):
         return message(" ".join(f"{next(numbers):064b}"[-body["max_tokens"] :]))
 
     with serve_batches(AnthropicServer(answer=answer)) as server:
@@ -63,8 +58,8 @@ def test_it_keeps_the_contract() -> None:
         model.close()
 
 
-def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]) -> None:
-    requests: list[Any] = []
+def test_a_request_is_what_was_said_and_how_it_is_decoded(frames):
+    requests = []
     with serve_batches(AnthropicServer(answer=_kept(requests))) as server:
         model = _open(server)
         talk = model.conversation()
@@ -98,16 +93,14 @@ def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]
 @pytest.mark.parametrize(
     ("prompt_cache", "expected"), [("1h", {"type": "ephemeral", "ttl": "1h"}), ("off", None)]
 )
-def test_the_cache_may_last_longer_or_be_left_alone(
-    prompt_cache: str, expected: Any, frames: list[FrameRef]
-) -> None:
-    requests: list[Any] = []
+def test_the_cache_may_last_longer_or_be_left_alone(prompt_cache, expected, frames):
+    requests = []
     with serve_batches(AnthropicServer(answer=_kept(requests))) as server:
         _ask(server, frames[0], "What?", options={"prompt_cache": prompt_cache})
     assert requests[0]["messages"][0]["content"][0].get("cache_control") == expected
 
 
-def test_cached_tokens_are_counted_and_priced() -> None:
+def test_cached_tokens_are_counted_and_priced():
     prices = {
         "price_per_m_input": 4,
         "price_per_m_cached": 0.4,
@@ -131,7 +124,7 @@ def test_cached_tokens_are_counted_and_priced() -> None:
         ({"content": []}, "does not answer with a message"),
     ],
 )
-def test_what_is_no_reply_is_one_line(outcome: Any, expected: str) -> None:
+def test_what_is_no_reply_is_one_line(outcome, expected):
     with (
         serve_batches(AnthropicServer(answer=lambda _: outcome)) as server,
         pytest.raises(ModelError) as caught,
@@ -151,7 +144,7 @@ def test_what_is_no_reply_is_one_line(outcome: Any, expected: str) -> None:
         (500, errored(200, "overloaded_error", "Overloaded")[1]),
     ],
 )
-def test_what_passes_is_sent_again_and_told(outcome: Any) -> None:
+def test_what_passes_is_sent_again_and_told(outcome):
     is_inside = "stop_reason" in outcome[1] or outcome[1]["error"]["message"] == "Overloaded"
     outcomes = iter([outcome[1] if is_inside else outcome])
     with serve_batches(AnthropicServer(answer=lambda _: next(outcomes, message()))) as server:
@@ -177,13 +170,13 @@ def test_what_passes_is_sent_again_and_told(outcome: Any) -> None:
         ("many", (None, None, None)),
     ],
 )
-def test_no_usage_takes_the_reply_with_it(usage: Any, counts: Any) -> None:
+def test_no_usage_takes_the_reply_with_it(usage, counts):
     with serve_batches(AnthropicServer(answer=lambda _: message(usage=usage))) as server:
         reply = _ask(server)
     assert (reply.n_context_tokens, reply.n_reply_tokens, reply.n_cached_tokens) == counts
 
 
-def test_thoughts_are_told_apart_and_refusals_in_words_are_replies() -> None:
+def test_thoughts_are_told_apart_and_refusals_in_words_are_replies():
     blocks = [
         {"type": "thinking", "thinking": "A mug?", "signature": "x"},
         {"type": "text", "text": "a cup"},
@@ -196,12 +189,12 @@ def test_thoughts_are_told_apart_and_refusals_in_words_are_replies() -> None:
         assert _ask(server).text == "I will not"
 
 
-def test_the_key_goes_into_the_head_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_key_goes_into_the_head_alone(monkeypatch):
     monkeypatch.setenv("ANTHROPIC_API_KEY", KEY)
-    heard: list[Any] = []
+    heard = []
 
     class Listening(AnthropicServer):
-        def answer_to(self, method: str, path: str, headers: Any, body: bytes) -> Any:
+        def answer_to(self, method, path, headers, body):
             heard.append((headers["x-api-key"], headers["Authorization"], KEY in str(body)))
             return super().answer_to(method, path, headers, body)
 
@@ -210,7 +203,7 @@ def test_the_key_goes_into_the_head_alone(monkeypatch: pytest.MonkeyPatch) -> No
     assert heard == [(KEY, None, False)]
 
 
-def test_a_temperature_that_is_not_taken_is_refused() -> None:
+def test_a_temperature_that_is_not_taken_is_refused():
     with (
         serve_batches(AnthropicServer()) as server,
         pytest.raises(ModelError, match="anthropic takes temperatures up to 1; lower it"),
@@ -219,14 +212,14 @@ def test_a_temperature_that_is_not_taken_is_refused() -> None:
 
 
 @given(st.binary(max_size=200) | st.text(max_size=80).map(str.encode))
-def test_no_bytes_are_a_traceback(content: bytes) -> None:
+def test_no_bytes_are_a_traceback(content):
     try:
         decode_reply("here", content, Message, "a message").text("here")
     except ModelError as error:
         assert "\n" not in str(error)
 
 
-def test_questions_are_asked_in_a_batch(ask: Ask, tmp_path: Path) -> None:
+def test_questions_are_asked_in_a_batch(ask, tmp_path):
     prices = {"price_per_m_input": 2, "price_per_m_cached": 0.2, "price_per_m_output": 10}
     with serve_batches(AnthropicServer(answer=lambda _: message())) as server:
         code, out, err = ask(server, model="anthropic", batch_requests=2, **prices)
@@ -248,9 +241,7 @@ def test_questions_are_asked_in_a_batch(ask: Ask, tmp_path: Path) -> None:
         (errored(400, "invalid_request_error"), 1),
     ],
 )
-def test_lines_without_a_reply_are_asked_again_if_that_may_help(
-    ask: Ask, outcome: Any, code: int
-) -> None:
+def test_lines_without_a_reply_are_asked_again_if_that_may_help(ask, outcome, code):
     outcomes = iter([outcome, outcome])
     with serve_batches(AnthropicServer(answer=lambda _: next(outcomes, message()))) as server:
         assert ask(server, model="anthropic")[0] == code
@@ -258,23 +249,22 @@ def test_lines_without_a_reply_are_asked_again_if_that_may_help(
 
 
 @pytest.mark.parametrize("looks", [0, 3])
-def test_a_batch_whose_name_was_lost_is_found_again(ask: Ask, looks: int) -> None:
+def test_a_batch_whose_name_was_lost_is_found_again(ask, looks):
     with serve_batches(AnthropicServer(answer=lambda _: message(), looks=looks)) as server:
         n_posts = 0
 
-        def lose(method: str, path: str) -> tuple[int, bytes] | None:
+        def lose(method, path):
             nonlocal n_posts
             n_posts += method == "POST"
-            return None
 
         answer_to = server.answer_to
 
-        def answer_and_lose(method: str, path: str, headers: Any, body: bytes) -> Any:
+        def answer_and_lose(method, path, headers, body):
             answer = answer_to(method, path, headers, body)
             return (0, b"") if method == "POST" and n_posts == 1 else answer
 
         server.before = lose
-        server.answer_to = answer_and_lose  # type: ignore[method-assign]
+        server.answer_to = answer_and_lose
         code, _, err = ask(server, model="anthropic")
     assert code == 0, err
     assert len(server.sizes) == 1

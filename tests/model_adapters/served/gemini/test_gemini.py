@@ -3,8 +3,6 @@
 import base64
 import json
 from io import BytesIO
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
 from model_adapters.served import endpoint
 from model_adapters.served.completion import decode_reply
@@ -21,18 +18,17 @@ from model_adapters.served.gemini import GeneratedContent
 
 from ...asking import up_to
 from ..batches.server import serve_batches
-from ..conftest import Ask
 from .server import GeminiServer, content, errored
 
 KEY = "AIza0123456789abcdef0123456789"
 
 
-def _open(server: GeminiServer, **options: object) -> Any:
+def _open(server, **options):
     settings = {"base_url": server.url, "model": "m", "retries": 1, **options}
     return load("gemini", {name: str(value) for name, value in settings.items()}, 0)
 
 
-def _ask(server: GeminiServer, *parts: Any, options: Any = None, **decoding: Any) -> Any:
+def _ask(server, *parts, options=None, **decoding):
     model = _open(server, **(options or {}))
     try:
         talk = model.conversation()
@@ -42,19 +38,19 @@ def _ask(server: GeminiServer, *parts: Any, options: Any = None, **decoding: Any
         model.close()
 
 
-def _said(body: dict[str, Any]) -> str:
+def _said(body):
     return " ".join(str(abs(hash(repr(body)))))[: body["generationConfig"]["maxOutputTokens"]]
 
 
-def test_it_keeps_the_contract() -> None:
+def test_it_keeps_the_contract():
     with serve_batches(GeminiServer(answer=lambda body: content(_said(body)))) as server:
         model = _open(server)
         check_adapter(model)
         model.close()
 
 
-def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]) -> None:
-    requests: list[Any] = []
+def test_a_request_is_what_was_said_and_how_it_is_decoded(frames):
+    requests = []
     with serve_batches(GeminiServer(answer=lambda body: requests.append(body) or content())) as url:
         model = _open(url, model="models/m")
         talk = model.conversation()
@@ -80,7 +76,7 @@ def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]
     }
 
 
-def test_cached_tokens_and_thoughts_are_counted_and_priced() -> None:
+def test_cached_tokens_and_thoughts_are_counted_and_priced():
     prices = {"price_per_m_input": 2, "price_per_m_cached": 0.5, "price_per_m_output": 12}
     with serve_batches(GeminiServer(answer=lambda _: content())) as server:
         reply = _ask(server, options=prices)
@@ -103,7 +99,7 @@ def test_cached_tokens_and_thoughts_are_counted_and_priced() -> None:
         ({"candidates": 3}, "does not answer with generated content"),
     ],
 )
-def test_what_is_no_reply_is_one_line(outcome: Any, expected: str) -> None:
+def test_what_is_no_reply_is_one_line(outcome, expected):
     with (
         serve_batches(GeminiServer(answer=lambda _: outcome)) as server,
         pytest.raises(ModelError) as caught,
@@ -113,8 +109,8 @@ def test_what_is_no_reply_is_one_line(outcome: Any, expected: str) -> None:
     assert server.n_asked == 1
 
 
-def test_a_server_that_is_busy_is_asked_again_when_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    waited: list[float] = []
+def test_a_server_that_is_busy_is_asked_again_when_it_says(monkeypatch):
+    waited = []
     monkeypatch.setattr(endpoint.time, "sleep", waited.append)
     delay = {"@type": "type.googleapis.com/google.rpc.RetryInfo", "retryDelay": "7.5s"}
     busy = errored(429, "RESOURCE_EXHAUSTED")
@@ -137,7 +133,7 @@ def test_a_server_that_is_busy_is_asked_again_when_it_says(monkeypatch: pytest.M
         ),
     ],
 )
-def test_an_error_in_a_success_is_asked_again(outcome: Any, words: str) -> None:
+def test_an_error_in_a_success_is_asked_again(outcome, words):
     outcomes = iter([outcome])
     with serve_batches(GeminiServer(answer=lambda _: next(outcomes, content()))) as server:
         reply = _ask(server)
@@ -154,14 +150,14 @@ def test_an_error_in_a_success_is_asked_again(outcome: Any, words: str) -> None:
         ([], (None, None, None)),
     ],
 )
-def test_no_usage_takes_the_reply_with_it(usage: Any, counts: Any) -> None:
+def test_no_usage_takes_the_reply_with_it(usage, counts):
     said = content(usageMetadata=usage)
     with serve_batches(GeminiServer(answer=lambda _: said)) as server:
         reply = _ask(server)
     assert (reply.n_context_tokens, reply.n_reply_tokens, reply.n_cached_tokens) == counts
 
 
-def test_thoughts_are_told_apart() -> None:
+def test_thoughts_are_told_apart():
     parts = [{"text": "A mug?", "thought": True}, {"text": "a cup"}]
     said = {"candidates": [{"content": {"parts": parts}, "finishReason": "STOP"}]}
     with serve_batches(GeminiServer(answer=lambda _: said)) as server:
@@ -169,12 +165,12 @@ def test_thoughts_are_told_apart() -> None:
     assert (reply.text, reply.thinking, reply.n_reply_tokens) == ("a cup", "A mug?", None)
 
 
-def test_the_key_goes_into_the_head_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_key_goes_into_the_head_alone(monkeypatch):
     monkeypatch.setenv("GEMINI_API_KEY", KEY)
-    heard: list[Any] = []
+    heard = []
 
     class Listening(GeminiServer):
-        def answer_to(self, method: str, path: str, headers: Any, body: bytes) -> Any:
+        def answer_to(self, method, path, headers, body):
             heard.append((headers["x-goog-api-key"], KEY in path, KEY in str(body)))
             return super().answer_to(method, path, headers, body)
 
@@ -184,14 +180,14 @@ def test_the_key_goes_into_the_head_alone(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @given(st.binary(max_size=200) | st.text(max_size=80).map(str.encode))
-def test_no_bytes_are_a_traceback(given_bytes: bytes) -> None:
+def test_no_bytes_are_a_traceback(given_bytes):
     try:
         decode_reply("here", given_bytes, GeneratedContent, "content").text("here")
     except ModelError as error:
         assert "\n" not in str(error)
 
 
-def test_questions_are_asked_in_a_batch(ask: Ask, tmp_path: Path) -> None:
+def test_questions_are_asked_in_a_batch(ask, tmp_path):
     server = GeminiServer(answer=lambda _: content(), last_status="succeeded")
     with serve_batches(server):
         code, out, err = ask(server, model="gemini", batch_requests=3)
@@ -211,9 +207,7 @@ def test_questions_are_asked_in_a_batch(ask: Ask, tmp_path: Path) -> None:
         (errored(400, "INVALID_ARGUMENT"), 1),
     ],
 )
-def test_lines_without_a_reply_are_asked_again_if_that_may_help(
-    ask: Ask, outcome: Any, code: int
-) -> None:
+def test_lines_without_a_reply_are_asked_again_if_that_may_help(ask, outcome, code):
     outcomes = iter([outcome, outcome])
     server = GeminiServer(answer=lambda _: next(outcomes, content()), last_status="succeeded")
     with serve_batches(server):
@@ -221,16 +215,16 @@ def test_lines_without_a_reply_are_asked_again_if_that_may_help(
         assert [n for n, _ in server.sizes] == ([5, 2] if code == 0 else [5])
 
 
-def test_a_batch_that_expires_is_asked_again_and_one_that_fails_ends_the_run(ask: Ask) -> None:
+def test_a_batch_that_expires_is_asked_again_and_one_that_fails_ends_the_run(ask):
     server = GeminiServer(answer=lambda _: content(), last_status="expired")
     statuses = iter(["expired", "succeeded"])
     finish = server.finish
 
-    def finish_as_told(batch: dict[str, Any]) -> None:
+    def finish_as_told(batch):
         server.last_status = next(statuses, server.last_status)
         finish(batch)
 
-    server.finish = finish_as_told  # type: ignore[method-assign]
+    server.finish = finish_as_told
     with serve_batches(server):
         code, _, err = ask(server, model="gemini")
         assert code == 0, err
@@ -242,18 +236,18 @@ def test_a_batch_that_expires_is_asked_again_and_one_that_fails_ends_the_run(ask
     assert "refuses batch batches/" in err and "bad file; fix it" in err
 
 
-def test_a_batch_whose_name_was_lost_is_found_again(ask: Ask) -> None:
+def test_a_batch_whose_name_was_lost_is_found_again(ask):
     server = GeminiServer(answer=lambda _: content(), last_status="succeeded")
     with serve_batches(server):
         answer_to = server.answer_to
         lost = iter([True])
 
-        def answer_and_lose(method: str, path: str, headers: Any, body: bytes) -> Any:
+        def answer_and_lose(method, path, headers, body):
             answer = answer_to(method, path, headers, body)
             is_lost = path.endswith(":batchGenerateContent") and next(lost, False)
             return (0, b"") if is_lost else answer
 
-        server.answer_to = answer_and_lose  # type: ignore[method-assign]
+        server.answer_to = answer_and_lose
         code, _, err = ask(server, model="gemini")
     assert code == 0, err
     assert len(server.sizes) == 1

@@ -1,9 +1,6 @@
 """Models in real vLLM; `make test-vllm` makes an environment that has it."""
 
 import importlib.util
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -11,21 +8,19 @@ from model_adapters import load
 
 
 @pytest.fixture(scope="session", autouse=True)
-def installed() -> None:
+def installed():
     """Skips where vLLM is not installed."""
     if importlib.util.find_spec("vllm") is None:
         pytest.skip("vLLM is not installed (make test-vllm makes an environment with it)")
 
 
 @pytest.fixture
-def start(
-    checkpoints: dict[str, Path], monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Callable[..., Any]]:
+def start(checkpoints, monkeypatch):
     """Starts a model of a tiny checkpoint in vLLM, and ends it with the test."""
     monkeypatch.setenv("VLLM_CPU_KVCACHE_SPACE", "1")
-    started: list[Any] = []
+    started = []
 
-    def start(family: str = "qwen2.5-vl", name: str | None = None, **options: object) -> Any:
+    def start(family="qwen2.5-vl", name=None, **options):
         settings = {
             "pretrained": checkpoints[family],
             "dtype": "float32",
