@@ -1,11 +1,11 @@
 """Frames, tiny models and their checkpoints for the tests of adapters, and transformers' own way of
 running these."""
 
-import importlib
 import json
 import os
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +15,7 @@ from PIL import Image
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Video, load
 
-from ..helpers.benchmarks import FOLDER
-from .checkpoints import FAMILIES, OTHERS, save
+from .checkpoints import FAMILIES, OTHERS, save, save_family
 
 PEERS = Path(sys.prefix) / "test-peers"  # torchvision's Python half, kept out of the environment
 
@@ -178,16 +177,11 @@ def _part_as_json(part):
 @pytest.fixture(scope="session")
 def tiny_family(tmp_path_factory):
     """Returns the folder of a tiny checkpoint of a family of `benchmarks/families.py`."""
-    made = {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(FOLDER)
-        families = importlib.import_module("families").FAMILIES
-        save_family = importlib.import_module("tiny_families.checkpoint").save
 
-        def make(family):
-            if family not in made:
-                made[family] = tmp_path_factory.mktemp(family)
-                save_family(family, families[family], made[family])
-            return made[family]
+    @cache
+    def make(family):
+        folder = tmp_path_factory.mktemp(family)
+        save_family(family, folder)
+        return folder
 
-        yield make
+    return make

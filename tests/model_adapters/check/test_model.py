@@ -20,6 +20,8 @@ from model_adapters import (
     check_turns,
 )
 
+from ...helpers.refusals import read_one_line
+
 
 class HashModel:
     """A model that keeps every clause of the contract and looks at frames through their digests."""
@@ -88,8 +90,11 @@ def _size(turns):
     ) + len(turns)
 
 
-def _able(**capabilities):
-    return type("Able", (HashModel,), {"capabilities": Capabilities(**capabilities)})()
+def _model(capabilities=Capabilities(), **methods):  # noqa: B008 - it is frozen
+    """A model whose conversations have other methods."""
+    talk = type("Talk", (HashConversation,), methods)
+    about = {"capabilities": capabilities, "conversation": lambda self: talk(capabilities)}
+    return type("Broken", (HashModel,), about)()
 
 
 @pytest.mark.parametrize(
@@ -103,12 +108,30 @@ def _able(**capabilities):
     ],
 )
 def test_a_good_model_passes(capabilities):
-    check_adapter(_able(**capabilities))
+    check_adapter(_model(Capabilities(**capabilities)))
 
 
-def _model(**methods):
-    talk = type("Talk", (HashConversation,), methods)
-    return type("Broken", (HashModel,), {"conversation": lambda self: talk()})()
+def _asked_as(method="reply", **changes):
+    """A method that does as if something else had been asked for."""
+    own = getattr(HashConversation, method)
+    return lambda self, decoding: own(self, replace(decoding, **changes))
+
+
+def _replying(**changes):
+    """A `reply` that changes what is replied, each by what it is made from."""
+
+    def reply(self, decoding):
+        honest = HashConversation.reply(self, decoding)
+        return replace(honest, **{name: make(self, honest) for name, make in changes.items()})
+
+    return reply
+
+
+def _answering(change):
+    """A `replies` that changes the list, given the conversation and a way to have it."""
+    return lambda self, continuations, decoding: change(
+        self, continuations, lambda some: Transcript.replies(self, some, decoding)
+    )
 
 
 def _reply_that_appends(self, decoding):
@@ -124,24 +147,9 @@ def _reply_without_frames(self, decoding):
     return replace(blind.reply(decoding), n_context_tokens=self.n_tokens)
 
 
-def _reply_without_stop(self, decoding):
-    return HashConversation.reply(self, replace(decoding, stop=()))
-
-
-def _reply_with_a_memory(self, decoding):
+def _text_that_counts_calls(self, reply):
     self.calls = getattr(self, "calls", 0) + 1
-    reply = HashConversation.reply(self, decoding)
-    return replace(reply, text=reply.text + str(self.calls))
-
-
-def _reply_that_miscounts(self, decoding):
-    reply = HashConversation.reply(self, decoding)
-    return replace(reply, n_context_tokens=(reply.n_context_tokens or 0) + 1)
-
-
-def _reply_that_remembers_what_was_rewound(self, decoding):
-    reply = HashConversation.reply(self, decoding)
-    return replace(reply, text=reply.text + "x" * getattr(self, "rewound", 0))
+    return reply.text + str(self.calls)
 
 
 def _reply_to_anything(self, decoding):
@@ -150,39 +158,9 @@ def _reply_to_anything(self, decoding):
 
 
 def _reply_to_the_assistant(self, decoding):
-    check_decoding("hash", self.capabilities, decoding)
     if not self.turns:
         raise ModelError("nothing")
-    return self.hash_reply(decoding)
-
-
-def _reply_without_ids(self, decoding):
-    return replace(HashConversation.reply(self, decoding), token_ids=None)
-
-
-def _reply_with_more_ids(self, decoding):
-    return replace(HashConversation.reply(self, decoding), n_reply_tokens=0)
-
-
-def _reply_at_any_temperature(self, decoding):
-    return HashConversation.reply(self, replace(decoding, temperature=0.0))
-
-
-def _reply_with_any_choices(self, decoding):
-    return HashConversation.reply(self, replace(decoding, choices=()))
-
-
-def _replies_to_the_first(self, continuations, decoding):
-    return Transcript.replies(self, continuations[:1], decoding)
-
-
-def _replies_backwards(self, continuations, decoding):
-    return Transcript.replies(self, continuations, decoding)[::-1]
-
-
-def _replies_that_append(self, continuations, decoding):
-    self.append(*continuations[0])
-    return Transcript.replies(self, continuations, decoding)
+    return _reply_to_anything(self, decoding)
 
 
 def _rewind_that_counts(self, mark):
@@ -206,16 +184,29 @@ def _rewind_anywhere(self, mark):
     del self._spoken[mark.n_parts :]
 
 
+def _replies_that_append(self, continuations, answer):
+    self.append(*continuations[0])
+    return answer(continuations)
+
+
 @pytest.mark.parametrize(
     ("methods", "clause"),
     [
         ({"reply": _reply_that_appends}, "reply.. changes the conversation"),
         ({"reply": _reply_without_frames}, "does not see the frames"),
-        ({"reply": _reply_without_stop}, "stop string"),
-        ({"reply": _reply_with_a_memory}, "not answered the same way twice"),
-        ({"reply": _reply_that_miscounts}, "not the reply's n_context_tokens"),
+        ({"reply": _asked_as(stop=())}, "stop string"),
+        ({"reply": _replying(text=_text_that_counts_calls)}, "not answered the same way twice"),
         (
-            {"reply": _reply_that_remembers_what_was_rewound, "rewind": _rewind_that_counts},
+            {"reply": _replying(n_context_tokens=lambda _, reply: reply.n_context_tokens + 1)},
+            "not the reply's n_context_tokens",
+        ),
+        (
+            {
+                "reply": _replying(
+                    text=lambda self, reply: reply.text + "x" * getattr(self, "rewound", 0)
+                ),
+                "rewind": _rewind_that_counts,
+            },
             "after a rewind differs from that of a new conversation",
         ),
         ({"append": _append_anything}, "does not raise TypeError"),
@@ -232,107 +223,91 @@ def _rewind_anywhere(self, mark):
             {"reply": _reply_to_the_assistant},
             "whose last turn is the assistant's does not raise ModelError",
         ),
-        ({"reply": _reply_without_ids}, "a reply has no token_ids"),
-        ({"reply": _reply_with_more_ids}, "n_reply_tokens is not the number of token_ids"),
+        ({"reply": _replying(token_ids=lambda *_: None)}, "a reply has no token_ids"),
         (
-            {"reply": _reply_at_any_temperature},
+            {"reply": _replying(n_reply_tokens=lambda *_: 0)},
+            "n_reply_tokens is not the number of token_ids",
+        ),
+        (
+            {"reply": _asked_as(temperature=0.0)},
             "a temperature does not raise ModelError though sampling is false; call",
         ),
         (
-            {"reply": _reply_with_any_choices},
+            {"reply": _asked_as(choices=())},
             "choices do not raise ModelError though choices is false; call",
         ),
-        ({"replies": _replies_to_the_first}, "one reply per continuation"),
-        ({"replies": _replies_backwards}, "replies.. differs from asking one by one"),
-        ({"replies": _replies_that_append}, "replies.. changes the conversation"),
+        (
+            {"replies": _answering(lambda _, asked, answer: answer(asked[:1]))},
+            "one reply per continuation",
+        ),
+        (
+            {"replies": _answering(lambda _, asked, answer: answer(asked)[::-1])},
+            "replies.. differs from asking one by one",
+        ),
+        ({"replies": _answering(_replies_that_append)}, "replies.. changes the conversation"),
     ],
 )
 def test_a_broken_conversation_is_named(methods, clause):
     with pytest.raises(ContractError, match=clause) as caught:
         check_adapter(_model(**methods))
-    assert "\n" not in str(caught.value)
+    read_one_line(caught)
+
+
+def _claiming(**capabilities):
+    """Capabilities that are not those of the model's conversations."""
+    return {
+        "capabilities": Capabilities(**capabilities),
+        "conversation": lambda self: HashConversation(),
+    }
 
 
 @pytest.mark.parametrize(
-    ("identity", "clause"),
+    ("members", "clause"),
     [
-        (lambda self: {"a": {1}}, "is a set, which JSON cannot hold"),
-        (lambda self: {"a": (1,)}, "changes when written as JSON"),
+        ({"identity": lambda self: {"a": {1}}}, "is a set, which JSON cannot hold"),
+        ({"identity": lambda self: {"a": (1,)}}, "changes when written as JSON"),
+        ({"tokens_per_frame": lambda *_: 0}, "tokens_per_frame"),
+        ({"tokens_per_frame": lambda *_: 11}, "tokens_per_frame"),
+        (
+            {"tokens_per_frame": lambda *_: 10, "capabilities": Capabilities(counts_tokens=False)},
+            r"tokens_per_frame\(\) is not None",
+        ),
+        (_claiming(counts_tokens=False), "n_tokens is not None though counts_tokens is false"),
+        (_claiming(token_ids=False), "a reply has token_ids though token_ids is false"),
+        (_claiming(batch_size=0), "batch_size is below 1"),
+        (_claiming(max_in_flight=0), "max_in_flight is below 1"),
+        (
+            {"conversation": lambda self: Transcript()},
+            "Transcript lacks a member of Conversation: n_tokens, reply",
+        ),
     ],
 )
-def test_a_broken_identity_is_named(identity, clause):
+def test_a_broken_model_is_named(members, clause):
     with pytest.raises(ContractError, match=clause):
-        check_adapter(type("Broken", (HashModel,), {"identity": identity})())
+        check_adapter(type("Broken", (HashModel,), members)())
 
 
-@pytest.mark.parametrize("count", [0, 11])
-def test_a_wrong_count_of_a_frames_tokens_is_named(count):
-    broken = type("Broken", (HashModel,), {"tokens_per_frame": lambda self, frame: count})()
-    with pytest.raises(ContractError, match="tokens_per_frame"):
-        check_adapter(broken)
-
-
-@pytest.mark.parametrize(
-    ("claims", "clause"),
-    [
-        ({"counts_tokens": False}, "n_tokens is not None though counts_tokens is false"),
-        ({"token_ids": False}, "a reply has token_ids though token_ids is false"),
-        ({"batch_size": 0}, "batch_size is below 1"),
-        ({"max_in_flight": 0}, "max_in_flight is below 1"),
-    ],
-)
-def test_capabilities_that_are_not_the_models_are_named(claims, clause):
-    broken = type("Broken", (HashModel,), {"capabilities": Capabilities(**claims)})()
-    broken.conversation = HashConversation
-    with pytest.raises(ContractError, match=clause):
-        check_adapter(broken)
-
-
-def test_a_count_of_a_frames_tokens_by_a_model_that_counts_none_is_named():
-    broken = _able(counts_tokens=False)
-    broken.tokens_per_frame = lambda frame: 10
-    with pytest.raises(ContractError, match=r"tokens_per_frame\(\) is not None"):
-        check_adapter(broken)
-
-
-def _talking(capabilities, **methods):
-    talk = type("Talk", (HashConversation,), methods)
-    return type(
-        "Broken",
-        (HashModel,),
-        {"capabilities": capabilities, "conversation": lambda self: talk(capabilities)},
-    )()
-
-
-def _text_of_no_seed(self, decoding):
-    return HashConversation.text(self, replace(decoding, temperature=0.0))
-
-
-def _text_of_no_choice(self, decoding):
-    return HashConversation.text(self, replace(decoding, choices=()))
+def test_what_is_no_model_is_named():
+    with pytest.raises(ContractError, match=r"object lacks a member of Model: .*tokens_per_frame"):
+        check_adapter(object())
 
 
 def _text_drawn_anew(self, decoding):
-    return HashConversation.text(
-        self, replace(decoding, seed=decoding.seed + random.getrandbits(60))
-    )
+    other = replace(decoding, seed=decoding.seed + random.getrandbits(60))
+    return HashConversation.text(self, other)
 
 
 @pytest.mark.parametrize(
-    ("capabilities", "text", "clause"),
+    ("able", "text", "clause"),
     [
-        (Capabilities(sampling=True), _text_of_no_seed, "no seed changes a reply at temperature 2"),
-        (
-            Capabilities(sampling=True),
-            _text_drawn_anew,
-            "the same seed does not give the same reply",
-        ),
-        (Capabilities(choices=True), _text_of_no_choice, "a reply is none of its choices"),
+        ("sampling", _asked_as("text", temperature=0.0), "no seed changes a reply at temperature"),
+        ("sampling", _text_drawn_anew, "the same seed does not give the same reply"),
+        ("choices", _asked_as("text", choices=()), "a reply is none of its choices"),
     ],
 )
-def test_a_claim_that_does_not_hold_is_named(capabilities, text, clause):
+def test_a_claim_that_does_not_hold_is_named(able, text, clause):
     with pytest.raises(ContractError, match=clause):
-        check_adapter(_talking(capabilities, text=text))
+        check_adapter(_model(Capabilities(**{able: True}), text=text))
 
 
 def test_replies_that_hang_on_who_else_asks_are_named():
@@ -348,16 +323,6 @@ def test_replies_that_hang_on_who_else_asks_are_named():
             flying.pop()
         return ("x" if crowd > 1 else "y") + HashConversation.text(self, decoding)[:-1]
 
-    check_adapter(_talking(Capabilities(), text=text))
+    check_adapter(_model(text=text))
     with pytest.raises(ContractError, match="at the same time differ"):
-        check_adapter(_talking(Capabilities(max_in_flight=4), text=text))
-
-
-def test_what_is_missing_is_named():
-    with pytest.raises(ContractError, match=r"object lacks a member of Model: .*tokens_per_frame"):
-        check_adapter(object())
-    silent = type("Silent", (HashModel,), {"conversation": lambda self: Transcript()})()
-    with pytest.raises(
-        ContractError, match="Transcript lacks a member of Conversation: n_tokens, reply"
-    ):
-        check_adapter(silent)
+        check_adapter(_model(Capabilities(max_in_flight=4), text=text))

@@ -138,14 +138,6 @@ def test_a_reply_of_any_shape_is_one_line_and_not_asked_for_again(shape):
     assert n_asked == 1
 
 
-@given(st.binary(max_size=200) | st.text(max_size=80).map(str.encode))
-def test_no_bytes_are_a_traceback(content):
-    try:
-        _read(content)
-    except ModelError as error:
-        assert "\n" not in str(error)
-
-
 _VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
     lambda inner: (

@@ -7,7 +7,7 @@ from model_adapters import load, options
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.uncached import UncachedModel
 
-from ...asking import up_to
+from ...asking import ask, load_saved
 
 # Name to the family of its tiny checkpoint, and a usual checkpoint.
 NAMED = {
@@ -25,10 +25,6 @@ NAMED = {
 }
 
 
-def _load(name, folder, **settings):
-    return load(name, {"pretrained": str(folder), "device": "cpu", **settings}, seed=0)
-
-
 @pytest.mark.parametrize("name", NAMED)
 def test_a_name_runs_its_family_as_hf_vlm_does(name, tiny_family, frames):
     family, usual = NAMED[name]
@@ -36,22 +32,18 @@ def test_a_name_runs_its_family_as_hf_vlm_does(name, tiny_family, frames):
     shares = name != "molmo2"
     settings = {} if shares else {"share_prefix": "false"}
     model, generic = (
-        _load(name, tiny_family(family)),
-        _load("hf-vlm", tiny_family(family), **settings),
+        load_saved(name, tiny_family(family)),
+        load_saved("hf-vlm", tiny_family(family), **settings),
     )
     assert isinstance(model, TransformersModel if shares else UncachedModel)
-    replies = []
-    for each in (model, generic):
-        talk = each.conversation()
-        talk.append(*frames[:2], "\nWhat is it?")
-        replies.append(talk.reply(up_to(4)))
-    assert replies[0] == replies[1]
+    parts = (*frames[:2], "\nWhat is it?")
+    assert ask(model, *parts) == ask(generic, *parts)
     assert model.identity() | {"adapter": "hf-vlm"} == generic.identity()
 
 
 def test_a_checkpoint_of_another_model_is_refused(tiny_family):
     with pytest.raises(ModelError, match=r"is a gemma3 checkpoint, not qwen3_vl; try hf-vlm"):
-        _load("qwen3-vl", tiny_family("gemma3"))
+        load_saved("qwen3-vl", tiny_family("gemma3"))
 
 
 @pytest.mark.parametrize(
@@ -66,7 +58,7 @@ def test_a_size_of_frames_changes_their_tokens_and_the_identity(
     name, setting, value, tiny_family, frames
 ):
     folder = tiny_family(NAMED[name][0])
-    usual, changed = _load(name, folder), _load(name, folder, **{setting: value})
+    usual, changed = load_saved(name, folder), load_saved(name, folder, **{setting: value})
     fewer, more = sorted(each.tokens_per_frame(frames[0]) for each in (usual, changed))
     assert fewer < more
     assert usual.identity()["image_processor"] != changed.identity()["image_processor"]
