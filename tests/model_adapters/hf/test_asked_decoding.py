@@ -7,7 +7,7 @@ from infthor_eval.errors import ModelError
 from model_adapters import load
 from model_adapters.hf.uncached import UncachedModel, process_turns
 
-from ..asking import up_to
+from ..asking import ask, load_saved, talk_of, up_to, user
 
 PLACES = ("in the sink", "in the bin", "on the table", "on the table top", "on")
 
@@ -15,13 +15,15 @@ PLACES = ("in the sink", "in the bin", "on the table", "on the table top", "on")
 @pytest.fixture(scope="module")
 def ways(checkpoints):
     """One checkpoint in every way it can be run."""
-    settings = {"pretrained": str(checkpoints["llava"]), "device": "cpu", "dtype": "float32"}
     options = {
-        "shared": {"chunk_tokens": "20"},
-        "batched": {"batch_size": "4"},
-        "uncached": {"share_prefix": "false"},
+        "shared": {"chunk_tokens": 20},
+        "batched": {"batch_size": 4},
+        "uncached": {"share_prefix": False},
     }
-    return {way: load("hf-vlm", {**settings, **chosen}, seed=0) for way, chosen in options.items()}
+    return {
+        way: load_saved("hf-vlm", checkpoints["llava"], dtype="float32", **chosen)
+        for way, chosen in options.items()
+    }
 
 
 def _asked(frames):
@@ -65,20 +67,16 @@ def test_a_draw_hangs_on_its_seed_and_not_on_what_was_asked_before(ways, frames,
 @pytest.mark.parametrize("choices", [PLACES, PLACES[:2], PLACES[2:], ("no", "yes")])
 def test_choices_are_those_that_generate_makes_under_the_same_constraint(ways, frames, choices):
     model = ways["uncached"]
-    loaded, talk = model._loaded, model.conversation()
-    talk.append(*frames[:2], "\nWhere is it?")
+    loaded, talk = model._loaded, talk_of(model, user(*frames[:2], "\nWhere is it?"))
     spelled = [loaded.tokenizer(text, add_special_tokens=False)["input_ids"] for text in choices]
     inputs = process_turns(model._processor, loaded.template, talk.turns)
     n_context = inputs["input_ids"].shape[1]
 
     def allowed(_, ids):
         begun = ids[n_context:].tolist()
-        results = {
-            ids[len(begun)]
-            for ids in spelled
-            if ids[: len(begun)] == begun and len(ids) > len(begun)
-        }
-        return sorted(results | (loaded.generation.end_ids if begun in spelled else set()))
+        longer = [ids for ids in spelled if ids[: len(begun)] == begun and ids != begun]
+        ends = loaded.generation.end_ids if begun in spelled else set()
+        return sorted({ids[len(begun)] for ids in longer} | ends)
 
     output = loaded.model.generate(
         **inputs, do_sample=False, max_new_tokens=20, prefix_allowed_tokens_fn=allowed
@@ -90,36 +88,27 @@ def test_choices_are_those_that_generate_makes_under_the_same_constraint(ways, f
 
 def test_what_is_said_in_choices_depends_on_what_is_asked(frames):
     model = load("qwen2.5-vl-tiny", {}, seed=0)
-    heard = [
-        reply
-        for frame in frames
-        for reply in _replies(model, [frame] * 4, up_to(12, choices=PLACES))
-    ]
-    results = {text for text, _ in heard}
-    assert results <= set(PLACES)
-    assert len(results) > 1
+    decoding = up_to(12, choices=PLACES)
+    said = {text for frame in frames for text, _ in _replies(model, [frame] * 4, decoding)}
+    assert said <= set(PLACES)
+    assert len(said) > 1
 
 
 def test_a_stop_string_cuts_no_choice(ways, frames):
-    talk = ways["shared"].conversation()
-    talk.append(frames[0], "\nWhere?")
-    assert talk.reply(up_to(12, choices=("on the table",), stop=("the",))).text == "on the table"
+    held = {"choices": ("on the table",), "stop": ("the",)}
+    assert ask(ways["shared"], frames[0], "\nWhere?", new=12, **held).text == "on the table"
 
 
 def test_a_choice_that_cannot_be_said_in_so_few_tokens_is_refused(ways, frames):
     for model in ways.values():
-        talk = model.conversation()
-        talk.append(frames[0])
         with pytest.raises(
             ModelError, match=r"the choice 'on the table top' has \d+ tokens and a reply may have 3"
         ):
-            talk.reply(up_to(3, choices=("on", "on the table top")))
+            ask(model, frames[0], new=3, choices=("on", "on the table top"))
 
 
 def test_replies_have_their_lengths(ways, frames):
     for model in ways.values():
-        talk = model.conversation()
-        talk.append(frames[0], "\nWhere?")
-        reply = talk.reply(up_to(5))
+        reply = ask(model, frames[0], "\nWhere?", new=5)
         assert reply.n_reply_tokens == len(reply.token_ids)
         assert reply.faults == ()

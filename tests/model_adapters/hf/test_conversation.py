@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
-from model_adapters.hf.prompting.prompt import token_ids
 
-from ..asking import up_to, user
+from ..asking import ask, require_same, talk_of, up_to, user
 
 NEW = 6
 
@@ -68,26 +67,14 @@ def _parts(frames):
 
 
 @pytest.mark.parametrize("case", range(5))
-def test_ids_are_those_of_the_chat_template_on_the_whole(tiny, frames, case):
+def test_ids_and_replies_are_those_of_the_chat_template_on_the_whole_and_generate(
+    tiny, frames, case
+):
     parts = _parts(frames)[case]
-    talk = tiny.conversation()
-    talk.append(*parts)
-    expected = _inputs(tiny, parts)["input_ids"][0].tolist()
-    assert list(token_ids(tiny.pieces(talk.turns))) == expected
-    assert talk.n_tokens == len(expected)
-
-
-@pytest.mark.parametrize("case", range(5))
-def test_replies_are_those_of_generate(tiny, frames, case):
-    parts = _parts(frames)[case]
-    talk = tiny.conversation()
-    talk.append(*parts)
     inputs = _inputs(tiny, parts)
-    output = tiny._loaded.model.generate(**inputs, do_sample=False, max_new_tokens=NEW)
-    new = output[0, inputs["input_ids"].shape[1] :].tolist()
-    ends = tiny._loaded.generation.end_ids
-    expected = next((new[:at] for at, token in enumerate(new) if token in ends), new)
-    assert list(talk.reply(up_to(NEW)).token_ids) == expected
+    output = tiny._loaded.model.generate(**inputs, do_sample=False, max_new_tokens=NEW)[0].tolist()
+    n = inputs["input_ids"].shape[1]
+    require_same(tiny, user(*parts), output[:n], output[n:], NEW)
 
 
 def test_logits_are_those_of_a_plain_forward_pass(tiny, frames):
@@ -114,11 +101,8 @@ def test_a_penalised_reply_is_that_of_generate(frames):
     model._loaded = replace(
         model._loaded, generation=replace(model._loaded.generation, repetition_penalty=1.3)
     )
-    talk = model.conversation()
-    talk.append(*parts)
-    assert (
-        list(talk.reply(up_to(12)).token_ids) == output[0, inputs["input_ids"].shape[1] :].tolist()
-    )
+    new = output[0, inputs["input_ids"].shape[1] :].tolist()
+    assert list(ask(model, *parts, new=12).token_ids) == new
     assert model.identity()["generation"]["repetition_penalty"] == 1.3
 
 
@@ -184,9 +168,8 @@ def test_the_second_question_pays_for_itself_only(tiny, frames):
 
 def test_other_conversations_share_frames_too(tiny, frames):
     for expected in (False, True):
-        talk = tiny.conversation()
-        talk.append(*frames[::-1], "\nAgain?")
-        assert (talk.reply(up_to(1)).n_cached_tokens > 50) is expected
+        reply = ask(tiny, *frames[::-1], "\nAgain?", new=1)
+        assert (reply.n_cached_tokens > 50) is expected
 
 
 def test_without_sharing_nothing_is_cached(plain, frames):
@@ -206,27 +189,20 @@ def test_features_are_computed_once_per_frame(frames, monkeypatch):
 
     monkeypatch.setattr(FrameRef, "load", counting)
     for order in ([0, 1, 2], [2, 1, 0], [0, 0, 1]):
-        talk = model.conversation()
-        talk.append(*(frames[index] for index in order), "?")
-        talk.reply(up_to(1))
+        ask(model, *(frames[index] for index in order), "?", new=1)
     assert sorted(decoded) == [frames[index].path for index in range(3)]
 
 
 @pytest.mark.parametrize("megabytes", ["0", "1"])
 def test_any_size_of_the_feature_cache_gives_the_same_reply(plain, frames, megabytes):
     model = load("qwen2.5-vl-tiny", {"feature_cache_mb": megabytes}, seed=0)
-    replies = []
-    for each in (model, plain):
-        talk = each.conversation()
-        talk.append(*frames, "\nWhat?")
-        replies.append(talk.reply(up_to(NEW)).token_ids)
+    replies = [ask(each, *frames, "\nWhat?", new=NEW).token_ids for each in (model, plain)]
     assert replies[0] == replies[1]
     assert model._embed._features._bytes <= int(megabytes) * 2**20
 
 
 def test_stop_strings_end_the_reply(tiny, frames):
-    talk = tiny.conversation()
-    talk.append(frames[0], "\nSay something.")
+    talk = talk_of(tiny, user(frames[0], "\nSay something."))
     whole = talk.reply(up_to(20))
     stop = whole.text[4:6]
     cut = talk.reply(up_to(20, stop=("never there", stop)))
@@ -253,10 +229,8 @@ def test_max_tokens_is_the_checkpoints_or_the_options(tiny):
 
 
 def test_a_text_with_the_image_token_is_refused(tiny, frames):
-    talk = tiny.conversation()
-    talk.append(frames[0], "<|image_pad|>")
     with pytest.raises(ModelError, match="2 image placeholders for 1 frames"):
-        talk.reply(up_to(1))
+        ask(tiny, frames[0], "<|image_pad|>", new=1)
 
 
 ERRORS = [
@@ -269,8 +243,8 @@ ERRORS = [
 def test_out_of_memory_names_the_size_and_the_model_goes_on(
     tiny, plain, frames, monkeypatch, error
 ):
-    talk = tiny.conversation()
-    talk.append(*frames, "\nWhat?")
+    parts = (*frames, "\nWhat?")
+    talk = talk_of(tiny, user(*parts))
     forward = tiny._loaded.model.forward
     calls = []
 
@@ -287,14 +261,12 @@ def test_out_of_memory_names_the_size_and_the_model_goes_on(
         talk.reply(up_to(NEW))
     assert tiny._embed._features._bytes == tiny._prefix.n_tokens == 0
     monkeypatch.undo()
-    other = plain.conversation()
-    other.append(*talk.turns[0].parts)
-    assert talk.reply(up_to(NEW)).token_ids == other.reply(up_to(NEW)).token_ids
+    assert talk.reply(up_to(NEW)).token_ids == ask(plain, *parts, new=NEW).token_ids
 
 
 def test_an_interrupted_reply_leaves_nothing_half_encoded(tiny, plain, frames, monkeypatch):
-    talk = tiny.conversation()
-    talk.append(*frames, "\nWhat?")
+    parts = (*frames, "\nWhat?")
+    talk = talk_of(tiny, user(*parts))
     last = tiny._loaded.model.model.language_model.layers[1]
     forward, calls = last.forward, []
 
@@ -310,18 +282,16 @@ def test_an_interrupted_reply_leaves_nothing_half_encoded(tiny, plain, frames, m
     with pytest.raises(KeyboardInterrupt):
         talk.reply(up_to(NEW))
     monkeypatch.undo()
-    other = plain.conversation()
-    other.append(*talk.turns[0].parts)
-    assert talk.reply(up_to(NEW)).token_ids == other.reply(up_to(NEW)).token_ids
+    assert talk.reply(up_to(NEW)).token_ids == ask(plain, *parts, new=NEW).token_ids
 
 
-@pytest.mark.parametrize("content", [b"not an image", None])
+@pytest.mark.parametrize("damage", ["none", "not an image", "cut off in the middle"])
 def test_a_frame_that_cannot_be_read_is_a_data_error_and_the_model_goes_on(
-    tiny, frames, tmp_path, content
+    tiny, frames, tmp_path, damage
 ):
     path = tmp_path / "broken.png"
-    if content is not None:
-        path.write_bytes(content)
+    if damage != "none":
+        path.write_bytes(b"no" if "not" in damage else frames[1].path.read_bytes()[:-200])
     talk = tiny.conversation()
     talk.append(frames[0])
     start = talk.mark()
@@ -333,15 +303,5 @@ def test_a_frame_that_cannot_be_read_is_a_data_error_and_the_model_goes_on(
     assert talk.reply(up_to(NEW)).token_ids == before.token_ids
 
 
-def test_a_frame_cut_off_in_the_middle_is_a_data_error(tiny, frames, tmp_path):
-    path = tmp_path / "cut.png"
-    path.write_bytes(frames[0].path.read_bytes()[:-200])
-    talk = tiny.conversation()
-    talk.append(frames[1], FrameRef(path))
-    with pytest.raises(DataError, match=r"cut\.png"):
-        talk.reply(up_to(NEW))
-
-
-def test_the_tiny_models_keep_their_contract(tiny, plain):
-    check_adapter(tiny)
+def test_the_model_without_sharing_keeps_its_contract(plain):
     check_adapter(plain, frame_size=(56, 56))

@@ -2,12 +2,11 @@
 refusals."""
 
 import pytest
-import torch
 
 from infthor_eval.errors import ModelError
 from model_adapters import check_adapter, load
 
-from ..asking import up_to, user
+from ..asking import ask, load_saved, talk_of, up_to, user
 from ..checkpoints import FAMILIES, twin
 
 TOKENS = {"qwen2.5-vl": 121 + 2, "llava-onevision": 1485, "deepseek-vl": 576, "pixtral": 380}
@@ -26,55 +25,33 @@ def family(request):
 
 @pytest.fixture(scope="module")
 def model(family, checkpoints):
-    loaded = load(family, {"pretrained": str(checkpoints[family]), "device": "cpu"}, seed=0)
+    loaded = load_saved(family, checkpoints[family])
     yield loaded
     loaded.close()
 
 
 def _parts(scene):
-    return [
-        "Goal: wash the cup. ",
-        scene[0],
-        scene[1],
-        "MoveAhead",
-        scene[2],
-        "\nWhat do you see now?",
-    ]
-
-
-def _ask(model, parts):
-    talk = model.conversation()
-    talk.append(*parts)
-    return talk.reply(up_to(NEW))
+    words = ("Goal: wash the cup. ", "MoveAhead", "\nWhat do you see now?")
+    return [words[0], *scene[:2], words[1], scene[2], words[2]]
 
 
 def test_a_frame_takes_the_published_number_of_tokens(family, model, scene):
-    sizes = []
-    for count in (1, 2):
-        talk = model.conversation()
-        talk.append(*scene[:count])
-        sizes.append(talk.n_tokens)
+    sizes = [talk_of(model, user(*scene[:count])).n_tokens for count in (1, 2)]
     assert sizes[1] - sizes[0] == TOKENS[family]
     assert model.tokens_per_frame(scene[0]) == TOKENS[family] - (2 if family == "qwen2.5-vl" else 0)
 
 
 def test_the_tiny_model_is_the_saved_one_and_keeps_its_contract(family, model, scene):
     tiny = load(f"{family}-tiny", {}, seed=0)
-    assert _ask(tiny, _parts(scene)).token_ids == _ask(model, _parts(scene)).token_ids
+    replies = [ask(each, *_parts(scene), new=NEW) for each in (tiny, model)]
+    assert replies[0].token_ids == replies[1].token_ids
     check_adapter(tiny, frame_size=(200, 300))
-
-
-def test_half_precision_works(family, checkpoints, scene):
-    options = {"pretrained": str(checkpoints[family]), "dtype": "bfloat16", "device": "cpu"}
-    model = load(family, options, seed=0)
-    pieces = model.pieces(user(scene[0], "?"))
-    assert model._prefix.feed(pieces).dtype == torch.bfloat16
 
 
 def test_a_family_refuses_the_others_checkpoints(family, checkpoints):
     other = next(name for name in FAMILIES if name != family)
     with pytest.raises(ModelError, match="checkpoint, not"):
-        load(family, {"pretrained": str(checkpoints[other])}, seed=0)
+        load_saved(family, checkpoints[other])
 
 
 def test_pixtral_refuses_another_llava(checkpoints, tmp_path):
@@ -93,13 +70,9 @@ def test_pixtral_refuses_another_llava(checkpoints, tmp_path):
 def test_frames_stay_between_texts_though_the_template_writes_images_first(frames):
     model = load("llava-onevision-tiny", {}, seed=0)
     pieces = model.pieces(user("Goal: wash. ", frames[0], "MoveAhead. ", frames[1], "What now?"))
-    ids = [
-        piece
-        if isinstance(piece, int)
-        else model._loaded.tokenizer.convert_tokens_to_ids("<image>")
-        for piece in pieces
-    ]
-    written = model._loaded.tokenizer.decode(ids)
+    tokenizer = model._loaded.tokenizer
+    image = tokenizer.convert_tokens_to_ids("<image>")
+    written = tokenizer.decode([piece if isinstance(piece, int) else image for piece in pieces])
     assert "Goal: wash. <image>MoveAhead. <image>What now?" in written
     talk = model.conversation()
     talk.append("Goal: wash. ", frames[0], "MoveAhead. ")

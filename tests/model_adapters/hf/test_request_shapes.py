@@ -8,10 +8,9 @@ import torch
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Part, Transcript, load
-from model_adapters.hf.prompting.prompt import token_ids
+from model_adapters import Part, Transcript
 
-from ..asking import up_to, user
+from ..asking import load_saved, require_same, talk_of, up_to, user
 from ..checkpoints import FAMILIES
 
 NEW = 5
@@ -67,13 +66,8 @@ def family(request):
 @pytest.fixture(scope="module")
 def build(family, checkpoints):
     def build(options):
-        defaults = {
-            "pretrained": str(checkpoints[family]),
-            "device": "cpu",
-            "dtype": "float32",
-            "max_tokens": "0",
-        }
-        return load(ADAPTERS[family], {**defaults, **options}, seed=0)
+        given = {"dtype": "float32", "max_tokens": 0, **options}
+        return load_saved(ADAPTERS[family], checkpoints[family], **given)
 
     return build
 
@@ -118,6 +112,8 @@ def _ask(model, talk, shapes):
 @pytest.mark.parametrize("mode", MODES)
 def test_replies_are_those_of_encoding_everything_for_each(build, shapes, expected, mode):
     model = build(MODES[mode])
+    if "batch_size" in MODES[mode]:
+        assert model.capabilities.batch_size == int(MODES[mode]["batch_size"])
     talk = model.conversation()
     assert {name: _ask(model, talk, listed) for name, listed in shapes.items()} == expected
     model.close()
@@ -140,13 +136,7 @@ def test_ids_and_replies_are_those_of_transformers_own_processor_and_generate(
 ):
     model = build({"chunk_tokens": "50"})
     for listed, (ids, reply) in zip(shapes.values(), plainly[checkpoints[family]], strict=True):
-        prompt = _prompt(listed[0])
-        assert list(token_ids(model.pieces(prompt))) == ids
-        talk = model.conversation()
-        talk.append(*prompt[0].parts)
-        answer = list(talk.reply(up_to(NEW)).token_ids)
-        assert answer == reply[: len(answer)]
-        assert reply[len(answer) :] == [] or reply[len(answer)] in model._loaded.generation.end_ids
+        require_same(model, _prompt(listed[0]), ids, reply, NEW)
 
 
 def _received(model, talk):
@@ -167,8 +157,7 @@ def _received(model, talk):
 def test_the_model_receives_as_many_tokens_as_were_counted(build, alone, shapes, mode):
     model = alone if mode == "alone" else build(MODES[mode])
     for listed in shapes.values():
-        talk = model.conversation()
-        talk.append(*_prompt(listed[0])[0].parts)
+        talk = talk_of(model, _prompt(listed[0]))
         n_cached, n_fed, n_positions = _received(model, talk)
         assert n_cached + n_fed == talk.n_tokens
         assert n_positions == n_fed

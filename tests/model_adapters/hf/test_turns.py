@@ -6,7 +6,7 @@ import pytest
 from infthor_eval.errors import ModelError
 from model_adapters import Turn, load
 
-from ..asking import require_same, talk_of, up_to
+from ..asking import load_saved, require_same, talk_of, up_to
 from ..checkpoints import FAMILIES
 
 NEW = 6
@@ -39,22 +39,13 @@ def plainly(checkpoints, conversations, answer_plainly):
     return answer_plainly({checkpoints[name]: conversations for name in ADAPTERS}, NEW)
 
 
-def _load(name, checkpoints, **options):
-    defaults = {
-        "pretrained": str(checkpoints[name]),
-        "device": "cpu",
-        "dtype": "float32",
-        "max_tokens": "0",
-    }
-    return load(ADAPTERS[name], {**defaults, **options}, seed=0)
-
-
 @pytest.mark.parametrize("name", ADAPTERS)
 @pytest.mark.parametrize("share_prefix", ["true", "false"])
 def test_ids_and_replies_are_those_of_transformers(
     name, share_prefix, checkpoints, conversations, plainly
 ):
-    model = _load(name, checkpoints, share_prefix=share_prefix, chunk_tokens="50")
+    options = {"dtype": "float32", "max_tokens": 0, "chunk_tokens": 50}
+    model = load_saved(ADAPTERS[name], checkpoints[name], share_prefix=share_prefix, **options)
     for turns, (ids, reply) in zip(conversations, plainly[checkpoints[name]], strict=True):
         require_same(model, turns, ids, reply, NEW)
     model.close()

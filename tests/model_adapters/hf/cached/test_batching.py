@@ -7,10 +7,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from infthor_eval.errors import ModelError
-from model_adapters import check_adapter, load
+from model_adapters import load
 from model_adapters.hf.prompting.prompt import n_common
 
-from ...asking import up_to
+from ...asking import ask, talk_of, up_to, user
 
 CONTINUATION = st.lists(
     st.one_of(
@@ -43,23 +43,10 @@ def test_replies_are_those_of_asking_one_by_one(batching, tiny, frames, start, c
         [_parts(continuation, frames) for continuation in continuations], up_to(5, stop=stop)
     )
     for continuation, reply in zip(continuations, together, strict=True):
-        alone = tiny.conversation()
-        alone.append(*_parts(start, frames), *_parts(continuation, frames))
-        expected = alone.reply(up_to(5, stop=stop))
+        parts = (*_parts(start, frames), *_parts(continuation, frames))
+        expected = ask(tiny, *parts, new=5, stop=stop)
         assert (reply.text, reply.token_ids) == (expected.text, expected.token_ids)
         assert reply.n_context_tokens == expected.n_context_tokens
-
-
-@pytest.mark.parametrize("family", ["qwen2.5-vl", "llava-onevision", "deepseek-vl", "pixtral"])
-def test_every_family_answers_in_batches(family, frames):
-    model = load(f"{family}-tiny", {"batch_size": "8"}, seed=0)
-    check_adapter(model, frame_size=(60, 60))
-    talk = model.conversation()
-    assert model.capabilities.batch_size == 8
-    talk.append(frames[0])
-    batched = talk.replies([["\nWhat is it?"], ["\nWhere was the mug before?"]], up_to(4))
-    talk.append("\nWhat is it?")
-    assert talk.reply(up_to(4)).token_ids == batched[0].token_ids
 
 
 def test_a_window_slides_over_the_prefix_and_each_continuation(frames):
@@ -117,14 +104,9 @@ def test_penalties_are_each_rows_own(frames):
         model._loaded = replace(
             loaded, generation=replace(loaded.generation, repetition_penalty=1.4)
         )
-        talk = model.conversation()
-        talk.append(frames[0])
-        replies.append(
-            [
-                reply.token_ids
-                for reply in talk.replies([["mug"], ["\nWhere?"], ["\nWhy not?"]], up_to(40))
-            ]
-        )
+        talk = talk_of(model, user(frames[0]))
+        answers = talk.replies([["mug"], ["\nWhere?"], ["\nWhy not?"]], up_to(40))
+        replies.append([reply.token_ids for reply in answers])
     assert replies[0] == replies[1]
 
 

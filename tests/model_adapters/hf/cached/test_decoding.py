@@ -40,15 +40,9 @@ def _run(generation, limit, finished=lambda ids: False):
     return _written(_writing(up_to(limit), generation, finished=finished), _points_at(1))
 
 
-def test_stops_before_the_end_token():
+def test_a_reply_stops_before_the_end_token_at_the_limit_and_when_told():
     assert _run(Generation(frozenset({4, 9})), 50) == [1, 2, 3]
-
-
-def test_stops_at_the_limit():
     assert _run(END, 2) == [1, 2]
-
-
-def test_stops_when_told():
     assert _run(END, 50, lambda ids: 3 in ids) == [1, 2, 3]
 
 
@@ -80,14 +74,8 @@ def test_replies_are_written_in_step_each_to_its_own_end():
     assert fed == [{0: 6, 1: 1, 2: 1}, {0: 7, 2: 2}, {0: 8}]
 
 
-def test_the_penalty_is_for_tokens_of_context_and_reply():
+def test_the_penalty_is_for_tokens_of_context_and_reply_and_a_request_may_have_its_own():
     # 5 leads by a little but lies in the context; once 3 is said, it is penalised too and 4 leads.
-    logits = torch.tensor([0.0, 0.0, 0.0, 2.0, 1.9, 2.1, 0.0, 0.0, 0.0, 0.0])
-    reply = _writing(up_to(2), Generation(frozenset(), repetition_penalty=1.2), context=[5])
-    assert _written(reply, logits, lambda token: logits) == [3, 4]
-
-
-def test_a_request_may_have_a_penalty_of_its_own():
     logits = torch.tensor([0.0, 0.0, 0.0, 2.0, 1.9, 2.1, 0.0, 0.0, 0.0, 0.0])
     for of_checkpoint, of_request, written in (
         (1.2, 1.0, [5, 5]),

@@ -17,7 +17,7 @@ from model_adapters.hf.prompting.templates import chat_template, plain_template
 from model_adapters.hf.uncached import UncachedModel
 from model_adapters.tiny.tokenizer import train_tokenizer
 
-from ...asking import require_same
+from ...asking import load_saved, require_same, talk_of, user
 from ...checkpoints import FAMILIES, OTHERS
 
 NEW = 6
@@ -66,14 +66,8 @@ def conversations(frames):
 
 
 def _load(name, folder, **options):
-    defaults = {
-        "pretrained": str(folder),
-        "device": "cpu",
-        "dtype": "float32",
-        "max_tokens": "0",
-        "prompt": "plain",
-    }
-    return load(name if name in FAMILIES else "hf-vlm", defaults | options, seed=0)
+    defaults = {"dtype": "float32", "max_tokens": 0, "prompt": "plain"}
+    return load_saved(name if name in FAMILIES else "hf-vlm", folder, **defaults | options)
 
 
 def _without_template(checkpoint, folder):
@@ -164,15 +158,14 @@ def test_of_all_places_and_names_transformers_default_is_taken(
 
 
 def test_the_way_of_asking_is_part_of_the_identity(checkpoints):
+    folder = checkpoints["llava"]
     for share_prefix in ("true", "false"):
-        identities = [
-            _load(
-                "llava", checkpoints["llava"], share_prefix=share_prefix, **prompt_option
-            ).identity()
-            for prompt_option in ({}, {"prompt": "chat"})
-        ]
-        assert [identity["prompt"] for identity in identities] == ["plain", "chat"]
-        assert identities[0]["chat_template"] != identities[1]["chat_template"]
+        plain, chat = (
+            _load("llava", folder, share_prefix=share_prefix, prompt=prompt).identity()
+            for prompt in ("plain", "chat")
+        )
+        assert (plain["prompt"], chat["prompt"]) == ("plain", "chat")
+        assert plain["chat_template"] != chat["chat_template"]
     default, chat = (
         load("qwen2.5-vl-tiny", prompt_option, seed=0).identity()
         for prompt_option in ({}, {"prompt": "chat"})
@@ -181,16 +174,13 @@ def test_the_way_of_asking_is_part_of_the_identity(checkpoints):
 
 
 def test_the_model_without_sharing_is_asked_plainly_too(checkpoints, frames):
-    model = _load("gemma3", checkpoints["gemma3"], share_prefix="false")
-    assert isinstance(model, UncachedModel)
-    lengths = []
-    for prompt in ("plain", "chat"):
-        talk = _load(
-            "gemma3", checkpoints["gemma3"], share_prefix="false", prompt=prompt
-        ).conversation()
-        talk.append("mug", frames[0])
-        lengths.append(talk.n_tokens)
-    assert lengths[0] < lengths[1]
+    plain, chat = (
+        _load("gemma3", checkpoints["gemma3"], share_prefix=False, prompt=prompt)
+        for prompt in ("plain", "chat")
+    )
+    assert isinstance(plain, UncachedModel)
+    turns = user("mug", frames[0])
+    assert talk_of(plain, turns).n_tokens < talk_of(chat, turns).n_tokens
 
 
 @pytest.mark.parametrize(
