@@ -5,13 +5,17 @@ from typing import Any
 from model_adapters import Decoding, Part, Reply, Turn, load
 from model_adapters.hf.prompting.prompt import token_ids
 
-__all__ = ["ask", "load_saved", "require_same", "talk_of", "up_to", "user"]
+__all__ = ["ask", "load_saved", "load_with", "require_same", "talk_of", "up_to", "user"]
+
+
+def load_with(name: str, **options: object) -> Any:
+    """A model or policy with these options, whose values need not be texts."""
+    return load(name, {option: str(value) for option, value in options.items()}, 0)
 
 
 def load_saved(name: str, folder: object, **options: object) -> Any:
     """The model of a checkpoint in a folder, on the CPU."""
-    given = {"pretrained": folder, "device": "cpu", **options}
-    return load(name, {option: str(value) for option, value in given.items()}, 0)
+    return load_with(name, **{"pretrained": folder, "device": "cpu", **options})
 
 
 def up_to(n: int, **settings: Any) -> Decoding:

@@ -8,10 +8,10 @@ from PIL import Image
 from safetensors.torch import load_file, save_file
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import load
 from model_adapters.tiny.openvla import OpenVLATiny
 from model_adapters.tiny.spatialvla import SpatialVLATiny
 
+from ..asking import load_saved
 from .servers import no_proxy  # noqa: F401 - a fixture
 
 TWINS = {"openvla": OpenVLATiny.twin, "spatialvla": SpatialVLATiny.twin}
@@ -30,10 +30,7 @@ def policy_checkpoints(tmp_path_factory):
 @pytest.fixture(scope="session")
 def policies(policy_checkpoints):
     """The tiny checkpoints as the adapters of the published ones load them, by family."""
-    loaded = {
-        family: load(family, {"pretrained": str(at), "device": "cpu"}, 0)
-        for family, at in policy_checkpoints.items()
-    }
+    loaded = {family: load_saved(family, at) for family, at in policy_checkpoints.items()}
     yield loaded
     for policy in loaded.values():
         policy.close()

@@ -11,8 +11,9 @@ import torch
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import load
 from model_adapters.policies.preprocessing import resize
+
+from ..asking import load_saved
 
 # A patch's features, of every 16th number: OpenVLA's as its towers give them, SpatialVLA's as Gemma
 # sees them.
@@ -55,7 +56,7 @@ def test_features_are_theirs(family, policies, frame):
 
 @pytest.mark.parametrize("family", ACTIONS)
 def test_actions_are_theirs(family, policy_checkpoints, frame):
-    settings = {"pretrained": str(policy_checkpoints[family]), "device": "cpu", "ensemble": "none"}
-    steps = load(family, settings, 0).act(frame, "pick up the mug")
+    policy = load_saved(family, policy_checkpoints[family], ensemble="none")
+    steps = policy.act(frame, "pick up the mug")
     values = [(*step.translation, *step.rotation, step.gripper) for step in steps]
     assert np.array(values) == pytest.approx(np.array(ACTIONS[family]), abs=2e-6)

@@ -13,10 +13,10 @@ import pytest
 from PIL import Image
 
 from infthor_eval.errors import ModelError
-from model_adapters import Reply, load
+from model_adapters import Reply
 
 from ...helpers.refusals import read_one_line
-from ..asking import ask
+from ..asking import ask, load_with
 from ..policies.servers import Answer, serve
 
 __all__ = [
@@ -96,8 +96,7 @@ def serve_chat(answer: Answer = talkative, port: int = 0) -> Iterator[str]:
 @contextmanager
 def open_behind(url: str, name: str = "openai", **options: object) -> Iterator[Any]:
     """A model behind a server; nothing is left open."""
-    settings = {"base_url": url, "model": "m", **options}
-    model: Any = load(name, {option: str(value) for option, value in settings.items()}, 0)
+    model = load_with(name, **{"base_url": url, "model": "m", **options})
     try:
         yield model
     finally:

@@ -1,14 +1,12 @@
 """Plans carried out by a model behind a server."""
 
 import hashlib
-import json
 
 import msgspec
 import pytest
 
-from infthor_eval.plans.records import RECORDS
-from infthor_eval.runs import read_run
 from tests.helpers.command_line import option_words
+from tests.helpers.journals import read_outcome
 from tests.helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 
 from ..policies.servers import send
@@ -37,8 +35,7 @@ def played(task_files, tmp_path, run_cli):
         arguments = option_words(model="openai", model_args=typed, tasks="infthor_plans", data=data)
         code, _, err = run_cli(*arguments, "--greedy", "--name", name, "--out", tmp_path / "out")
         assert "Traceback" not in err
-        (results,) = (tmp_path / "out" / name).rglob("results.json")
-        return code, read_run(results.parent, RECORDS)[1], json.loads(results.read_text())
+        return code, *read_outcome(tmp_path / "out" / name)
 
     return played
 

@@ -1,6 +1,5 @@
 """Whole runs against a server, as their user types them."""
 
-import json
 import logging
 import signal
 import subprocess
@@ -10,10 +9,8 @@ import time
 
 import pytest
 
-from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs import read_run
-
 from ...helpers.command_line import option_words
+from ...helpers.journals import read_outcome
 from ..policies.servers import send
 from .talking import always_say, completion, keep_requests, serve_chat, talkative
 
@@ -34,18 +31,12 @@ def ask(make_nieh_set, tmp_path, run_cli):
     return ask
 
 
-def _run(folder):
-    """The records of the one run in a folder, and its results."""
-    (results,) = folder.rglob("results.json")
-    return read_run(results.parent, RECORDS)[1], json.loads(results.read_text())
-
-
 def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(ask, tmp_path):
     prices = {"price_per_m_input": 2, "price_per_m_cached": 1, "price_per_m_output": 10}
     with serve_chat(lambda *_: completion("yes", (1000, 10, 200))) as url:
         code, out, err = ask(url, **prices)
     assert code == 0, err
-    records, results = _run(tmp_path / "out")
+    records, results = read_outcome(tmp_path / "out")
     assert (tmp_path / "out" / "m").is_dir()
     each = (800 * 2 + 200 * 1 + 10 * 10) / 1e6
     assert [record.payload.reply for record in records] == ["yes"] * 5
@@ -73,7 +64,7 @@ def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask, tmp_path):
         assert code == 0, err
         assert "2 evaluated now, 3 resumed from the journal" in err
         assert len(requests) == 5
-    records, results = _run(tmp_path / "out")
+    records, results = read_outcome(tmp_path / "out")
     assert [record.failure for record in records] == [None] * 5
     assert results["usage"] == {"requests": 5, "context": 475, "reply": 25, "cost": None}
 
@@ -133,7 +124,7 @@ def test_units_that_fail_are_named_and_the_others_answered(ask, tmp_path):
     assert code == 1
     assert "Traceback" not in err
     assert "1 sample(s) failed, in no score: " in err
-    records, results = _run(tmp_path / "out")
+    records, results = read_outcome(tmp_path / "out")
     (failed,) = [record for record in records if record.failure]
     assert "answers 400 Bad Request: 'no fridge'" in failed.failure
     assert results["usage"]["requests"] == 4
@@ -149,7 +140,7 @@ def test_a_survived_fault_stands_in_the_record(ask, tmp_path):
 
     with serve_chat(answer) as url:
         assert ask(url, retries=1, max_in_flight=1)[0] == 0
-    faults = [fault for record in _run(tmp_path / "out")[0] for fault in record.faults]
+    faults = [fault for record in read_outcome(tmp_path / "out")[0] for fault in record.faults]
     assert len(faults) == 1
     assert "answers 503 Service Unavailable: 'busy'" in faults[0]
 
@@ -244,7 +235,7 @@ def test_notes_are_paid_for_too(make_nieh_set, tmp_path, run_cli):
         )
         code, out, err = run_cli(*arguments, "--out", tmp_path / "out")
     assert code == 0, err
-    _, results = _run(tmp_path / "out")
+    _, results = read_outcome(tmp_path / "out")
     assert results["usage"] == {
         "requests": 7,
         "context": 700,

@@ -16,13 +16,11 @@ from infthor_eval.errors import ModelError
 from infthor_eval.formats.nieh_set import NiehSet
 from model_adapters import check_adapter, load
 from tests.helpers.bundled import BUNDLED
-from tests.helpers.command_line import option_words
-from tests.helpers.journals import read_records
 from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
 
 from ..asking import up_to
 from ..checkpoints import save
-from ..serving import free_port, wait_for_server
+from ..serving import free_port, run_each, wait_for_server
 
 for package in ("fastapi", "uvicorn", "multipart", "openai"):
     pytest.importorskip(
@@ -80,20 +78,9 @@ def both(served, tmp_path, run_cli):
     """Runs the same tasks behind the server and in this process; gives the records of both."""
 
     def both(*arguments, **more):
-        here = {
-            "pretrained": served.folder,
-            "device": "cpu",
-            "dtype": "float32",
-            "max_tokens": 100_000,
-        }
-        records = []
-        for model, settings in (("openai", served.options | more), ("hf-vlm", here)):
-            options = ",".join(f"{name}={value}" for name, value in settings.items())
-            typed = option_words(model=model, model_args=options, name=model, out=tmp_path / "out")
-            code, _, err = run_cli(*typed, *arguments)
-            assert code == 0, err
-            records.append(read_records(tmp_path / "out" / model))
-        return records
+        here = {"pretrained": served.folder, "device": "cpu", "dtype": "float32"}
+        models = {"openai": served.options | more, "hf-vlm": here | {"max_tokens": 100_000}}
+        return run_each(run_cli, tmp_path / "out", models, *arguments)
 
     return both
 

@@ -4,8 +4,7 @@ import sys
 
 import pytest
 
-from model_adapters import load
-
+from ..asking import load_saved, load_with
 from .double import Double
 
 
@@ -26,9 +25,7 @@ def start(vllm, checkpoints):
 
     def start(family="qwen2.5-vl", name=None, **options):
         settings = {"pretrained": checkpoints[family], "dtype": "float32", **options}
-        return load(
-            f"{name or family}@vllm", {key: str(value) for key, value in settings.items()}, 0
-        )
+        return load_with(f"{name or family}@vllm", **settings)
 
     return start
 
@@ -41,14 +38,9 @@ def in_process(checkpoints):
     def get(family, name=None, **options):
         key = (family, str(sorted(options.items())))
         if key not in loaded:
-            settings = {
-                "pretrained": checkpoints[family],
-                "dtype": "float32",
-                "device": "cpu",
-                **options,
-            }
-            loaded[key] = load(
-                name or family, {option: str(value) for option, value in settings.items()}, 0
+            folder = checkpoints[family]
+            loaded[key] = load_saved(
+                name or family, options.pop("pretrained", folder), dtype="float32", **options
             )
         return loaded[key]
 

@@ -68,39 +68,10 @@ def test_llama_4_has_the_temperature_of_its_config_in_every_length():
 
 
 def test_every_option_arrives_under_vllms_name():
-    typed = VllmOptions(
-        pretrained="x",
-        dtype="bfloat16",
-        trust_remote_code=True,
-        max_model_len=9_999,
-        tensor_parallel_size=2,
-        pipeline_parallel_size=3,
-        data_parallel_size=4,
-        distributed_executor_backend="external_launcher",
-        gpu_memory_utilization=0.5,
-        enforce_eager=True,
-        quantization="fp8",
-        prefix_caching=False,
-        mm_processor_cache_gb=0.0,
-        max_num_seqs=3,
-        max_num_batched_tokens=4_096,
-        enable_chunked_prefill=False,
-        block_size=32,
-        kv_cache_dtype="fp8",
-        kv_offloading_size=1.5,
-        decode_context_parallel_size=2,
-        prefill_context_parallel_size=4,
-        mm_encoder_tp_mode="data",
-        mm_encoder_attn_backend="TORCH_SDPA",
-        encoder_cache_tokens=50_000,
-        seed=7,
-        frame_size=640,
-        rope="yarn:4",
-    )
-    assert model_arguments(FOLDER, _qwen("yarn:4"), typed, max_tokens=9_999, max_frames=12) == {
-        "model": "checkpoint",
+    own_names = {
         "dtype": "bfloat16",
-        "seed": 7,
+        "trust_remote_code": True,
+        "max_model_len": 9_999,
         "tensor_parallel_size": 2,
         "pipeline_parallel_size": 3,
         "data_parallel_size": 4,
@@ -108,7 +79,6 @@ def test_every_option_arrives_under_vllms_name():
         "gpu_memory_utilization": 0.5,
         "enforce_eager": True,
         "quantization": "fp8",
-        "enable_prefix_caching": False,
         "mm_processor_cache_gb": 0.0,
         "max_num_seqs": 3,
         "max_num_batched_tokens": 4_096,
@@ -120,8 +90,14 @@ def test_every_option_arrives_under_vllms_name():
         "prefill_context_parallel_size": 4,
         "mm_encoder_tp_mode": "data",
         "mm_encoder_attn_backend": "TORCH_SDPA",
-        "max_model_len": 9_999,
-        "trust_remote_code": True,
+        "seed": 7,
+    }
+    others = {"prefix_caching": False, "encoder_cache_tokens": 50_000, "frame_size": 640}
+    typed = VllmOptions(pretrained="x", rope="yarn:4", **own_names, **others)
+    arguments = model_arguments(FOLDER, _qwen("yarn:4"), typed, max_tokens=9_999, max_frames=12)
+    assert arguments == own_names | {
+        "model": "checkpoint",
+        "enable_prefix_caching": False,
         "limit_mm_per_prompt": {"image": {"count": 12, "width": 640, "height": 640}, "video": 0},
         "mm_processor_kwargs": {"use_fast": False},
         "ec_manager_config": {

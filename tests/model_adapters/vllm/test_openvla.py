@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.errors import ModelError, UsageError
-from model_adapters import check_adapter, load
+from model_adapters import check_adapter
 from model_adapters.tiny.openvla import OpenVLATiny
+
+from ..asking import load_saved, load_with
 
 
 @pytest.fixture(scope="module")
@@ -23,8 +25,7 @@ def policy(vllm, folder):
     """Starts the tiny policy on the double."""
 
     def start(**options):
-        settings = {"pretrained": folder, "dtype": "float32", **options}
-        return load("openvla@vllm", {name: str(value) for name, value in settings.items()}, 0)
+        return load_with("openvla@vllm", **{"pretrained": folder, "dtype": "float32", **options})
 
     return start
 
@@ -32,9 +33,7 @@ def policy(vllm, folder):
 @pytest.mark.parametrize("constrained", [True, False])
 def test_actions_are_those_of_the_native_port(constrained, policy, folder, frames):
     ours = policy(constrained=constrained)
-    theirs = load(
-        "openvla", {"pretrained": str(folder), "device": "cpu", "constrained": str(constrained)}, 0
-    )
+    theirs = load_saved("openvla", folder, constrained=constrained)
     requests = [
         (frame, text) for frame in frames[:3] for text in ("pick up the Mug", "close the fridge")
     ]

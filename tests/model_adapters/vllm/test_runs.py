@@ -8,11 +8,9 @@ import sys
 import pytest
 
 from infthor_eval.errors import UsageError
-from infthor_eval.nieh.records import RECORDS
-from infthor_eval.plans.records import RECORDS as PLAN_RECORDS
-from infthor_eval.runs import read_run
 from model_adapters import name_on_engine
 from tests.helpers.command_line import option_words
+from tests.helpers.journals import read_outcome
 from tests.helpers.trajectories import MUG, cut_trajectory, write_trajectories
 
 from . import double
@@ -34,9 +32,8 @@ def ask(make_nieh_set, checkpoints, tmp_path, run_cli):
 
 def _found(folder):
     """The records of the one run in a folder, its results, and what it took."""
-    (results,) = folder.rglob("results.json")
-    took = json.loads((results.parent / "usage.json").read_text())
-    return read_run(results.parent, RECORDS)[1], json.loads(results.read_text()), took
+    (took,) = folder.rglob("usage.json")
+    return *read_outcome(folder), json.loads(took.read_text())
 
 
 def test_both_engines_give_the_same_replies_and_tokens_and_the_hit_rate_is_told(
@@ -114,11 +111,8 @@ def test_plans_are_carried_out_alike(checkpoints, vllm, task_files, tmp_path, ru
         output = tmp_path / "out" / engine
         code, _, err = run_cli(*arguments, "--engine", engine, "--constrained", "--out", output)
         assert code == 0, err
-        (results,) = output.rglob("results.json")
-        records = read_run(results.parent, PLAN_RECORDS)[1]
-        played.append(
-            (json.loads(results.read_text())["usage"], [record.payload for record in records])
-        )
+        records, results = read_outcome(output)
+        played.append((results["usage"], [record.payload for record in records]))
     assert played[0] == played[1]
     assert all(call.params.structured_outputs is not None for call in vllm.calls)
 

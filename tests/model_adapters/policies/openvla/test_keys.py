@@ -5,6 +5,7 @@ vit_so400m_patch14_siglip_224 with `gamma` called `scale_factor`; those of the l
 transformers'.
 """
 
+import math
 import re
 from collections import Counter
 
@@ -101,12 +102,7 @@ def test_what_no_feature_depends_on_is_known_not_ignored(layout):
 
 
 def test_it_is_a_model_of_seven_billion(layout):
-    n_weights = 0
-    for shape in layout.all_shapes().values():
-        size = 1
-        for side in shape:
-            size *= side
-        n_weights += size
+    n_weights = sum(map(math.prod, layout.all_shapes().values()))
     assert n_weights == pytest.approx(7.54e9, rel=0.002)
 
 

@@ -6,11 +6,12 @@ import torch
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import load
 from model_adapters.policies.decoding import embed_ids
 from model_adapters.policies.openvla.network import OpenVLANetwork, prompt, prompt_ids
 from model_adapters.policies.openvla.vision import Tower, TowerShape
 from model_adapters.policies.preprocessing import crop_centre, normalise, resize
+
+from ...asking import load_saved
 
 
 @pytest.fixture
@@ -66,9 +67,9 @@ def test_frames_are_cropped_where_the_option_says_so(policy_checkpoints, tmp_pat
     whole, cropped = tmp_path / "whole.png", tmp_path / "cropped.png"
     Image.fromarray(noise).save(whole)
     crop_centre(Image.fromarray(noise), 56).save(cropped)
-    options = {"pretrained": str(policy_checkpoints["openvla"]), "device": "cpu"}
     plain, cropping = (
-        load("openvla", {**options, **more}, 0) for more in ({}, {"center_crop": "true"})
+        load_saved("openvla", policy_checkpoints["openvla"], center_crop=crops)
+        for crops in (False, True)
     )
     steps = [policy.act(FrameRef(whole), "pick up the mug") for policy in (plain, cropping)]
     assert steps[0] != steps[1] == plain.act(FrameRef(cropped), "pick up the mug")
@@ -111,12 +112,3 @@ def test_actions_with_a_cache_are_those_of_reading_all_anew(network, plain_frame
     assert len(set(written)) > 1
     expected = network.bins.decode(written)
     assert (network.predict(image, "pick up the mug", constrained=True) == expected).all()
-
-
-def test_without_the_constraint_a_policy_still_acts(policy_checkpoints, plain_frames):
-    from model_adapters import check_adapter, load
-
-    policy = load(
-        "openvla", {"pretrained": str(policy_checkpoints["openvla"]), "constrained": "false"}, 0
-    )
-    check_adapter(policy)

@@ -6,9 +6,10 @@ import torch
 from safetensors.torch import load_file
 
 from infthor_eval.errors import ModelError
-from model_adapters import check_adapter, load
 from model_adapters.policies.decoding import embed_ids
 from model_adapters.policies.spatialvla.network import SpatialVLANetwork, prompt
+
+from ...asking import load_saved
 
 N_ACTIONS, N_PATCHES, HIDDEN = 8194, 16, 64
 
@@ -76,36 +77,18 @@ def test_actions_with_a_cache_are_those_of_reading_all_anew(network, plain_frame
             },
             position_ids=torch.arange(1, length + 1)[None],
         )
-        action_ids = network.bins.action_ids[place % 3]
-        written.append(
-            action_ids.start
-            + int(output.logits[0, -1, action_ids.start : action_ids.stop].argmax())
-        )
-    assert (
-        network.predict(image, "pick up the mug", constrained=True) == network.bins.decode(written)
-    ).all()
+        legal = network.bins.action_ids[place % 3]
+        written.append(legal.start + int(output.logits[0, -1, legal.start : legal.stop].argmax()))
+    acted = network.predict(image, "pick up the mug", constrained=True)
+    assert (acted == network.bins.decode(written)).all()
 
 
 def test_the_camera_changes_what_is_seen(policy_checkpoints, plain_frames):
     seen = []
     for intrinsics in ("default", "thor:60", "thor:90"):
-        settings = {
-            "pretrained": str(policy_checkpoints["spatialvla"]),
-            "device": "cpu",
-            "intrinsics": intrinsics,
-        }
-        policy = load("spatialvla", settings, 0)
+        policy = load_saved("spatialvla", policy_checkpoints["spatialvla"], intrinsics=intrinsics)
         assert policy.identity()["intrinsics"] == intrinsics
         with torch.inference_mode():
             seen.append(policy._network.features(plain_frames[0].load()))
     assert not torch.equal(seen[0], seen[1])
     assert not torch.equal(seen[1], seen[2])
-
-
-def test_without_the_constraint_a_policy_still_acts(policy_checkpoints):
-    policy = load(
-        "spatialvla",
-        {"pretrained": str(policy_checkpoints["spatialvla"]), "constrained": "false"},
-        0,
-    )
-    check_adapter(policy)

@@ -5,10 +5,9 @@ from collections.abc import Callable
 
 import pytest
 
-from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs import read_run
 from model_adapters.served.batches import transfer
 
+from ....helpers.journals import read_records
 from ..anthropic.server import AnthropicServer, message
 from ..gemini.server import GeminiServer, content
 from ..talking import completion
@@ -75,11 +74,6 @@ def _damage(server, damage):
     server.answer_to = answer
 
 
-def _records(folder):
-    (results,) = folder.rglob("results.json")
-    return read_run(results.parent, RECORDS)[1]
-
-
 @pytest.mark.parametrize(("model", "name"), CASES)
 def test_a_damaged_line_is_the_fault_of_its_request_alone(ask, tmp_path, model, name):
     with serve_batches(SERVERS[model]()) as server:
@@ -87,7 +81,7 @@ def test_a_damaged_line_is_the_fault_of_its_request_alone(ask, tmp_path, model, 
         _damage(server, lambda lines: [_damages(model)[name](lines[0]), *lines[1:]])
         code, _, err = ask(server, model=model)
         assert (code, "Traceback" in err) == (1, False), err
-        failures = [record.failure for record in _records(tmp_path / "out")]
+        failures = [record.failure for record in read_records(tmp_path / "out")]
         (failure,) = filter(None, failures)
         assert "gives no reply in a batch: it " in failure
         assert [n for n, _ in server.sizes] == [5]
@@ -127,7 +121,7 @@ def test_of_two_replies_that_differ_none_counts(ask, tmp_path, model):
         code, _, err = ask(server, model=model)
     assert code == 1, err
     assert "4 answered, 1 not" in err
-    failures = [record.failure for record in _records(tmp_path / "out") if record.failure]
+    failures = [record.failure for record in read_records(tmp_path / "out") if record.failure]
     assert len(failures) == 1 and "it gives several that differ, and none counts" in failures[0]
     assert [n for n, _ in server.sizes] == [5]
 

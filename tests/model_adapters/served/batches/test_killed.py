@@ -9,10 +9,8 @@ import sys
 import threading
 import time
 
-from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs import read_run
-
 from ....helpers.command_line import option_words
+from ....helpers.journals import read_outcome
 from ....helpers.waiting import PATIENCE_S, wait_until
 from ..talking import completion
 from .server import BatchServer, serve_batches
@@ -45,9 +43,7 @@ def _says(body):
 
 
 def _replies(output):
-    (results,) = output.rglob("results.json")
-    _, records = read_run(results.parent, RECORDS)
-    return {record.key: record.payload.reply for record in records}
+    return {record.key: record.payload.reply for record in read_outcome(output)[0]}
 
 
 def test_ten_kills_at_any_moment_change_nothing(make_nieh_set, tmp_path):

@@ -4,19 +4,12 @@ import json
 
 import pytest
 
-from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs import read_run
 from model_adapters.served.batches import queue
 
 from ....helpers.command_line import assert_refused, option_words
+from ....helpers.journals import read_outcome
 from ..talking import completion
 from .server import BatchServer, failed, serve_batches
-
-
-def _run(folder):
-    """The records of the one run in a folder, and its results."""
-    (results,) = folder.rglob("results.json")
-    return read_run(results.parent, RECORDS)[1], json.loads(results.read_text())
 
 
 def _first_time(outcome):
@@ -43,7 +36,7 @@ def test_questions_are_asked_in_one_batch_and_their_cost_is_in_the_results(ask, 
         again, _, err = ask(server, **prices)
         assert (again, server.n_asked) == (0, 5)
         assert "0 evaluated now, 5 resumed from the journal" in err
-    records, results = _run(tmp_path / "out")
+    records, results = read_outcome(tmp_path / "out")
     each = (60 * 1 + 40 * 0.5 + 10 * 5) / 1e6
     assert [record.payload.reply for record in records] == ["yes"] * 5
     assert results["usage"] == {
@@ -95,7 +88,7 @@ def test_a_request_that_no_batch_can_hold_fails_alone(ask, tmp_path, monkeypatch
         code, _, err = ask(server, "--fresh", batch_mb=1)
     assert code == 1
     assert "the request has 1.0 MB, more than a batch may have" in err
-    records, _ = _run(tmp_path / "out")
+    records, _ = read_outcome(tmp_path / "out")
     assert 1 <= sum(record.failure is not None for record in records) < 5
 
 
@@ -114,7 +107,7 @@ def test_what_passes_is_asked_again_and_told(ask, tmp_path, outcome, fault):
     assert [n for n, _ in server.sizes] == [5, 2]
     assert "3 answered, 2 not" in err
     assert "2 request(s) were not processed, and are asked again" in err
-    faults = [fault for record in _run(tmp_path / "out")[0] for fault in record.faults]
+    faults = [fault for record in read_outcome(tmp_path / "out")[0] for fault in record.faults]
     assert len(faults) == 2
     assert all(fault in line for line in faults)
 
@@ -127,14 +120,14 @@ def test_what_does_not_pass_fails_and_is_asked_by_the_next_run(ask, tmp_path):
         assert [n for n, _ in server.sizes] == [5, 5]
         server.answer = lambda _: completion("yes")
         assert ask(server)[0] == 0
-    assert [record.failure for record in _run(tmp_path / "out")[0]] == [None] * 5
+    assert [record.failure for record in read_outcome(tmp_path / "out")[0]] == [None] * 5
 
 
 def test_a_refusal_is_not_asked_again(ask, tmp_path):
     with serve_batches(BatchServer(answer=_first_time(failed(400, "no fridge")))) as server:
         assert ask(server)[0] == 1
     assert len(server.sizes) == 1
-    failures = [record.failure for record in _run(tmp_path / "out")[0] if record.failure]
+    failures = [record.failure for record in read_outcome(tmp_path / "out")[0] if record.failure]
     assert len(failures) == 2
     assert all("in a batch answers 400 Bad Request" in failure for failure in failures)
 

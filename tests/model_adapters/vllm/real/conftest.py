@@ -4,7 +4,7 @@ import importlib.util
 
 import pytest
 
-from model_adapters import load
+from ...asking import load_with
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -21,15 +21,8 @@ def start(checkpoints, monkeypatch):
     started = []
 
     def start(family="qwen2.5-vl", name=None, **options):
-        settings = {
-            "pretrained": checkpoints[family],
-            "dtype": "float32",
-            "enforce_eager": True,
-            **options,
-        }
-        started.append(
-            load(f"{name or family}@vllm", {key: str(value) for key, value in settings.items()}, 0)
-        )
+        usual = {"pretrained": checkpoints[family], "dtype": "float32", "enforce_eager": True}
+        started.append(load_with(f"{name or family}@vllm", **usual | options))
         return started[-1]
 
     yield start

@@ -19,7 +19,7 @@ from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_traje
 from tests.helpers.waiting import PATIENCE_S, wait_until
 
 from ...asking import up_to
-from ...serving import free_port, wait_for_server
+from ...serving import free_port, run_each, wait_for_server
 
 SERVER = "vllm.entrypoints.openai.api_server"
 MODEL = str(packaged_folder(NANO_FOLDER))
@@ -75,16 +75,8 @@ def both(served, tmp_path, run_cli):
 
     def both(*arguments, **more):
         here = {"pretrained": served["model"], "device": "cpu", "dtype": "float32"}
-        records = []
-        for model, settings in (("openai", served | more), ("qwen2.5-vl", here)):
-            options = ",".join(f"{name}={value}" for name, value in settings.items())
-            code, _, err = run_cli(
-                *option_words(model=model, model_args=options, name=model, out=tmp_path / "out"),
-                *arguments,
-            )
-            assert code == 0, err
-            records.append(read_records(tmp_path / "out" / model))
-        return records
+        models = {"openai": served | more, "qwen2.5-vl": here}
+        return run_each(run_cli, tmp_path / "out", models, *arguments)
 
     return both
 
