@@ -2,17 +2,17 @@
 
 import hashlib
 import json
-import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+from .http_servers import SilentHandler, run_server
 
 __all__ = ["COMMIT", "Hub", "serve_hub"]
 
 COMMIT = "0" * 40
 
 
-class Hub(BaseHTTPRequestHandler):
+class Hub(SilentHandler):
     """The server's answers.
 
     `repository` is "datasets/owner/name" or "models/owner/name", `files` are its files by path, and
@@ -65,18 +65,10 @@ class Hub(BaseHTTPRequestHandler):
         if self.command == "GET":
             self.wfile.write(content)
 
-    def log_message(self, *_: object) -> None:
-        """Say nothing."""
-
 
 @contextmanager
 def serve_hub(repository: str, files: dict[str, bytes]) -> Iterator[tuple[str, type[Hub]]]:
     """Serve a repository; yields the address, and the answers, whose files may be changed."""
     answers = type("ThisHub", (Hub,), {"repository": repository, "files": files, "fetched": []})
-    server = ThreadingHTTPServer(("127.0.0.1", 0), answers)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    try:
-        yield f"http://127.0.0.1:{server.server_port}", answers
-    finally:
-        server.shutdown()
-        server.server_close()
+    with run_server(answers) as address:
+        yield address, answers

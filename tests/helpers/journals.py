@@ -9,7 +9,14 @@ from infthor_eval.runs import RecordTypes, RunHeader, UnitRecord, read_header, r
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.suites import find_suite
 
-__all__ = ["RecordedRun", "read_records", "spoil_config", "write_journal", "write_run"]
+__all__ = [
+    "RecordedRun",
+    "read_outcome",
+    "read_records",
+    "spoil_config",
+    "write_journal",
+    "write_run",
+]
 
 
 class RecordedRun(Protocol):
@@ -51,3 +58,9 @@ def read_records(output: Path) -> list[UnitRecord[Any]]:
     (journal,) = output.rglob("journal")
     suite = find_suite(read_header(journal.parent).suite)
     return read_run(journal.parent, suite.records)[1]
+
+
+def read_outcome(output: Path) -> tuple[list[UnitRecord[Any]], dict[str, Any]]:
+    """The records of the one run below a folder, and its results."""
+    (results,) = output.rglob("results.json")
+    return read_records(output), json.loads(results.read_text())

@@ -2,10 +2,20 @@
 
 from typing import Any
 
-from model_adapters import Decoding, Part, Turn
+from model_adapters import Decoding, Part, Reply, Turn, load
 from model_adapters.hf.prompting.prompt import token_ids
 
-__all__ = ["require_same", "talk_of", "up_to", "user"]
+__all__ = ["ask", "load_saved", "load_with", "require_same", "talk_of", "up_to", "user"]
+
+
+def load_with(name: str, **options: object) -> Any:
+    """A model or policy with these options, whose values need not be texts."""
+    return load(name, {option: str(value) for option, value in options.items()}, 0)
+
+
+def load_saved(name: str, folder: object, **options: object) -> Any:
+    """The model of a checkpoint in a folder, on the CPU."""
+    return load_with(name, **{"pretrained": folder, "device": "cpu", **options})
 
 
 def up_to(n: int, **settings: Any) -> Decoding:
@@ -24,6 +34,12 @@ def talk_of(model: Any, turns: tuple[Turn, ...]) -> Any:
     for turn in turns:
         talk.append(*turn.parts, role=turn.role)
     return talk
+
+
+def ask(model: Any, *parts: Part, new: int = 4, **settings: Any) -> Reply:
+    """The reply of at most so many tokens to one user turn."""
+    reply: Reply = talk_of(model, user(*parts)).reply(up_to(new, **settings))
+    return reply
 
 
 def require_same(

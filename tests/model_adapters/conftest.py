@@ -1,26 +1,21 @@
 """Frames, tiny models and their checkpoints for the tests of adapters, and transformers' own way of
 running these."""
 
-import importlib
 import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Part, Turn, Video, load
+from model_adapters import Video, load
 
-from ..helpers.benchmarks import FOLDER
-from .checkpoints import FAMILIES, OTHERS, save
-
-TinyFamily = Callable[[str], Path]
+from .checkpoints import FAMILIES, OTHERS, save, save_family
 
 PEERS = Path(sys.prefix) / "test-peers"  # torchvision's Python half, kept out of the environment
 
@@ -90,16 +85,12 @@ for folder, prompts in work["prompts"].items():
 print(json.dumps(answers))
 """
 
-Answers = Callable[
-    [Mapping[Path, Sequence[Sequence[Turn]]], int], dict[Path, list[tuple[list[int], list[int]]]]
-]
-
 
 @pytest.fixture(scope="session")
-def make_frames(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., list[FrameRef]]:
+def make_frames(tmp_path_factory):
     """Writes frames of coloured noise, all different, and returns references to them."""
 
-    def make(count: int, width: int = 84, height: int = 84, seed: int = 0) -> list[FrameRef]:
+    def make(count, width=84, height=84, seed=0):
         folder = tmp_path_factory.mktemp("frames")
         draw = np.random.default_rng(seed)
         refs = []
@@ -114,29 +105,29 @@ def make_frames(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., list[
 
 
 @pytest.fixture(scope="session")
-def frames(make_frames: Callable[..., list[FrameRef]]) -> list[FrameRef]:
+def frames(make_frames):
     """Six small frames (9 tokens each in Qwen2.5-VL)."""
     return make_frames(6)
 
 
 @pytest.fixture(scope="session")
-def tiny() -> Iterator[Any]:
+def tiny():
     """A tiny Qwen2.5-VL that shares prefixes, with chunks small enough to need several."""
     model = load("qwen2.5-vl-tiny", {"chunk_tokens": "24"}, seed=0)
     yield model
-    model.close()  # type: ignore[union-attr]
+    model.close()
 
 
 @pytest.fixture(scope="session")
-def plain() -> Iterator[Any]:
+def plain():
     """The same model without sharing, encoding everything in one forward pass."""
     model = load("qwen2.5-vl-tiny", {"share_prefix": "false", "chunk_tokens": "1000000"}, seed=0)
     yield model
-    model.close()  # type: ignore[union-attr]
+    model.close()
 
 
 @pytest.fixture(scope="session")
-def checkpoints(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def checkpoints(tmp_path_factory):
     """Folders of tiny checkpoints by family."""
     root = tmp_path_factory.mktemp("checkpoints")
     for name in (*FAMILIES, *OTHERS):
@@ -145,7 +136,7 @@ def checkpoints(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.fixture(scope="session")
-def answer_plainly() -> Answers:
+def answer_plainly():
     """Has checkpoints answer by their own whole processor and `generate`, every prompt from its
     beginning.
 
@@ -153,7 +144,7 @@ def answer_plainly() -> Answers:
     reply, end token included.
     """
 
-    def answer(prompts: Mapping[Path, Sequence[Sequence[Turn]]], new: int) -> dict[Path, list[Any]]:
+    def answer(prompts, new):
         if not PEERS.is_dir():
             pytest.skip("torchvision is not set aside in test-peers (make test does it)")
         prompts_as_json = {
@@ -173,29 +164,24 @@ def answer_plainly() -> Answers:
     return answer
 
 
-def _as_json(turns: Sequence[Turn]) -> list[tuple[str, list[tuple[str, Any]]]]:
+def _as_json(turns):
     return [(turn.role, [_part_as_json(part) for part in turn.parts]) for turn in turns]
 
 
-def _part_as_json(part: Part) -> tuple[str, Any]:
+def _part_as_json(part):
     if isinstance(part, Video):
         return "video", {"frames": [str(frame.path) for frame in part.frames], "fps": part.fps}
     return ("text", part) if isinstance(part, str) else ("image", str(part.path))
 
 
 @pytest.fixture(scope="session")
-def tiny_family(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TinyFamily]:
+def tiny_family(tmp_path_factory):
     """Returns the folder of a tiny checkpoint of a family of `benchmarks/families.py`."""
-    made: dict[str, Path] = {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(FOLDER)
-        families = importlib.import_module("families").FAMILIES
-        save_family = importlib.import_module("tiny_families.checkpoint").save
 
-        def make(family: str) -> Path:
-            if family not in made:
-                made[family] = tmp_path_factory.mktemp(family)
-                save_family(family, families[family], made[family])
-            return made[family]
+    @cache
+    def make(family):
+        folder = tmp_path_factory.mktemp(family)
+        save_family(family, folder)
+        return folder
 
-        yield make
+    return make

@@ -5,11 +5,18 @@ import subprocess
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-__all__ = ["free_port", "wait_for_server"]
+from infthor_eval.runs import UnitRecord
+
+from ..helpers.command_line import CliRunner, option_words
+from ..helpers.journals import read_records
+
+__all__ = ["free_port", "run_each", "wait_for_server"]
 
 START_S = 600
 
@@ -33,3 +40,17 @@ def wait_for_server(url: str, server: "subprocess.Popen[bytes]", log: Path) -> N
         except (urllib.error.URLError, ConnectionError):
             time.sleep(0.2)
     pytest.fail(f"the server does not come up: {log.read_text()[-2000:]}")
+
+
+def run_each(
+    run_cli: CliRunner, output: Path, models: Mapping[str, Mapping[str, object]], *words: object
+) -> list[list[UnitRecord[Any]]]:
+    """Run the same tasks with each model and its options; gives the records of each."""
+    records = []
+    for model, settings in models.items():
+        options = ",".join(f"{name}={value}" for name, value in settings.items())
+        typed = option_words(model=model, model_args=options, name=model, out=output)
+        code, _, error_text = run_cli(*typed, *words)
+        assert code == 0, error_text
+        records.append(read_records(output / model))
+    return records

@@ -1,6 +1,3 @@
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 from infthor_eval.errors import ModelError
@@ -19,7 +16,7 @@ from .asking import up_to, user
         ({"choices": True}, {"choices": ("yes", "no")}),
     ],
 )
-def test_what_a_model_can_do_is_let_through(able: dict[str, Any], settings: dict[str, Any]) -> None:
+def test_what_a_model_can_do_is_let_through(able, settings):
     check_decoding("m", Capabilities(**able), up_to(3, **settings))
 
 
@@ -38,14 +35,12 @@ def test_what_a_model_can_do_is_let_through(able: dict[str, Any], settings: dict
         ),
     ],
 )
-def test_what_it_cannot_do_is_refused(
-    able: dict[str, Any], settings: dict[str, Any], complaint: str
-) -> None:
+def test_what_it_cannot_do_is_refused(able, settings, complaint):
     with pytest.raises(ModelError, match=complaint):
         check_decoding("m", Capabilities(**able), up_to(3, **settings))
 
 
-def test_only_a_users_turn_can_be_replied_to() -> None:
+def test_only_a_users_turn_can_be_replied_to():
     check_turns("m", Capabilities(), user("What?"))
     with pytest.raises(
         ModelError, match="m has nothing to reply to: the conversation is empty; append a user turn"
@@ -58,7 +53,7 @@ def test_only_a_users_turn_can_be_replied_to() -> None:
         check_turns("m", Capabilities(), (*user("What?"), Turn("assistant", ("This.",))))
 
 
-def test_a_video_needs_a_video_input(tmp_path: Path) -> None:
+def test_a_video_needs_a_video_input(tmp_path):
     turns = user(Video((FrameRef(tmp_path / "a.png"),), 1.0), "What?")
     check_turns("m", Capabilities(video_input=True), turns)
     with pytest.raises(

@@ -5,7 +5,6 @@ import types
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -28,7 +27,7 @@ from model_adapters.options import NoOptions
 from model_adapters.registry import model_description
 
 
-def test_names_and_help_need_neither_torch_nor_transformers() -> None:
+def test_names_and_help_need_neither_torch_nor_transformers():
     code = (
         "import sys, model_adapters as m; [m.options(name) for name in m.names()]; "
         "m.label('hf-vlm', {});"
@@ -38,7 +37,7 @@ def test_names_and_help_need_neither_torch_nor_transformers() -> None:
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_the_options_that_are_told_without_an_adapter_are_the_adapters_own(name: str) -> None:
+def test_the_options_that_are_told_without_an_adapter_are_the_adapters_own(name):
     module, _, attribute = BUILT_IN[name].adapter.partition(":")
     adapter = getattr(importlib.import_module(module), attribute)
     module, _, attribute = BUILT_IN[name].options.partition(":")
@@ -47,36 +46,36 @@ def test_the_options_that_are_told_without_an_adapter_are_the_adapters_own(name:
     assert own is adapter.Options or BUILT_IN[name].defaults
 
 
-def test_built_in_names() -> None:
+def test_built_in_names():
     assert {"hf-vlm", "pixtral", "qwen2.5-vl", "qwen2.5-vl-tiny"} <= set(names())
 
 
 @pytest.mark.parametrize(("typed", "meant"), [("qwen2.5vl", "qwen2.5-vl"), ("pixtrall", "pixtral")])
-def test_unknown_model_names_the_nearest(typed: str, meant: str) -> None:
+def test_unknown_model_names_the_nearest(typed, meant):
     with pytest.raises(UsageError, match=f"unknown model '{typed}'; did you mean '{meant}'"):
         load(typed, {}, 0)
 
 
-def test_far_off_name_lists_all() -> None:
+def test_far_off_name_lists_all():
     with pytest.raises(UsageError, match=r"unknown model 'zzz'; there are .*qwen2\.5-vl"):
         load("zzz", {}, 0)
 
 
-def test_unknown_option_names_the_nearest_and_all_with_defaults() -> None:
+def test_unknown_option_names_the_nearest_and_all_with_defaults():
     with pytest.raises(
         UsageError, match=r"no option dtyp; did you mean dtype\?.*share_prefix=true"
     ):
         load("qwen2.5-vl-tiny", {"dtyp": "float32"}, 0)
 
 
-def test_an_adapter_without_options_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_adapter_without_options_says_so(monkeypatch):
     _install(monkeypatch, "outside_package:Outside")
     _import_as_outside(monkeypatch, type("Bare", (Outside,), {"Options": NoOptions}))
     with pytest.raises(UsageError, match="it takes: no options"):
         load("outside", {"dtype": "float32"}, 0)
 
 
-def test_options_are_listed_with_their_defaults() -> None:
+def test_options_are_listed_with_their_defaults():
     assert "pretrained=Qwen/Qwen2.5-VL-7B-Instruct" in options("qwen2.5-vl")
 
 
@@ -88,45 +87,43 @@ class _Options:
 class Outside:
     Options = _Options
 
-    def __init__(self, name: str, sure: bool, seed: int) -> None:
+    def __init__(self, name, sure, seed):
         self.name, self.sure, self.seed = name, sure, seed
         self.capabilities = Capabilities()
 
     @classmethod
-    def build(cls, name: str, options: _Options, seed: int) -> "Outside":
+    def build(cls, name, options, seed):
         return cls(name, options.sure, seed)
 
-    def identity(self) -> dict[str, Any]:
+    def identity(self):
         return {}
 
-    def reset(self) -> None:
+    def reset(self):
         pass
 
-    def act(self, frame: Any, instruction: str) -> Any:
+    def act(self, frame, instruction):
         return ()
 
-    def close(self) -> None:
+    def close(self):
         pass
 
 
-def _install(monkeypatch: pytest.MonkeyPatch, target: str, name: str = "outside") -> None:
+def _install(monkeypatch, target, name="outside"):
     point = EntryPoint(name, target, registry.ENTRY_POINTS)
     monkeypatch.setattr(
         registry, "entry_points", lambda group: [point] if group == point.group else []
     )
 
 
-def _import_as_outside(monkeypatch: pytest.MonkeyPatch, adapter: type) -> None:
+def _import_as_outside(monkeypatch, adapter):
     monkeypatch.setitem(sys.modules, "outside_package", types.ModuleType("outside_package"))
     monkeypatch.setattr("outside_package.Outside", adapter, raising=False)
 
 
-def test_models_of_other_packages_come_through_entry_points(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_models_of_other_packages_come_through_entry_points(monkeypatch):
     _install(monkeypatch, "outside_package:Outside")
     _import_as_outside(monkeypatch, Outside)
-    model: Any = load("outside", {"sure": "yes"}, 7)
+    model = load("outside", {"sure": "yes"}, 7)
     assert "outside" in names()
     assert isinstance(model, Policy)
     assert (model.name, model.sure, model.seed) == ("outside", True, 7)
@@ -140,22 +137,20 @@ def test_models_of_other_packages_come_through_entry_points(
         ("json:loads", "Options and build"),
     ],
 )
-def test_a_broken_entry_point_is_one_line(
-    monkeypatch: pytest.MonkeyPatch, target: str, complaint: str
-) -> None:
+def test_a_broken_entry_point_is_one_line(monkeypatch, target, complaint):
     _install(monkeypatch, target)
     with pytest.raises(ModelError, match=complaint):
         load("outside", {}, 0)
 
 
-def test_no_package_can_take_a_built_in_name(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_package_can_take_a_built_in_name(monkeypatch):
     _install(monkeypatch, "json:loads", name="qwen2.5-vl-tiny")
     assert load("qwen2.5-vl-tiny", {}, 0).name == "qwen2.5-vl-tiny"
     assert adapter_identity("qwen2.5-vl-tiny") == {}
 
 
 @pytest.fixture
-def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def installed(tmp_path, monkeypatch):
     """A distribution with an adapter, as pip would leave it."""
     package = tmp_path / "dummy_robot"
     (package / "arms").mkdir(parents=True)
@@ -175,9 +170,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_an_adapter_of_another_package_has_its_version_and_source_in_its_identity(
-    installed: Path,
-) -> None:
+def test_an_adapter_of_another_package_has_its_version_and_source_in_its_identity(installed):
     before = adapter_identity("dummy")
     assert before.keys() == {"package", "version", "source"}
     assert (before["package"], before["version"]) == ("Dummy-Robot", "1.2")
@@ -188,13 +181,13 @@ def test_an_adapter_of_another_package_has_its_version_and_source_in_its_identit
 
 
 @pytest.mark.parametrize("change", ["arms/right.py", "other.py"])
-def test_a_new_module_of_the_package_is_another_source(installed: Path, change: str) -> None:
+def test_a_new_module_of_the_package_is_another_source(installed, change):
     before = adapter_identity("dummy")["source"]
     (installed / "dummy_robot" / change).write_text("")
     assert adapter_identity("dummy")["source"] != before
 
 
-def test_an_adapter_in_a_single_module_has_the_source_of_that(installed: Path) -> None:
+def test_an_adapter_in_a_single_module_has_the_source_of_that(installed):
     before = adapter_identity("single")["source"]
     (installed / "dummy_robot" / "__init__.py").write_text("B = 2\n")
     assert adapter_identity("single")["source"] == before
@@ -202,7 +195,7 @@ def test_an_adapter_in_a_single_module_has_the_source_of_that(installed: Path) -
     assert adapter_identity("single")["source"] != before
 
 
-def test_the_source_of_an_adapter_that_is_not_there_is_one_line(installed: Path) -> None:
+def test_the_source_of_an_adapter_that_is_not_there_is_one_line(installed):
     with pytest.raises(ModelError, match="no module no_such; install the package"):
         adapter_identity("lost")
     with pytest.raises(UsageError, match="unknown model 'losst'; did you mean 'lost'"):
@@ -226,14 +219,12 @@ def test_the_source_of_an_adapter_that_is_not_there_is_one_line(installed: Path)
         ({"pretrained": "runs/nano/checkpoint-500"}, "checkpoint-500"),
     ],
 )
-def test_a_run_is_called_by_its_checkpoint(model_options: dict[str, str], expected: str) -> None:
+def test_a_run_is_called_by_its_checkpoint(model_options, expected):
     assert label("qwen2.5-vl", model_options) == expected
 
 
 @pytest.mark.parametrize("pretrained", [".", "..", "/", "./", "../.."])
-def test_any_label_is_one_component_of_a_path(
-    pretrained: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_any_label_is_one_component_of_a_path(pretrained, tmp_path, monkeypatch):
     folder = tmp_path / "here" / "there"
     folder.mkdir(parents=True)
     monkeypatch.chdir(folder)
@@ -243,7 +234,7 @@ def test_any_label_is_one_component_of_a_path(
     assert pretrained != "." or name == "there"
 
 
-def test_tiny_models_are_described_as_random_and_the_nano_model_as_trained() -> None:
+def test_tiny_models_are_described_as_random_and_the_nano_model_as_trained():
     tiny = [name for name in names() if name.endswith("-tiny")]
     assert len(tiny) == 6
     for name in tiny:
@@ -256,7 +247,7 @@ def test_tiny_models_are_described_as_random_and_the_nano_model_as_trained() -> 
     assert (model_note("qwen2.5-vl-nano"), model_description("qwen2.5-vl")) == ("", "")
 
 
-def test_switches_are_on_where_they_have_not_their_defaults() -> None:
+def test_switches_are_on_where_they_have_not_their_defaults():
     typed = {"share_prefix": "yes", "batch_size": "6_4", "kv_offload": "1", "dtype": "float32"}
     assert switched_on("qwen2.5-vl", typed) == {"kv_offload": "1"}
     typed["attn_implementation"] = "eager"
@@ -266,5 +257,5 @@ def test_switches_are_on_where_they_have_not_their_defaults() -> None:
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_every_switch_is_an_option(name: str) -> None:
+def test_every_switch_is_an_option(name):
     assert set(switches(name)) <= {each.partition("=")[0] for each in options(name).split(", ")}

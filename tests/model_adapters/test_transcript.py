@@ -1,18 +1,16 @@
 from itertools import pairwise
-from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
-from model_adapters import ROLES, Decoding, Part, Reply, Role, Transcript, Turn
+from model_adapters import ROLES, Reply, Transcript, Turn
 
 from .asking import up_to, user
 
 
-def test_touching_texts_are_one(frames: list[FrameRef]) -> None:
+def test_touching_texts_are_one(frames):
     talk = Transcript()
     talk.append("a", "b", "", frames[0])
     talk.append("", "c")
@@ -20,7 +18,7 @@ def test_touching_texts_are_one(frames: list[FrameRef]) -> None:
     assert talk.turns == user("ab", frames[0], "cd")
 
 
-def test_turns_are_told_apart_by_who_speaks(frames: list[FrameRef]) -> None:
+def test_turns_are_told_apart_by_who_speaks(frames):
     talk = Transcript()
     talk.append("Be brief.", role="system")
     talk.append(frames[0])
@@ -36,7 +34,7 @@ def test_turns_are_told_apart_by_who_speaks(frames: list[FrameRef]) -> None:
     )
 
 
-def test_a_turn_of_nothing_is_none_and_its_neighbours_touch() -> None:
+def test_a_turn_of_nothing_is_none_and_its_neighbours_touch():
     talk = Transcript()
     talk.append("a")
     talk.append("", role="assistant")
@@ -53,14 +51,14 @@ SAID = st.lists(
 )
 
 
-def _append(talk: Transcript, message: Any, frames: list[FrameRef]) -> None:
+def _append(talk, message, frames):
     for role, numbered in message:
         talk.append(
             *(frames[part] if isinstance(part, int) else part for part in numbered), role=role
         )
 
 
-def _letters(message: Any) -> list[tuple[Role, str | int]]:
+def _letters(message):
     whole = [
         (role, part if isinstance(part, str) else [part])
         for role, parts in message
@@ -71,9 +69,7 @@ def _letters(message: Any) -> list[tuple[Role, str | int]]:
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(message=SAID, more=SAID)
-def test_turns_hold_what_was_said_and_leave_no_joint(
-    frames: list[FrameRef], message: Any, more: Any
-) -> None:
+def test_turns_hold_what_was_said_and_leave_no_joint(frames, message, more):
     talk = Transcript()
     _append(talk, message, frames)
     turns, here = talk.turns, talk.mark()
@@ -94,7 +90,7 @@ def test_turns_hold_what_was_said_and_leave_no_joint(
     assert talk.turns == turns
 
 
-def test_a_mark_serves_many_rewinds() -> None:
+def test_a_mark_serves_many_rewinds():
     talk = Transcript()
     talk.append("a")
     mark = talk.mark()
@@ -105,7 +101,7 @@ def test_a_mark_serves_many_rewinds() -> None:
         assert talk.turns == user("a")
 
 
-def test_nested_marks_unwind_in_order() -> None:
+def test_nested_marks_unwind_in_order():
     talk = Transcript()
     outer = talk.mark()
     talk.append("a")
@@ -118,14 +114,14 @@ def test_nested_marks_unwind_in_order() -> None:
         talk.rewind(inner)
 
 
-def test_a_mark_of_another_conversation_is_refused() -> None:
+def test_a_mark_of_another_conversation_is_refused():
     talk, other = Transcript(), Transcript()
     talk.mark()
     with pytest.raises(ValueError, match="another conversation"):
         talk.rewind(other.mark())
 
 
-def test_a_late_mark_stays_dead_after_growing_back() -> None:
+def test_a_late_mark_stays_dead_after_growing_back():
     talk = Transcript()
     start = talk.mark()
     talk.append("a")
@@ -136,12 +132,12 @@ def test_a_late_mark_stays_dead_after_growing_back() -> None:
         talk.rewind(late)
 
 
-def test_a_refused_part_leaves_nothing_behind() -> None:
+def test_a_refused_part_leaves_nothing_behind():
     talk = Transcript()
     with pytest.raises(TypeError, match="int"):
-        talk.append("a", 3)  # type: ignore[arg-type]
+        talk.append("a", 3)
     with pytest.raises(ValueError, match="no role 'narrator'; roles: system, user, assistant"):
-        talk.append("a", role="narrator")  # type: ignore[arg-type]
+        talk.append("a", role="narrator")
     assert talk.turns == ()
 
 
@@ -150,7 +146,7 @@ class Echo(Transcript):
 
     n_tokens = None
 
-    def reply(self, decoding: Decoding) -> Reply:
+    def reply(self, decoding):
         heard = "".join(str(part) for turn in self.turns for part in turn.parts)
         if "?" in heard:
             raise ModelError("no questions")
@@ -158,7 +154,7 @@ class Echo(Transcript):
 
 
 @pytest.mark.parametrize("continuations", [[], [["b"]], [["b", "c"], ["dddd"], []]])
-def test_continuations_are_answered_one_by_one(continuations: list[list[Part]]) -> None:
+def test_continuations_are_answered_one_by_one(continuations):
     talk = Echo()
     talk.append("a")
     expected = [str(1 + sum(len(str(part)) for part in parts)) for parts in continuations]
@@ -166,7 +162,7 @@ def test_continuations_are_answered_one_by_one(continuations: list[list[Part]]) 
     assert talk.turns == user("a")
 
 
-def test_a_continuation_that_is_refused_is_forgotten() -> None:
+def test_a_continuation_that_is_refused_is_forgotten():
     talk = Echo()
     talk.append("a")
     with pytest.raises(ModelError, match="no questions"):

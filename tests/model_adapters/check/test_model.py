@@ -4,21 +4,14 @@ import hashlib
 import random
 import threading
 import time
-from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import (
     Capabilities,
     ContractError,
-    Decoding,
-    Mark,
-    Model,
-    Part,
     Reply,
     Transcript,
     Turn,
@@ -27,7 +20,7 @@ from model_adapters import (
     check_turns,
 )
 
-Method = Callable[..., Any]
+from ...helpers.refusals import read_one_line
 
 
 class HashModel:
@@ -36,34 +29,34 @@ class HashModel:
     name = "hash"
     capabilities = Capabilities()
 
-    def tokens_per_frame(self, frame: FrameRef) -> int | None:
+    def tokens_per_frame(self, frame):
         return 10 if self.capabilities.counts_tokens else None
 
-    def identity(self) -> dict[str, Any]:
+    def identity(self):
         return {"model": self.name}
 
-    def conversation(self) -> "HashConversation":
+    def conversation(self):
         return HashConversation(self.capabilities)
 
-    def close(self) -> None:
+    def close(self):
         pass
 
 
 class HashConversation(Transcript):
-    def __init__(self, capabilities: Capabilities = Capabilities()) -> None:  # noqa: B008 - it is frozen
+    def __init__(self, capabilities=Capabilities()):  # noqa: B008 - it is frozen
         super().__init__()
         self.capabilities = capabilities
 
     @property
-    def n_tokens(self) -> int | None:
+    def n_tokens(self):
         return _size(self.turns) if self.capabilities.counts_tokens else None
 
-    def reply(self, decoding: Decoding) -> Reply:
+    def reply(self, decoding):
         check_decoding("hash", self.capabilities, decoding)
         check_turns("hash", self.capabilities, self.turns)
         return self.hash_reply(decoding)
 
-    def hash_reply(self, decoding: Decoding) -> Reply:
+    def hash_reply(self, decoding):
         """The reply, whatever is asked."""
         text = self.text(decoding)
         ids = tuple(map(ord, text))
@@ -76,7 +69,7 @@ class HashConversation(Transcript):
         )
         return Reply(text, *counted, ids if self.capabilities.token_ids else None)
 
-    def text(self, decoding: Decoding) -> str:
+    def text(self, decoding):
         parts = [(turn.role, part) for turn in self.turns for part in turn.parts]
         key = "\n".join(
             f"{role}:{part if isinstance(part, str) else part.digest}" for role, part in parts
@@ -91,14 +84,17 @@ class HashConversation(Transcript):
         return whole[: decoding.max_new_tokens]
 
 
-def _size(turns: Sequence[Turn]) -> int:
+def _size(turns):
     return sum(
         len(part) if isinstance(part, str) else 10 for turn in turns for part in turn.parts
     ) + len(turns)
 
 
-def _able(**capabilities: Any) -> Model:
-    return type("Able", (HashModel,), {"capabilities": Capabilities(**capabilities)})()
+def _model(capabilities=Capabilities(), **methods):  # noqa: B008 - it is frozen
+    """A model whose conversations have other methods."""
+    talk = type("Talk", (HashConversation,), methods)
+    about = {"capabilities": capabilities, "conversation": lambda self: talk(capabilities)}
+    return type("Broken", (HashModel,), about)()
 
 
 @pytest.mark.parametrize(
@@ -111,114 +107,86 @@ def _able(**capabilities: Any) -> Model:
         {"sampling": True, "choices": True, "max_in_flight": 8, "batch_size": 4},
     ],
 )
-def test_a_good_model_passes(capabilities: dict[str, Any]) -> None:
-    check_adapter(_able(**capabilities))
+def test_a_good_model_passes(capabilities):
+    check_adapter(_model(Capabilities(**capabilities)))
 
 
-def _model(**methods: Any) -> Model:
-    talk = type("Talk", (HashConversation,), methods)
-    return type("Broken", (HashModel,), {"conversation": lambda self: talk()})()
+def _asked_as(method="reply", **changes):
+    """A method that does as if something else had been asked for."""
+    own = getattr(HashConversation, method)
+    return lambda self, decoding: own(self, replace(decoding, **changes))
 
 
-def _reply_that_appends(self: Any, decoding: Decoding) -> Reply:
+def _replying(**changes):
+    """A `reply` that changes what is replied, each by what it is made from."""
+
+    def reply(self, decoding):
+        honest = HashConversation.reply(self, decoding)
+        return replace(honest, **{name: make(self, honest) for name, make in changes.items()})
+
+    return reply
+
+
+def _answering(change):
+    """A `replies` that changes the list, given the conversation and a way to have it."""
+    return lambda self, continuations, decoding: change(
+        self, continuations, lambda some: Transcript.replies(self, some, decoding)
+    )
+
+
+def _reply_that_appends(self, decoding):
     reply = HashConversation.reply(self, decoding)
     self.append(reply.text)
     return reply
 
 
-def _reply_without_frames(self: Any, decoding: Decoding) -> Reply:
+def _reply_without_frames(self, decoding):
     blind = HashConversation()
     for turn in self.turns:
         blind.append(*(part for part in turn.parts if isinstance(part, str)), role=turn.role)
     return replace(blind.reply(decoding), n_context_tokens=self.n_tokens)
 
 
-def _reply_without_stop(self: Any, decoding: Decoding) -> Reply:
-    return HashConversation.reply(self, replace(decoding, stop=()))
-
-
-def _reply_with_a_memory(self: Any, decoding: Decoding) -> Reply:
+def _text_that_counts_calls(self, reply):
     self.calls = getattr(self, "calls", 0) + 1
-    reply = HashConversation.reply(self, decoding)
-    return replace(reply, text=reply.text + str(self.calls))
+    return reply.text + str(self.calls)
 
 
-def _reply_that_miscounts(self: Any, decoding: Decoding) -> Reply:
-    reply = HashConversation.reply(self, decoding)
-    return replace(reply, n_context_tokens=(reply.n_context_tokens or 0) + 1)
-
-
-def _reply_that_remembers_what_was_rewound(self: Any, decoding: Decoding) -> Reply:
-    reply = HashConversation.reply(self, decoding)
-    return replace(reply, text=reply.text + "x" * getattr(self, "rewound", 0))
-
-
-def _reply_to_anything(self: Any, decoding: Decoding) -> Reply:
+def _reply_to_anything(self, decoding):
     check_decoding("hash", self.capabilities, decoding)
     return self.hash_reply(decoding)
 
 
-def _reply_to_the_assistant(self: Any, decoding: Decoding) -> Reply:
-    check_decoding("hash", self.capabilities, decoding)
+def _reply_to_the_assistant(self, decoding):
     if not self.turns:
         raise ModelError("nothing")
-    return self.hash_reply(decoding)
+    return _reply_to_anything(self, decoding)
 
 
-def _reply_without_ids(self: Any, decoding: Decoding) -> Reply:
-    return replace(HashConversation.reply(self, decoding), token_ids=None)
-
-
-def _reply_with_more_ids(self: Any, decoding: Decoding) -> Reply:
-    return replace(HashConversation.reply(self, decoding), n_reply_tokens=0)
-
-
-def _reply_at_any_temperature(self: Any, decoding: Decoding) -> Reply:
-    return HashConversation.reply(self, replace(decoding, temperature=0.0))
-
-
-def _reply_with_any_choices(self: Any, decoding: Decoding) -> Reply:
-    return HashConversation.reply(self, replace(decoding, choices=()))
-
-
-def _replies_to_the_first(
-    self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding
-) -> list[Reply]:
-    return Transcript.replies(self, continuations[:1], decoding)
-
-
-def _replies_backwards(
-    self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding
-) -> list[Reply]:
-    return Transcript.replies(self, continuations, decoding)[::-1]
-
-
-def _replies_that_append(
-    self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding
-) -> list[Reply]:
-    self.append(*continuations[0])
-    return Transcript.replies(self, continuations, decoding)
-
-
-def _rewind_that_counts(self: Any, mark: Mark) -> None:
+def _rewind_that_counts(self, mark):
     self.rewound = 1
     HashConversation.rewind(self, mark)
 
 
-def _append_anything(self: Any, *parts: Part, role: Any = "user") -> None:
+def _append_anything(self, *parts, role="user"):
     HashConversation.append(self, *(part for part in parts if not isinstance(part, int)), role=role)
 
 
-def _append_in_any_role(self: Any, *parts: Part, role: Any = "user") -> None:
+def _append_in_any_role(self, *parts, role="user"):
     HashConversation.append(self, *parts, role="user" if role == "narrator" else role)
 
 
-def _turns_without_joints(self: Any, continuation: Sequence[Part]) -> tuple[Turn, ...]:
+def _turns_without_joints(self, continuation):
     return tuple(Turn(role, (part,)) for role, part in self._spoken)
 
 
-def _rewind_anywhere(self: Any, mark: Mark) -> None:
+def _rewind_anywhere(self, mark):
     del self._spoken[mark.n_parts :]
+
+
+def _replies_that_append(self, continuations, answer):
+    self.append(*continuations[0])
+    return answer(continuations)
 
 
 @pytest.mark.parametrize(
@@ -226,11 +194,19 @@ def _rewind_anywhere(self: Any, mark: Mark) -> None:
     [
         ({"reply": _reply_that_appends}, "reply.. changes the conversation"),
         ({"reply": _reply_without_frames}, "does not see the frames"),
-        ({"reply": _reply_without_stop}, "stop string"),
-        ({"reply": _reply_with_a_memory}, "not answered the same way twice"),
-        ({"reply": _reply_that_miscounts}, "not the reply's n_context_tokens"),
+        ({"reply": _asked_as(stop=())}, "stop string"),
+        ({"reply": _replying(text=_text_that_counts_calls)}, "not answered the same way twice"),
         (
-            {"reply": _reply_that_remembers_what_was_rewound, "rewind": _rewind_that_counts},
+            {"reply": _replying(n_context_tokens=lambda _, reply: reply.n_context_tokens + 1)},
+            "not the reply's n_context_tokens",
+        ),
+        (
+            {
+                "reply": _replying(
+                    text=lambda self, reply: reply.text + "x" * getattr(self, "rewound", 0)
+                ),
+                "rewind": _rewind_that_counts,
+            },
             "after a rewind differs from that of a new conversation",
         ),
         ({"append": _append_anything}, "does not raise TypeError"),
@@ -247,118 +223,98 @@ def _rewind_anywhere(self: Any, mark: Mark) -> None:
             {"reply": _reply_to_the_assistant},
             "whose last turn is the assistant's does not raise ModelError",
         ),
-        ({"reply": _reply_without_ids}, "a reply has no token_ids"),
-        ({"reply": _reply_with_more_ids}, "n_reply_tokens is not the number of token_ids"),
+        ({"reply": _replying(token_ids=lambda *_: None)}, "a reply has no token_ids"),
         (
-            {"reply": _reply_at_any_temperature},
+            {"reply": _replying(n_reply_tokens=lambda *_: 0)},
+            "n_reply_tokens is not the number of token_ids",
+        ),
+        (
+            {"reply": _asked_as(temperature=0.0)},
             "a temperature does not raise ModelError though sampling is false; call",
         ),
         (
-            {"reply": _reply_with_any_choices},
+            {"reply": _asked_as(choices=())},
             "choices do not raise ModelError though choices is false; call",
         ),
-        ({"replies": _replies_to_the_first}, "one reply per continuation"),
-        ({"replies": _replies_backwards}, "replies.. differs from asking one by one"),
-        ({"replies": _replies_that_append}, "replies.. changes the conversation"),
+        (
+            {"replies": _answering(lambda _, asked, answer: answer(asked[:1]))},
+            "one reply per continuation",
+        ),
+        (
+            {"replies": _answering(lambda _, asked, answer: answer(asked)[::-1])},
+            "replies.. differs from asking one by one",
+        ),
+        ({"replies": _answering(_replies_that_append)}, "replies.. changes the conversation"),
     ],
 )
-def test_a_broken_conversation_is_named(methods: dict[str, Any], clause: str) -> None:
+def test_a_broken_conversation_is_named(methods, clause):
     with pytest.raises(ContractError, match=clause) as caught:
         check_adapter(_model(**methods))
-    assert "\n" not in str(caught.value)
+    read_one_line(caught)
+
+
+def _claiming(**capabilities):
+    """Capabilities that are not those of the model's conversations."""
+    return {
+        "capabilities": Capabilities(**capabilities),
+        "conversation": lambda self: HashConversation(),
+    }
 
 
 @pytest.mark.parametrize(
-    ("identity", "clause"),
+    ("members", "clause"),
     [
-        (lambda self: {"a": {1}}, "is a set, which JSON cannot hold"),
-        (lambda self: {"a": (1,)}, "changes when written as JSON"),
-    ],
-)
-def test_a_broken_identity_is_named(identity: Method, clause: str) -> None:
-    with pytest.raises(ContractError, match=clause):
-        check_adapter(type("Broken", (HashModel,), {"identity": identity})())
-
-
-@pytest.mark.parametrize("count", [0, 11])
-def test_a_wrong_count_of_a_frames_tokens_is_named(count: int) -> None:
-    broken = type("Broken", (HashModel,), {"tokens_per_frame": lambda self, frame: count})()
-    with pytest.raises(ContractError, match="tokens_per_frame"):
-        check_adapter(broken)
-
-
-@pytest.mark.parametrize(
-    ("claims", "clause"),
-    [
-        ({"counts_tokens": False}, "n_tokens is not None though counts_tokens is false"),
-        ({"token_ids": False}, "a reply has token_ids though token_ids is false"),
-        ({"batch_size": 0}, "batch_size is below 1"),
-        ({"max_in_flight": 0}, "max_in_flight is below 1"),
-    ],
-)
-def test_capabilities_that_are_not_the_models_are_named(
-    claims: dict[str, Any], clause: str
-) -> None:
-    broken = type("Broken", (HashModel,), {"capabilities": Capabilities(**claims)})()
-    broken.conversation = HashConversation
-    with pytest.raises(ContractError, match=clause):
-        check_adapter(broken)
-
-
-def test_a_count_of_a_frames_tokens_by_a_model_that_counts_none_is_named() -> None:
-    broken = _able(counts_tokens=False)
-    broken.tokens_per_frame = lambda frame: 10  # type: ignore[method-assign]
-    with pytest.raises(ContractError, match=r"tokens_per_frame\(\) is not None"):
-        check_adapter(broken)
-
-
-def _talking(capabilities: Capabilities, **methods: Any) -> Model:
-    talk = type("Talk", (HashConversation,), methods)
-    return type(
-        "Broken",
-        (HashModel,),
-        {"capabilities": capabilities, "conversation": lambda self: talk(capabilities)},
-    )()
-
-
-def _text_of_no_seed(self: Any, decoding: Decoding) -> str:
-    return HashConversation.text(self, replace(decoding, temperature=0.0))
-
-
-def _text_of_no_choice(self: Any, decoding: Decoding) -> str:
-    return HashConversation.text(self, replace(decoding, choices=()))
-
-
-def _text_drawn_anew(self: Any, decoding: Decoding) -> str:
-    return HashConversation.text(
-        self, replace(decoding, seed=decoding.seed + random.getrandbits(60))
-    )
-
-
-@pytest.mark.parametrize(
-    ("capabilities", "text", "clause"),
-    [
-        (Capabilities(sampling=True), _text_of_no_seed, "no seed changes a reply at temperature 2"),
+        ({"identity": lambda self: {"a": {1}}}, "is a set, which JSON cannot hold"),
+        ({"identity": lambda self: {"a": (1,)}}, "changes when written as JSON"),
+        ({"tokens_per_frame": lambda *_: 0}, "tokens_per_frame"),
+        ({"tokens_per_frame": lambda *_: 11}, "tokens_per_frame"),
         (
-            Capabilities(sampling=True),
-            _text_drawn_anew,
-            "the same seed does not give the same reply",
+            {"tokens_per_frame": lambda *_: 10, "capabilities": Capabilities(counts_tokens=False)},
+            r"tokens_per_frame\(\) is not None",
         ),
-        (Capabilities(choices=True), _text_of_no_choice, "a reply is none of its choices"),
+        (_claiming(counts_tokens=False), "n_tokens is not None though counts_tokens is false"),
+        (_claiming(token_ids=False), "a reply has token_ids though token_ids is false"),
+        (_claiming(batch_size=0), "batch_size is below 1"),
+        (_claiming(max_in_flight=0), "max_in_flight is below 1"),
+        (
+            {"conversation": lambda self: Transcript()},
+            "Transcript lacks a member of Conversation: n_tokens, reply",
+        ),
     ],
 )
-def test_a_claim_that_does_not_hold_is_named(
-    capabilities: Capabilities, text: Method, clause: str
-) -> None:
+def test_a_broken_model_is_named(members, clause):
     with pytest.raises(ContractError, match=clause):
-        check_adapter(_talking(capabilities, text=text))
+        check_adapter(type("Broken", (HashModel,), members)())
 
 
-def test_replies_that_hang_on_who_else_asks_are_named() -> None:
+def test_what_is_no_model_is_named():
+    with pytest.raises(ContractError, match=r"object lacks a member of Model: .*tokens_per_frame"):
+        check_adapter(object())
+
+
+def _text_drawn_anew(self, decoding):
+    other = replace(decoding, seed=decoding.seed + random.getrandbits(60))
+    return HashConversation.text(self, other)
+
+
+@pytest.mark.parametrize(
+    ("able", "text", "clause"),
+    [
+        ("sampling", _asked_as("text", temperature=0.0), "no seed changes a reply at temperature"),
+        ("sampling", _text_drawn_anew, "the same seed does not give the same reply"),
+        ("choices", _asked_as("text", choices=()), "a reply is none of its choices"),
+    ],
+)
+def test_a_claim_that_does_not_hold_is_named(able, text, clause):
+    with pytest.raises(ContractError, match=clause):
+        check_adapter(_model(Capabilities(**{able: True}), text=text))
+
+
+def test_replies_that_hang_on_who_else_asks_are_named():
     flying = []
     lock = threading.Lock()
 
-    def text(self: Any, decoding: Decoding) -> str:
+    def text(self, decoding):
         with lock:
             flying.append(1)
         time.sleep(0.05)
@@ -367,16 +323,6 @@ def test_replies_that_hang_on_who_else_asks_are_named() -> None:
             flying.pop()
         return ("x" if crowd > 1 else "y") + HashConversation.text(self, decoding)[:-1]
 
-    check_adapter(_talking(Capabilities(), text=text))
+    check_adapter(_model(text=text))
     with pytest.raises(ContractError, match="at the same time differ"):
-        check_adapter(_talking(Capabilities(max_in_flight=4), text=text))
-
-
-def test_what_is_missing_is_named() -> None:
-    with pytest.raises(ContractError, match=r"object lacks a member of Model: .*tokens_per_frame"):
-        check_adapter(object())  # type: ignore[arg-type]
-    silent = type("Silent", (HashModel,), {"conversation": lambda self: Transcript()})()
-    with pytest.raises(
-        ContractError, match="Transcript lacks a member of Conversation: n_tokens, reply"
-    ):
-        check_adapter(silent)
+        check_adapter(_model(Capabilities(max_in_flight=4), text=text))

@@ -1,27 +1,22 @@
 """What a conversation feeds to the model and gets from it, against transformers' own plain path."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import pytest
 import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from PIL import Image
 
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Part, check_adapter, load
-from model_adapters.hf.prompting.prompt import token_ids
+from model_adapters import check_adapter, load
 
-from ..asking import up_to, user
+from ..asking import ask, require_same, talk_of, up_to, user
 
 NEW = 6
 
 
-def _inputs(model: Any, parts: Sequence[Part]) -> dict[str, torch.Tensor]:
+def _inputs(model, parts):
     """What transformers' processor makes of it: placeholders expanded in the text, then tokenised
     as a whole."""
     loaded = model._loaded
@@ -52,7 +47,7 @@ def _inputs(model: Any, parts: Sequence[Part]) -> dict[str, torch.Tensor]:
     }
 
 
-def _parts(frames: Sequence[FrameRef]) -> list[list[Part]]:
+def _parts(frames):
     return [
         [*frames[:4], "\nDid you see a mug?"],
         [
@@ -72,32 +67,18 @@ def _parts(frames: Sequence[FrameRef]) -> list[list[Part]]:
 
 
 @pytest.mark.parametrize("case", range(5))
-def test_ids_are_those_of_the_chat_template_on_the_whole(
-    tiny: Any, frames: list[FrameRef], case: int
-) -> None:
+def test_ids_and_replies_are_those_of_the_chat_template_on_the_whole_and_generate(
+    tiny, frames, case
+):
     parts = _parts(frames)[case]
-    talk = tiny.conversation()
-    talk.append(*parts)
-    expected = _inputs(tiny, parts)["input_ids"][0].tolist()
-    assert list(token_ids(tiny.pieces(talk.turns))) == expected
-    assert talk.n_tokens == len(expected)
-
-
-@pytest.mark.parametrize("case", range(5))
-def test_replies_are_those_of_generate(tiny: Any, frames: list[FrameRef], case: int) -> None:
-    parts = _parts(frames)[case]
-    talk = tiny.conversation()
-    talk.append(*parts)
     inputs = _inputs(tiny, parts)
-    output = tiny._loaded.model.generate(**inputs, do_sample=False, max_new_tokens=NEW)
-    new = output[0, inputs["input_ids"].shape[1] :].tolist()
-    ends = tiny._loaded.generation.end_ids
-    expected = next((new[:at] for at, token in enumerate(new) if token in ends), new)
-    assert list(talk.reply(up_to(NEW)).token_ids) == expected
+    output = tiny._loaded.model.generate(**inputs, do_sample=False, max_new_tokens=NEW)[0].tolist()
+    n = inputs["input_ids"].shape[1]
+    require_same(tiny, user(*parts), output[:n], output[n:], NEW)
 
 
-def test_logits_are_those_of_a_plain_forward_pass(tiny: Any, frames: list[FrameRef]) -> None:
-    parts: list[Part] = ["Goal.", *frames[:3], "\nWhat now?", frames[3], "so?"]
+def test_logits_are_those_of_a_plain_forward_pass(tiny, frames):
+    parts = ["Goal.", *frames[:3], "\nWhat now?", frames[3], "so?"]
     pieces = tiny.pieces(user(*parts))
     prefix = tiny._prefix
     prefix.reset()
@@ -109,9 +90,9 @@ def test_logits_are_those_of_a_plain_forward_pass(tiny: Any, frames: list[FrameR
     torch.testing.assert_close(logits, expected, atol=1e-4, rtol=1e-4)
 
 
-def test_a_penalised_reply_is_that_of_generate(frames: list[FrameRef]) -> None:
-    model: Any = load("qwen2.5-vl-tiny", {}, seed=1)
-    parts: list[Part] = [*frames[:2], "\nWhat do you see?"]
+def test_a_penalised_reply_is_that_of_generate(frames):
+    model = load("qwen2.5-vl-tiny", {}, seed=1)
+    parts = [*frames[:2], "\nWhat do you see?"]
     inputs = _inputs(model, parts)
     config = model._loaded.model.generation_config
     config.repetition_penalty = 1.3
@@ -120,11 +101,8 @@ def test_a_penalised_reply_is_that_of_generate(frames: list[FrameRef]) -> None:
     model._loaded = replace(
         model._loaded, generation=replace(model._loaded.generation, repetition_penalty=1.3)
     )
-    talk = model.conversation()
-    talk.append(*parts)
-    assert (
-        list(talk.reply(up_to(12)).token_ids) == output[0, inputs["input_ids"].shape[1] :].tolist()
-    )
+    new = output[0, inputs["input_ids"].shape[1] :].tolist()
+    assert list(ask(model, *parts, new=12).token_ids) == new
     assert model.identity()["generation"]["repetition_penalty"] == 1.3
 
 
@@ -148,10 +126,8 @@ STEPS = st.lists(
 
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(steps=STEPS)
-def test_sharing_changes_no_reply(
-    tiny: Any, plain: Any, frames: list[FrameRef], steps: list[Any]
-) -> None:
-    def play(model: Any) -> list[Any]:
+def test_sharing_changes_no_reply(tiny, plain, frames, steps):
+    def play(model):
         talk, marks, heard = model.conversation(), [], []
         for step, value in [*steps, ("reply", 3)]:
             if step == "text":
@@ -177,7 +153,7 @@ def test_sharing_changes_no_reply(
     assert play(tiny) == play(plain)
 
 
-def test_the_second_question_pays_for_itself_only(tiny: Any, frames: list[FrameRef]) -> None:
+def test_the_second_question_pays_for_itself_only(tiny, frames):
     talk = tiny.conversation()
     talk.append(*frames)
     start = talk.mark()
@@ -190,55 +166,43 @@ def test_the_second_question_pays_for_itself_only(tiny: Any, frames: list[FrameR
     assert again.n_context_tokens - again.n_cached_tokens < 20
 
 
-def test_other_conversations_share_frames_too(tiny: Any, frames: list[FrameRef]) -> None:
+def test_other_conversations_share_frames_too(tiny, frames):
     for expected in (False, True):
-        talk = tiny.conversation()
-        talk.append(*frames[::-1], "\nAgain?")
-        assert (talk.reply(up_to(1)).n_cached_tokens > 50) is expected
+        reply = ask(tiny, *frames[::-1], "\nAgain?", new=1)
+        assert (reply.n_cached_tokens > 50) is expected
 
 
-def test_without_sharing_nothing_is_cached(plain: Any, frames: list[FrameRef]) -> None:
+def test_without_sharing_nothing_is_cached(plain, frames):
     talk = plain.conversation()
     talk.append(*frames)
     assert [talk.reply(up_to(1)).n_cached_tokens for _ in range(2)] == [0, 0]
 
 
-def test_features_are_computed_once_per_frame(
-    frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    model: Any = load("qwen2.5-vl-tiny", {}, seed=0)
-    decoded: list[Path] = []
+def test_features_are_computed_once_per_frame(frames, monkeypatch):
+    model = load("qwen2.5-vl-tiny", {}, seed=0)
+    decoded = []
     whole = FrameRef.load
 
-    def counting(self: FrameRef) -> Image.Image:
+    def counting(self):
         decoded.append(self.path)
         return whole(self)
 
     monkeypatch.setattr(FrameRef, "load", counting)
     for order in ([0, 1, 2], [2, 1, 0], [0, 0, 1]):
-        talk = model.conversation()
-        talk.append(*(frames[index] for index in order), "?")
-        talk.reply(up_to(1))
+        ask(model, *(frames[index] for index in order), "?", new=1)
     assert sorted(decoded) == [frames[index].path for index in range(3)]
 
 
 @pytest.mark.parametrize("megabytes", ["0", "1"])
-def test_any_size_of_the_feature_cache_gives_the_same_reply(
-    plain: Any, frames: list[FrameRef], megabytes: str
-) -> None:
-    model: Any = load("qwen2.5-vl-tiny", {"feature_cache_mb": megabytes}, seed=0)
-    replies = []
-    for each in (model, plain):
-        talk = each.conversation()
-        talk.append(*frames, "\nWhat?")
-        replies.append(talk.reply(up_to(NEW)).token_ids)
+def test_any_size_of_the_feature_cache_gives_the_same_reply(plain, frames, megabytes):
+    model = load("qwen2.5-vl-tiny", {"feature_cache_mb": megabytes}, seed=0)
+    replies = [ask(each, *frames, "\nWhat?", new=NEW).token_ids for each in (model, plain)]
     assert replies[0] == replies[1]
     assert model._embed._features._bytes <= int(megabytes) * 2**20
 
 
-def test_stop_strings_end_the_reply(tiny: Any, frames: list[FrameRef]) -> None:
-    talk = tiny.conversation()
-    talk.append(frames[0], "\nSay something.")
+def test_stop_strings_end_the_reply(tiny, frames):
+    talk = talk_of(tiny, user(frames[0], "\nSay something."))
     whole = talk.reply(up_to(20))
     stop = whole.text[4:6]
     cut = talk.reply(up_to(20, stop=("never there", stop)))
@@ -247,8 +211,8 @@ def test_stop_strings_end_the_reply(tiny: Any, frames: list[FrameRef]) -> None:
     assert cut.token_ids == whole.token_ids[: len(cut.token_ids)]
 
 
-def test_too_long_a_context_gives_tokens_and_limit(frames: list[FrameRef]) -> None:
-    model: Any = load("qwen2.5-vl-tiny", {"max_tokens": "60"}, seed=0)
+def test_too_long_a_context_gives_tokens_and_limit(frames):
+    model = load("qwen2.5-vl-tiny", {"max_tokens": "60"}, seed=0)
     talk = model.conversation()
     talk.append(frames[0])
     talk.reply(up_to(4))
@@ -259,16 +223,14 @@ def test_too_long_a_context_gives_tokens_and_limit(frames: list[FrameRef]) -> No
         talk.reply(up_to(4))
 
 
-def test_max_tokens_is_the_checkpoints_or_the_options(tiny: Any) -> None:
+def test_max_tokens_is_the_checkpoints_or_the_options(tiny):
     assert tiny.capabilities.max_tokens == 128_000
-    assert load("qwen2.5-vl-tiny", {"max_tokens": "0"}, seed=0).capabilities.max_tokens is None  # type: ignore[union-attr]
+    assert load("qwen2.5-vl-tiny", {"max_tokens": "0"}, seed=0).capabilities.max_tokens is None
 
 
-def test_a_text_with_the_image_token_is_refused(tiny: Any, frames: list[FrameRef]) -> None:
-    talk = tiny.conversation()
-    talk.append(frames[0], "<|image_pad|>")
+def test_a_text_with_the_image_token_is_refused(tiny, frames):
     with pytest.raises(ModelError, match="2 image placeholders for 1 frames"):
-        talk.reply(up_to(1))
+        ask(tiny, frames[0], "<|image_pad|>", new=1)
 
 
 ERRORS = [
@@ -279,14 +241,14 @@ ERRORS = [
 
 @pytest.mark.parametrize("error", ERRORS)
 def test_out_of_memory_names_the_size_and_the_model_goes_on(
-    tiny: Any, plain: Any, frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch, error: Exception
-) -> None:
-    talk = tiny.conversation()
-    talk.append(*frames, "\nWhat?")
+    tiny, plain, frames, monkeypatch, error
+):
+    parts = (*frames, "\nWhat?")
+    talk = talk_of(tiny, user(*parts))
     forward = tiny._loaded.model.forward
     calls = []
 
-    def failing(*args: Any, **kwargs: Any) -> Any:
+    def failing(*args, **kwargs):
         calls.append(1)
         output = forward(*args, **kwargs)
         if len(calls) == 2:
@@ -299,20 +261,16 @@ def test_out_of_memory_names_the_size_and_the_model_goes_on(
         talk.reply(up_to(NEW))
     assert tiny._embed._features._bytes == tiny._prefix.n_tokens == 0
     monkeypatch.undo()
-    other = plain.conversation()
-    other.append(*talk.turns[0].parts)
-    assert talk.reply(up_to(NEW)).token_ids == other.reply(up_to(NEW)).token_ids
+    assert talk.reply(up_to(NEW)).token_ids == ask(plain, *parts, new=NEW).token_ids
 
 
-def test_an_interrupted_reply_leaves_nothing_half_encoded(
-    tiny: Any, plain: Any, frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    talk = tiny.conversation()
-    talk.append(*frames, "\nWhat?")
+def test_an_interrupted_reply_leaves_nothing_half_encoded(tiny, plain, frames, monkeypatch):
+    parts = (*frames, "\nWhat?")
+    talk = talk_of(tiny, user(*parts))
     last = tiny._loaded.model.model.language_model.layers[1]
     forward, calls = last.forward, []
 
-    def interrupted(*args: Any, **kwargs: Any) -> Any:
+    def interrupted(*args, **kwargs):
         calls.append(1)
         if len(calls) == 2:
             raise KeyboardInterrupt
@@ -324,18 +282,16 @@ def test_an_interrupted_reply_leaves_nothing_half_encoded(
     with pytest.raises(KeyboardInterrupt):
         talk.reply(up_to(NEW))
     monkeypatch.undo()
-    other = plain.conversation()
-    other.append(*talk.turns[0].parts)
-    assert talk.reply(up_to(NEW)).token_ids == other.reply(up_to(NEW)).token_ids
+    assert talk.reply(up_to(NEW)).token_ids == ask(plain, *parts, new=NEW).token_ids
 
 
-@pytest.mark.parametrize("content", [b"not an image", None])
+@pytest.mark.parametrize("damage", ["none", "not an image", "cut off in the middle"])
 def test_a_frame_that_cannot_be_read_is_a_data_error_and_the_model_goes_on(
-    tiny: Any, frames: list[FrameRef], tmp_path: Path, content: bytes | None
-) -> None:
+    tiny, frames, tmp_path, damage
+):
     path = tmp_path / "broken.png"
-    if content is not None:
-        path.write_bytes(content)
+    if damage != "none":
+        path.write_bytes(b"no" if "not" in damage else frames[1].path.read_bytes()[:-200])
     talk = tiny.conversation()
     talk.append(frames[0])
     start = talk.mark()
@@ -347,17 +303,5 @@ def test_a_frame_that_cannot_be_read_is_a_data_error_and_the_model_goes_on(
     assert talk.reply(up_to(NEW)).token_ids == before.token_ids
 
 
-def test_a_frame_cut_off_in_the_middle_is_a_data_error(
-    tiny: Any, frames: list[FrameRef], tmp_path: Path
-) -> None:
-    path = tmp_path / "cut.png"
-    path.write_bytes(frames[0].path.read_bytes()[:-200])
-    talk = tiny.conversation()
-    talk.append(frames[1], FrameRef(path))
-    with pytest.raises(DataError, match=r"cut\.png"):
-        talk.reply(up_to(NEW))
-
-
-def test_the_tiny_models_keep_their_contract(tiny: Any, plain: Any) -> None:
-    check_adapter(tiny)
+def test_the_model_without_sharing_keeps_its_contract(plain):
     check_adapter(plain, frame_size=(56, 56))

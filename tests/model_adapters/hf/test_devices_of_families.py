@@ -1,10 +1,7 @@
 """Families that people bring, on devices without devices: another device, two of them, a disk, and
 half precision."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import accelerate
 import pytest
@@ -12,11 +9,9 @@ import torch
 from accelerate.hooks import AlignDevicesHook, add_hook_to_module
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import load
 
 from ..asking import up_to
-from ..conftest import TinyFamily
 from ..elsewhere import Seen, elsewhere, move
 
 QUESTIONS = ("\nWhat?", "\nWhere was it?", "\nWho was there before that?")
@@ -33,38 +28,35 @@ BRING = (
 )
 TOGETHER = [(family, "3") for family in BRING]
 FIRST, SECOND = torch.device("meta", 0), torch.device("meta", 1)
-Ids = list[tuple[int, ...]]
 
 
-def _asked(model: Any, frames: Sequence[FrameRef], new: int = 4) -> Ids:
+def _asked(model, frames, new=4):
     talk = model.conversation()
     talk.append(*frames)
     return [reply.token_ids for reply in talk.replies([[text] for text in QUESTIONS], up_to(new))]
 
 
-def _load(folder: Path, batch_size: str = "3", **settings: str) -> Any:
+def _load(folder, batch_size="3", **settings):
     """A model that never ends its turn by itself."""
     options = {"pretrained": str(folder), "device": "cpu", "max_tokens": "0", "chunk_tokens": "40"}
-    model: Any = load("hf-vlm", {**options, "batch_size": batch_size, **settings}, seed=0)
+    model = load("hf-vlm", {**options, "batch_size": batch_size, **settings}, seed=0)
     generation = replace(model._loaded.generation, end_ids=frozenset())
     model._loaded = replace(model._loaded, generation=generation)
     return model
 
 
-def _forget(model: Any) -> None:
+def _forget(model):
     model._prefix.reset()
     model._embed.clear()
 
 
-def _decoder(model: Any) -> Any:
+def _decoder(model):
     decoder = model._loaded.model.get_decoder()
     return decoder if hasattr(decoder, "layers") else decoder.model  # Llama 4's has a head, too
 
 
 @pytest.mark.parametrize(("family", "batch_size"), [*TOGETHER, ("qwen3_vl", "1")])
-def test_on_another_device_a_token_is_read_once(
-    family: str, batch_size: str, tiny_family: TinyFamily, frames: list[FrameRef]
-) -> None:
+def test_on_another_device_a_token_is_read_once(family, batch_size, tiny_family, frames):
     model, seen = _load(tiny_family(family), batch_size), Seen()
     here = _asked(model, frames[:2], 8)
     _forget(model)
@@ -84,11 +76,11 @@ def test_on_another_device_a_token_is_read_once(
 class _Placed(AlignDevicesHook):
     """accelerate's hook, on a module whose weights are where they belong."""
 
-    def init_hook(self, module: torch.nn.Module) -> torch.nn.Module:
+    def init_hook(self, module):
         return module
 
 
-def _spread(model: Any, seen: Seen) -> None:
+def _spread(model, seen):
     """Place a model on two devices, as `device_map=auto` does: later layers, what follows them and
     a head of its own on the second one."""
     network, decoder = model._loaded.model, _decoder(model)
@@ -114,9 +106,7 @@ def _spread(model: Any, seen: Seen) -> None:
     ("family", "batch_size"),
     [*TOGETHER, ("qwen3_vl", "1"), ("qwen2_5_vl", "3"), ("llava_onevision", "3")],
 )
-def test_on_two_devices_replies_are_the_same(
-    family: str, batch_size: str, tiny_family: TinyFamily, frames: list[FrameRef]
-) -> None:
+def test_on_two_devices_replies_are_the_same(family, batch_size, tiny_family, frames):
     model, seen = _load(tiny_family(family), batch_size), Seen()
     here = _asked(model, frames[:2])
     _forget(model)
@@ -129,9 +119,7 @@ def test_on_two_devices_replies_are_the_same(
 
 
 @pytest.mark.parametrize("family", ["qwen2_5_vl", "gemma3"])
-def test_a_layer_that_has_no_room_is_read_from_the_disk(
-    family: str, tiny_family: TinyFamily, frames: list[FrameRef], tmp_path: Path
-) -> None:
+def test_a_layer_that_has_no_room_is_read_from_the_disk(family, tiny_family, frames, tmp_path):
     model = _load(tiny_family(family))
     here = _asked(model, frames[:2])
     _forget(model)
@@ -144,15 +132,13 @@ def test_a_layer_that_has_no_room_is_read_from_the_disk(
     assert _asked(model, frames[:2]) == here
 
 
-def test_no_room_for_the_embeddings_is_one_line(tiny_family: TinyFamily) -> None:
+def test_no_room_for_the_embeddings_is_one_line(tiny_family):
     with pytest.raises(ModelError, match=r"device_map=meta has no room for the embeddings of .*4"):
         _load(tiny_family("gemma3"), device_map="meta")
 
 
 @pytest.mark.parametrize("family", BRING)
-def test_half_precision_answers_the_same_every_time(
-    family: str, tiny_family: TinyFamily, frames: list[FrameRef]
-) -> None:
+def test_half_precision_answers_the_same_every_time(family, tiny_family, frames):
     model = _load(tiny_family(family), dtype="bfloat16")
     first = _asked(model, frames[:2])
     kept = {layer.keys.dtype for layer in model._prefix._cache.layers if hasattr(layer, "keys")}

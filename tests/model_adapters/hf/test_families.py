@@ -1,18 +1,12 @@
 """Every family by the same measure: the published tokens per frame, the contract, precision,
 refusals."""
 
-from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
-from typing import Any
-
 import pytest
-import torch
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
-from model_adapters import Part, check_adapter, load
+from model_adapters import check_adapter, load
 
-from ..asking import up_to, user
+from ..asking import ask, load_saved, talk_of, up_to, user
 from ..checkpoints import FAMILIES, twin
 
 TOKENS = {"qwen2.5-vl": 121 + 2, "llava-onevision": 1485, "deepseek-vl": 576, "pixtral": 380}
@@ -20,80 +14,52 @@ NEW = 6
 
 
 @pytest.fixture(scope="module")
-def scene(make_frames: Callable[..., list[FrameRef]]) -> list[FrameRef]:
+def scene(make_frames):
     return make_frames(3, 300, 300, seed=4)
 
 
 @pytest.fixture(scope="module", params=FAMILIES)
-def family(request: pytest.FixtureRequest) -> str:
+def family(request):
     return str(request.param)
 
 
 @pytest.fixture(scope="module")
-def model(family: str, checkpoints: dict[str, Path]) -> Iterator[Any]:
-    loaded: Any = load(family, {"pretrained": str(checkpoints[family]), "device": "cpu"}, seed=0)
+def model(family, checkpoints):
+    loaded = load_saved(family, checkpoints[family])
     yield loaded
     loaded.close()
 
 
-def _parts(scene: Sequence[FrameRef]) -> list[Part]:
-    return [
-        "Goal: wash the cup. ",
-        scene[0],
-        scene[1],
-        "MoveAhead",
-        scene[2],
-        "\nWhat do you see now?",
-    ]
+def _parts(scene):
+    words = ("Goal: wash the cup. ", "MoveAhead", "\nWhat do you see now?")
+    return [words[0], *scene[:2], words[1], scene[2], words[2]]
 
 
-def _ask(model: Any, parts: Sequence[Part]) -> Any:
-    talk = model.conversation()
-    talk.append(*parts)
-    return talk.reply(up_to(NEW))
-
-
-def test_a_frame_takes_the_published_number_of_tokens(
-    family: str, model: Any, scene: list[FrameRef]
-) -> None:
-    sizes = []
-    for count in (1, 2):
-        talk = model.conversation()
-        talk.append(*scene[:count])
-        sizes.append(talk.n_tokens)
+def test_a_frame_takes_the_published_number_of_tokens(family, model, scene):
+    sizes = [talk_of(model, user(*scene[:count])).n_tokens for count in (1, 2)]
     assert sizes[1] - sizes[0] == TOKENS[family]
     assert model.tokens_per_frame(scene[0]) == TOKENS[family] - (2 if family == "qwen2.5-vl" else 0)
 
 
-def test_the_tiny_model_is_the_saved_one_and_keeps_its_contract(
-    family: str, model: Any, scene: list[FrameRef]
-) -> None:
-    tiny: Any = load(f"{family}-tiny", {}, seed=0)
-    assert _ask(tiny, _parts(scene)).token_ids == _ask(model, _parts(scene)).token_ids
+def test_the_tiny_model_is_the_saved_one_and_keeps_its_contract(family, model, scene):
+    tiny = load(f"{family}-tiny", {}, seed=0)
+    replies = [ask(each, *_parts(scene), new=NEW) for each in (tiny, model)]
+    assert replies[0].token_ids == replies[1].token_ids
     check_adapter(tiny, frame_size=(200, 300))
 
 
-def test_half_precision_works(
-    family: str, checkpoints: dict[str, Path], scene: list[FrameRef]
-) -> None:
-    options = {"pretrained": str(checkpoints[family]), "dtype": "bfloat16", "device": "cpu"}
-    model: Any = load(family, options, seed=0)
-    pieces = model.pieces(user(scene[0], "?"))
-    assert model._prefix.feed(pieces).dtype == torch.bfloat16
-
-
-def test_a_family_refuses_the_others_checkpoints(family: str, checkpoints: dict[str, Path]) -> None:
+def test_a_family_refuses_the_others_checkpoints(family, checkpoints):
     other = next(name for name in FAMILIES if name != family)
     with pytest.raises(ModelError, match="checkpoint, not"):
-        load(family, {"pretrained": str(checkpoints[other])}, seed=0)
+        load_saved(family, checkpoints[other])
 
 
-def test_pixtral_refuses_another_llava(checkpoints: dict[str, Path], tmp_path: Path) -> None:
+def test_pixtral_refuses_another_llava(checkpoints, tmp_path):
     pixtral = twin("pixtral")
     vocabulary = {token: index for index, token in enumerate(("[IMG]", "<s>"))}
     tokenizer = pixtral.tokenizer()
     model = pixtral.model(tokenizer, pixtral.model_config(tokenizer), 0, "sdpa")
-    tokenizer.get_vocab = lambda: vocabulary  # type: ignore[method-assign]
+    tokenizer.get_vocab = lambda: vocabulary
     with pytest.raises(ModelError, match=r"no \[IMG_BREAK\] or no \[IMG_END\]"):
         pixtral.family(model, pixtral.image_processor(), tokenizer)
     model.config.vision_config.model_type = "clip_vision_model"
@@ -101,18 +67,12 @@ def test_pixtral_refuses_another_llava(checkpoints: dict[str, Path], tmp_path: P
         pixtral.family(model, pixtral.image_processor(), tokenizer)
 
 
-def test_frames_stay_between_texts_though_the_template_writes_images_first(
-    frames: list[FrameRef],
-) -> None:
+def test_frames_stay_between_texts_though_the_template_writes_images_first(frames):
     model = load("llava-onevision-tiny", {}, seed=0)
     pieces = model.pieces(user("Goal: wash. ", frames[0], "MoveAhead. ", frames[1], "What now?"))
-    ids = [
-        piece
-        if isinstance(piece, int)
-        else model._loaded.tokenizer.convert_tokens_to_ids("<image>")
-        for piece in pieces
-    ]
-    written = model._loaded.tokenizer.decode(ids)
+    tokenizer = model._loaded.tokenizer
+    image = tokenizer.convert_tokens_to_ids("<image>")
+    written = tokenizer.decode([piece if isinstance(piece, int) else image for piece in pieces])
     assert "Goal: wash. <image>MoveAhead. <image>What now?" in written
     talk = model.conversation()
     talk.append("Goal: wash. ", frames[0], "MoveAhead. ")

@@ -1,20 +1,14 @@
 """One user turn that grows by actions and frames, as agents are asked: nothing in it is encoded
 twice."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
-from typing import Any
 
 import pytest
 import torch
 from transformers import AutoModelForImageTextToText, AutoTokenizer
 
-from infthor_eval.formats.frames import FrameRef
-from model_adapters import Part, load
-from model_adapters.hf.family import Family
-from model_adapters.tiny.twin import Twin
+from model_adapters import load
 
 from ..asking import up_to
 from ..checkpoints import FAMILIES, twin
@@ -33,17 +27,15 @@ TAIL = 24
 CASES = {"greedy": up_to(10, stop=STOP), "drawn": up_to(10, stop=STOP, temperature=1.0, seed=5)}
 
 
-def _steps(frames: Sequence[FrameRef], n: int) -> Iterator[list[Part]]:
+def _steps(frames, n):
     """What is appended before each of n replies."""
     yield [GOAL, frames[0], PLAN]
     for step in range(1, n):
         yield [f"{ACTIONS[step % 5]}<|act|>", frames[step % len(frames)], "<|act|>"]
 
 
-def _small_vision(
-    config: Callable[[Mapping[str, int], int], Any],
-) -> Callable[[Mapping[str, int], int], Any]:
-    def smaller(ids: Mapping[str, int], vocab_size: int) -> Any:
+def _small_vision(config):
+    def smaller(ids, vocab_size):
         small_config = config(ids, vocab_size)
         small_config.vision_config.image_size = 56
         small_config.image_grid_pinpoints = [[56, 56]]
@@ -52,7 +44,7 @@ def _small_vision(
     return smaller
 
 
-def _small(family: str) -> Twin:
+def _small(family):
     """A twin whose frames take few tokens, for many of them."""
     usual = twin(family)
     if family != "llava-onevision":
@@ -62,11 +54,11 @@ def _small(family: str) -> Twin:
     return replace(usual, config=_small_vision(usual.config), image_settings=settings)
 
 
-def _add_tokens(folder: Path) -> None:
+def _add_tokens(folder):
     """Add the tokens of plans as a fine-tuning does, and make the model say the one that ends an
     action often."""
-    tokenizer: Any = AutoTokenizer.from_pretrained(folder)
-    model: Any = AutoModelForImageTextToText.from_pretrained(folder)
+    tokenizer = AutoTokenizer.from_pretrained(folder)
+    model = AutoModelForImageTextToText.from_pretrained(folder)
     assert tokenizer.add_special_tokens({"additional_special_tokens": list(TOKENS)}) == len(TOKENS)
     torch.manual_seed(0)
     model.resize_token_embeddings(len(tokenizer), mean_resizing=False)
@@ -77,7 +69,7 @@ def _add_tokens(folder: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], Path]:
+def folders(tmp_path_factory):
     """Checkpoints of two families, with the usual tokenizer and with one that has the tokens of
     plans."""
     root = tmp_path_factory.mktemp("growing")
@@ -90,7 +82,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], P
     return by_family
 
 
-def _load(folders: Mapping[tuple[str, str], Path], family: str, tokens: str, **options: str) -> Any:
+def _load(folders, family, tokens, **options):
     defaults = {
         "pretrained": str(folders[family, tokens]),
         "device": "cpu",
@@ -100,9 +92,7 @@ def _load(folders: Mapping[tuple[str, str], Path], family: str, tokens: str, **o
     return load(family, {**defaults, **options}, seed=0)
 
 
-def _play(
-    model: Any, frames: Sequence[FrameRef], n: int, decoding: Any, every: int = 1
-) -> list[Any]:
+def _play(model, frames, n, decoding, every=1):
     """The replies after every so many of n steps, the last one among them."""
     talk, replies = model.conversation(), []
     for step, parts in enumerate(_steps(frames, n), start=1):
@@ -117,13 +107,8 @@ def _play(
 @pytest.mark.parametrize("tokens", ["usual", "added"])
 @pytest.mark.parametrize("family", ["qwen2.5-vl", "llava-onevision"])
 def test_replies_are_those_of_a_model_that_shares_nothing(
-    folders: dict[tuple[str, str], Path],
-    frames: list[FrameRef],
-    family: str,
-    tokens: str,
-    prompt: str,
-    decoding: str,
-) -> None:
+    folders, frames, family, tokens, prompt, decoding
+):
     shared, alone = (
         _play(
             _load(folders, family, tokens, prompt=prompt, share_prefix=share),
@@ -154,22 +139,22 @@ def test_replies_are_those_of_a_model_that_shares_nothing(
 class _Counting:
     """A family that counts the frames that are given positions: those that are encoded."""
 
-    def __init__(self, family: Family) -> None:
+    def __init__(self, family):
         self._family = family
         self.n_frames = 0
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name):
         return getattr(self._family, name)
 
-    def positions(self, ids: torch.Tensor, sizes: Sequence[Any], start: int) -> torch.Tensor:
+    def positions(self, ids, sizes, start):
         self.n_frames += len(sizes)
         return self._family.positions(ids, sizes, start)
 
 
 @pytest.mark.parametrize("prompt", ["plain", "chat"])
 @pytest.mark.parametrize("family", FAMILIES)
-def test_every_frame_is_encoded_once(family: str, prompt: str, frames: list[FrameRef]) -> None:
-    model: Any = load(f"{family}-tiny", {"prompt": prompt, "max_tokens": "0"}, seed=0)
+def test_every_frame_is_encoded_once(family, prompt, frames):
+    model = load(f"{family}-tiny", {"prompt": prompt, "max_tokens": "0"}, seed=0)
     counting = _Counting(model._loaded.family)
     model._embed._family = counting
     replies = _play(model, frames, 8, CASES["greedy"])

@@ -1,27 +1,23 @@
 """The requests of every context, by every family and in every mode: replies are those of encoding
 everything alone."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import pytest
 import torch
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Conversation, Part, Transcript, Turn, load
-from model_adapters.hf.prompting.prompt import token_ids
+from model_adapters import Part, Transcript
 
-from ..asking import up_to, user
+from ..asking import load_saved, require_same, talk_of, up_to, user
 from ..checkpoints import FAMILIES
 
 NEW = 5
 ADAPTERS = {family: family for family in FAMILIES} | dict.fromkeys(
     ("llava", "idefics3", "deepseek-vl-1.3b"), "hf-vlm"
 )
-MODES: dict[str, dict[str, str]] = {
+MODES = {
     "shared": {"batch_size": "1"},
     "chunked": {"batch_size": "1", "chunk_tokens": "50"},
     "offloaded": {"kv_offload": "true"},
@@ -38,7 +34,7 @@ class Shape:
 
 
 @pytest.fixture(scope="module")
-def shapes(make_frames: Callable[..., list[FrameRef]]) -> dict[str, list[Shape]]:
+def shapes(make_frames):
     """In the order in which a run comes to them: each is left for the next with its prefix still
     encoded."""
     frames = make_frames(7, seed=3)
@@ -63,26 +59,21 @@ def shapes(make_frames: Callable[..., list[FrameRef]]) -> dict[str, list[Shape]]
 
 
 @pytest.fixture(scope="module", params=ADAPTERS)
-def family(request: pytest.FixtureRequest) -> str:
+def family(request):
     return str(request.param)
 
 
 @pytest.fixture(scope="module")
-def build(family: str, checkpoints: dict[str, Path]) -> Callable[[Mapping[str, str]], Any]:
-    def build(options: Mapping[str, str]) -> Any:
-        defaults = {
-            "pretrained": str(checkpoints[family]),
-            "device": "cpu",
-            "dtype": "float32",
-            "max_tokens": "0",
-        }
-        return load(ADAPTERS[family], {**defaults, **options}, seed=0)
+def build(family, checkpoints):
+    def build(options):
+        given = {"dtype": "float32", "max_tokens": 0, **options}
+        return load_saved(ADAPTERS[family], checkpoints[family], **given)
 
     return build
 
 
 @pytest.fixture(scope="module")
-def alone(build: Callable[[Mapping[str, str]], Any]) -> Iterator[Any]:
+def alone(build):
     """The family's model without sharing; of hf-vlm, transformers' own processor and generate."""
     model = build({"share_prefix": "false", "chunk_tokens": "1000000"})
     yield model
@@ -90,18 +81,18 @@ def alone(build: Callable[[Mapping[str, str]], Any]) -> Iterator[Any]:
 
 
 @pytest.fixture(scope="module")
-def expected(alone: Any, shapes: dict[str, list[Shape]]) -> dict[str, list[Any]]:
+def expected(alone, shapes):
     return {name: _ask(alone, alone.conversation(), listed) for name, listed in shapes.items()}
 
 
-def _prompt(shape: Shape) -> tuple[Turn, ...]:
+def _prompt(shape):
     """The context with its first question, as a conversation has it: texts that touch are one."""
     talk = Transcript()
     talk.append(*shape.context, shape.questions[0])
     return talk.turns
 
 
-def _ask(model: Any, talk: Any, shapes: Sequence[Shape]) -> list[Any]:
+def _ask(model, talk, shapes):
     """Ids and context tokens of all replies, asked for as a run asks: one conversation, rewound."""
     start, heard = talk.mark(), []
     for shape in shapes:
@@ -119,54 +110,39 @@ def _ask(model: Any, talk: Any, shapes: Sequence[Shape]) -> list[Any]:
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_replies_are_those_of_encoding_everything_for_each(
-    build: Callable[[Mapping[str, str]], Any],
-    shapes: dict[str, list[Shape]],
-    expected: dict[str, list[Any]],
-    mode: str,
-) -> None:
+def test_replies_are_those_of_encoding_everything_for_each(build, shapes, expected, mode):
     model = build(MODES[mode])
+    if "batch_size" in MODES[mode]:
+        assert model.capabilities.batch_size == int(MODES[mode]["batch_size"])
     talk = model.conversation()
     assert {name: _ask(model, talk, listed) for name, listed in shapes.items()} == expected
     model.close()
 
 
-def test_replies_depend_on_the_request(expected: dict[str, list[Any]]) -> None:
+def test_replies_depend_on_the_request(expected):
     replies = [ids for heard in expected.values() for ids, _ in heard]
     assert len(set(replies)) > len(replies) / 2
 
 
 @pytest.fixture(scope="module")
-def plainly(
-    checkpoints: dict[str, Path], shapes: dict[str, list[Shape]], answer_plainly: Any
-) -> dict[Path, list[Any]]:
+def plainly(checkpoints, shapes, answer_plainly):
     """What transformers makes of the first question of each shape."""
     prompts = [_prompt(listed[0]) for listed in shapes.values()]
     return answer_plainly({checkpoints[name]: prompts for name in ADAPTERS}, NEW)
 
 
 def test_ids_and_replies_are_those_of_transformers_own_processor_and_generate(
-    family: str,
-    build: Callable[[Mapping[str, str]], Any],
-    shapes: dict[str, list[Shape]],
-    checkpoints: dict[str, Path],
-    plainly: dict[Path, list[Any]],
-) -> None:
+    family, build, shapes, checkpoints, plainly
+):
     model = build({"chunk_tokens": "50"})
     for listed, (ids, reply) in zip(shapes.values(), plainly[checkpoints[family]], strict=True):
-        prompt = _prompt(listed[0])
-        assert list(token_ids(model.pieces(prompt))) == ids
-        talk = model.conversation()
-        talk.append(*prompt[0].parts)
-        answer = list(talk.reply(up_to(NEW)).token_ids)
-        assert answer == reply[: len(answer)]
-        assert reply[len(answer) :] == [] or reply[len(answer)] in model._loaded.generation.end_ids
+        require_same(model, _prompt(listed[0]), ids, reply, NEW)
 
 
-def _received(model: Any, talk: Conversation) -> tuple[int, int, int]:
+def _received(model, talk):
     """Of one reply: the tokens that had been encoded before, and the tokens and positions that
     reach the text model."""
-    fed: list[dict[str, Any]] = []
+    fed = []
     text_model = model._loaded.model.get_decoder()
     hook = text_model.register_forward_pre_hook(
         lambda _, args, kwargs: fed.append(kwargs), with_kwargs=True
@@ -178,22 +154,17 @@ def _received(model: Any, talk: Conversation) -> tuple[int, int, int]:
 
 
 @pytest.mark.parametrize("mode", ["alone", "chunked"])
-def test_the_model_receives_as_many_tokens_as_were_counted(
-    build: Callable[[Mapping[str, str]], Any], alone: Any, shapes: dict[str, list[Shape]], mode: str
-) -> None:
+def test_the_model_receives_as_many_tokens_as_were_counted(build, alone, shapes, mode):
     model = alone if mode == "alone" else build(MODES[mode])
     for listed in shapes.values():
-        talk = model.conversation()
-        talk.append(*_prompt(listed[0])[0].parts)
+        talk = talk_of(model, _prompt(listed[0]))
         n_cached, n_fed, n_positions = _received(model, talk)
         assert n_cached + n_fed == talk.n_tokens
         assert n_positions == n_fed
         assert n_cached == 0 or mode != "alone"
 
 
-def test_a_black_and_a_white_frame_give_different_logits(
-    build: Callable[[Mapping[str, str]], Any], tmp_path: Path
-) -> None:
+def test_a_black_and_a_white_frame_give_different_logits(build, tmp_path):
     model = build({})
     logits = []
     for colour in ("black", "white"):

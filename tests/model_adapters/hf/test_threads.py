@@ -1,21 +1,17 @@
 """Tiny and small models compute on one torch thread; other models and the process keep theirs."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import pytest
 import torch
 
 from infthor_eval.errors import UsageError
-from infthor_eval.formats.frames import FrameRef
-from model_adapters import Part, load, options
+from model_adapters import load, options
 from model_adapters.hf.global_settings import torch_threads
 
 from ..asking import up_to
 
 
 @pytest.fixture(autouse=True)
-def two_threads() -> Iterator[None]:
+def two_threads():
     """A process with two torch threads."""
     before = torch.get_num_threads()
     torch.set_num_threads(2)
@@ -23,7 +19,7 @@ def two_threads() -> Iterator[None]:
     torch.set_num_threads(before)
 
 
-def _threads_of(network: torch.nn.Module, use: Any) -> set[int]:
+def _threads_of(network, use):
     counts = set()
     hooks = [
         part.register_forward_pre_hook(lambda *_: counts.add(torch.get_num_threads()))
@@ -45,13 +41,11 @@ def _threads_of(network: torch.nn.Module, use: Any) -> set[int]:
         ("llava-onevision-tiny", {}, 1),
     ],
 )
-def test_a_model_computes_on_its_threads(
-    name: str, model_options: dict[str, str], expected: int, frames: list[FrameRef]
-) -> None:
-    model: Any = load(name, model_options, seed=0)
+def test_a_model_computes_on_its_threads(name, model_options, expected, frames):
+    model = load(name, model_options, seed=0)
 
-    def use() -> None:
-        parts: tuple[Part, ...] = (frames[0], "\nWhat is it?")
+    def use():
+        parts = (frames[0], "\nWhat is it?")
         talk = model.conversation()
         talk.append(*parts)
         assert talk.n_tokens
@@ -66,26 +60,24 @@ def test_a_model_computes_on_its_threads(
     ("name", "model_options", "expected"),
     [("openvla-tiny", {}, 1), ("spatialvla-tiny", {"threads": "2"}, 2)],
 )
-def test_a_policy_acts_on_its_threads(
-    name: str, model_options: dict[str, str], expected: int, frames: list[FrameRef]
-) -> None:
-    policy: Any = load(name, model_options, seed=0)
+def test_a_policy_acts_on_its_threads(name, model_options, expected, frames):
+    policy = load(name, model_options, seed=0)
     threads = _threads_of(policy._network.weights, lambda: policy.act(frames[0], "pick up the mug"))
     assert threads == {expected}
     assert torch.get_num_threads() == 2
 
 
-def test_replies_do_not_depend_on_the_number_of_threads(frames: list[FrameRef]) -> None:
+def test_replies_do_not_depend_on_the_number_of_threads(frames):
     replies = []
     for threads in ("1", "2"):
-        model: Any = load("qwen2.5-vl-nano", {"threads": threads}, seed=0)
+        model = load("qwen2.5-vl-nano", {"threads": threads}, seed=0)
         talk = model.conversation()
         talk.append(*frames, "\nHave you seen a mug?")
         replies.append(talk.reply(up_to(8)))
     assert replies[0] == replies[1]
 
 
-def test_other_models_take_the_threads_of_the_process_unless_they_are_given_some() -> None:
+def test_other_models_take_the_threads_of_the_process_unless_they_are_given_some():
     assert "threads=none" in options("qwen2.5-vl")
     assert "threads=1" in options("qwen2.5-vl-tiny")
     with torch_threads(None):

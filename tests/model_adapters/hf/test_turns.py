@@ -1,17 +1,12 @@
 """Conversations of several turns, against transformers' own chat template, processor and
 generate."""
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import Turn, load
 
-from ..asking import require_same, talk_of, up_to
+from ..asking import load_saved, require_same, talk_of, up_to
 from ..checkpoints import FAMILIES
 
 NEW = 6
@@ -21,7 +16,7 @@ ADAPTERS = {family: family for family in FAMILIES} | dict.fromkeys(
 
 
 @pytest.fixture(scope="module")
-def conversations(frames: list[FrameRef]) -> list[tuple[Turn, ...]]:
+def conversations(frames):
     return [
         (
             Turn("user", (*frames[:2], "\nWhat is it?")),
@@ -40,41 +35,26 @@ def conversations(frames: list[FrameRef]) -> list[tuple[Turn, ...]]:
 
 
 @pytest.fixture(scope="module")
-def plainly(
-    checkpoints: dict[str, Path], conversations: list[tuple[Turn, ...]], answer_plainly: Any
-) -> dict[Path, list[Any]]:
+def plainly(checkpoints, conversations, answer_plainly):
     return answer_plainly({checkpoints[name]: conversations for name in ADAPTERS}, NEW)
-
-
-def _load(name: str, checkpoints: Mapping[str, Path], **options: str) -> Any:
-    defaults = {
-        "pretrained": str(checkpoints[name]),
-        "device": "cpu",
-        "dtype": "float32",
-        "max_tokens": "0",
-    }
-    return load(ADAPTERS[name], {**defaults, **options}, seed=0)
 
 
 @pytest.mark.parametrize("name", ADAPTERS)
 @pytest.mark.parametrize("share_prefix", ["true", "false"])
 def test_ids_and_replies_are_those_of_transformers(
-    name: str,
-    share_prefix: str,
-    checkpoints: dict[str, Path],
-    conversations: list[tuple[Turn, ...]],
-    plainly: dict[Path, list[Any]],
-) -> None:
-    model = _load(name, checkpoints, share_prefix=share_prefix, chunk_tokens="50")
+    name, share_prefix, checkpoints, conversations, plainly
+):
+    options = {"dtype": "float32", "max_tokens": 0, "chunk_tokens": 50}
+    model = load_saved(ADAPTERS[name], checkpoints[name], share_prefix=share_prefix, **options)
     for turns, (ids, reply) in zip(conversations, plainly[checkpoints[name]], strict=True):
         require_same(model, turns, ids, reply, NEW)
     model.close()
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_every_round_encodes_what_is_new_in_it_only(family: str, frames: list[FrameRef]) -> None:
-    shared: Any = load(f"{family}-tiny", {"chunk_tokens": "40"}, seed=0)
-    alone: Any = load(f"{family}-tiny", {"share_prefix": "false"}, seed=0)
+def test_every_round_encodes_what_is_new_in_it_only(family, frames):
+    shared = load(f"{family}-tiny", {"chunk_tokens": "40"}, seed=0)
+    alone = load(f"{family}-tiny", {"share_prefix": "false"}, seed=0)
     talk, other = shared.conversation(), alone.conversation()
     n_context, cached = 0, []
     for frame, action in zip(
@@ -95,7 +75,7 @@ def test_every_round_encodes_what_is_new_in_it_only(family: str, frames: list[Fr
     assert cached[-1] > 3 * shared.tokens_per_frame(frames[0])
 
 
-def test_batches_go_on_from_several_turns(conversations: list[tuple[Turn, ...]]) -> None:
+def test_batches_go_on_from_several_turns(conversations):
     results = []
     for size in ("1", "3"):
         talk = talk_of(load("qwen2.5-vl-tiny", {"batch_size": size}, seed=0), conversations[1][:-1])
@@ -107,7 +87,7 @@ def test_batches_go_on_from_several_turns(conversations: list[tuple[Turn, ...]])
 
 
 @pytest.mark.parametrize("role", ["system", "assistant"])
-def test_only_a_users_turn_is_replied_to(tiny: Any, role: Any) -> None:
+def test_only_a_users_turn_is_replied_to(tiny, role):
     talk = tiny.conversation()
     for _ in range(2):
         with pytest.raises(

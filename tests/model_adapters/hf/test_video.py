@@ -3,15 +3,12 @@ processor and `generate`."""
 
 import gzip
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 import torch
 
 from infthor_eval.errors import DataError, ModelError
-from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.pictures.video import FILM_FPS, sample_positions
 from model_adapters import Video, load
 from model_adapters.hf.family import ClipShape
@@ -24,13 +21,13 @@ MARKERS = 2  # around a video of Qwen2.5-VL
 
 
 @pytest.fixture(scope="module")
-def published(make_frames: Callable[..., list[FrameRef]]) -> FrameRef:
+def published(make_frames):
     """A frame of the published size."""
     (frame,) = make_frames(1, 300, 300)
     return frame
 
 
-def vision_tokens(model: Any, video: Video) -> int:
+def vision_tokens(model, video):
     talk = model.conversation()
     talk.append(QUESTION)
     without = talk.n_tokens
@@ -38,13 +35,13 @@ def vision_tokens(model: Any, video: Video) -> int:
     return int(talk.n_tokens) - int(without)
 
 
-def published_tokens(n_frames: int, fps: int) -> int:
+def published_tokens(n_frames, fps):
     """Vision tokens of the published logs of video input: counted there, of every trajectory."""
     return 144 * (n_frames * fps // 10 // 2)
 
 
 @pytest.fixture(scope="module")
-def tokens_of_sampled(tiny: Any, published: FrameRef) -> dict[int, int]:
+def tokens_of_sampled(tiny, published):
     """Vision tokens of a request, without markers, by the number of sampled frames."""
     talk = tiny.conversation()
     talk.append(QUESTION)
@@ -57,9 +54,7 @@ def tokens_of_sampled(tiny: Any, published: FrameRef) -> dict[int, int]:
 
 
 @pytest.mark.parametrize("fps", [1, 2])
-def test_a_film_takes_the_published_number_of_tokens_whatever_its_length(
-    tokens_of_sampled: dict[int, int], fps: int
-) -> None:
+def test_a_film_takes_the_published_number_of_tokens_whatever_its_length(tokens_of_sampled, fps):
     for n_frames in range(570, 1224):
         sampled = sample_positions(n_frames, FILM_FPS, fps)
         assert tokens_of_sampled[len(sampled)] == published_tokens(n_frames, fps), n_frames
@@ -67,9 +62,7 @@ def test_a_film_takes_the_published_number_of_tokens_whatever_its_length(
 
 
 @pytest.mark.skipif(not LOGS.is_dir(), reason="the published logs are not at ../shared/data")
-def test_every_published_trajectory_takes_its_number_of_tokens(
-    tokens_of_sampled: dict[int, int],
-) -> None:
+def test_every_published_trajectory_takes_its_number_of_tokens(tokens_of_sampled):
     n_frames = {}
     for log in LOGS.glob("*_full_traj.log.gz"):
         with gzip.open(log, "rt") as lines:
@@ -83,8 +76,8 @@ def test_every_published_trajectory_takes_its_number_of_tokens(
             ), traj_id
 
 
-def test_a_frame_of_a_video_takes_196_tokens_of_llava_onevision(published: FrameRef) -> None:
-    model: Any = load("llava-onevision-tiny", {}, seed=0)
+def test_a_frame_of_a_video_takes_196_tokens_of_llava_onevision(published):
+    model = load("llava-onevision-tiny", {}, seed=0)
     assert [vision_tokens(model, Video((published,) * n, 1.0)) for n in (1, 2, 56)] == [
         197,
         393,
@@ -94,8 +87,8 @@ def test_a_frame_of_a_video_takes_196_tokens_of_llava_onevision(published: Frame
 
 
 def test_replies_are_those_of_the_whole_processor_and_generate(
-    checkpoints: dict[str, Path], answer_plainly: Any, make_frames: Callable[..., list[FrameRef]]
-) -> None:
+    checkpoints, answer_plainly, make_frames
+):
     """Frames have the size that they are scaled to, as PIL and torchvision scale differently.
 
     Eight frames a second, so that no time of Qwen2.5-VL's clips is beyond their rows, where
@@ -118,15 +111,13 @@ def test_replies_are_those_of_the_whole_processor_and_generate(
         {checkpoints[family]: turns for family, turns in requests.items()}, new
     )
     for family, turns in requests.items():
-        model: Any = load(family, {"pretrained": str(checkpoints[family]), "device": "cpu"}, seed=0)
+        model = load(family, {"pretrained": str(checkpoints[family]), "device": "cpu"}, seed=0)
         for one, (ids, reply) in zip(turns, answers[checkpoints[family]], strict=True):
             require_same(model, one, ids, reply, new)
         model.close()
 
 
-def test_sharing_and_chunks_change_no_reply(
-    tiny: Any, plain: Any, make_frames: Callable[..., list[FrameRef]]
-) -> None:
+def test_sharing_and_chunks_change_no_reply(tiny, plain, make_frames):
     frames = make_frames(4, 300, 300)
     films = [Video(tuple(frames), 1.0), Video(tuple(frames[:2]), 1.0), Video(tuple(frames), 0.5)]
     requests = [(video, f"\nIs there a {name}?") for video in films for name in ("mug", "bed")]
@@ -147,9 +138,7 @@ def test_sharing_and_chunks_change_no_reply(
     assert two.n_cached_tokens >= 2 * 144
 
 
-def test_the_rate_and_the_order_of_frames_change_the_prompt(
-    tiny: Any, frames: list[FrameRef]
-) -> None:
+def test_the_rate_and_the_order_of_frames_change_the_prompt(tiny, frames):
     videos = [
         Video(tuple(frames), 1.0),
         Video(tuple(frames), 2.0),
@@ -159,7 +148,7 @@ def test_the_rate_and_the_order_of_frames_change_the_prompt(
     assert first not in others
 
 
-def test_two_equal_frames_have_the_features_of_their_image(tiny: Any, published: FrameRef) -> None:
+def test_two_equal_frames_have_the_features_of_their_image(tiny, published):
     family, image = tiny._loaded.family, published.load()
     shape = ClipShape(image.size, 0, 1, 2.0)
     with torch.inference_mode():
@@ -168,7 +157,7 @@ def test_two_equal_frames_have_the_features_of_their_image(tiny: Any, published:
     torch.testing.assert_close(clip, still, atol=1e-3, rtol=1e-3)
 
 
-def test_positions_count_the_time_of_a_video_and_go_on_behind_it(tiny: Any) -> None:
+def test_positions_count_the_time_of_a_video_and_go_on_behind_it(tiny):
     """By hand: two rows and columns, four positions a second, clips two seconds apart, text before
     and behind."""
     family = tiny._loaded.family
@@ -183,14 +172,14 @@ def test_positions_count_the_time_of_a_video_and_go_on_behind_it(tiny: Any) -> N
     assert positions[2].tolist() == [0, 1, *[2 + at % side for at in range(n)] * 3, 19]
 
 
-def test_a_models_own_token_of_a_video_has_the_position_of_a_text(tiny: Any) -> None:
+def test_a_models_own_token_of_a_video_has_the_position_of_a_text(tiny):
     placeholder = tiny._loaded.family.video.placeholder_id
     assert tiny._loaded.family.positions(torch.tensor([placeholder]), [], 7).tolist() == [[[7]]] * 3
 
 
-def test_models_without_a_video_input_refuse_videos(frames: list[FrameRef]) -> None:
+def test_models_without_a_video_input_refuse_videos(frames):
     for name in ("pixtral-tiny", "qwen2.5-vl-nano"):
-        model: Any = load(name, {}, seed=0)
+        model = load(name, {}, seed=0)
         talk = model.conversation()
         talk.append(Video(tuple(frames), 1.0), QUESTION)
         with pytest.raises(
@@ -200,23 +189,21 @@ def test_models_without_a_video_input_refuse_videos(frames: list[FrameRef]) -> N
         model.close()
 
 
-def test_a_plain_prompt_has_videos_too(frames: list[FrameRef]) -> None:
-    model: Any = load("qwen2.5-vl-tiny", {"prompt": "plain"}, seed=0)
+def test_a_plain_prompt_has_videos_too(frames):
+    model = load("qwen2.5-vl-tiny", {"prompt": "plain"}, seed=0)
     assert model.capabilities.video_input
     assert vision_tokens(model, Video(tuple(frames), 1.0)) == 3 * 144 + MARKERS
     model.close()
 
 
-def test_a_text_with_the_token_of_a_video_is_refused(tiny: Any) -> None:
+def test_a_text_with_the_token_of_a_video_is_refused(tiny):
     with pytest.raises(
         ModelError, match=r"1 video placeholders for 0 videos; a text must not contain .*video_pad"
     ):
         tiny.pieces(user("<|video_pad|> what?"))
 
 
-def test_frames_of_a_video_have_one_size(
-    tiny: Any, published: FrameRef, make_frames: Callable[..., list[FrameRef]]
-) -> None:
+def test_frames_of_a_video_have_one_size(tiny, published, make_frames):
     (other,) = make_frames(1, 200, 300)
     with pytest.raises(
         DataError,
@@ -225,7 +212,7 @@ def test_frames_of_a_video_have_one_size(
         tiny.pieces(user(Video((published, other), 1.0), "?"))
 
 
-def test_the_pixels_of_long_videos_are_shared_by_their_frames(tiny: Any) -> None:
+def test_the_pixels_of_long_videos_are_shared_by_their_frames(tiny):
     """By hand from qwen-vl-utils: of 768 frames, each has 128000 * 28 * 28 * 0.9 * 2 / 768 pixels:
     300 tokens."""
     large = (1400, 1400)

@@ -2,7 +2,6 @@
 
 import threading
 import time
-from collections.abc import Callable
 
 import pytest
 
@@ -12,11 +11,11 @@ from model_adapters.human.desk import Answer, Desk, Inquiry, ScreenClock, StaleE
 ASKED = Inquiry((Turn("user", ("Where is the mug?",)),), Decoding(max_new_tokens=5), Notice())
 
 
-def asking(desk: Desk) -> tuple[threading.Thread, list[object]]:
+def asking(desk):
     """Ask in a thread; the answer, or the type of the error, comes into a list."""
-    answers: list[object] = []
+    answers = []
 
-    def ask() -> None:
+    def ask():
         try:
             answers.append(desk.ask(ASKED))
         except KeyboardInterrupt as error:
@@ -28,7 +27,7 @@ def asking(desk: Desk) -> tuple[threading.Thread, list[object]]:
     return thread, answers
 
 
-def until(holds: Callable[[], bool]) -> None:
+def until(holds):
     for _ in range(1000):
         if holds():
             return
@@ -36,7 +35,7 @@ def until(holds: Callable[[], bool]) -> None:
     pytest.fail("it never came to hold")
 
 
-def test_a_question_waits_for_its_answer_and_is_gone_then() -> None:
+def test_a_question_waits_for_its_answer_and_is_gone_then():
     desk = Desk()
     thread, answers = asking(desk)
     assert desk.question is not None and desk.question.number == 1
@@ -46,12 +45,12 @@ def test_a_question_waits_for_its_answer_and_is_gone_then() -> None:
 
 
 @pytest.mark.parametrize("is_kept", [True, False])
-def test_an_answer_counts_once_the_run_has_kept_it(is_kept: bool) -> None:
+def test_an_answer_counts_once_the_run_has_kept_it(is_kept):
     desk = Desk()
     thread, _ = asking(desk)
     desk.give(1, "Fridge", 7)
     thread.join()
-    kept: list[bool] = []
+    kept = []
     telling = threading.Thread(target=lambda: kept.append(desk.wait_until_kept(1)), daemon=True)
     telling.start()
     telling.join(0.05)
@@ -67,7 +66,7 @@ def test_an_answer_counts_once_the_run_has_kept_it(is_kept: bool) -> None:
     assert (kept, desk.n_answered) == ([is_kept], int(is_kept))
 
 
-def test_an_answer_to_another_question_is_refused_and_the_first_of_two_counts() -> None:
+def test_an_answer_to_another_question_is_refused_and_the_first_of_two_counts():
     desk = Desk()
     with pytest.raises(StaleError):
         desk.give(1, "too early", 0)
@@ -85,7 +84,7 @@ def test_an_answer_to_another_question_is_refused_and_the_first_of_two_counts() 
     thread.join()
 
 
-def test_a_run_that_is_stopped_ends_as_by_ctrl_c() -> None:
+def test_a_run_that_is_stopped_ends_as_by_ctrl_c():
     desk = Desk()
     thread, answers = asking(desk)
     desk.stop()
@@ -93,7 +92,7 @@ def test_a_run_that_is_stopped_ends_as_by_ctrl_c() -> None:
     assert (answers, desk.n_answered) == ([KeyboardInterrupt], 0)
 
 
-def test_who_waits_for_a_change_learns_of_it() -> None:
+def test_who_waits_for_a_change_learns_of_it():
     desk = Desk()
     seen = desk.version
     with desk.reading():
@@ -101,7 +100,7 @@ def test_who_waits_for_a_change_learns_of_it() -> None:
     assert desk.is_closed and desk.version > seen
 
 
-def test_it_ends_when_a_page_has_learned_of_it_or_when_there_is_none() -> None:
+def test_it_ends_when_a_page_has_learned_of_it_or_when_there_is_none():
     desk = Desk()
     desk.close()
     desk.wait_until_informed(60.0, 60.0)  # nobody has asked: returns at once
@@ -116,7 +115,7 @@ def test_it_ends_when_a_page_has_learned_of_it_or_when_there_is_none() -> None:
     assert not ending.is_alive()
 
 
-def test_a_page_that_waits_for_news_is_waited_for_longer_than_one_that_may_be_closed() -> None:
+def test_a_page_that_waits_for_news_is_waited_for_longer_than_one_that_may_be_closed():
     desk = Desk()
     with desk.reading():
         desk.close()
@@ -129,7 +128,7 @@ def test_a_page_that_waits_for_news_is_waited_for_longer_than_one_that_may_be_cl
     assert not ending.is_alive()
 
 
-def test_the_clock_goes_while_a_page_shows_the_question(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_clock_goes_while_a_page_shows_the_question(monkeypatch):
     now = [100.0]
     monkeypatch.setattr("model_adapters.human.desk.time.monotonic", lambda: now[0])
     clock = ScreenClock()
@@ -151,7 +150,7 @@ def test_the_clock_goes_while_a_page_shows_the_question(monkeypatch: pytest.Monk
     assert clock.seconds == 10.0
 
 
-def test_what_a_page_tells_of_another_question_is_not_counted() -> None:
+def test_what_a_page_tells_of_another_question_is_not_counted():
     desk = Desk()
     thread, answers = asking(desk)
     desk.report_screen(2, "a", shows=True)

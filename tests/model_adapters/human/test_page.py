@@ -7,16 +7,13 @@ import subprocess
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any
 
 import pytest
 
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.records import RECORDS, NiehAnswer
+from infthor_eval.nieh.records import RECORDS
 from infthor_eval.plans.records import RECORDS as PLAN_RECORDS
-from infthor_eval.runs import UnitRecord, read_run
+from infthor_eval.runs import read_run
 from model_adapters.human.model import UNTIMED
 
 from ...helpers.processes import cli_words
@@ -41,7 +38,7 @@ ANSWERS = {question.text: str(question.answers[0]) for question in QUESTIONS}
 class Session:
     """A run of a person, and the tab that answers."""
 
-    def __init__(self, browser: Any, output: Path, *words: object) -> None:
+    def __init__(self, browser, output, *words):
         model = () if "--model" in words else ("--model", "human:browser=false")
         self.process = subprocess.Popen(
             cli_words(*model, "--out", output, *words),
@@ -50,10 +47,10 @@ class Session:
             text=True,
         )
         self.address = self._address()
-        self.errors: list[str] = []
+        self.errors = []
         self.tab = self.new_tab(browser)
 
-    def _address(self) -> str:
+    def _address(self):
         assert self.process.stderr is not None
         for line in self.process.stderr:
             match = re.search(r"human: answer at (http://\S+)", line)
@@ -61,7 +58,7 @@ class Session:
                 return match[1]
         pytest.fail("the run ended without a page")
 
-    def new_tab(self, browser: Any, slow_s: float = 0.0) -> Any:
+    def new_tab(self, browser, slow_s=0.0):
         """Open the page in a tab, which gets the first frame so many seconds late."""
         tab = browser.new_page(viewport={"width": 1280, "height": 900})
         # A simulator that starts, or an action in it, can take more than the usual 30 s where the
@@ -75,16 +72,16 @@ class Session:
         tab.locator("#desk").wait_for()
         return tab
 
-    def await_answered(self, number: int) -> None:
+    def await_answered(self, number):
         """Wait until so many are answered and the next one is shown, or that there is none."""
         self.tab.get_by_text(f"{number} answered in this sitting", exact=True).wait_for()
         self.tab.locator("#state:empty, #desk[hidden]").first.wait_for(state="attached")
 
     @property
-    def question(self) -> str:
+    def question(self):
         return self.tab.locator("#question").inner_text().rpartition("Question: ")[2]
 
-    def end(self) -> int:
+    def end(self):
         """Wait until the run ends, and return its exit code."""
         assert self.process.stderr is not None
         error_text = self.process.stderr.read()
@@ -94,11 +91,11 @@ class Session:
 
 
 @pytest.fixture
-def session(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Session]]:
+def session(browser, tmp_path):
     """Starts sessions; ends those that are left."""
-    begun: list[Session] = []
+    begun = []
 
-    def begin(*words: object) -> Session:
+    def begin(*words):
         begun.append(Session(browser, tmp_path / "out", *words))
         return begun[-1]
 
@@ -110,22 +107,20 @@ def session(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Session]]:
 
 
 @pytest.fixture
-def data(make_nieh_set: Callable[..., Path]) -> Path:
+def data(make_nieh_set):
     return make_nieh_set(QUESTIONS, n_frames=12)
 
 
-def records(tmp_path: Path) -> list[UnitRecord[NiehAnswer]]:
+def records(tmp_path):
     (folder,) = (tmp_path / "out/human").iterdir()
     return read_run(folder, RECORDS)[1]
 
 
-def by_text(tmp_path: Path) -> dict[str, NiehAnswer]:
+def by_text(tmp_path):
     return {record.payload.question: record.payload for record in records(tmp_path)}
 
 
-def test_ten_questions_by_keyboard_alone(
-    session: Callable[..., Session], data: Path, tmp_path: Path
-) -> None:
+def test_ten_questions_by_keyboard_alone(session, data, tmp_path):
     one = session("--tasks", "nieh_full", "--data", data)
     keyboard, unknown = one.tab.keyboard, ""
     for number in range(10):
@@ -159,9 +154,7 @@ def test_ten_questions_by_keyboard_alone(
     )
 
 
-def test_ten_questions_by_mouse(
-    session: Callable[..., Session], data: Path, tmp_path: Path
-) -> None:
+def test_ten_questions_by_mouse(session, data, tmp_path):
     one = session("--tasks", "nieh_gt", "--data", data)
     for number in range(10):
         one.await_answered(number)
@@ -186,9 +179,7 @@ def test_ten_questions_by_mouse(
     assert {text: answer.reply for text, answer in by_text(tmp_path).items()} == ANSWERS
 
 
-def test_exactly_the_frames_are_shown_that_a_model_is_given(
-    session: Callable[..., Session], data: Path
-) -> None:
+def test_exactly_the_frames_are_shown_that_a_model_is_given(session, data):
     one = session("--tasks", "nieh_gt", "--data", data, "--frames", "blank")
     one.await_answered(0)
     assert one.tab.locator("#place").inner_text() == "1 of 1"  # the clue frame
@@ -206,9 +197,7 @@ def test_exactly_the_frames_are_shown_that_a_model_is_given(
     assert width == 300 and red == green == blue
 
 
-def test_two_tabs_answer_one_question_once(
-    session: Callable[..., Session], data: Path, tmp_path: Path, browser: Any
-) -> None:
+def test_two_tabs_answer_one_question_once(session, data, tmp_path, browser):
     one = session("--tasks", "nieh_gt", "--data", data, "--limit", 2)
     one.await_answered(0)
     other = one.new_tab(browser)
@@ -227,16 +216,14 @@ def test_two_tabs_answer_one_question_once(
     assert by_text(tmp_path)[first].reply == "first"
 
 
-def test_what_is_no_answer_is_refused_with_the_reason(
-    session: Callable[..., Session], data: Path
-) -> None:
+def test_what_is_no_answer_is_refused_with_the_reason(session, data):
     one = session("--tasks", "nieh_gt", "--data", data, "--limit", 1)
     one.await_answered(0)
     one.tab.locator("#text").fill("   ")
     one.tab.keyboard.press("Enter")
     one.tab.get_by_text("write an answer first").wait_for()
 
-    def post(path: str, body: bytes, **headers: str) -> int:
+    def post(path, body, **headers):
         request = urllib.request.Request(path, body, headers)
         try:
             with urllib.request.urlopen(request) as answer:
@@ -258,9 +245,7 @@ def test_what_is_no_answer_is_refused_with_the_reason(
     assert one.end() == 0
 
 
-def test_a_run_that_is_killed_goes_on_where_it_was(
-    session: Callable[..., Session], data: Path, tmp_path: Path
-) -> None:
+def test_a_run_that_is_killed_goes_on_where_it_was(session, data, tmp_path):
     words = ("--tasks", "nieh_gt", "--data", data, "--limit", 3)
     one = session(*words)
     one.await_answered(0)
@@ -284,9 +269,7 @@ def test_a_run_that_is_killed_goes_on_where_it_was(
     } | dict.fromkeys(questions, "I do not know")
 
 
-def test_a_run_is_stopped_from_the_page_by_keys_and_taken_up_again(
-    session: Callable[..., Session], data: Path, tmp_path: Path
-) -> None:
+def test_a_run_is_stopped_from_the_page_by_keys_and_taken_up_again(session, data, tmp_path):
     words = ("--tasks", "nieh_gt", "--data", data, "--limit", 4)
     one = session(*words)
     one.await_answered(0)
@@ -312,9 +295,7 @@ def test_a_run_is_stopped_from_the_page_by_keys_and_taken_up_again(
     assert len(records(tmp_path)) == 4
 
 
-def test_one_of_several_pages_cannot_stop_the_run(
-    session: Callable[..., Session], data: Path
-) -> None:
+def test_one_of_several_pages_cannot_stop_the_run(session, data):
     one = session("--tasks", "nieh_gt", "--data", data, "--workers", 2)
     one.await_answered(0)
     assert one.tab.locator("#stop").is_hidden()
@@ -323,8 +304,8 @@ def test_one_of_several_pages_cannot_stop_the_run(
 
 
 def test_the_clock_starts_when_the_frames_are_shown_and_stands_while_nobody_looks(
-    session: Callable[..., Session], data: Path, tmp_path: Path, browser: Any
-) -> None:
+    session, data, tmp_path, browser
+):
     before = time.monotonic()
     one = session("--tasks", "nieh_full", "--data", data, "--limit", 2)
     one.await_answered(0)
@@ -346,9 +327,7 @@ def test_the_clock_starts_when_the_frames_are_shown_and_stands_while_nobody_look
     assert second.seconds > 0.0
 
 
-def test_all_controls_are_reached_and_used_by_keys(
-    session: Callable[..., Session], data: Path
-) -> None:
+def test_all_controls_are_reached_and_used_by_keys(session, data):
     one = session("--tasks", "nieh_full", "--data", data, "--limit", 1)
     one.await_answered(0)
     reached = set()
@@ -369,7 +348,7 @@ def test_all_controls_are_reached_and_used_by_keys(
 
 
 @pytest.mark.parametrize("by", ["keyboard", "mouse"])
-def test_a_plan_is_acted_out(session: Callable[..., Session], tmp_path: Path, by: str) -> None:
+def test_a_plan_is_acted_out(session, tmp_path, by):
     document = cut_trajectory(FORK, 1)
     data = write_trajectories(tmp_path / "data", document)
     one = session("--tasks", "infthor_plans", "--data", data)
@@ -404,7 +383,7 @@ def test_a_plan_is_acted_out(session: Callable[..., Session], tmp_path: Path, by
     assert record.payload.reward == record.payload.max_reward > 0
 
 
-def test_people_are_told_apart(session: Callable[..., Session], data: Path, tmp_path: Path) -> None:
+def test_people_are_told_apart(session, data, tmp_path):
     words = cli_words("--model", "human:reader=../x", "--tasks", "nieh_gt", "--data", data)
     refused = subprocess.run(words, capture_output=True, text=True, check=False)
     assert refused.returncode == 2

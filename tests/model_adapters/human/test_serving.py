@@ -6,8 +6,6 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 from PIL import Image
@@ -18,14 +16,13 @@ from model_adapters import Decoding, Notice, Turn
 from model_adapters.human.desk import Desk, Inquiry
 from model_adapters.human.serving import desk_routes
 
-from ...helpers.command_line import CliRunner, assert_refused, option_words
+from ...helpers.command_line import assert_refused, option_words
 
-Get = Callable[[str], tuple[int, str | None, bytes]]
 LONG = "9" * 5000
 
 
 @pytest.fixture
-def frames(tmp_path: Path) -> list[FrameRef]:
+def frames(tmp_path):
     """A PNG file and a JPEG file that are named as pages, and a page that is named as an image."""
     paths = [tmp_path / name for name in ("a.html", "b.html", "c.png")]
     Image.new("RGB", (8, 8)).save(paths[0], format="PNG")
@@ -35,7 +32,7 @@ def frames(tmp_path: Path) -> list[FrameRef]:
 
 
 @pytest.fixture
-def get(frames: list[FrameRef]) -> Iterator[Get]:
+def get(frames):
     """Gets a path of the page of a question; its status, media type and content."""
     desk = Desk()
     inquiry = Inquiry((Turn("user", (*frames, "?")),), Decoding(max_new_tokens=5), Notice())
@@ -43,7 +40,7 @@ def get(frames: list[FrameRef]) -> Iterator[Get]:
     asking.start()
     with serve_pages(desk_routes(desk)) as server:
 
-        def get(path: str) -> tuple[int, str | None, bytes]:
+        def get(path):
             try:
                 answer = urllib.request.urlopen(server.address + path)
             except urllib.error.HTTPError as error:
@@ -58,12 +55,12 @@ def get(frames: list[FrameRef]) -> Iterator[Get]:
         asking.join()
 
 
-def _ask(desk: Desk, inquiry: Inquiry) -> None:
+def _ask(desk, inquiry):
     with pytest.raises(KeyboardInterrupt):
         desk.ask(inquiry)
 
 
-def test_a_frame_is_an_image_whatever_it_is_called(get: Get, frames: list[FrameRef]) -> None:
+def test_a_frame_is_an_image_whatever_it_is_called(get, frames):
     assert get("frames/1/0") == (200, "image/png", frames[0].path.read_bytes())
     assert get("frames/1/1") == (200, "image/jpeg", frames[1].path.read_bytes())
     status, media_type, content = get("frames/1/2")
@@ -72,18 +69,18 @@ def test_a_frame_is_an_image_whatever_it_is_called(get: Get, frames: list[FrameR
 
 
 @pytest.mark.parametrize("number", [LONG, "-1", "x", "3", "%D9%A3"])
-def test_a_number_that_is_none_of_a_frame_is_refused(get: Get, number: str) -> None:
+def test_a_number_that_is_none_of_a_frame_is_refused(get, number):
     assert get(f"frames/1/{number}")[0] == 404
     assert get(f"frames/{number}/0")[0] == 409
 
 
 @pytest.mark.parametrize("seen", [LONG, "x", ""])
-def test_a_number_that_is_none_of_a_version_is_not_waited_for(get: Get, seen: str) -> None:
+def test_a_number_that_is_none_of_a_version_is_not_waited_for(get, seen):
     status, media_type, _ = get(f"state.json?seen={seen}")
     assert (status, media_type) == (200, "application/json")
 
 
-def test_pages_that_wait_hold_up_no_answer(get: Get) -> None:
+def test_pages_that_wait_hold_up_no_answer(get):
     version = json.loads(get("state.json")[2])["version"]
     waiting = [
         threading.Thread(target=get, args=(f"state.json?seen={version}",), daemon=True)
@@ -99,8 +96,8 @@ def test_pages_that_wait_hold_up_no_answer(get: Get) -> None:
 
 
 def test_a_port_that_is_taken_ends_the_run_before_the_first_question(
-    make_nieh_set: Callable[..., Path], tmp_path: Path, run_cli: CliRunner
-) -> None:
+    make_nieh_set, tmp_path, run_cli
+):
     arguments = option_words(tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "out")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]

@@ -3,7 +3,7 @@ import pytest
 from model_adapters.options.checkpoints import HfOptions
 
 
-def test_a_gpu_gets_larger_chunks_unless_their_size_is_given() -> None:
+def test_a_gpu_gets_larger_chunks_unless_their_size_is_given():
     assert {kind: HfOptions().chunk_size(kind) for kind in ("cpu", "cuda", "xpu")} == {
         "cpu": 1024,
         "cuda": 4096,
@@ -12,6 +12,6 @@ def test_a_gpu_gets_larger_chunks_unless_their_size_is_given() -> None:
     assert HfOptions(chunk_tokens=10).chunk_size("cuda") == 10
 
 
-def test_a_chunk_has_a_token_at_least() -> None:
+def test_a_chunk_has_a_token_at_least():
     with pytest.raises(ValueError, match="chunk_tokens and batch_size must be positive"):
         HfOptions(chunk_tokens=0)

@@ -1,5 +1,4 @@
 from dataclasses import dataclass
-from typing import Any
 
 import pytest
 
@@ -15,22 +14,22 @@ class Options:
     flag: bool = True
     limit: int | None = None
 
-    def __post_init__(self) -> None:
+    def __post_init__(self):
         if self.count < 0:
             raise ValueError("count must not be negative")
 
 
-def test_values_take_the_type_of_the_field() -> None:
+def test_values_take_the_type_of_the_field():
     texts = {"text": "7", "count": "7", "part": "7", "flag": "No", "limit": "7"}
     assert parse("m", Options, texts) == Options("7", 7, 7.0, False, 7)
 
 
-def test_what_is_left_out_takes_its_default() -> None:
+def test_what_is_left_out_takes_its_default():
     assert parse("m", Options, {}) == Options()
 
 
 @pytest.mark.parametrize("text", ["none", "None", ""])
-def test_none_where_the_field_allows_it(text: str) -> None:
+def test_none_where_the_field_allows_it(text):
     assert parse("m", Options, {"limit": text}).limit is None
 
 
@@ -44,7 +43,7 @@ def test_none_where_the_field_allows_it(text: str) -> None:
         ({"limits": "1"}, r"m has no option limits; did you mean limit\?"),
     ],
 )
-def test_what_does_not_fit_is_named_with_all_options(texts: dict[str, str], complaint: str) -> None:
+def test_what_does_not_fit_is_named_with_all_options(texts, complaint):
     with pytest.raises(UsageError, match=complaint) as caught:
         parse("m", Options, texts)
     assert "it takes: text=a, count=3, part=0.5, flag=true, limit=none" in str(caught.value)
@@ -53,11 +52,11 @@ def test_what_does_not_fit_is_named_with_all_options(texts: dict[str, str], comp
 @pytest.mark.parametrize(
     ("options", "beginning"), [(NoOptions, "no options"), (Options, "text=a, count=3")]
 )
-def test_describe(options: Any, beginning: str) -> None:
+def test_describe(options, beginning):
     assert describe(options).startswith(beginning)
 
 
-def test_an_option_without_a_default_must_be_given() -> None:
+def test_an_option_without_a_default_must_be_given():
     @dataclass(frozen=True)
     class Required:
         path: str

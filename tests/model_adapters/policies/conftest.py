@@ -2,30 +2,24 @@
 
 import json
 import shutil
-from collections.abc import Callable, Iterator, Mapping
-from pathlib import Path
-from typing import Any
 
 import pytest
 from PIL import Image
 from safetensors.torch import load_file, save_file
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import load
-from model_adapters.policies.policy import VlaPolicy
 from model_adapters.tiny.openvla import OpenVLATiny
 from model_adapters.tiny.spatialvla import SpatialVLATiny
 
+from ..asking import load_saved
 from .servers import no_proxy  # noqa: F401 - a fixture
 
 TWINS = {"openvla": OpenVLATiny.twin, "spatialvla": SpatialVLATiny.twin}
 FAMILIES = tuple(TWINS)
 
-Edit = Callable[[Path], object]
-
 
 @pytest.fixture(scope="session")
-def policy_checkpoints(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def policy_checkpoints(tmp_path_factory):
     """Folders of tiny checkpoints by family."""
     root = tmp_path_factory.mktemp("policies")
     for family, twin in TWINS.items():
@@ -34,22 +28,19 @@ def policy_checkpoints(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pa
 
 
 @pytest.fixture(scope="session")
-def policies(policy_checkpoints: dict[str, Path]) -> Iterator[dict[str, VlaPolicy]]:
+def policies(policy_checkpoints):
     """The tiny checkpoints as the adapters of the published ones load them, by family."""
-    loaded = {
-        family: load(family, {"pretrained": str(at), "device": "cpu"}, 0)
-        for family, at in policy_checkpoints.items()
-    }
-    yield loaded  # type: ignore[misc]
+    loaded = {family: load_saved(family, at) for family, at in policy_checkpoints.items()}
+    yield loaded
     for policy in loaded.values():
         policy.close()
 
 
 @pytest.fixture
-def altered(policy_checkpoints: dict[str, Path], tmp_path: Path) -> Callable[[str, Edit], Path]:
+def altered(policy_checkpoints, tmp_path):
     """Makes a copy of a family's checkpoint and alters it; its folder."""
 
-    def alter(family: str, edit: Edit) -> Path:
+    def alter(family, edit):
         folder = tmp_path / "altered"
         shutil.copytree(policy_checkpoints[family], folder)
         edit(folder)
@@ -59,7 +50,7 @@ def altered(policy_checkpoints: dict[str, Path], tmp_path: Path) -> Callable[[st
 
 
 @pytest.fixture(scope="session")
-def plain_frames(tmp_path_factory: pytest.TempPathFactory) -> tuple[FrameRef, FrameRef]:
+def plain_frames(tmp_path_factory):
     """A black frame and a white one."""
     folder = tmp_path_factory.mktemp("plain")
     for colour in ("black", "white"):
@@ -67,10 +58,10 @@ def plain_frames(tmp_path_factory: pytest.TempPathFactory) -> tuple[FrameRef, Fr
     return FrameRef(folder / "black.png"), FrameRef(folder / "white.png")
 
 
-def json_edit(name: str, change: Callable[[dict[str, Any]], object]) -> Edit:
+def json_edit(name, change):
     """An edit of one JSON file of a checkpoint."""
 
-    def edit(folder: Path) -> None:
+    def edit(folder):
         content = json.loads((folder / name).read_text())
         change(content)
         (folder / name).write_text(json.dumps(content))
@@ -78,10 +69,10 @@ def json_edit(name: str, change: Callable[[dict[str, Any]], object]) -> Edit:
     return edit
 
 
-def weights_edit(change: Callable[[dict[str, Any]], Mapping[str, Any]]) -> Edit:
+def weights_edit(change):
     """An edit of a checkpoint's tensors."""
 
-    def edit(folder: Path) -> None:
+    def edit(folder):
         save_file(
             dict(change(load_file(folder / "model.safetensors"))), folder / "model.safetensors"
         )

@@ -3,10 +3,9 @@
 import base64
 import json
 import tempfile
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import BaseHTTPRequestHandler
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,8 @@ from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Policy
+
+from ...helpers.http_servers import SilentHandler, run_server
 
 __all__ = ["Answer", "no_proxy", "policy_answers", "read_image", "send", "serve"]
 
@@ -35,7 +36,7 @@ def serve(answer: Answer, path: str = "/act", port: int = 0) -> Iterator[str]:
     """The address of a server that answers POSTs to a path, for as long as it is needed; at a port
     that is free if none is given."""
 
-    class Handler(BaseHTTPRequestHandler):
+    class Handler(SilentHandler):
         def do_POST(self) -> None:
             body = self.rfile.read(int(self.headers["Content-Length"]))
             if self.path != path:
@@ -45,21 +46,8 @@ def serve(answer: Answer, path: str = "/act", port: int = 0) -> Iterator[str]:
             if content is not None:
                 send(self, 200, json.dumps(content).encode())
 
-        def log_message(self, *args: Any) -> None:
-            pass
-
-    server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
-    server.daemon_threads = True
-    thread = threading.Thread(
-        target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True
-    )
-    thread.start()
-    try:
-        yield f"http://127.0.0.1:{server.server_port}"
-    finally:
-        server.shutdown()
-        server.server_close()
-        thread.join()
+    with run_server(Handler, port) as address:
+        yield address
 
 
 def send(

@@ -9,16 +9,16 @@ from model_adapters.policies.decoding import decode_greedily
 LEGAL = [range(4, 6), range(6, 8)]
 
 
-def _scores(best: int, second: int = 0) -> torch.Tensor:
+def _scores(best, second=0):
     scores = torch.zeros(10)
     scores[best], scores[second] = 9.0, 5.0
     return scores
 
 
-def test_only_legal_tokens_are_chosen_at_each_place() -> None:
+def test_only_legal_tokens_are_chosen_at_each_place():
     fed = []
 
-    def step(token: int) -> torch.Tensor:
+    def step(token):
         fed.append(token)
         return _scores(best=0, second=7)
 
@@ -26,10 +26,10 @@ def test_only_legal_tokens_are_chosen_at_each_place() -> None:
     assert fed == [5]
 
 
-def test_without_the_constraint_others_are_clipped_as_the_originals_do() -> None:
+def test_without_the_constraint_others_are_clipped_as_the_originals_do():
     fed = []
 
-    def step(token: int) -> torch.Tensor:
+    def step(token):
         fed.append(token)
         return _scores(best=0)
 
@@ -42,7 +42,7 @@ def test_without_the_constraint_others_are_clipped_as_the_originals_do() -> None
 
 @pytest.mark.parametrize("bad", [torch.nan, torch.inf])
 @pytest.mark.parametrize("place", [1, 2])
-def test_scores_that_are_no_numbers_are_refused(bad: float, place: int) -> None:
+def test_scores_that_are_no_numbers_are_refused(bad, place):
     broken = torch.full((10,), bad)
     first, second = (broken, _scores(6)) if place == 1 else (_scores(4), broken)
     with pytest.raises(ModelError, match=f"action token {place} has no finite score"):

@@ -1,14 +1,11 @@
 """A policy beside a server that its own twin answers for."""
 
 import math
-from pathlib import Path
-from typing import Any
 
 import pytest
 from PIL import Image
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import ArmDelta
 from model_adapters.policies.parity import (
     INSTRUCTIONS,
@@ -18,7 +15,6 @@ from model_adapters.policies.parity import (
     reference_policy,
     synthetic_frames,
 )
-from model_adapters.policies.policy import VlaPolicy
 
 from .servers import policy_answers, serve
 
@@ -28,13 +24,13 @@ class Still:
 
     name = "still"
 
-    def __init__(self, *steps: ArmDelta) -> None:
+    def __init__(self, *steps):
         self.steps = steps
 
-    def reset(self) -> None:
+    def reset(self):
         pass
 
-    def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
+    def act(self, frame, instruction):
         return self.steps
 
 
@@ -43,9 +39,7 @@ OTHER = ArmDelta((0.0, 0.25, 0.0), (0.0, 0.0, -0.5), 0.0)
 
 
 @pytest.mark.parametrize("family", ["openvla", "spatialvla"])
-def test_the_same_policy_behind_a_server_is_equal(
-    family: str, policy_checkpoints: dict[str, Path], policies: dict[str, VlaPolicy]
-) -> None:
+def test_the_same_policy_behind_a_server_is_equal(family, policy_checkpoints, policies):
     settings = {"pretrained": str(policy_checkpoints[family]), "device": "cpu"}
     theirs = load_policy(family, settings)
     with synthetic_frames() as frames, serve(policy_answers(theirs)) as url:
@@ -61,9 +55,9 @@ def test_the_same_policy_behind_a_server_is_equal(
     assert apart.equal == (family == "openvla")
 
 
-def test_differences_are_told_by_kind(plain_frames: tuple[FrameRef, FrameRef]) -> None:
-    ours: Any = Still(STEP)
-    theirs: Any = Still(OTHER)
+def test_differences_are_told_by_kind(plain_frames):
+    ours = Still(STEP)
+    theirs = Still(OTHER)
     report = compare_policies(ours, theirs, plain_frames, ["pick up the mug"], 0.4)
     assert not report.equal
     assert report.table().rows[0].cells == ("pick up the mug", "2", "1", "0.25", "0.5", "1")
@@ -71,31 +65,29 @@ def test_differences_are_told_by_kind(plain_frames: tuple[FrameRef, FrameRef]) -
     assert compare_policies(ours, theirs, plain_frames, ["x"], 1.0).equal
 
 
-def test_more_steps_than_the_other_gives_is_a_difference(
-    plain_frames: tuple[FrameRef, FrameRef],
-) -> None:
-    ours: Any = Still(STEP, STEP)
-    theirs: Any = Still(STEP)
+def test_more_steps_than_the_other_gives_is_a_difference(plain_frames):
+    ours = Still(STEP, STEP)
+    theirs = Still(STEP)
     report = compare_policies(ours, theirs, plain_frames, ["x"], 1e9)
     assert not report.equal
     assert report.rows[0].largest == math.inf
     assert report.table().rows[0].cells[2] == "2 and 1"
 
 
-def test_pictures_of_a_folder_are_taken_by_name(tmp_path: Path) -> None:
+def test_pictures_of_a_folder_are_taken_by_name(tmp_path):
     for name in ("b.png", "a.jpg"):
         Image.new("RGB", (8, 8)).save(tmp_path / name)
     (tmp_path / "notes.txt").write_text("x")
     assert [frame.path.name for frame in frames_in_folder(tmp_path)] == ["a.jpg", "b.png"]
 
 
-def test_a_folder_without_pictures_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_pictures_is_refused(tmp_path):
     for folder in (tmp_path, tmp_path / "none"):
         with pytest.raises(DataError, match="has no pictures"):
             frames_in_folder(folder)
 
 
-def test_misuse_is_refused() -> None:
+def test_misuse_is_refused():
     with pytest.raises(UsageError, match=r"--reference-url: url is not the address of a server"):
         reference_policy("host", None)
     with pytest.raises(

@@ -5,18 +5,15 @@ They are those of the tiny checkpoints of seed 0, computed by `benchmarks/refere
 which shares no line with the code here.
 """
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 import torch
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import load
-from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.preprocessing import resize
+
+from ..asking import load_saved
 
 # A patch's features, of every 16th number: OpenVLA's as its towers give them, SpatialVLA's as Gemma
 # sees them.
@@ -36,7 +33,7 @@ ACTIONS = {
 
 
 @pytest.fixture(scope="module")
-def frame(tmp_path_factory: pytest.TempPathFactory) -> FrameRef:
+def frame(tmp_path_factory):
     """A pattern without symmetry."""
     path = tmp_path_factory.mktemp("pattern") / "pattern.png"
     Image.fromarray((np.arange(64 * 64 * 3) % 251).astype(np.uint8).reshape(64, 64, 3)).save(path)
@@ -44,26 +41,22 @@ def frame(tmp_path_factory: pytest.TempPathFactory) -> FrameRef:
 
 
 @torch.inference_mode()
-def _features(family: str, network: Any, image: Image.Image) -> torch.Tensor:
+def _features(family, network, image):
     if family == "openvla":
-        values: torch.Tensor = network.weights.vision_backbone(
-            resize(image, network.image_size)[None]
-        )
+        values = network.weights.vision_backbone(resize(image, network.image_size)[None])
         return values
-    return network.features(image)  # type: ignore[no-any-return]
+    return network.features(image)
 
 
 @pytest.mark.parametrize("family", FEATURES)
-def test_features_are_theirs(family: str, policies: dict[str, VlaPolicy], frame: FrameRef) -> None:
+def test_features_are_theirs(family, policies, frame):
     values = _features(family, policies[family]._network, frame.load())
     assert values[0, 5, ::16].tolist() == pytest.approx(FEATURES[family], abs=2e-4)
 
 
 @pytest.mark.parametrize("family", ACTIONS)
-def test_actions_are_theirs(
-    family: str, policy_checkpoints: dict[str, Path], frame: FrameRef
-) -> None:
-    settings = {"pretrained": str(policy_checkpoints[family]), "device": "cpu", "ensemble": "none"}
-    steps = load(family, settings, 0).act(frame, "pick up the mug")  # type: ignore[union-attr]
+def test_actions_are_theirs(family, policy_checkpoints, frame):
+    policy = load_saved(family, policy_checkpoints[family], ensemble="none")
+    steps = policy.act(frame, "pick up the mug")
     values = [(*step.translation, *step.rotation, step.gripper) for step in steps]
     assert np.array(values) == pytest.approx(np.array(ACTIONS[family]), abs=2e-6)

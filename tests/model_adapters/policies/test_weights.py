@@ -1,7 +1,5 @@
 """Every key of a checkpoint's files is accounted for, or nothing is loaded."""
 
-from pathlib import Path
-
 import pytest
 import torch
 from safetensors.torch import save_file
@@ -12,7 +10,7 @@ from model_adapters.policies.weights import Layout, empty_parameters, load_weigh
 
 
 class Small(nn.Module):
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__()
         self.first = nn.Linear(3, 2)
         self.norm = nn.LayerNorm(2)
@@ -29,7 +27,7 @@ WHOLE = {
 }
 
 
-def _loaded(folder: Path, dtype: torch.dtype = torch.float32) -> Small:
+def _loaded(folder, dtype=torch.float32):
     with empty_parameters():
         module = Small()
     layout = Layout.of(module, lambda name: name.replace("first", "old"), UNUSED)
@@ -37,7 +35,7 @@ def _loaded(folder: Path, dtype: torch.dtype = torch.float32) -> Small:
     return module
 
 
-def test_tensors_come_into_their_parameters_from_all_files(tmp_path: Path) -> None:
+def test_tensors_come_into_their_parameters_from_all_files(tmp_path):
     save_file({key: WHOLE[key] for key in list(WHOLE)[:2]}, tmp_path / "a.safetensors")
     save_file({key: WHOLE[key] for key in list(WHOLE)[2:]}, tmp_path / "b.safetensors")
     module = _loaded(tmp_path, torch.bfloat16)
@@ -47,14 +45,14 @@ def test_tensors_come_into_their_parameters_from_all_files(tmp_path: Path) -> No
     assert not any(parameter.requires_grad for parameter in module.parameters())
 
 
-def test_buffers_are_computed_not_lost(tmp_path: Path) -> None:
+def test_buffers_are_computed_not_lost(tmp_path):
     save_file(WHOLE, tmp_path / "model.safetensors")
     module = _loaded(tmp_path, torch.bfloat16)
     assert module.get_buffer("bands").tolist() == [0, 1, 2, 3]
     assert module.get_buffer("bands").dtype == torch.float32
 
 
-def test_parameters_take_no_memory_before_they_are_loaded() -> None:
+def test_parameters_take_no_memory_before_they_are_loaded():
     with empty_parameters():
         module = Small()
     assert {parameter.device.type for parameter in module.parameters()} == {"meta"}
@@ -80,9 +78,7 @@ def test_parameters_take_no_memory_before_they_are_loaded() -> None:
         ),
     ],
 )
-def test_any_other_key_or_shape_ends_the_loading(
-    tmp_path: Path, without: str | None, also: dict[str, torch.Tensor], message: str
-) -> None:
+def test_any_other_key_or_shape_ends_the_loading(tmp_path, without, also, message):
     save_file(
         {key: value for key, value in WHOLE.items() if key != without} | also,
         tmp_path / "model.safetensors",
@@ -91,19 +87,19 @@ def test_any_other_key_or_shape_ends_the_loading(
         _loaded(tmp_path)
 
 
-def test_a_key_in_two_files_is_refused(tmp_path: Path) -> None:
+def test_a_key_in_two_files_is_refused(tmp_path):
     save_file(WHOLE, tmp_path / "a.safetensors")
     save_file({"old.bias": torch.zeros(2)}, tmp_path / "b.safetensors")
     with pytest.raises(ModelError, match=r"two files of mine have old\.bias"):
         _loaded(tmp_path)
 
 
-def test_quantised_weights_are_refused(tmp_path: Path) -> None:
+def test_quantised_weights_are_refused(tmp_path):
     save_file(WHOLE | {"old.bias": torch.ones(2, dtype=torch.int8)}, tmp_path / "model.safetensors")
     with pytest.raises(ModelError, match=r"old\.bias of mine is torch\.int8; quantised"):
         _loaded(tmp_path)
 
 
-def test_a_folder_without_weights_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_weights_is_refused(tmp_path):
     with pytest.raises(ModelError, match=r"mine has no \*\.safetensors"):
         _loaded(tmp_path)

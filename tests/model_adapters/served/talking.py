@@ -13,8 +13,10 @@ import pytest
 from PIL import Image
 
 from infthor_eval.errors import ModelError
-from model_adapters import Decoding, Reply, load
+from model_adapters import Reply
 
+from ...helpers.refusals import read_one_line
+from ..asking import ask, load_with
 from ..policies.servers import Answer, serve
 
 __all__ = [
@@ -24,6 +26,7 @@ __all__ = [
     "completion",
     "images_in",
     "keep_requests",
+    "open_behind",
     "open_model",
     "read_refusal",
     "serve_chat",
@@ -91,31 +94,33 @@ def serve_chat(answer: Answer = talkative, port: int = 0) -> Iterator[str]:
 
 
 @contextmanager
+def open_behind(url: str, name: str = "openai", **options: object) -> Iterator[Any]:
+    """A model behind a server; nothing is left open."""
+    model = load_with(name, **{"base_url": url, "model": "m", **options})
+    try:
+        yield model
+    finally:
+        model.close()
+
+
+@contextmanager
 def open_model(answer: Answer = talkative, **options: object) -> Iterator[Any]:
-    """A model behind such a server; nothing is left open."""
-    with serve_chat(answer) as url:
-        settings = {name: str(value) for name, value in {"retries": 0, **options}.items()}
-        model: Any = load("openai", {"base_url": url, "model": "m", **settings}, 0)
-        try:
-            yield model
-        finally:
-            model.close()
+    """A model behind a server that answers so."""
+    with serve_chat(answer) as url, open_behind(url, **{"retries": 0, **options}) as model:
+        yield model
 
 
-def ask_once(model: Any) -> Reply:
+def ask_once(model: Any, **decoding: Any) -> Reply:
     """The model's reply to one question."""
-    talk = model.conversation()
-    talk.append("What is it?")
-    return talk.reply(Decoding(max_new_tokens=5))
+    return ask(model, "What is it?", new=5, **decoding)
 
 
 def read_refusal(answer: Answer, **options: object) -> str:
     """The one line that a model behind such a server ends in."""
     with open_model(answer, **options) as model, pytest.raises(ModelError) as caught:
         ask_once(model)
-    message = str(caught.value)
+    message = read_one_line(caught)
     assert message.startswith("http://127.0.0.1:")
-    assert "\n" not in message
     assert "; " in message  # a mend
     assert len(message) < 600
     return message

@@ -6,8 +6,6 @@ import threading
 import time
 from contextlib import suppress
 from email.utils import formatdate
-from http.server import BaseHTTPRequestHandler
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -16,31 +14,31 @@ from hypothesis import strategies as st
 from infthor_eval.errors import ModelError
 from model_adapters.served import endpoint, wire
 
-from ..policies.servers import Answer, send
+from ..policies.servers import send
 from .talking import always_send, ask_once, completion, open_model, read_refusal, talkative
 
 
-def _resets(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+def _resets(_request, handler):
     handler.close_connection = True
     handler.connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     handler.connection.close()
 
 
-def _cut_off(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+def _cut_off(_request, handler):
     handler.close_connection = True
     send(handler, 200, b'{"choices": [', length=100)
 
 
-def _babbles(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+def _babbles(_request, handler):
     handler.close_connection = True
     handler.wfile.write(b"SSH-2.0-OpenSSH_9.6\r\n\r\n")
 
 
-def _in_a_200(choice: dict[str, Any]) -> Answer:
+def _in_a_200(choice):
     return lambda *_: completion() | {"choices": [choice]}
 
 
-PASSING: dict[str, tuple[Answer, str]] = {
+PASSING = {
     "500": (
         always_send(500, b"CUDA out\nof memory"),
         "answers 500 Internal Server Error: 'CUDA out of memory'",
@@ -93,11 +91,11 @@ PASSING: dict[str, tuple[Answer, str]] = {
 
 
 @pytest.mark.parametrize("fault", PASSING)
-def test_what_passes_is_sent_again_and_told(fault: str) -> None:
+def test_what_passes_is_sent_again_and_told(fault):
     fail, message = PASSING[fault]
     n_asked = 0
 
-    def answer(request: Any, handler: BaseHTTPRequestHandler) -> Any:
+    def answer(request, handler):
         nonlocal n_asked
         n_asked += 1
         return fail(request, handler) if n_asked < 3 else talkative(request, handler)
@@ -119,10 +117,10 @@ def test_what_passes_is_sent_again_and_told(fault: str) -> None:
 @pytest.mark.parametrize(
     ("code", "hint"), [(400, "check"), (401, "set the environment variable"), (402, "check your")]
 )
-def test_what_does_not_pass_is_not_asked_again_inside_a_200_either(code: int, hint: str) -> None:
+def test_what_does_not_pass_is_not_asked_again_inside_a_200_either(code, hint):
     n_asked = 0
 
-    def answer(*_: Any) -> dict[str, Any]:
+    def answer(*_):
         nonlocal n_asked
         n_asked += 1
         return {"error": {"code": code, "message": "no such fridge"}}
@@ -142,15 +140,15 @@ def test_what_does_not_pass_is_not_asked_again_inside_a_200_either(code: int, hi
         completion(finish_reason="strange"),
     ],
 )
-def test_a_reply_that_ended_well_is_none(document: dict[str, Any]) -> None:
+def test_a_reply_that_ended_well_is_none(document):
     with open_model(lambda *_: document) as model:
         assert ask_once(model).text == "yes"
 
 
-def test_a_server_that_is_down_is_not_waited_for_by_every_unit() -> None:
+def test_a_server_that_is_down_is_not_waited_for_by_every_unit():
     down, n_asked = True, 0
 
-    def answer(request: Any, handler: BaseHTTPRequestHandler) -> Any:
+    def answer(request, handler):
         nonlocal n_asked
         n_asked += 1
         return send(handler, 503, b"") if down else talkative(request, handler)
@@ -167,10 +165,10 @@ def test_a_server_that_is_down_is_not_waited_for_by_every_unit() -> None:
             ask_once(model)
 
 
-def test_a_server_that_is_only_busy_is_asked_as_patiently_by_every_unit() -> None:
+def test_a_server_that_is_only_busy_is_asked_as_patiently_by_every_unit():
     n_asked = 0
 
-    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+    def answer(_request, handler):
         nonlocal n_asked
         n_asked += 1
         send(handler, 429, b"slow down")
@@ -184,7 +182,7 @@ def test_a_server_that_is_only_busy_is_asked_as_patiently_by_every_unit() -> Non
             assert n_asked == n_expected
 
 
-def test_a_server_that_is_not_there_is_one_line() -> None:
+def test_a_server_that_is_not_there_is_one_line():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         where = f"http://127.0.0.1:{taken.getsockname()[1]}/v1"
@@ -198,7 +196,7 @@ def test_a_server_that_is_not_there_is_one_line() -> None:
 
 
 @pytest.mark.parametrize("proxy", ["http://127.0.0.1:999999", "http://a..b", "garbage"])
-def test_a_proxy_that_is_not_there_is_one_line(proxy: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_proxy_that_is_not_there_is_one_line(proxy, monkeypatch):
     monkeypatch.setenv("ALL_PROXY", proxy)
     with (
         open_model(base_url="https://none.example/v1", retries=0) as model,
@@ -209,17 +207,17 @@ def test_a_proxy_that_is_not_there_is_one_line(proxy: str, monkeypatch: pytest.M
         ask_once(model)
 
 
-def test_a_wait_that_the_server_asks_for_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    waited: list[float] = []
+def test_a_wait_that_the_server_asks_for_is_kept(monkeypatch):
+    waited = []
     monkeypatch.setattr(endpoint.time, "sleep", waited.append)
-    answers: list[Answer] = [
+    answers = [
         always_send(429, b"", {"Retry-After": "7"}),
         always_send(429, b"", {"retry-after-ms": "1500"}),
         always_send(503, b"", {"Retry-After": formatdate(time.time() + 30, usegmt=True)}),
         talkative,
     ]
 
-    def answer(request: Any, handler: BaseHTTPRequestHandler) -> Any:
+    def answer(request, handler):
         return answers.pop(0)(request, handler)
 
     with open_model(answer, retries=4) as model:
@@ -228,8 +226,8 @@ def test_a_wait_that_the_server_asks_for_is_kept(monkeypatch: pytest.MonkeyPatch
     assert 15 < waited[2] <= 30  # until a time of day, which comes nearer while the machine is busy
 
 
-def test_without_one_each_wait_is_longer(monkeypatch: pytest.MonkeyPatch) -> None:
-    waited: list[float] = []
+def test_without_one_each_wait_is_longer(monkeypatch):
+    waited = []
     monkeypatch.setattr(endpoint.time, "sleep", waited.append)
     monkeypatch.setattr(endpoint, "_FIRST_WAIT_S", 0.5)
     read_refusal(always_send(500, b""), retries=10)
@@ -239,7 +237,7 @@ def test_without_one_each_wait_is_longer(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 @pytest.mark.parametrize("retry_after", ["100000", "9" * 400])
-def test_a_wait_without_end_is_not_kept(retry_after: str) -> None:
+def test_a_wait_without_end_is_not_kept(retry_after):
     message = read_refusal(
         always_send(429, b"come back later", {"Retry-After": retry_after}), retries=3
     )
@@ -249,7 +247,7 @@ def test_a_wait_without_end_is_not_kept(retry_after: str) -> None:
 
 @settings(max_examples=200)
 @given(st.sampled_from(["retry-after", "retry-after-ms"]), st.text(max_size=20))
-def test_no_head_is_a_traceback(name: str, value: str) -> None:
+def test_no_head_is_a_traceback(name, value):
     waited = endpoint._retry_after_s({name: value})
     assert waited is None or waited >= 0
 
@@ -257,10 +255,10 @@ def test_no_head_is_a_traceback(name: str, value: str) -> None:
 @pytest.mark.parametrize(
     "slow", ["before it answers", "in the head", "in the body", "in the body of an error"]
 )
-def test_a_server_that_takes_too_long_is_given_up_in_the_end(slow: str) -> None:
+def test_a_server_that_takes_too_long_is_given_up_in_the_end(slow):
     done = threading.Event()
 
-    def drip(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+    def drip(_request, handler):
         handler.close_connection = True
         if slow == "in the head":
             handler.wfile.write(b"HTTP/1.1 200 OK\r\n")
@@ -270,7 +268,7 @@ def test_a_server_that_takes_too_long_is_given_up_in_the_end(slow: str) -> None:
             if slow != "before it answers":
                 handler.wfile.write(b"X-More: 1\r\n" if slow == "in the head" else b" ")
 
-    def answer(request: Any, handler: BaseHTTPRequestHandler) -> None:
+    def answer(request, handler):
         with suppress(OSError):  # it was given up
             drip(request, handler)
 
@@ -282,11 +280,11 @@ def test_a_server_that_takes_too_long_is_given_up_in_the_end(slow: str) -> None:
 
 
 @pytest.mark.parametrize("status", [200, 400, 500])
-def test_a_reply_without_end_is_not_read(status: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reply_without_end_is_not_read(status, monkeypatch):
     monkeypatch.setattr(wire, "_LARGEST", 1000)
     n_sent = 0
 
-    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+    def answer(_request, handler):
         nonlocal n_sent
         handler.close_connection = True
         handler.send_response(status)
@@ -299,8 +297,8 @@ def test_a_reply_without_end_is_not_read(status: int, monkeypatch: pytest.Monkey
     assert n_sent < 50_000_000
 
 
-def test_a_head_without_end_is_not_read() -> None:
-    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+def test_a_head_without_end_is_not_read():
+    def answer(_request, handler):
         handler.close_connection = True
         with suppress(OSError):
             handler.wfile.write(b"HTTP/1.1 200 OK\r\n" + b"X-More: 1\r\n" * 10**6)

@@ -3,16 +3,13 @@
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
 import pytest
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
-from model_adapters import Decoding, check_adapter, load
+from model_adapters import check_adapter, load
 from model_adapters.served import model as served
 
 from ..asking import up_to
@@ -29,19 +26,19 @@ from .talking import (
 KEY = "sk-0123456789abcdef0123456789"
 
 
-def _ask(model: Any, *parts: Any, decoding: Decoding | None = None) -> Any:
+def _ask(model, *parts, decoding=None):
     talk = model.conversation()
     talk.append(*parts)
     return talk.reply(decoding or up_to(5))
 
 
-def test_it_keeps_the_contract() -> None:
+def test_it_keeps_the_contract():
     with open_model() as model:
         check_adapter(model)
 
 
-def test_it_keeps_the_contract_of_choices_where_the_server_holds_replies_to_them() -> None:
-    def answer(request: dict[str, Any], handler: Any) -> Any:
+def test_it_keeps_the_contract_of_choices_where_the_server_holds_replies_to_them():
+    def answer(request, handler):
         if "structured_outputs" in request:
             return completion(request["structured_outputs"]["choice"][0])
         return talkative(request, handler)
@@ -50,8 +47,8 @@ def test_it_keeps_the_contract_of_choices_where_the_server_holds_replies_to_them
         check_adapter(model)
 
 
-def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]) -> None:
-    requests: list[dict[str, Any]] = []
+def test_a_request_is_what_was_said_and_how_it_is_decoded(frames):
+    requests = []
     with open_model(keep_requests(requests)) as model:
         talk = model.conversation()
         talk.append("Be brief.", role="system")
@@ -88,8 +85,8 @@ def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]
     assert "authorization" not in first["headers"]
 
 
-def test_what_a_server_does_not_take_is_not_sent() -> None:
-    requests: list[dict[str, Any]] = []
+def test_what_a_server_does_not_take_is_not_sent():
+    requests = []
     without = {
         "send_seed": False,
         "send_stop": False,
@@ -111,8 +108,8 @@ def test_what_a_server_does_not_take_is_not_sent() -> None:
     }
 
 
-def test_a_penalty_is_sent_where_one_is_asked_for() -> None:
-    requests: list[dict[str, Any]] = []
+def test_a_penalty_is_sent_where_one_is_asked_for():
+    requests = []
     with open_model(keep_requests(requests, always_say("x"))) as model:
         _ask(model, "What?", decoding=up_to(5, repetition_penalty=1.0))
         _ask(model, "What?", decoding=up_to(5))
@@ -120,10 +117,8 @@ def test_a_penalty_is_sent_where_one_is_asked_for() -> None:
 
 
 @pytest.mark.parametrize(("sent", "expected"), [(True, [False, None]), (False, [None, None])])
-def test_special_tokens_are_asked_for_where_one_may_stop_a_reply(
-    sent: bool, expected: list[bool | None]
-) -> None:
-    requests: list[dict[str, Any]] = []
+def test_special_tokens_are_asked_for_where_one_may_stop_a_reply(sent, expected):
+    requests = []
     with open_model(
         keep_requests(requests, always_say("x")), send_skip_special_tokens=sent
     ) as model:
@@ -133,9 +128,9 @@ def test_special_tokens_are_asked_for_where_one_may_stop_a_reply(
     assert [request.get("skip_special_tokens") for request in requests] == expected
 
 
-def test_the_key_goes_into_the_head_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_key_goes_into_the_head_alone(monkeypatch):
     monkeypatch.setenv("OTHER_KEY", f" {KEY}\n")
-    requests: list[dict[str, Any]] = []
+    requests = []
     with open_model(keep_requests(requests), api_key_env="OTHER_KEY") as model:
         _ask(model, "What?")
         descriptions = [repr(model), str(vars(model)), str(model.identity()), repr(model._secret)]
@@ -145,7 +140,7 @@ def test_the_key_goes_into_the_head_alone(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.parametrize("value", ["", "  ", "two words", "schlüssel-schlüssel"])
-def test_a_missing_or_broken_key_is_one_line(value: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_or_broken_key_is_one_line(value, monkeypatch):
     monkeypatch.setenv("MY_KEY", value)
     with pytest.raises(
         ModelError, match="the environment variable that api_key_env names holds no key"
@@ -154,12 +149,12 @@ def test_a_missing_or_broken_key_is_one_line(value: str, monkeypatch: pytest.Mon
     assert "MY_KEY" not in str(caught.value)  # it may be the key, put in the wrong place
 
 
-def test_stop_strings_cut_whatever_the_server_does() -> None:
+def test_stop_strings_cut_whatever_the_server_does():
     with open_model(always_say("MoveAhead<|act|>and more\nyes")) as model:
         assert _ask(model, "What?", decoding=up_to(9, stop=("\n", "<|act|>"))).text == "MoveAhead"
 
 
-def test_tokens_and_cost_are_told_with_the_reply() -> None:
+def test_tokens_and_cost_are_told_with_the_reply():
     prices = {"price_per_m_input": 2, "price_per_m_cached": 0.5, "price_per_m_output": 8}
     with open_model(lambda *_: completion("yes", (1000, 10, 400)), **prices) as model:
         reply = _ask(model, "What?")
@@ -175,7 +170,7 @@ def test_tokens_and_cost_are_told_with_the_reply() -> None:
     assert (reply.n_context_tokens, reply.n_reply_tokens, reply.cost) == (None, None, None)
 
 
-def test_a_reply_that_cannot_be_used_is_paid_for_all_the_same() -> None:
+def test_a_reply_that_cannot_be_used_is_paid_for_all_the_same():
     with open_model(lambda *_: completion(None, (100, 10)), max_tokens_total=200) as model:
         for _ in range(2):
             with pytest.raises(ModelError, match="gives no text"):
@@ -184,7 +179,7 @@ def test_a_reply_that_cannot_be_used_is_paid_for_all_the_same() -> None:
             _ask(model, "What?")
 
 
-def test_a_server_that_does_not_hold_to_choices_is_found_out() -> None:
+def test_a_server_that_does_not_hold_to_choices_is_found_out():
     with (
         open_model(always_say("perhaps"), guided="vllm") as model,
         pytest.raises(ModelError, match="leave out guided"),
@@ -192,11 +187,11 @@ def test_a_server_that_does_not_hold_to_choices_is_found_out() -> None:
         _ask(model, "What?", decoding=up_to(5, choices=("yes", "no")))
 
 
-def test_there_is_a_request_in_flight_per_thread_and_conversations_are_independent() -> None:
+def test_there_is_a_request_in_flight_per_thread_and_conversations_are_independent():
     together, most, lock = 0, 0, threading.Lock()
     all_there = threading.Barrier(4, timeout=600)
 
-    def answer(request: dict[str, Any], handler: Any) -> Any:
+    def answer(request, handler):
         nonlocal together, most
         with lock:
             together += 1
@@ -213,16 +208,16 @@ def test_there_is_a_request_in_flight_per_thread_and_conversations_are_independe
 
 
 @pytest.fixture
-def waits(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
-    amounts: list[float] = []
+def waits(monkeypatch):
+    amounts = []
     monkeypatch.setattr(served.RateLimiter, "wait", lambda pace, amount=1.0: amounts.append(amount))
     return amounts
 
 
-def test_what_is_in_flight_ends_when_the_model_is_closed() -> None:
+def test_what_is_in_flight_ends_when_the_model_is_closed():
     request_came, done = threading.Event(), threading.Event()
 
-    def answer(_request: Any, _handler: Any) -> None:
+    def answer(_request, _handler):
         request_came.set()
         done.wait(20)
 
@@ -240,9 +235,7 @@ def test_what_is_in_flight_ends_when_the_model_is_closed() -> None:
         done.set()
 
 
-def test_a_server_on_this_machine_is_asked_without_the_environments_proxy(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_server_on_this_machine_is_asked_without_the_environments_proxy(monkeypatch):
     for name in ("HTTP_PROXY", "http_proxy", "ALL_PROXY", "all_proxy"):
         monkeypatch.setenv(name, "http://127.0.0.1:1")
     for name in ("NO_PROXY", "no_proxy"):
@@ -251,7 +244,7 @@ def test_a_server_on_this_machine_is_asked_without_the_environments_proxy(
         assert _ask(model, "What?").text == "a mug"
 
 
-def test_what_is_no_encryption_is_found_out() -> None:
+def test_what_is_no_encryption_is_found_out():
     refused = pytest.raises(
         ModelError, match=r"^https://127.0.0.1:\d+/v1 cannot be reached \(.*SSL"
     )
@@ -259,7 +252,7 @@ def test_what_is_no_encryption_is_found_out() -> None:
         _ask(model, "What?")
 
 
-def test_tokens_a_minute_are_kept_by_the_size_of_the_last_request(waits: list[float]) -> None:
+def test_tokens_a_minute_are_kept_by_the_size_of_the_last_request(waits):
     with open_model(
         lambda *_: completion("yes", (90, 10)), tokens_per_minute=1000, requests_per_minute=10
     ) as model:
@@ -268,7 +261,7 @@ def test_tokens_a_minute_are_kept_by_the_size_of_the_last_request(waits: list[fl
     assert waits == [0, 1.0, 100, 1.0]  # tokens, then the request itself
 
 
-def test_the_identity_is_whom_is_asked_and_how() -> None:
+def test_the_identity_is_whom_is_asked_and_how():
     with open_model(
         always_say("x"),
         base_url="https://host:1/v1/",
@@ -291,7 +284,7 @@ def test_the_identity_is_whom_is_asked_and_how() -> None:
         assert not model.capabilities.deterministic
 
 
-def test_listing_and_checking_options_does_not_import_the_client() -> None:
+def test_listing_and_checking_options_does_not_import_the_client():
     code = (
         "import sys, model_adapters as m; m.options('openai'); m.check_options('openai', {'model': "
         "'m'});"
@@ -301,9 +294,7 @@ def test_listing_and_checking_options_does_not_import_the_client() -> None:
 
 
 @pytest.mark.parametrize("field", ["reasoning_content", "reasoning"])
-def test_thoughts_that_the_server_tells_apart_are_kept_apart(
-    field: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_thoughts_that_the_server_tells_apart_are_kept_apart(field, monkeypatch):
     monkeypatch.setenv("MY_KEY", KEY)
     answer = completion("a cup", message={field: f"A mug? {KEY}"})
     with open_model(lambda *_: answer, api_key_env="MY_KEY") as model:

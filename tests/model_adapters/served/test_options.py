@@ -45,9 +45,7 @@ ASKED = {"model": "m"}
         ),
     ],
 )
-def test_misuse_is_refused_in_one_line_that_tells_no_secret(
-    settings: dict[str, str], message: str
-) -> None:
+def test_misuse_is_refused_in_one_line_that_tells_no_secret(settings, message):
     with pytest.raises(UsageError) as caught:
         check_options("openai", ASKED | settings)
     assert message in str(caught.value)
@@ -65,15 +63,15 @@ def test_misuse_is_refused_in_one_line_that_tells_no_secret(
         "http://127.9.9.9/",
     ],
 )
-def test_this_machine_may_be_asked_in_the_open_and_others_under_encryption(url: str) -> None:
+def test_this_machine_may_be_asked_in_the_open_and_others_under_encryption(url):
     check_options("openai", ASKED | {"base_url": url})
 
 
-def test_another_machine_may_be_asked_in_the_open_where_that_is_said() -> None:
+def test_another_machine_may_be_asked_in_the_open_where_that_is_said():
     check_options("openai", ASKED | {"base_url": "http://gpu-box:8000/v1", "insecure": "true"})
 
 
-def test_options_are_listed_with_their_defaults() -> None:
+def test_options_are_listed_with_their_defaults():
     listed = options("openai")
     assert "api_key_env=OPENAI_API_KEY" in listed
     assert "max_cost=none" in listed
@@ -82,5 +80,5 @@ def test_options_are_listed_with_their_defaults() -> None:
 @pytest.mark.parametrize(
     ("model", "named"), [("gpt-x", "gpt-x"), ("org/name-7b", "name-7b"), ("/a/folder", "folder")]
 )
-def test_a_run_is_called_by_the_servers_model(model: str, named: str) -> None:
+def test_a_run_is_called_by_the_servers_model(model, named):
     assert label("openai", {"model": model, "base_url": "https://host/v1"}) == named

@@ -1,16 +1,12 @@
 """Plans carried out by a model behind a server."""
 
 import hashlib
-import json
-from pathlib import Path
-from typing import Any
 
 import msgspec
 import pytest
 
-from infthor_eval.plans.records import RECORDS
-from infthor_eval.runs import UnitRecord, read_run
 from tests.helpers.command_line import option_words
+from tests.helpers.journals import read_outcome
 from tests.helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 
 from ..policies.servers import send
@@ -19,35 +15,32 @@ from .talking import completion, serve_chat
 MOVES = ("RotateLeft", "RotateRight", "LookUp", "LookDown", "MoveAhead")
 
 
-def _moves(request: dict[str, Any], _handler: Any = None) -> dict[str, Any]:
+def _moves(request, _handler=None):
     """A move that follows from everything that was shown."""
     drawn = hashlib.sha256(repr(request["messages"]).encode()).digest()[0]
     return completion(f"{MOVES[drawn % len(MOVES)]}<|act|>", (100, 3))
 
 
 @pytest.fixture
-def played(task_files: Path, tmp_path: Path, run_cli: Any) -> Any:
+def played(task_files, tmp_path, run_cli):
     """Plays plans of at most four actions; gives exit code, records and results."""
     task = task_files / "plans" / "infthor_plans.yaml"
     task.write_text(
         "include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 4}\n"
     )
 
-    def played(
-        url: str, data: Path, name: str = "m", **more: object
-    ) -> tuple[int, list[UnitRecord[Any]], Any]:
+    def played(url, data, name="m", **more):
         settings = {"base_url": url, "model": "m", "retries": 0, **more}
         typed = ",".join(f"{option}={value}" for option, value in settings.items())
         arguments = option_words(model="openai", model_args=typed, tasks="infthor_plans", data=data)
         code, _, err = run_cli(*arguments, "--greedy", "--name", name, "--out", tmp_path / "out")
         assert "Traceback" not in err
-        (results,) = (tmp_path / "out" / name).rglob("results.json")
-        return code, read_run(results.parent, RECORDS)[1], json.loads(results.read_text())
+        return code, *read_outcome(tmp_path / "out" / name)
 
     return played
 
 
-def test_episodes_at_once_find_what_one_after_the_other_finds(played: Any, tmp_path: Path) -> None:
+def test_episodes_at_once_find_what_one_after_the_other_finds(played, tmp_path):
     data = write_trajectories(
         tmp_path / "data",
         cut_trajectory(FORK, 1),
@@ -75,11 +68,11 @@ def test_episodes_at_once_find_what_one_after_the_other_finds(played: Any, tmp_p
 
 
 def test_a_plan_that_fails_in_the_middle_says_what_it_took_and_the_next_one_is_played(
-    played: Any, tmp_path: Path
-) -> None:
+    played, tmp_path
+):
     n_asked = 0
 
-    def answer(request: dict[str, Any], handler: Any) -> Any:
+    def answer(request, handler):
         nonlocal n_asked
         n_asked += 1
         return send(handler, 400, b"no") if n_asked == 3 else completion("RotateLeft", (100, 3))
@@ -93,10 +86,10 @@ def test_a_plan_that_fails_in_the_middle_says_what_it_took_and_the_next_one_is_p
     assert results["usage"]["requests"] == 6
 
 
-def test_a_survived_fault_stands_in_the_plans_record(played: Any, tmp_path: Path) -> None:
+def test_a_survived_fault_stands_in_the_plans_record(played, tmp_path):
     n_asked = 0
 
-    def answer(request: dict[str, Any], handler: Any) -> Any:
+    def answer(request, handler):
         nonlocal n_asked
         n_asked += 1
         return send(handler, 503, b"busy") if n_asked == 2 else completion("RotateLeft")
@@ -109,9 +102,7 @@ def test_a_survived_fault_stands_in_the_plans_record(played: Any, tmp_path: Path
     assert "answers 503 Service Unavailable: 'busy'" in fault
 
 
-def test_plans_beyond_the_cap_are_not_asked_and_are_played_by_the_next_run(
-    played: Any, tmp_path: Path
-) -> None:
+def test_plans_beyond_the_cap_are_not_asked_and_are_played_by_the_next_run(played, tmp_path):
     data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 2))
     with serve_chat(lambda *_: completion("RotateLeft", (95, 5))) as url:
         code, (first, second), _ = played(url, data, max_tokens_total=400)

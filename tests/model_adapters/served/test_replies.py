@@ -1,8 +1,6 @@
 """What a server replies, of whatever shape, is the reply or one line, and tells no key."""
 
 import json
-from http.server import BaseHTTPRequestHandler
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -12,21 +10,21 @@ from infthor_eval.errors import ModelError
 from model_adapters.served.completion import decode_reply
 from model_adapters.served.openai import ChatCompletion
 
-from ..policies.servers import Answer, send
+from ..policies.servers import send
 from .talking import always_say, always_send, ask_once, completion, open_model, read_refusal
 
 KEY = "sk-0123456789abcdef0123456789"
 
 
-def _read(content: bytes) -> str:
+def _read(content):
     return decode_reply("here", content, ChatCompletion, "a chat completion").text("here")
 
 
-def _answers(document: Any) -> Answer:
+def _answers(document):
     return lambda *_: document
 
 
-SHAPES: dict[str, tuple[Answer, str]] = {
+SHAPES = {
     "nothing": (
         always_send(200, b""),
         "does not answer with a chat completion (Input data was truncated)",
@@ -127,25 +125,17 @@ SHAPES: dict[str, tuple[Answer, str]] = {
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_a_reply_of_any_shape_is_one_line_and_not_asked_for_again(shape: str) -> None:
+def test_a_reply_of_any_shape_is_one_line_and_not_asked_for_again(shape):
     answer, message = SHAPES[shape]
     n_asked = 0
 
-    def counted(request: Any, handler: BaseHTTPRequestHandler) -> Any:
+    def counted(request, handler):
         nonlocal n_asked
         n_asked += 1
         return answer(request, handler)
 
     assert message in read_refusal(counted, retries=3)
     assert n_asked == 1
-
-
-@given(st.binary(max_size=200) | st.text(max_size=80).map(str.encode))
-def test_no_bytes_are_a_traceback(content: bytes) -> None:
-    try:
-        _read(content)
-    except ModelError as error:
-        assert "\n" not in str(error)
 
 
 _VALUES = st.recursive(
@@ -159,12 +149,12 @@ _VALUES = st.recursive(
 
 @settings(max_examples=200)
 @given(st.data())
-def test_no_document_is_a_traceback(data: st.DataObject) -> None:
+def test_no_document_is_a_traceback(data):
     document = completion()
     place = data.draw(
         st.sampled_from([(), ("choices",), ("usage",), ("choices", 0), ("choices", 0, "message")])
     )
-    within: Any = document
+    within = document
     for step in place:
         within = within[step]
     key = data.draw(st.sampled_from(sorted(within))) if isinstance(within, dict) else 0
@@ -195,12 +185,12 @@ def test_no_document_is_a_traceback(data: st.DataObject) -> None:
         (completion("yes") | {"extra": [1, {"more": None}]}, "yes"),
     ],
 )
-def test_what_was_said_is_the_reply(document: dict[str, Any], text: str) -> None:
+def test_what_was_said_is_the_reply(document, text):
     with open_model(_answers(document)) as model:
         assert ask_once(model).text == text
 
 
-USAGES: list[tuple[str, tuple[int | None, ...]]] = [
+USAGES = [
     ('{"prompt_tokens": 10, "completion_tokens": 2}', (10, 2, None)),
     ('{"prompt_tokens": 10.0, "completion_tokens": 2.0}', (10, 2, None)),
     ('{"prompt_tokens": 10, "completion_tokens": 2, "prompt_tokens_details": null}', (10, 2, None)),
@@ -244,7 +234,7 @@ USAGES: list[tuple[str, tuple[int | None, ...]]] = [
 
 
 @pytest.mark.parametrize(("usage", "counts"), USAGES)
-def test_no_usage_takes_the_reply_with_it(usage: str, counts: tuple[int | None, ...]) -> None:
+def test_no_usage_takes_the_reply_with_it(usage, counts):
     body = json.dumps(completion() | {"usage": "@"}).replace('"@"', usage).encode()
     with open_model(always_send(200, body)) as model:
         reply = ask_once(model)
@@ -270,27 +260,25 @@ def test_no_usage_takes_the_reply_with_it(usage: str, counts: tuple[int | None, 
         ([], "", None),
     ],
 )
-def test_content_may_be_chunks(content: Any, text: str, thinking: str | None) -> None:
+def test_content_may_be_chunks(content, text, thinking):
     with open_model(_answers(completion(message={"content": content}))) as model:
         reply = ask_once(model)
     assert (reply.text, reply.thinking) == (text, thinking)
 
 
-def test_nothing_before_the_token_limit_is_a_thought_that_was_cut_off() -> None:
+def test_nothing_before_the_token_limit_is_a_thought_that_was_cut_off():
     for content, reason, thinking in (("", "length", ""), ([], "length", ""), ("", "stop", None)):
-        with open_model(_answers(completion(content, finish_reason=reason))) as model:  # type: ignore[arg-type]
+        with open_model(_answers(completion(content, finish_reason=reason))) as model:
             reply = ask_once(model)
         assert (reply.text, reply.thinking) == ("", thinking)
 
 
 @pytest.mark.parametrize("status", [200, 400, 401, 429, 500])
-def test_a_server_that_says_the_key_again_does_not_have_it_told(
-    status: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_server_that_says_the_key_again_does_not_have_it_told(status, monkeypatch):
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
     heard = []
 
-    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> Any:
+    def answer(_request, handler):
         heard.append(handler.headers["Authorization"])
         if status == 200:
             return completion(f"The key is {heard[0]}.")
@@ -306,7 +294,7 @@ def test_a_server_that_says_the_key_again_does_not_have_it_told(
     assert KEY[:8] not in message
 
 
-def test_a_short_key_keeps_no_secret(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_short_key_keeps_no_secret(monkeypatch):
     monkeypatch.setenv("OPENAI_API_KEY", "mug")
     with open_model(always_say("a mug")) as model:
         assert ask_once(model).text == "a mug"

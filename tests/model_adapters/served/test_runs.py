@@ -1,21 +1,16 @@
 """Whole runs against a server, as their user types them."""
 
-import json
 import logging
 import signal
 import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
-from typing import Any
 
 import pytest
 
-from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs import read_run
-
 from ...helpers.command_line import option_words
+from ...helpers.journals import read_outcome
 from ..policies.servers import send
 from .talking import always_say, completion, keep_requests, serve_chat, talkative
 
@@ -23,11 +18,11 @@ KEY = "sk-0123456789abcdef0123456789"
 
 
 @pytest.fixture
-def ask(make_nieh_set: Any, tmp_path: Path, run_cli: Any) -> Any:
+def ask(make_nieh_set, tmp_path, run_cli):
     """Runs `nieh_gt` on five questions."""
     data = make_nieh_set(size=56)
 
-    def ask(url: str, *options: object, **model_args: object) -> tuple[int, str, str]:
+    def ask(url, *options, **model_args):
         settings = {"base_url": url, "model": "m", "retries": 0, **model_args}
         typed = ",".join(f"{name}={value}" for name, value in settings.items())
         arguments = option_words(model="openai", model_args=typed, tasks="nieh_gt", data=data)
@@ -36,20 +31,12 @@ def ask(make_nieh_set: Any, tmp_path: Path, run_cli: Any) -> Any:
     return ask
 
 
-def _run(folder: Path) -> tuple[list[Any], dict[str, Any]]:
-    """The records of the one run in a folder, and its results."""
-    (results,) = folder.rglob("results.json")
-    return read_run(results.parent, RECORDS)[1], json.loads(results.read_text())
-
-
-def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(
-    ask: Any, tmp_path: Path
-) -> None:
+def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(ask, tmp_path):
     prices = {"price_per_m_input": 2, "price_per_m_cached": 1, "price_per_m_output": 10}
     with serve_chat(lambda *_: completion("yes", (1000, 10, 200))) as url:
         code, out, err = ask(url, **prices)
     assert code == 0, err
-    records, results = _run(tmp_path / "out")
+    records, results = read_outcome(tmp_path / "out")
     assert (tmp_path / "out" / "m").is_dir()
     each = (800 * 2 + 200 * 1 + 10 * 10) / 1e6
     assert [record.payload.reply for record in records] == ["yes"] * 5
@@ -66,8 +53,8 @@ def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(
     )
 
 
-def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask: Any, tmp_path: Path) -> None:
-    requests: list[Any] = []
+def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask, tmp_path):
+    requests = []
     with serve_chat(keep_requests(requests, lambda *_: completion("yes", (95, 5)))) as url:
         code, _, err = ask(url, "--max-tokens-total", 250)
         assert code == 1
@@ -77,13 +64,13 @@ def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask: Any, tmp_path
         assert code == 0, err
         assert "2 evaluated now, 3 resumed from the journal" in err
         assert len(requests) == 5
-    records, results = _run(tmp_path / "out")
+    records, results = read_outcome(tmp_path / "out")
     assert [record.failure for record in records] == [None] * 5
     assert results["usage"] == {"requests": 5, "context": 475, "reply": 25, "cost": None}
 
 
-def test_money_is_capped_likewise(ask: Any) -> None:
-    requests: list[Any] = []
+def test_money_is_capped_likewise(ask):
+    requests = []
     with serve_chat(keep_requests(requests, lambda *_: completion("yes", (1000, 0)))) as url:
         code, _, err = ask(url, "--max-cost", 0.0015, price_per_m_input=1, price_per_m_output=1)
     assert code == 1
@@ -110,13 +97,7 @@ def test_money_is_capped_likewise(ask: Any) -> None:
         ((), {"api_key_env": KEY}, "api_key_env is not the name of an environment variable"),
     ],
 )
-def test_misuse_is_one_line_before_anything_is_read(
-    options: tuple[object, ...],
-    model_args: dict[str, object],
-    message: str,
-    ask: Any,
-    tmp_path: Path,
-) -> None:
+def test_misuse_is_one_line_before_anything_is_read(options, model_args, message, ask, tmp_path):
     code, out, err = ask("http://127.0.0.1:1/v1", *options, **model_args)
     assert (code, out, len(err.splitlines())) == (2, "", 1)
     assert message in err
@@ -124,9 +105,7 @@ def test_misuse_is_one_line_before_anything_is_read(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_cap_is_not_for_models_that_cost_nothing(
-    run_cli: Any, make_nieh_set: Any, tmp_path: Path
-) -> None:
+def test_a_cap_is_not_for_models_that_cost_nothing(run_cli, make_nieh_set, tmp_path):
     data = make_nieh_set(size=56)
     arguments = option_words(tasks="nieh_gt", data=data, out=tmp_path / "out", max_cost=1)
     for model in ("qwen2.5-vl-tiny", "oracle"):
@@ -135,8 +114,8 @@ def test_a_cap_is_not_for_models_that_cost_nothing(
         assert f"{model} has no option max_cost" in err
 
 
-def test_units_that_fail_are_named_and_the_others_answered(ask: Any, tmp_path: Path) -> None:
-    def answer(request: Any, handler: Any) -> Any:
+def test_units_that_fail_are_named_and_the_others_answered(ask, tmp_path):
+    def answer(request, handler):
         text = request["messages"][0]["content"][-1]["text"]
         return send(handler, 400, b"no fridge") if "fridge" in text else completion("yes")
 
@@ -145,28 +124,28 @@ def test_units_that_fail_are_named_and_the_others_answered(ask: Any, tmp_path: P
     assert code == 1
     assert "Traceback" not in err
     assert "1 sample(s) failed, in no score: " in err
-    records, results = _run(tmp_path / "out")
+    records, results = read_outcome(tmp_path / "out")
     (failed,) = [record for record in records if record.failure]
     assert "answers 400 Bad Request: 'no fridge'" in failed.failure
     assert results["usage"]["requests"] == 4
 
 
-def test_a_survived_fault_stands_in_the_record(ask: Any, tmp_path: Path) -> None:
+def test_a_survived_fault_stands_in_the_record(ask, tmp_path):
     n_asked = 0
 
-    def answer(request: Any, handler: Any) -> Any:
+    def answer(request, handler):
         nonlocal n_asked
         n_asked += 1
         return send(handler, 503, b"busy") if n_asked == 1 else completion("yes")
 
     with serve_chat(answer) as url:
         assert ask(url, retries=1, max_in_flight=1)[0] == 0
-    faults = [fault for record in _run(tmp_path / "out")[0] for fault in record.faults]
+    faults = [fault for record in read_outcome(tmp_path / "out")[0] for fault in record.faults]
     assert len(faults) == 1
     assert "answers 503 Service Unavailable: 'busy'" in faults[0]
 
 
-def _echoes(request: Any, handler: Any) -> Any:
+def _echoes(request, handler):
     """Says the key wherever it can: in a reply, in errors, in heads, as what a request failed
     for."""
     key = handler.headers["Authorization"]
@@ -188,11 +167,9 @@ def _echoes(request: Any, handler: Any) -> Any:
     return completion(f"The key is {key}.")
 
 
-def test_the_key_is_in_no_file_and_in_nothing_that_is_said(
-    ask: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_the_key_is_in_no_file_and_in_nothing_that_is_said(ask, tmp_path, monkeypatch, caplog):
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
-    heard: list[Any] = []
+    heard = []
     with caplog.at_level(logging.DEBUG), serve_chat(keep_requests(heard, _echoes)) as url:
         code, out, err = ask(url, retries=1)
     assert code == 1
@@ -208,12 +185,10 @@ def test_the_key_is_in_no_file_and_in_nothing_that_is_said(
 
 
 @pytest.mark.parametrize("in_flight", [1, 4])
-def test_a_run_interrupted_twice_ends_at_once_in_one_line(
-    make_nieh_set: Any, tmp_path: Path, in_flight: int
-) -> None:
+def test_a_run_interrupted_twice_ends_at_once_in_one_line(make_nieh_set, tmp_path, in_flight):
     request_came, done = threading.Event(), threading.Event()
 
-    def answer(_request: Any, _handler: Any) -> None:
+    def answer(_request, _handler):
         request_came.set()
         done.wait(600)
 
@@ -251,7 +226,7 @@ def test_a_run_interrupted_twice_ends_at_once_in_one_line(
     assert "pending" not in err
 
 
-def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run_cli: Any) -> None:
+def test_notes_are_paid_for_too(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
     with serve_chat(lambda *_: completion("a note", (100, 10))) as url:
         model_args = f"base_url={url},model=m,price_per_m_input=1,price_per_m_output=10"
@@ -260,7 +235,7 @@ def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run_cli: Any
         )
         code, out, err = run_cli(*arguments, "--out", tmp_path / "out")
     assert code == 0, err
-    _, results = _run(tmp_path / "out")
+    _, results = read_outcome(tmp_path / "out")
     assert results["usage"] == {
         "requests": 7,
         "context": 700,
@@ -270,9 +245,7 @@ def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run_cli: Any
     assert "7 requests" in out
 
 
-def test_in_process_models_and_baselines_tell_what_they_read(
-    make_nieh_set: Any, tmp_path: Path, run_cli: Any
-) -> None:
+def test_in_process_models_and_baselines_tell_what_they_read(make_nieh_set, tmp_path, run_cli):
     arguments = option_words(tasks="nieh_gt", data=make_nieh_set(size=56), out=tmp_path / "out")
     assert "requests" not in run_cli("--model", "oracle", *arguments)[1]
     assert "qwen2.5-vl-tiny: 5 requests, " in (
@@ -281,13 +254,11 @@ def test_in_process_models_and_baselines_tell_what_they_read(
     assert "US dollars" not in out
 
 
-def test_several_trajectories_are_asked_about_at_once(
-    make_nieh_set: Any, tmp_path: Path, run_cli: Any
-) -> None:
+def test_several_trajectories_are_asked_about_at_once(make_nieh_set, tmp_path, run_cli):
     both = threading.Barrier(2, timeout=600)
-    seen: set[int] = set()
+    seen = set()
 
-    def answer(request: Any, handler: Any) -> Any:
+    def answer(request, handler):
         if len(seen) < 2:
             seen.add(threading.get_ident())
             both.wait()
@@ -303,7 +274,7 @@ def test_several_trajectories_are_asked_about_at_once(
     assert code == 0, err
 
 
-def test_a_server_that_says_nonsense_fails_every_unit_and_nothing_else(ask: Any) -> None:
+def test_a_server_that_says_nonsense_fails_every_unit_and_nothing_else(ask):
     with serve_chat(always_say("\x1b[2J\x00 not a word")) as url:
         code, out, err = ask(url)
     assert code == 0

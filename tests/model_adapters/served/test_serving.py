@@ -6,26 +6,21 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import pytest
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.runs import UnitRecord
 from model_adapters import check_adapter, load
 from tests.helpers.bundled import BUNDLED
-from tests.helpers.command_line import option_words
-from tests.helpers.journals import read_records
 from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
 
 from ..asking import up_to
 from ..checkpoints import save
-from ..serving import free_port, wait_for_server
+from ..serving import free_port, run_each, wait_for_server
 
 for package in ("fastapi", "uvicorn", "multipart", "openai"):
     pytest.importorskip(
@@ -44,12 +39,12 @@ class Served(NamedTuple):
     folder: Path
 
     @property
-    def options(self) -> dict[str, str]:
+    def options(self):
         return {"base_url": self.url, "model": str(self.folder)}
 
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+def served(tmp_path_factory):
     root = tmp_path_factory.mktemp("served")
     folder = root / "idefics3"
     save("idefics3", folder)
@@ -79,39 +74,24 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 
 @pytest.fixture
-def both(
-    served: Served, tmp_path: Path, run_cli: Any
-) -> Callable[..., list[list[UnitRecord[Any]]]]:
+def both(served, tmp_path, run_cli):
     """Runs the same tasks behind the server and in this process; gives the records of both."""
 
-    def both(*arguments: object, **more: str) -> list[list[UnitRecord[Any]]]:
-        here = {
-            "pretrained": served.folder,
-            "device": "cpu",
-            "dtype": "float32",
-            "max_tokens": 100_000,
-        }
-        records = []
-        for model, settings in (("openai", served.options | more), ("hf-vlm", here)):
-            options = ",".join(f"{name}={value}" for name, value in settings.items())
-            typed = option_words(model=model, model_args=options, name=model, out=tmp_path / "out")
-            code, _, err = run_cli(*typed, *arguments)
-            assert code == 0, err
-            records.append(read_records(tmp_path / "out" / model))
-        return records
+    def both(*arguments, **more):
+        here = {"pretrained": served.folder, "device": "cpu", "dtype": "float32"}
+        models = {"openai": served.options | more, "hf-vlm": here | {"max_tokens": 100_000}}
+        return run_each(run_cli, tmp_path / "out", models, *arguments)
 
     return both
 
 
-def test_it_keeps_the_contract(served: Served) -> None:
-    model: Any = load("openai", served.options | WITHOUT_STOP, 0)
+def test_it_keeps_the_contract(served):
+    model = load("openai", served.options | WITHOUT_STOP, 0)
     check_adapter(model)
     model.close()
 
 
-def test_questions_are_answered_as_in_this_process(
-    both: Callable[..., list[list[UnitRecord[Any]]]],
-) -> None:
+def test_questions_are_answered_as_in_this_process(both):
     behind, here = both("--tasks", "nieh_mini", "--limit", 3)
     assert len(behind) == 6
     assert [record.payload for record in behind] == [record.payload for record in here]
@@ -122,9 +102,7 @@ def test_questions_are_answered_as_in_this_process(
     assert not any(record.faults for record in behind)
 
 
-def test_plans_are_carried_out_as_in_this_process(
-    both: Callable[..., list[list[UnitRecord[Any]]]], tmp_path: Path
-) -> None:
+def test_plans_are_carried_out_as_in_this_process(both, tmp_path):
     data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 2), cut_trajectory(CANDLE, 2))
     behind, here = both(
         "--tasks", "infthor_plans", "--data", data, "--greedy", **WITHOUT_STOP, **WITHOUT_PENALTY
@@ -136,17 +114,13 @@ def test_plans_are_carried_out_as_in_this_process(
     }
 
 
-def test_all_bundled_questions_are_answered_alike(
-    both: Callable[..., list[list[UnitRecord[Any]]]],
-) -> None:
+def test_all_bundled_questions_are_answered_alike(both):
     behind, here = both("--tasks", "nieh_mini")
     assert len(behind) == 2 * len(NiehSet(BUNDLED).questions)
     assert [record.payload for record in behind] == [record.payload for record in here]
 
 
-def test_bundled_plans_are_carried_out_alike(
-    both: Callable[..., list[list[UnitRecord[Any]]]],
-) -> None:
+def test_bundled_plans_are_carried_out_alike(both):
     behind, here = both(
         "--tasks", "infthor_plans_mini", "--limit", 2, "--greedy", **WITHOUT_STOP, **WITHOUT_PENALTY
     )
@@ -156,8 +130,8 @@ def test_bundled_plans_are_carried_out_alike(
     assert [record.payload for record in behind] == uncounted
 
 
-def test_turns_and_systems_are_taken(served: Served, frames: list[FrameRef]) -> None:
-    models: list[Any] = [
+def test_turns_and_systems_are_taken(served, frames):
+    models = [
         load("openai", served.options, 0),
         load("hf-vlm", {"pretrained": str(served.folder), "device": "cpu", "dtype": "float32"}, 0),
     ]
@@ -174,10 +148,8 @@ def test_turns_and_systems_are_taken(served: Served, frames: list[FrameRef]) -> 
     assert replies[0] == replies[1]
 
 
-def test_what_the_server_refuses_is_one_line(served: Served, tmp_path: Path) -> None:
-    model: Any = load(
-        "openai", served.options | {"model": str(tmp_path / "none"), "retries": "0"}, 0
-    )
+def test_what_the_server_refuses_is_one_line(served, tmp_path):
+    model = load("openai", served.options | {"model": str(tmp_path / "none"), "retries": "0"}, 0)
     talk = model.conversation()
     talk.append("What is it?")
     with pytest.raises(

@@ -13,19 +13,19 @@ from model_adapters.served.completion import TokenUsage
 from model_adapters.served.spend import Caps, Charge, Prices, RateLimiter, Spend
 
 
-def _took(spend: Spend, tokens: int | None, cost: float = 0.0) -> None:
+def _took(spend, tokens, cost=0.0):
     with spend.request() as charge:
         charge.sent, charge.tokens, charge.cost = True, tokens, cost
 
 
-def test_cached_tokens_cost_what_they_cost() -> None:
+def test_cached_tokens_cost_what_they_cost():
     prices = Prices(prompt=2.0, cached=0.5, reply=8.0)
     assert prices.cost(TokenUsage(1_000_000, 0)) == 2.0
     used = TokenUsage(1_000_000, 100_000, n_cached=400_000)
     assert prices.cost(used) == pytest.approx(0.6 * 2 + 0.4 * 0.5 + 0.1 * 8)
 
 
-def test_what_is_put_into_the_cache_has_its_own_price() -> None:
+def test_what_is_put_into_the_cache_has_its_own_price():
     used = TokenUsage(1_000_000, 0, n_cached=400_000, n_stored=500_000)
     prices = Prices(prompt=2.0, cached=0.5, reply=8.0, stored=2.5)
     assert prices.cost(used) == pytest.approx(0.1 * 2 + 0.4 * 0.5 + 0.5 * 2.5)
@@ -42,14 +42,14 @@ def test_what_is_put_into_the_cache_has_its_own_price() -> None:
         (Caps(tokens=101), 1),
     ],
 )
-def test_a_batch_is_as_large_as_the_caps_allow(caps: Caps, room: int | None) -> None:
+def test_a_batch_is_as_large_as_the_caps_allow(caps, room):
     spend = Spend("m", caps)
     assert spend.room() == (None if room is None else 1)  # the first one tells what one takes
     spend.add(Charge(tokens=100, cost=0.2, sent=True))
     assert spend.room() == room
 
 
-def test_there_is_no_room_beyond_the_caps() -> None:
+def test_there_is_no_room_beyond_the_caps():
     spend = Spend("m", Caps(tokens=100))
     spend.add(Charge(tokens=100, sent=True))
     with pytest.raises(ModelError, match="not asked: 100 tokens reach max_tokens_total=100"):
@@ -57,7 +57,7 @@ def test_there_is_no_room_beyond_the_caps() -> None:
 
 
 @given(st.lists(st.integers(0, 50), min_size=1, max_size=30), st.integers(1, 200))
-def test_nothing_is_begun_once_the_cap_is_reached(takes: list[int], cap: int) -> None:
+def test_nothing_is_begun_once_the_cap_is_reached(takes, cap):
     spend, taken = Spend("m", Caps(tokens=cap)), 0
     for tokens in takes:
         if taken >= cap:
@@ -71,7 +71,7 @@ def test_nothing_is_begun_once_the_cap_is_reached(takes: list[int], cap: int) ->
             taken += tokens
 
 
-def test_money_is_capped_likewise() -> None:
+def test_money_is_capped_likewise():
     spend = Spend("m", Caps(cost=1.0))
     _took(spend, 10, 0.6)
     _took(spend, 10, 0.6)
@@ -82,7 +82,7 @@ def test_money_is_capped_likewise() -> None:
         _took(spend, 10, 0.6)
 
 
-def test_a_request_that_failed_without_a_reply_takes_nothing() -> None:
+def test_a_request_that_failed_without_a_reply_takes_nothing():
     spend = Spend("m", Caps(tokens=5))
     with pytest.raises(OSError), spend.request():
         raise OSError
@@ -91,7 +91,7 @@ def test_a_request_that_failed_without_a_reply_takes_nothing() -> None:
         _took(spend, 1)
 
 
-def test_a_server_that_does_not_tell_is_asked_once_under_a_cap_and_for_ever_without() -> None:
+def test_a_server_that_does_not_tell_is_asked_once_under_a_cap_and_for_ever_without():
     capped, free = Spend("m", Caps(tokens=100)), Spend("m", Caps())
     for spend in (capped, free):
         _took(spend, None)
@@ -102,7 +102,7 @@ def test_a_server_that_does_not_tell_is_asked_once_under_a_cap_and_for_ever_with
         _took(capped, None)
 
 
-def test_a_reply_that_does_not_tell_counts_as_the_dearest_before_it() -> None:
+def test_a_reply_that_does_not_tell_counts_as_the_dearest_before_it():
     spend = Spend("m", Caps(tokens=100))
     for tokens in (10, 40, None, None):
         _took(spend, tokens)
@@ -110,10 +110,10 @@ def test_a_reply_that_does_not_tell_counts_as_the_dearest_before_it() -> None:
         _took(spend, 1)
 
 
-def test_threads_pass_a_cap_by_one_request_at_most() -> None:
+def test_threads_pass_a_cap_by_one_request_at_most():
     spend, taken, lock = Spend("m", Caps(tokens=100)), [], Lock()
 
-    def ask(_number: int) -> bool:
+    def ask(_number):
         try:
             with spend.request() as charge:
                 time.sleep(0.002)
@@ -131,7 +131,7 @@ def test_threads_pass_a_cap_by_one_request_at_most() -> None:
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+def clock(monkeypatch):
     """A clock that waiting turns on; its one item is the time."""
     now = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
@@ -139,7 +139,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return now
 
 
-def test_a_pace_is_even(clock: list[float]) -> None:
+def test_a_pace_is_even(clock):
     pace, begun = RateLimiter(30), []
     for _ in range(4):
         pace.wait()
@@ -147,9 +147,7 @@ def test_a_pace_is_even(clock: list[float]) -> None:
     assert begun == [0, 2, 4, 6]
 
 
-def test_what_was_taken_is_made_up_for_and_what_was_given_back_is_not_waited_for(
-    clock: list[float],
-) -> None:
+def test_what_was_taken_is_made_up_for_and_what_was_given_back_is_not_waited_for(clock):
     pace = RateLimiter(60)
     pace.wait(10)
     pace.take(20)  # it was 30
@@ -160,7 +158,7 @@ def test_what_was_taken_is_made_up_for_and_what_was_given_back_is_not_waited_for
     assert clock[0] == 130
 
 
-def test_without_a_limit_nothing_is_waited_for(clock: list[float]) -> None:
+def test_without_a_limit_nothing_is_waited_for(clock):
     pace = RateLimiter(None)
     for _ in range(5):
         pace.wait(1e9)

@@ -1,19 +1,15 @@
 """The double in vLLM's place, and tiny checkpoints for it."""
 
 import sys
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any
 
 import pytest
 
-from model_adapters import load
-
+from ..asking import load_saved, load_with
 from .double import Double
 
 
 @pytest.fixture
-def vllm(monkeypatch: pytest.MonkeyPatch) -> Double:
+def vllm(monkeypatch):
     """The double, found by whoever imports vLLM."""
     double = Double()
     # Else the adapter sets it for all tests to come.
@@ -24,34 +20,27 @@ def vllm(monkeypatch: pytest.MonkeyPatch) -> Double:
 
 
 @pytest.fixture
-def start(vllm: Double, checkpoints: dict[str, Path]) -> Callable[..., Any]:
+def start(vllm, checkpoints):
     """Starts a model of a tiny checkpoint on the double."""
 
-    def start(family: str = "qwen2.5-vl", name: str | None = None, **options: object) -> Any:
+    def start(family="qwen2.5-vl", name=None, **options):
         settings = {"pretrained": checkpoints[family], "dtype": "float32", **options}
-        return load(
-            f"{name or family}@vllm", {key: str(value) for key, value in settings.items()}, 0
-        )
+        return load_with(f"{name or family}@vllm", **settings)
 
     return start
 
 
 @pytest.fixture(scope="session")
-def in_process(checkpoints: dict[str, Path]) -> Iterator[Callable[..., Any]]:
+def in_process(checkpoints):
     """The same checkpoints as transformers runs them."""
-    loaded: dict[tuple[str, str], Any] = {}
+    loaded = {}
 
-    def get(family: str, name: str | None = None, **options: object) -> Any:
+    def get(family, name=None, **options):
         key = (family, str(sorted(options.items())))
         if key not in loaded:
-            settings = {
-                "pretrained": checkpoints[family],
-                "dtype": "float32",
-                "device": "cpu",
-                **options,
-            }
-            loaded[key] = load(
-                name or family, {option: str(value) for option, value in settings.items()}, 0
+            folder = checkpoints[family]
+            loaded[key] = load_saved(
+                name or family, options.pop("pretrained", folder), dtype="float32", **options
             )
         return loaded[key]
 

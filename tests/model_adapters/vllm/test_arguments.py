@@ -3,7 +3,6 @@
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -25,13 +24,13 @@ from model_adapters.vllm.arguments import (
 from model_adapters.vllm.options import EngineOptions, VllmOptions
 from model_adapters.vllm.plugin import encoder_cache_of
 
-from .double import SIGNATURES, Double
+from .double import SIGNATURES
 
 TAKEN = {*SIGNATURES["LLM"], *SIGNATURES["EngineArgs"]}
 FOLDER = Path("checkpoint")
 
 
-def _qwen(rope: str) -> Any:
+def _qwen(rope):
     config = Qwen2_5_VLConfig(
         text_config={
             "max_position_embeddings": 128_000,
@@ -46,7 +45,7 @@ def _qwen(rope: str) -> Any:
     return config
 
 
-def test_without_options_vllm_gets_what_it_needs_and_the_rest_is_its_own_choice() -> None:
+def test_without_options_vllm_gets_what_it_needs_and_the_rest_is_its_own_choice():
     assert engine_arguments(FOLDER, EngineOptions()) == {
         "model": "checkpoint",
         "dtype": "auto",
@@ -60,7 +59,7 @@ def test_without_options_vllm_gets_what_it_needs_and_the_rest_is_its_own_choice(
     }
 
 
-def test_llama_4_has_the_temperature_of_its_config_in_every_length() -> None:
+def test_llama_4_has_the_temperature_of_its_config_in_every_length():
     config = Llama4Config(text_config={"attn_temperature_tuning": True})
     arguments = model_arguments(
         FOLDER, config, VllmOptions(pretrained="x"), max_tokens=9, max_frames=1
@@ -68,40 +67,11 @@ def test_llama_4_has_the_temperature_of_its_config_in_every_length() -> None:
     assert arguments["override_generation_config"] == {"attn_temperature_tuning": True}
 
 
-def test_every_option_arrives_under_vllms_name() -> None:
-    typed = VllmOptions(
-        pretrained="x",
-        dtype="bfloat16",
-        trust_remote_code=True,
-        max_model_len=9_999,
-        tensor_parallel_size=2,
-        pipeline_parallel_size=3,
-        data_parallel_size=4,
-        distributed_executor_backend="external_launcher",
-        gpu_memory_utilization=0.5,
-        enforce_eager=True,
-        quantization="fp8",
-        prefix_caching=False,
-        mm_processor_cache_gb=0.0,
-        max_num_seqs=3,
-        max_num_batched_tokens=4_096,
-        enable_chunked_prefill=False,
-        block_size=32,
-        kv_cache_dtype="fp8",
-        kv_offloading_size=1.5,
-        decode_context_parallel_size=2,
-        prefill_context_parallel_size=4,
-        mm_encoder_tp_mode="data",
-        mm_encoder_attn_backend="TORCH_SDPA",
-        encoder_cache_tokens=50_000,
-        seed=7,
-        frame_size=640,
-        rope="yarn:4",
-    )
-    assert model_arguments(FOLDER, _qwen("yarn:4"), typed, max_tokens=9_999, max_frames=12) == {
-        "model": "checkpoint",
+def test_every_option_arrives_under_vllms_name():
+    own_names = {
         "dtype": "bfloat16",
-        "seed": 7,
+        "trust_remote_code": True,
+        "max_model_len": 9_999,
         "tensor_parallel_size": 2,
         "pipeline_parallel_size": 3,
         "data_parallel_size": 4,
@@ -109,7 +79,6 @@ def test_every_option_arrives_under_vllms_name() -> None:
         "gpu_memory_utilization": 0.5,
         "enforce_eager": True,
         "quantization": "fp8",
-        "enable_prefix_caching": False,
         "mm_processor_cache_gb": 0.0,
         "max_num_seqs": 3,
         "max_num_batched_tokens": 4_096,
@@ -121,8 +90,14 @@ def test_every_option_arrives_under_vllms_name() -> None:
         "prefill_context_parallel_size": 4,
         "mm_encoder_tp_mode": "data",
         "mm_encoder_attn_backend": "TORCH_SDPA",
-        "max_model_len": 9_999,
-        "trust_remote_code": True,
+        "seed": 7,
+    }
+    others = {"prefix_caching": False, "encoder_cache_tokens": 50_000, "frame_size": 640}
+    typed = VllmOptions(pretrained="x", rope="yarn:4", **own_names, **others)
+    arguments = model_arguments(FOLDER, _qwen("yarn:4"), typed, max_tokens=9_999, max_frames=12)
+    assert arguments == own_names | {
+        "model": "checkpoint",
+        "enable_prefix_caching": False,
         "limit_mm_per_prompt": {"image": {"count": 12, "width": 640, "height": 640}, "video": 0},
         "mm_processor_kwargs": {"use_fast": False},
         "ec_manager_config": {
@@ -147,8 +122,8 @@ def test_every_option_arrives_under_vllms_name() -> None:
 
 @pytest.mark.parametrize(("own", "size"), [(16_384, 50_000), (60_000, 60_000)])
 def test_vllm_makes_its_cache_of_encoded_frames_through_the_class_that_it_is_told(
-    own: int, size: int, vllm: Double, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    own, size, vllm, monkeypatch
+):
     module = ModuleType("vllm.v1.core.encoder_cache_manager")
     vars(module)["EncoderCacheManager"] = SimpleNamespace
     monkeypatch.setitem(sys.modules, module.__name__, module)
@@ -158,9 +133,7 @@ def test_vllm_makes_its_cache_of_encoded_frames_through_the_class_that_it_is_tol
     assert maker.create_manager(cache_size=own, vllm_config=config).cache_size == size
 
 
-def test_an_older_vllm_has_no_size_for_it(
-    start: Any, vllm: Double, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_older_vllm_has_no_size_for_it(start, vllm, monkeypatch):
     model = start(encoder_cache_tokens=50_000)
     assert model.identity()["throughput"] == {"encoder_cache_tokens": 50_000}
     monkeypatch.setattr(sys.modules["vllm"], "__version__", "0.32.0")
@@ -168,7 +141,7 @@ def test_an_older_vllm_has_no_size_for_it(
         start(encoder_cache_tokens=50_000)
 
 
-def test_limits_of_a_frames_area_are_the_processors() -> None:
+def test_limits_of_a_frames_area_are_the_processors():
     typed = Qwen25VLOnVllm.Options(min_pixels=100, max_pixels=200, image_backend="torchvision")
     arguments = model_arguments(FOLDER, _qwen("yarn:2"), typed, max_tokens=10, max_frames=1)
     assert arguments["mm_processor_kwargs"] == {
@@ -194,7 +167,7 @@ def test_limits_of_a_frames_area_are_the_processors() -> None:
         },
     )
 )
-def test_whatever_is_chosen_vllm_takes_all_of_it_and_no_none(chosen: dict[str, Any]) -> None:
+def test_whatever_is_chosen_vllm_takes_all_of_it_and_no_none(chosen):
     typed = VllmOptions(pretrained="x", max_frames=chosen.pop("image", None), **chosen)
     config = LlamaConfig()
     arguments = model_arguments(
@@ -205,20 +178,18 @@ def test_whatever_is_chosen_vllm_takes_all_of_it_and_no_none(chosen: dict[str, A
     assert arguments["limit_mm_per_prompt"]["image"]["count"] == (typed.max_frames or 14)
 
 
-def test_a_frame_is_taken_even_where_none_would_fit() -> None:
+def test_a_frame_is_taken_even_where_none_would_fit():
     assert frame_limit(100, 121, VllmOptions(pretrained="x")) == 1
 
 
 @pytest.mark.parametrize(
     ("typed", "own", "limit"), [(None, 128_000, 128_000), (4_096, 128_000, 4_096), (9, None, 9)]
 )
-def test_the_limit_is_what_was_asked_for_or_the_checkpoints(
-    typed: int | None, own: int | None, limit: int
-) -> None:
+def test_the_limit_is_what_was_asked_for_or_the_checkpoints(typed, own, limit):
     assert token_limit("x", own, VllmOptions(pretrained="x", max_model_len=typed)) == limit
 
 
-def test_a_checkpoint_without_a_limit_needs_one() -> None:
+def test_a_checkpoint_without_a_limit_needs_one():
     with pytest.raises(
         ModelError, match="the config of x has no context limit; give max_model_len="
     ):
@@ -228,7 +199,7 @@ def test_a_checkpoint_without_a_limit_needs_one() -> None:
 @pytest.mark.parametrize(
     ("rope_type", "longer"), [("yarn", True), ("longrope-scaled", True), ("linear", False)]
 )
-def test_a_model_of_one_part_has_its_extension_at_the_top(rope_type: str, longer: bool) -> None:
+def test_a_model_of_one_part_has_its_extension_at_the_top(rope_type, longer):
     config = LlamaConfig(max_position_embeddings=100, hidden_size=64, num_attention_heads=4)
     apply_rope(config, f"{rope_type}:2")
     overrides = rope_overrides(config, f"{rope_type}:2")
@@ -238,9 +209,7 @@ def test_a_model_of_one_part_has_its_extension_at_the_top(rope_type: str, longer
 
 
 @pytest.mark.parametrize(("rope", "scale"), [("longrope:2", 1.0), ("longrope-scaled:2", None)])
-def test_the_published_longrope_tells_vllm_that_attention_is_not_scaled(
-    rope: str, scale: float | None
-) -> None:
+def test_the_published_longrope_tells_vllm_that_attention_is_not_scaled(rope, scale):
     config = LlamaConfig(max_position_embeddings=100, hidden_size=64, num_attention_heads=4)
     apply_rope(config, rope)
     overrides = rope_overrides(config, rope)
@@ -251,14 +220,14 @@ def test_the_published_longrope_tells_vllm_that_attention_is_not_scaled(
 
 
 @pytest.mark.parametrize("rope", ["linear:2", "longrope:2", "longrope-scaled:2"])
-def test_an_extension_that_would_lose_the_three_axes_is_refused(rope: str) -> None:
+def test_an_extension_that_would_lose_the_three_axes_is_refused(rope):
     with pytest.raises(
         ModelError, match=r"qwen2_5_vl, which has three-axis positions, .* only yarn; use yarn:2"
     ):
         rope_overrides(_qwen(rope), rope)
 
 
-def test_a_dynamic_extension_is_refused_as_vllm_answers_nonsense_with_it() -> None:
+def test_a_dynamic_extension_is_refused_as_vllm_answers_nonsense_with_it():
     config = LlamaConfig(max_position_embeddings=100, hidden_size=64, num_attention_heads=4)
     apply_rope(config, "dynamic:2")
     with pytest.raises(
@@ -267,7 +236,7 @@ def test_a_dynamic_extension_is_refused_as_vllm_answers_nonsense_with_it() -> No
         rope_overrides(config, "dynamic:2")
 
 
-def test_three_axes_of_another_family_are_not_extended_unknown() -> None:
+def test_three_axes_of_another_family_are_not_extended_unknown():
     config = _qwen("yarn:2")
     config.model_type = "qwen9_vl"
     with pytest.raises(
@@ -293,19 +262,19 @@ def test_three_axes_of_another_family_are_not_extended_unknown() -> None:
         ({"device": "cpu"}, "has no option device"),
     ],
 )
-def test_options_that_cannot_be_are_refused_at_once(settings: dict[str, str], message: str) -> None:
+def test_options_that_cannot_be_are_refused_at_once(settings, message):
     with pytest.raises(UsageError, match=message):
         check_options("qwen2.5-vl@vllm", settings)
 
 
 @pytest.mark.parametrize("settings", [{"ensemble": "loud"}, {"dtype": "int8"}, {"execute": "0"}])
-def test_a_policys_options_are_refused_likewise(settings: dict[str, str]) -> None:
+def test_a_policys_options_are_refused_likewise(settings):
     with pytest.raises(UsageError, match=next(iter(settings))):
         check_options("openvla@vllm", settings)
 
 
 @pytest.mark.parametrize("name", ["qwen2.5-vl", "llava-onevision", "pixtral", "openvla"])
-def test_both_engines_load_the_same_checkpoint_where_none_is_named(name: str) -> None:
+def test_both_engines_load_the_same_checkpoint_where_none_is_named(name):
     named = [
         next(each for each in options(known).split(", ") if "pretrained=" in each)
         for known in (name, f"{name}@vllm")

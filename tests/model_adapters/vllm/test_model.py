@@ -5,40 +5,32 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Decoding, Part, check_adapter, load
+from model_adapters import Decoding, check_adapter, load
 from model_adapters.vllm.engine import import_vllm
 
 from ..asking import up_to, user
-from .double import Double
 from .families import FAMILIES, adapter_of, facts
-
-Start = Callable[..., Any]
 
 
 @pytest.mark.parametrize("family", ["qwen2.5-vl", "pixtral", "llava"])
-def test_it_keeps_the_contract(family: str, start: Start) -> None:
+def test_it_keeps_the_contract(family, start):
     model = start(family, adapter_of(family))
     check_adapter(model, (84, 84))
     model.close()
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_replies_and_counts_are_those_of_transformers(
-    family: str, start: Start, in_process: Start, frames: list[FrameRef]
-) -> None:
+def test_replies_and_counts_are_those_of_transformers(family, start, in_process, frames):
     ours, theirs = start(family, adapter_of(family)), in_process(family, adapter_of(family))
     assert ours.tokens_per_frame(frames[0]) == theirs.tokens_per_frame(frames[0])
-    prompts: list[tuple[Part, ...]] = [
+    prompts = [
         ("What do you see?",),
         (frames[0], "\nWhat is it?"),
         ("First ", frames[1], " then ", frames[2], "?"),
@@ -57,9 +49,7 @@ def test_replies_and_counts_are_those_of_transformers(
 @pytest.mark.parametrize(
     "options", [{"prompt": "plain"}, {"rope": "yarn:4"}, {"max_pixels": 3_200}]
 )
-def test_options_that_change_what_is_read_change_it_alike(
-    options: dict[str, Any], start: Start, in_process: Start, frames: list[FrameRef]
-) -> None:
+def test_options_that_change_what_is_read_change_it_alike(options, start, in_process, frames):
     ours, theirs = start(**options), in_process("qwen2.5-vl", **options)
     turns = user(frames[0], "Where is the mug? " * 8, frames[1])
     if "max_pixels" in options:  # the double's processor is the checkpoint's own: counts alone tell
@@ -74,9 +64,7 @@ def test_options_that_change_what_is_read_change_it_alike(
 
 
 @pytest.mark.parametrize("rope", ["linear:2", "yarn:2"])
-def test_a_model_of_one_axis_is_extended_alike(
-    rope: str, start: Start, in_process: Start, vllm: Double, frames: list[FrameRef]
-) -> None:
+def test_a_model_of_one_axis_is_extended_alike(rope, start, in_process, vllm, frames):
     ours, theirs, turns = (
         start("pixtral", rope=rope),
         in_process("pixtral", rope=rope),
@@ -95,8 +83,8 @@ def test_a_model_of_one_axis_is_extended_alike(
 
 
 def test_a_checkpoint_with_a_penalty_is_written_with_it(
-    start: Start, in_process: Start, vllm: Double, checkpoints: dict[str, Path], tmp_path: Path
-) -> None:
+    start, in_process, vllm, checkpoints, tmp_path
+):
     folder = tmp_path / "penalised"
     shutil.copytree(checkpoints["qwen2.5-vl"], folder)
     settings = json.loads((folder / "generation_config.json").read_text())
@@ -114,9 +102,7 @@ def test_a_checkpoint_with_a_penalty_is_written_with_it(
     assert vllm.calls[-1].params.repetition_penalty == 1.0
 
 
-def test_a_stop_string_ends_and_cuts_the_reply_where_transformers_does(
-    start: Start, in_process: Start, frames: list[FrameRef]
-) -> None:
+def test_a_stop_string_ends_and_cuts_the_reply_where_transformers_does(start, in_process, frames):
     ours, theirs, turns = start(), in_process("qwen2.5-vl"), user(frames[0], "Where?")
     whole = theirs.answer(turns, up_to(12)).text
     for stop in (whole[3:5], whole[-1], "never"):
@@ -139,9 +125,7 @@ SPECIAL = "<|im_start|>"
         ("<|im_end|>", (), ""),
     ],
 )
-def test_special_tokens_stop_a_reply_and_are_no_text(
-    message: str, stop: tuple[str, ...], text: str, start: Start, vllm: Double
-) -> None:
+def test_special_tokens_stop_a_reply_and_are_no_text(message, stop, text, start, vllm):
     model = start()
     tokenizer = model._loaded.tokenizer
     vllm.would_say = tokenizer(message, add_special_tokens=False)["input_ids"]
@@ -156,7 +140,7 @@ def test_special_tokens_stop_a_reply_and_are_no_text(
     )
 
 
-def test_draws_are_the_requests_own(start: Start, vllm: Double) -> None:
+def test_draws_are_the_requests_own(start, vllm):
     model = start()
     replies = [
         model.answer(user("Say it."), up_to(8, temperature=2.0, top_p=0.9, seed=seed))
@@ -169,9 +153,7 @@ def test_draws_are_the_requests_own(start: Start, vllm: Double) -> None:
     assert (vllm.calls[-1].params.temperature, vllm.calls[-1].params.seed) == (0, None)
 
 
-def test_a_reply_is_held_to_choices_and_no_stop_string_cuts_it(
-    start: Start, in_process: Start, vllm: Double, frames: list[FrameRef]
-) -> None:
+def test_a_reply_is_held_to_choices_and_no_stop_string_cuts_it(start, in_process, vllm, frames):
     decoding = up_to(30, choices=("on the table", "in the sink"), stop=("the",))
     turns = user(frames[0], "Where is the mug?")
     ours, theirs = start().answer(turns, decoding), in_process("qwen2.5-vl").answer(turns, decoding)
@@ -181,15 +163,13 @@ def test_a_reply_is_held_to_choices_and_no_stop_string_cuts_it(
     assert (params.structured_outputs.choice, params.stop) == (["on the table", "in the sink"], [])
 
 
-def test_a_choice_that_does_not_fit_is_refused_before_vllm_is_asked(
-    start: Start, vllm: Double
-) -> None:
+def test_a_choice_that_does_not_fit_is_refused_before_vllm_is_asked(start, vllm):
     with pytest.raises(ModelError, match=r"has .* tokens and a reply may have 2"):
         start().answer(user("x"), up_to(2, choices=("on the kitchen table",)))
     assert vllm.calls == []
 
 
-def test_a_reply_that_is_no_choice_fails(start: Start, vllm: Double) -> None:
+def test_a_reply_that_is_no_choice_fails(start, vllm):
     model = start()
     vllm.would_say = model._loaded.tokenizer("mug", add_special_tokens=False)["input_ids"]
     with pytest.raises(
@@ -198,9 +178,7 @@ def test_a_reply_that_is_no_choice_fails(start: Start, vllm: Double) -> None:
         model.answer(user("x"), up_to(20, choices=("yes", "no")))
 
 
-def test_a_processor_that_joins_words_and_frames_is_refused_before_vllm_starts(
-    start: Start, vllm: Double
-) -> None:
+def test_a_processor_that_joins_words_and_frames_is_refused_before_vllm_starts(start, vllm):
     # Gemma 3 makes one token of the line breaks after a frame and before the words that follow.
     with pytest.raises(
         ModelError, match=r"token ids differ .*: gemma3 cannot be run in vLLM; use --engine transf"
@@ -212,15 +190,15 @@ def test_a_processor_that_joins_words_and_frames_is_refused_before_vllm_starts(
 # What its cache finds.
 
 
-def _talk(model: Any, *parts: Part) -> Any:
+def _talk(model, *parts):
     talk = model.conversation()
     talk.append(*parts)
     return talk
 
 
 def test_of_continuations_the_first_goes_alone_and_the_others_find_its_prefix(
-    start: Start, in_process: Start, vllm: Double, frames: list[FrameRef]
-) -> None:
+    start, in_process, vllm, frames
+):
     requests = [[f"\nQuestion {number}: what is it?"] for number in range(5)]
     replies = _talk(start(), *frames).replies(requests, up_to(4))
     assert [len(call.prompts) for call in vllm.calls] == [1, 4]
@@ -231,9 +209,7 @@ def test_of_continuations_the_first_goes_alone_and_the_others_find_its_prefix(
     assert all(reply.n_cached_tokens >= shared > 0 for reply in replies[1:])
 
 
-def test_what_was_just_read_is_warm_already(
-    start: Start, vllm: Double, frames: list[FrameRef]
-) -> None:
+def test_what_was_just_read_is_warm_already(start, vllm, frames):
     talk = _talk(start(), *frames)
     talk.replies([["\nOne?"], ["\nTwo?"]], up_to(2))
     more = talk.replies([["\nThree?"], ["\nFour?"]], up_to(2))
@@ -241,9 +217,7 @@ def test_what_was_just_read_is_warm_already(
     assert all(reply.n_cached_tokens > 0 for reply in more)
 
 
-def test_the_first_of_each_context_go_together_and_then_the_others(
-    start: Start, in_process: Start, vllm: Double, frames: list[FrameRef]
-) -> None:
+def test_the_first_of_each_context_go_together_and_then_the_others(start, in_process, vllm, frames):
     contexts = [frames[:3], frames[:3], frames[3:], frames[3:]]
     requests = [[*context, f"\nQuestion {number}?"] for number, context in enumerate(contexts)]
     requests.append([frames[0], "\nAlone?"])
@@ -256,9 +230,7 @@ def test_the_first_of_each_context_go_together_and_then_the_others(
     assert [facts(reply) for reply in replies] == [facts(reply) for reply in theirs]
 
 
-def test_without_a_cache_all_go_together(
-    start: Start, vllm: Double, frames: list[FrameRef]
-) -> None:
+def test_without_a_cache_all_go_together(start, vllm, frames):
     replies = _talk(start(prefix_caching=False), *frames).replies(
         [["\nOne?"], ["\nTwo?"]], up_to(2)
     )
@@ -267,7 +239,7 @@ def test_without_a_cache_all_go_together(
     assert vllm.started[0]["enable_prefix_caching"] is False
 
 
-def test_other_frames_are_no_warm_prefix(start: Start, frames: list[FrameRef]) -> None:
+def test_other_frames_are_no_warm_prefix(start, frames):
     model = start()
     first = model.answer(user(*frames[:3], "What?"), up_to(2))
     other = model.answer(user(*frames[3:], "What?"), up_to(2))
@@ -277,10 +249,8 @@ def test_other_frames_are_no_warm_prefix(start: Start, frames: list[FrameRef]) -
     assert again.n_cached_tokens == 48
 
 
-def test_frames_are_sent_once_each_by_name_and_loaded_once(
-    start: Start, vllm: Double, frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    loaded: list[Path] = []
+def test_frames_are_sent_once_each_by_name_and_loaded_once(start, vllm, frames, monkeypatch):
+    loaded = []
     plain = FrameRef.load
     monkeypatch.setattr(FrameRef, "load", lambda self: loaded.append(self.path) or plain(self))
     talk = _talk(start(), frames[0], frames[1], frames[0])
@@ -294,9 +264,7 @@ def test_frames_are_sent_once_each_by_name_and_loaded_once(
 # What does not fit, and what fails.
 
 
-def test_what_does_not_fit_is_refused_before_vllm_is_asked(
-    start: Start, vllm: Double, frames: list[FrameRef]
-) -> None:
+def test_what_does_not_fit_is_refused_before_vllm_is_asked(start, vllm, frames):
     model = start(max_model_len=60)
     assert model.capabilities.max_tokens == 60 == vllm.started[0]["max_model_len"]
     with pytest.raises(
@@ -307,9 +275,7 @@ def test_what_does_not_fit_is_refused_before_vllm_is_asked(
     assert vllm.calls == []
 
 
-def test_more_frames_than_reserved_are_refused(
-    start: Start, vllm: Double, frames: list[FrameRef]
-) -> None:
+def test_more_frames_than_reserved_are_refused(start, vllm, frames):
     model = start(max_frames=2)
     assert vllm.started[0]["limit_mm_per_prompt"]["image"]["count"] == 2
     with pytest.raises(
@@ -319,7 +285,7 @@ def test_more_frames_than_reserved_are_refused(
     model.answer(user(*frames[:2]), up_to(2))
 
 
-def test_frames_reserved_are_as_many_as_fit(start: Start, vllm: Double) -> None:
+def test_frames_reserved_are_as_many_as_fit(start, vllm):
     start(max_model_len=1_300)
     assert vllm.started[0]["limit_mm_per_prompt"] == {
         "image": {"count": 10, "width": 300, "height": 300},
@@ -327,7 +293,7 @@ def test_frames_reserved_are_as_many_as_fit(start: Start, vllm: Double) -> None:
     }
 
 
-def test_a_vllm_that_counts_otherwise_is_not_believed(start: Start, vllm: Double) -> None:
+def test_a_vllm_that_counts_otherwise_is_not_believed(start, vllm):
     model = start()
     vllm.expands = True
     with pytest.raises(
@@ -344,9 +310,7 @@ def test_a_vllm_that_counts_otherwise_is_not_believed(start: Start, vllm: Double
         ValueError("At most 1 image(s) may be provided in one prompt."),
     ],
 )
-def test_what_vllm_says_to_a_request_is_one_line(
-    error: Exception, start: Start, vllm: Double
-) -> None:
+def test_what_vllm_says_to_a_request_is_one_line(error, start, vllm):
     model = start()
     vllm.fails = error
     with pytest.raises(
@@ -357,7 +321,7 @@ def test_what_vllm_says_to_a_request_is_one_line(
     assert " ".join(str(error).split()) in str(raised.value)
 
 
-def test_a_vllm_that_does_not_start_says_so_in_one_line(start: Start, vllm: Double) -> None:
+def test_a_vllm_that_does_not_start_says_so_in_one_line(start, vllm):
     vllm.fails = RuntimeError("Engine core initialization failed.\nSee root cause above.")
     with pytest.raises(
         ModelError, match=r"does not start \(Engine core initialization failed. See .*max_model_len"
@@ -365,9 +329,7 @@ def test_a_vllm_that_does_not_start_says_so_in_one_line(start: Start, vllm: Doub
         start()
 
 
-def test_without_vllm_the_line_says_what_to_install(
-    checkpoints: dict[str, Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_vllm_the_line_says_what_to_install(checkpoints, monkeypatch):
     monkeypatch.setitem(sys.modules, "vllm", None)
     for name in ("qwen2.5-vl@vllm", "hf-vlm@vllm", "openvla@vllm"):
         with pytest.raises(
@@ -376,9 +338,7 @@ def test_without_vllm_the_line_says_what_to_install(
             load(name, {"pretrained": str(checkpoints["qwen2.5-vl"])}, 0)
 
 
-def test_a_checkpoint_of_another_family_is_refused_as_in_transformers(
-    start: Start, vllm: Double
-) -> None:
+def test_a_checkpoint_of_another_family_is_refused_as_in_transformers(start, vllm):
     with pytest.raises(ModelError, match="is a llava checkpoint, not qwen2_5_vl; try hf-vlm"):
         start("llava", "qwen2.5-vl")
     with pytest.raises(UsageError, match=r"hf-vlm@vllm needs pretrained="):
@@ -386,9 +346,7 @@ def test_a_checkpoint_of_another_family_is_refused_as_in_transformers(
     assert vllm.started == []
 
 
-def test_identities_tell_engines_and_what_changes_a_number_apart(
-    start: Start, in_process: Start
-) -> None:
+def test_identities_tell_engines_and_what_changes_a_number_apart(start, in_process):
     plain, theirs = start().identity(), in_process("qwen2.5-vl").identity()
     assert (plain["engine"], plain["versions"]["vllm"]) == ("vllm", "0.33.0")
     assert plain["fingerprint"] == theirs["fingerprint"]
@@ -405,9 +363,7 @@ def test_identities_tell_engines_and_what_changes_a_number_apart(
 
 
 @pytest.mark.parametrize("daemon", [True, False])
-def test_in_a_worker_vllm_starts_no_processes_and_its_log_is_no_output(
-    daemon: bool, vllm: Double, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_in_a_worker_vllm_starts_no_processes_and_its_log_is_no_output(daemon, vllm, monkeypatch):
     names = ("VLLM_LOGGING_STREAM", "VLLM_ENABLE_V1_MULTIPROCESSING")
     for name in names:
         monkeypatch.setenv(name, "")  # so that what is set is taken back
@@ -417,7 +373,7 @@ def test_in_a_worker_vllm_starts_no_processes_and_its_log_is_no_output(
     assert [os.environ.get(name) for name in names] == ["ext://sys.stderr", "0" if daemon else None]
 
 
-def test_the_double_takes_no_argument_that_vllm_does_not_take(vllm: Double) -> None:
+def test_the_double_takes_no_argument_that_vllm_does_not_take(vllm):
     top = sys.modules["vllm"]
     for call in (
         lambda: top.LLM(model="x", image_limit=3),
@@ -428,12 +384,12 @@ def test_the_double_takes_no_argument_that_vllm_does_not_take(vllm: Double) -> N
             call()
 
 
-def test_decoding_that_vllm_refuses_is_told(start: Start) -> None:
+def test_decoding_that_vllm_refuses_is_told(start):
     with pytest.raises(ModelError, match=r"temperature must be in \[0, 2\]"):
         start().answer(user("x"), Decoding(max_new_tokens=2, temperature=3.0))
 
 
-def test_margins_are_of_the_two_likeliest_tokens(start: Start) -> None:
+def test_margins_are_of_the_two_likeliest_tokens(start):
     talk = start(margins="true").conversation()
     talk.append("What is it?")
     reply = talk.reply(up_to(3))

@@ -2,46 +2,38 @@
 
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from infthor_eval.errors import ModelError, UsageError
-from infthor_eval.formats.frames import FrameRef
-from model_adapters import check_adapter, load
+from model_adapters import check_adapter
 from model_adapters.tiny.openvla import OpenVLATiny
 
-from .double import Double
+from ..asking import load_saved, load_with
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     checkpoint = tmp_path_factory.mktemp("openvla")
     OpenVLATiny.twin.save(checkpoint, seed=0)
     return checkpoint
 
 
 @pytest.fixture
-def policy(vllm: Double, folder: Path) -> Callable[..., Any]:
+def policy(vllm, folder):
     """Starts the tiny policy on the double."""
 
-    def start(**options: object) -> Any:
-        settings = {"pretrained": folder, "dtype": "float32", **options}
-        return load("openvla@vllm", {name: str(value) for name, value in settings.items()}, 0)
+    def start(**options):
+        return load_with("openvla@vllm", **{"pretrained": folder, "dtype": "float32", **options})
 
     return start
 
 
 @pytest.mark.parametrize("constrained", [True, False])
-def test_actions_are_those_of_the_native_port(
-    constrained: bool, policy: Callable[..., Any], folder: Path, frames: list[FrameRef]
-) -> None:
+def test_actions_are_those_of_the_native_port(constrained, policy, folder, frames):
     ours = policy(constrained=constrained)
-    theirs: Any = load(
-        "openvla", {"pretrained": str(folder), "device": "cpu", "constrained": str(constrained)}, 0
-    )
+    theirs = load_saved("openvla", folder, constrained=constrained)
     requests = [
         (frame, text) for frame in frames[:3] for text in ("pick up the Mug", "close the fridge")
     ]
@@ -51,15 +43,13 @@ def test_actions_are_those_of_the_native_port(
     assert len(set(actions[0])) > 1 or not constrained
 
 
-def test_it_keeps_the_contract_of_policies(policy: Callable[..., Any]) -> None:
+def test_it_keeps_the_contract_of_policies(policy):
     acting = policy()
     check_adapter(acting)
     acting.close()
 
 
-def test_what_vllm_is_asked(
-    policy: Callable[..., Any], vllm: Double, frames: list[FrameRef], folder: Path
-) -> None:
+def test_what_vllm_is_asked(policy, vllm, frames, folder):
     policy(max_model_len=512, tensor_parallel_size=2).act(frames[0], "Pick up the mug")
     assert vllm.started[0]["limit_mm_per_prompt"] == {"image": 1}
     assert (vllm.started[0]["max_model_len"], vllm.started[0]["tensor_parallel_size"]) == (512, 2)
@@ -71,12 +61,7 @@ def test_what_vllm_is_asked(
     assert vllm.calls[-1].params.allowed_token_ids is None
 
 
-def test_too_few_tokens_are_told(
-    policy: Callable[..., Any],
-    vllm: Double,
-    frames: list[FrameRef],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_too_few_tokens_are_told(policy, vllm, frames, monkeypatch):
     acting = policy()
     monkeypatch.setattr(
         "tests.model_adapters.vllm.double._OpenVLA.write", lambda *_: ([31_800] * 3, "")
@@ -85,7 +70,7 @@ def test_too_few_tokens_are_told(
         acting.act(frames[0], "pick up the mug")
 
 
-def test_its_identity_has_engine_and_dataset(policy: Callable[..., Any]) -> None:
+def test_its_identity_has_engine_and_dataset(policy):
     identity = policy().identity()
     assert (identity["engine"], identity["unnorm_key"], identity["adapter"]) == (
         "vllm",
@@ -96,8 +81,8 @@ def test_its_identity_has_engine_and_dataset(policy: Callable[..., Any]) -> None
 
 
 def test_what_is_wrong_with_checkpoint_or_key_is_told_as_in_the_native_port(
-    policy: Callable[..., Any], vllm: Double, checkpoints: dict[str, Path]
-) -> None:
+    policy, vllm, checkpoints
+):
     with pytest.raises(UsageError, match="unnorm_key=x is not a dataset"):
         policy(unnorm_key="x")
     with pytest.raises(ModelError, match="is a qwen2_5_vl checkpoint, not openvla"):
@@ -106,13 +91,7 @@ def test_what_is_wrong_with_checkpoint_or_key_is_told_as_in_the_native_port(
 
 
 @pytest.mark.parametrize("content", [None, {}, {"bos_token": None}])
-def test_a_tokenizer_without_a_begin_token_is_refused(
-    content: dict[str, Any] | None,
-    policy: Callable[..., Any],
-    folder: Path,
-    vllm: Double,
-    tmp_path: Path,
-) -> None:
+def test_a_tokenizer_without_a_begin_token_is_refused(content, policy, folder, vllm, tmp_path):
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
     (copy / "tokenizer_config.json").unlink()
     if content is not None:

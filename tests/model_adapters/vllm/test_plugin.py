@@ -2,9 +2,7 @@
 
 import importlib
 import sys
-from collections.abc import Iterator
 from types import ModuleType, SimpleNamespace
-from typing import Any
 
 import pytest
 import torch
@@ -21,12 +19,12 @@ class Model:
     config = SimpleNamespace(get_text_config=lambda: SimpleNamespace(hidden_size=HIDDEN))
     vision_tower = SimpleNamespace()
 
-    def load_weights(self, weights: Any) -> dict[str, Any]:
+    def load_weights(self, weights):
         return dict(weights)
 
 
 @pytest.fixture
-def registered(monkeypatch: pytest.MonkeyPatch) -> Iterator[type[Model]]:
+def registered(monkeypatch):
     """The class of the model after `register`; any name of vLLM's is one."""
     model = type("Model", (Model,), {"load_weights": Model.load_weights})
     for name in ("vllm", "vllm.model_executor", "vllm.model_executor.models"):
@@ -42,7 +40,7 @@ def registered(monkeypatch: pytest.MonkeyPatch) -> Iterator[type[Model]]:
 
 
 @pytest.mark.parametrize("is_exchanged", [False, True], ids=["published", "saved anew"])
-def test_experts_arrive_as_published(registered: type[Model], is_exchanged: bool) -> None:
+def test_experts_arrive_as_published(registered, is_exchanged):
     published = {
         "model.layers.0.mlp.experts.gate_up_proj": torch.randn(EXPERTS, HIDDEN, 2 * INNER),
         "model.layers.0.mlp.experts.down_proj": torch.randn(EXPERTS, INNER, HIDDEN),
@@ -57,7 +55,7 @@ def test_experts_arrive_as_published(registered: type[Model], is_exchanged: bool
     assert all(torch.equal(loaded[name], weight) for name, weight in published.items())
 
 
-def test_weights_of_a_tower_with_its_own_level_get_it(registered: type[Model]) -> None:
+def test_weights_of_a_tower_with_its_own_level_get_it(registered):
     model = registered()
     model.vision_tower = SimpleNamespace(vision_model=None)
     assert [*model.load_weights([("vision_tower.encoder.a", 1)])] == [
@@ -65,14 +63,14 @@ def test_weights_of_a_tower_with_its_own_level_get_it(registered: type[Model]) -
     ]
 
 
-def test_a_processor_forgets_what_it_was_loaded_by(registered: type[Model]) -> None:
+def test_a_processor_forgets_what_it_was_loaded_by(registered):
     of_call = SimpleNamespace(_defaults={"images_kwargs": {"use_fast": False, "size": 3}})
     merged = ProcessorMixin._merge_kwargs(None, of_call, text=1)
     assert merged == {"text": 1}
     assert of_call._defaults == {"images_kwargs": {"size": 3}}
 
 
-def test_elsewhere_vllm_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_elsewhere_vllm_stays_as_it_is(monkeypatch):
     monkeypatch.delenv(plugin.ACTIVE, raising=False)
     before = ProcessorMixin._merge_kwargs
     plugin.register()

@@ -4,31 +4,24 @@ import itertools
 import json
 import re
 import sys
-from pathlib import Path
-from typing import Any
 
 import pytest
 
 from infthor_eval.errors import UsageError
-from infthor_eval.nieh.records import RECORDS
-from infthor_eval.plans.records import RECORDS as PLAN_RECORDS
-from infthor_eval.runs import read_run
 from model_adapters import name_on_engine
 from tests.helpers.command_line import option_words
+from tests.helpers.journals import read_outcome
 from tests.helpers.trajectories import MUG, cut_trajectory, write_trajectories
 
 from . import double
-from .double import Double
 
 
 @pytest.fixture
-def ask(make_nieh_set: Any, checkpoints: dict[str, Path], tmp_path: Path, run_cli: Any) -> Any:
+def ask(make_nieh_set, checkpoints, tmp_path, run_cli):
     """Runs a task (`nieh_full`) on five questions about two trajectories."""
     data = make_nieh_set(size=56)
 
-    def ask(
-        name: str, *options: object, task: str = "nieh_full", **model_args: object
-    ) -> tuple[int, str, str]:
+    def ask(name, *options, task="nieh_full", **model_args):
         settings = {"pretrained": checkpoints["qwen2.5-vl"], "dtype": "float32", **model_args}
         typed = ",".join(f"{option}={value}" for option, value in settings.items())
         arguments = option_words(model="qwen2.5-vl", model_args=typed, tasks=task, data=data)
@@ -37,16 +30,15 @@ def ask(make_nieh_set: Any, checkpoints: dict[str, Path], tmp_path: Path, run_cl
     return ask
 
 
-def _found(folder: Path) -> tuple[list[Any], dict[str, Any], dict[str, Any]]:
+def _found(folder):
     """The records of the one run in a folder, its results, and what it took."""
-    (results,) = folder.rglob("results.json")
-    took = json.loads((results.parent / "usage.json").read_text())
-    return read_run(results.parent, RECORDS)[1], json.loads(results.read_text()), took
+    (took,) = folder.rglob("usage.json")
+    return *read_outcome(folder), json.loads(took.read_text())
 
 
 def test_both_engines_give_the_same_replies_and_tokens_and_the_hit_rate_is_told(
-    ask: Any, vllm: Double, tmp_path: Path
-) -> None:
+    ask, vllm, tmp_path
+):
     code, out, err = ask("on vllm", "--engine", "vllm")
     assert code == 0, err
     assert ask("here", "--engine", "transformers", device="cpu")[0] == 0
@@ -81,9 +73,7 @@ def test_both_engines_give_the_same_replies_and_tokens_and_the_hit_rate_is_told(
     assert f"({cached:,} of them cached, {100 * cached / took['read']:.1f} %)" in out
 
 
-def test_the_order_of_the_requests_makes_the_hits(
-    ask: Any, vllm: Double, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_order_of_the_requests_makes_the_hits(ask, vllm, tmp_path, monkeypatch):
     assert ask("one first", "--engine", "vllm")[0] == 0
     monkeypatch.setattr(
         "model_adapters.vllm.model.VllmModel._new_prefixes",
@@ -98,9 +88,7 @@ def test_the_order_of_the_requests_makes_the_hits(
     assert [len(call.prompts) for call in vllm.calls] == [1, 2, 1, 1, 3, 2]
 
 
-def test_questions_on_different_frames_of_a_trajectory_are_asked_together(
-    ask: Any, vllm: Double, tmp_path: Path
-) -> None:
+def test_questions_on_different_frames_of_a_trajectory_are_asked_together(ask, vllm, tmp_path):
     assert ask("on vllm", "--engine", "vllm", task="nieh_gt")[0] == 0
     assert [len(call.prompts) for call in vllm.calls] == [3, 2]
     assert ask("here", "--engine", "transformers", task="nieh_gt", device="cpu")[0] == 0
@@ -108,9 +96,7 @@ def test_questions_on_different_frames_of_a_trajectory_are_asked_together(
     assert [record.payload for record in ours] == [record.payload for record in theirs]
 
 
-def test_plans_are_carried_out_alike(
-    checkpoints: dict[str, Path], vllm: Double, task_files: Path, tmp_path: Path, run_cli: Any
-) -> None:
+def test_plans_are_carried_out_alike(checkpoints, vllm, task_files, tmp_path, run_cli):
     task = task_files / "plans" / "infthor_plans.yaml"
     task.write_text(
         "include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 3}\n"
@@ -125,18 +111,13 @@ def test_plans_are_carried_out_alike(
         output = tmp_path / "out" / engine
         code, _, err = run_cli(*arguments, "--engine", engine, "--constrained", "--out", output)
         assert code == 0, err
-        (results,) = output.rglob("results.json")
-        records = read_run(results.parent, PLAN_RECORDS)[1]
-        played.append(
-            (json.loads(results.read_text())["usage"], [record.payload for record in records])
-        )
+        records, results = read_outcome(output)
+        played.append((results["usage"], [record.payload for record in records]))
     assert played[0] == played[1]
     assert all(call.params.structured_outputs is not None for call in vllm.calls)
 
 
-def test_switches_that_change_no_reply_are_checked_and_the_run_follows(
-    ask: Any, vllm: Double, tmp_path: Path
-) -> None:
+def test_switches_that_change_no_reply_are_checked_and_the_run_follows(ask, vllm, tmp_path):
     switches = {"block_size": 32, "max_num_batched_tokens": 256, "prefix_caching": "true"}
     code, _, err = ask("on vllm", "--engine", "vllm", "--check-equality", 3, **switches)
     assert code == 0, err
@@ -148,9 +129,7 @@ def test_switches_that_change_no_reply_are_checked_and_the_run_follows(
     assert len(_found(tmp_path / "out" / "on vllm")[0]) == 5
 
 
-def test_a_cache_type_that_changes_replies_is_named_and_the_run_is_not_started(
-    ask: Any, vllm: Double, tmp_path: Path
-) -> None:
+def test_a_cache_type_that_changes_replies_is_named_and_the_run_is_not_started(ask, vllm, tmp_path):
     fp8 = {"block_size": 32, "kv_cache_dtype": "fp8"}
     code, out, err = ask("on vllm", "--engine", "vllm", "--check-equality", 5, **fp8)
     assert (code, out) == (1, "")
@@ -161,9 +140,7 @@ def test_a_cache_type_that_changes_replies_is_named_and_the_run_is_not_started(
     assert not (tmp_path / "out" / "on vllm").exists()
 
 
-def test_an_engine_that_differs_from_itself_is_said_to(
-    ask: Any, vllm: Double, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_engine_that_differs_from_itself_is_said_to(ask, vllm, monkeypatch):
     ids = itertools.count(30)
     monkeypatch.setattr(double._Vlm, "write", lambda *_: ([next(ids)], ""))
     code, _, err = ask("on vllm", "--engine", "vllm", "--check-equality", 2, block_size=32)
@@ -172,7 +149,7 @@ def test_an_engine_that_differs_from_itself_is_said_to(
     assert line in " ".join(err.split())
 
 
-def test_transformers_switches_are_checked_as_well(ask: Any) -> None:
+def test_transformers_switches_are_checked_as_well(ask):
     small = {"device": "cpu", "chunk_tokens": 64, "batch_size": 1}
     code, _, err = ask("here", "--check-equality", 2, **small)
     assert code == 0, err
@@ -189,18 +166,14 @@ def test_transformers_switches_are_checked_as_well(ask: Any) -> None:
         ("oracle", "it has none"),
     ],
 )
-def test_without_a_switch_there_is_nothing_to_compare(
-    run_cli: Any, model: str, expected: str
-) -> None:
+def test_without_a_switch_there_is_nothing_to_compare(run_cli, model, expected):
     code, _, err = run_cli("--model", model, "--tasks", "nieh_mini", "--check-equality", 3)
     assert code == 2
     assert f"--check-equality 3: --model-args turns no switch of {model} on" in err
     assert expected in err
 
 
-def test_engines_that_do_not_run_a_model_are_refused_in_one_line(
-    run_cli: Any, tmp_path: Path
-) -> None:
+def test_engines_that_do_not_run_a_model_are_refused_in_one_line(run_cli, tmp_path):
     known = "these do: hf-vlm, llava-onevision, openvla, pixtral, qwen2.5-vl"
     for command in ("run", "plan"):
         code, _, err = run_cli(
@@ -211,7 +184,7 @@ def test_engines_that_do_not_run_a_model_are_refused_in_one_line(
         assert "Traceback" not in err
 
 
-def test_the_name_of_a_model_may_say_its_engine() -> None:
+def test_the_name_of_a_model_may_say_its_engine():
     assert (
         name_on_engine("qwen2.5-vl", "vllm")
         == name_on_engine("qwen2.5-vl@vllm", "vllm")
@@ -224,7 +197,7 @@ def test_the_name_of_a_model_may_say_its_engine() -> None:
         name_on_engine("pixtral@vllm", "transformers")
 
 
-def test_a_run_without_vllm_ends_with_one_line(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_without_vllm_ends_with_one_line(ask, monkeypatch):
     monkeypatch.setitem(sys.modules, "vllm", None)
     code, _, err = ask("none", "--engine", "vllm")
     assert code == 2

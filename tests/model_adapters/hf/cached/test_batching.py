@@ -1,18 +1,16 @@
 """Several continuations of one prefix, answered together, against the same asked one by one."""
 
 from dataclasses import replace
-from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
-from model_adapters import Part, check_adapter, load
+from model_adapters import load
 from model_adapters.hf.prompting.prompt import n_common
 
-from ...asking import up_to
+from ...asking import ask, talk_of, up_to, user
 
 CONTINUATION = st.lists(
     st.one_of(
@@ -24,11 +22,11 @@ CONTINUATION = st.lists(
 
 
 @pytest.fixture(scope="module")
-def batching() -> Any:
+def batching():
     return load("qwen2.5-vl-tiny", {"batch_size": "3", "chunk_tokens": "30"}, seed=0)
 
 
-def _parts(continuation: list[Any], frames: list[FrameRef]) -> list[Part]:
+def _parts(continuation, frames):
     return [frames[part] if isinstance(part, int) else part for part in continuation]
 
 
@@ -38,43 +36,23 @@ def _parts(continuation: list[Any], frames: list[FrameRef]) -> list[Part]:
     continuations=st.lists(CONTINUATION, min_size=1, max_size=7),
     stop=st.sampled_from([(), ("e", "o")]),
 )
-def test_replies_are_those_of_asking_one_by_one(
-    batching: Any,
-    tiny: Any,
-    frames: list[FrameRef],
-    start: list[Any],
-    continuations: list[Any],
-    stop: tuple[str, ...],
-) -> None:
+def test_replies_are_those_of_asking_one_by_one(batching, tiny, frames, start, continuations, stop):
     talk = batching.conversation()
     talk.append(*_parts(start, frames))
     together = talk.replies(
         [_parts(continuation, frames) for continuation in continuations], up_to(5, stop=stop)
     )
     for continuation, reply in zip(continuations, together, strict=True):
-        alone = tiny.conversation()
-        alone.append(*_parts(start, frames), *_parts(continuation, frames))
-        expected = alone.reply(up_to(5, stop=stop))
+        parts = (*_parts(start, frames), *_parts(continuation, frames))
+        expected = ask(tiny, *parts, new=5, stop=stop)
         assert (reply.text, reply.token_ids) == (expected.text, expected.token_ids)
         assert reply.n_context_tokens == expected.n_context_tokens
 
 
-@pytest.mark.parametrize("family", ["qwen2.5-vl", "llava-onevision", "deepseek-vl", "pixtral"])
-def test_every_family_answers_in_batches(family: str, frames: list[FrameRef]) -> None:
-    model: Any = load(f"{family}-tiny", {"batch_size": "8"}, seed=0)
-    check_adapter(model, frame_size=(60, 60))
-    talk = model.conversation()
-    assert model.capabilities.batch_size == 8
-    talk.append(frames[0])
-    batched = talk.replies([["\nWhat is it?"], ["\nWhere was the mug before?"]], up_to(4))
-    talk.append("\nWhat is it?")
-    assert talk.reply(up_to(4)).token_ids == batched[0].token_ids
-
-
-def test_a_window_slides_over_the_prefix_and_each_continuation(frames: list[FrameRef]) -> None:
+def test_a_window_slides_over_the_prefix_and_each_continuation(frames):
     heard = []
     for size, window in (("8", 20), ("1", 20), ("1", None)):
-        model: Any = load("pixtral-tiny", {"batch_size": size, "chunk_tokens": "30"}, seed=0)
+        model = load("pixtral-tiny", {"batch_size": size, "chunk_tokens": "30"}, seed=0)
         model._loaded.model.get_decoder().config.sliding_window = window
         talk = model.conversation()
         talk.append(
@@ -88,10 +66,8 @@ def test_a_window_slides_over_the_prefix_and_each_continuation(frames: list[Fram
     assert heard[0] == heard[1] != heard[2]
 
 
-def test_a_model_that_does_not_attend_by_the_interface_is_refused_or_asked_alone(
-    frames: list[FrameRef],
-) -> None:
-    model: Any = load("qwen2.5-vl-tiny", {}, seed=0)
+def test_a_model_that_does_not_attend_by_the_interface_is_refused_or_asked_alone(frames):
+    model = load("qwen2.5-vl-tiny", {}, seed=0)
     talk = model.conversation()
     talk.append(frames[0])
     assert model.capabilities.batch_size == 64  # the model has been asked how it attends
@@ -101,7 +77,7 @@ def test_a_model_that_does_not_attend_by_the_interface_is_refused_or_asked_alone
         ModelError, match="do not all attend by transformers' interface; set batch_size=1"
     ):
         talk.replies([["\nWhat?"], ["\nWho?"]], up_to(2))
-    other: Any = load("qwen2.5-vl-tiny", {}, seed=0)
+    other = load("qwen2.5-vl-tiny", {}, seed=0)
     other._loaded.model.get_decoder().config.num_hidden_layers += 1
     assert other.capabilities.batch_size == 1
     decoder.config.num_hidden_layers -= 1
@@ -112,7 +88,7 @@ def test_a_model_that_does_not_attend_by_the_interface_is_refused_or_asked_alone
     )
 
 
-def test_the_prefix_is_encoded_once_for_all(batching: Any, frames: list[FrameRef]) -> None:
+def test_the_prefix_is_encoded_once_for_all(batching, frames):
     talk = batching.conversation()
     talk.append(*frames[::-1])
     replies = talk.replies([[f"\nIs number {number} here?"] for number in range(6)], up_to(2))
@@ -120,31 +96,26 @@ def test_the_prefix_is_encoded_once_for_all(batching: Any, frames: list[FrameRef
     assert all(reply.n_cached_tokens > 60 for reply in replies[1:])
 
 
-def test_penalties_are_each_rows_own(frames: list[FrameRef]) -> None:
+def test_penalties_are_each_rows_own(frames):
     replies = []
     for size in ("1", "4"):
-        model: Any = load("qwen2.5-vl-tiny", {"batch_size": size}, seed=1)
+        model = load("qwen2.5-vl-tiny", {"batch_size": size}, seed=1)
         loaded = model._loaded
         model._loaded = replace(
             loaded, generation=replace(loaded.generation, repetition_penalty=1.4)
         )
-        talk = model.conversation()
-        talk.append(frames[0])
-        replies.append(
-            [
-                reply.token_ids
-                for reply in talk.replies([["mug"], ["\nWhere?"], ["\nWhy not?"]], up_to(40))
-            ]
-        )
+        talk = talk_of(model, user(frames[0]))
+        answers = talk.replies([["mug"], ["\nWhere?"], ["\nWhy not?"]], up_to(40))
+        replies.append([reply.token_ids for reply in answers])
     assert replies[0] == replies[1]
 
 
-def test_no_ending_no_reply(batching: Any) -> None:
+def test_no_ending_no_reply(batching):
     assert batching.conversation().replies([], up_to(3)) == []
 
 
-def test_one_that_does_not_fit_is_refused_before_any_is_answered(frames: list[FrameRef]) -> None:
-    model: Any = load("qwen2.5-vl-tiny", {"batch_size": "2", "max_tokens": "60"}, seed=0)
+def test_one_that_does_not_fit_is_refused_before_any_is_answered(frames):
+    model = load("qwen2.5-vl-tiny", {"batch_size": "2", "max_tokens": "60"}, seed=0)
     talk = model.conversation()
     with pytest.raises(ModelError, match="beyond the 60 tokens"):
         talk.replies([["short"], [*frames]], up_to(2))
@@ -154,7 +125,5 @@ def test_one_that_does_not_fit_is_refused_before_any_is_answered(frames: list[Fr
     ("prompts", "common"),
     [([[1, 2, 3], [1, 2, 4]], 2), ([[1, 2, 3], [1, 2]], 1), ([[1], [2]], 0), ([[1, 2], [1, 2]], 1)],
 )
-def test_what_prompts_have_in_common_leaves_a_piece_of_each(
-    prompts: list[list[int]], common: int
-) -> None:
-    assert n_common(prompts) == common  # type: ignore[arg-type]
+def test_what_prompts_have_in_common_leaves_a_piece_of_each(prompts, common):
+    assert n_common(prompts) == common

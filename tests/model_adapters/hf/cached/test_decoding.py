@@ -1,12 +1,8 @@
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
-
 import pytest
 import torch
 from transformers import GenerationConfig, TemperatureLogitsWarper, TopPLogitsWarper
 
 from infthor_eval.errors import ModelError
-from model_adapters import Decoding
 from model_adapters.hf.cached.choices import Choices
 from model_adapters.hf.cached.decoding import (
     Generation,
@@ -20,56 +16,40 @@ from ...asking import up_to
 
 VOCABULARY = 10
 END = Generation(frozenset({9}))
-Feed = Callable[[int], torch.Tensor]
 
 
-def _points_at(token: int) -> torch.Tensor:
+def _points_at(token):
     return torch.nn.functional.one_hot(torch.tensor(token), VOCABULARY).float()
 
 
-def _counting(token: int) -> torch.Tensor:
+def _counting(token):
     return _points_at(token + 1)
 
 
-def _writing(
-    decoding: Decoding,
-    generation: Generation = END,
-    *,
-    context: Sequence[int] = (0,),
-    choices: Sequence[tuple[int, ...]] = (),
-    finished: Callable[[list[int]], bool] = lambda ids: False,
-) -> ReplyState:
+def _writing(decoding, generation=END, *, context=(0,), choices=(), finished=lambda ids: False):
     held = Choices({ids: str(ids) for ids in choices}) if choices else None
     return ReplyState(generation, decoding, context=context, choices=held, finished=finished)
 
 
-def _written(reply: ReplyState, logits: torch.Tensor, step: Feed = _counting) -> list[int]:
+def _written(reply, logits, step=_counting):
     decode_replies(logits[None], lambda tokens: torch.stack([*map(step, tokens.values())]), [reply])
     return reply.ids
 
 
-def _run(
-    generation: Generation, limit: int, finished: Callable[[list[int]], bool] = lambda ids: False
-) -> list[int]:
+def _run(generation, limit, finished=lambda ids: False):
     return _written(_writing(up_to(limit), generation, finished=finished), _points_at(1))
 
 
-def test_stops_before_the_end_token() -> None:
+def test_a_reply_stops_before_the_end_token_at_the_limit_and_when_told():
     assert _run(Generation(frozenset({4, 9})), 50) == [1, 2, 3]
-
-
-def test_stops_at_the_limit() -> None:
     assert _run(END, 2) == [1, 2]
-
-
-def test_stops_when_told() -> None:
     assert _run(END, 50, lambda ids: 3 in ids) == [1, 2, 3]
 
 
-def test_no_token_is_fed_in_vain() -> None:
-    fed: list[int] = []
+def test_no_token_is_fed_in_vain():
+    fed = []
 
-    def step(token: int) -> torch.Tensor:
+    def step(token):
         fed.append(token)
         return _counting(token)
 
@@ -77,15 +57,15 @@ def test_no_token_is_fed_in_vain() -> None:
     assert fed == [1, 2]
 
 
-def test_replies_are_written_in_step_each_to_its_own_end() -> None:
+def test_replies_are_written_in_step_each_to_its_own_end():
     replies = [
         _writing(up_to(50)),
         _writing(up_to(2)),
         _writing(up_to(50), Generation(frozenset({3}))),
     ]
-    fed: list[dict[int, int]] = []
+    fed = []
 
-    def step(tokens: Mapping[int, int]) -> torch.Tensor:
+    def step(tokens):
         fed.append(dict(tokens))
         return torch.stack([_counting(token) for token in tokens.values()])
 
@@ -94,14 +74,8 @@ def test_replies_are_written_in_step_each_to_its_own_end() -> None:
     assert fed == [{0: 6, 1: 1, 2: 1}, {0: 7, 2: 2}, {0: 8}]
 
 
-def test_the_penalty_is_for_tokens_of_context_and_reply() -> None:
+def test_the_penalty_is_for_tokens_of_context_and_reply_and_a_request_may_have_its_own():
     # 5 leads by a little but lies in the context; once 3 is said, it is penalised too and 4 leads.
-    logits = torch.tensor([0.0, 0.0, 0.0, 2.0, 1.9, 2.1, 0.0, 0.0, 0.0, 0.0])
-    reply = _writing(up_to(2), Generation(frozenset(), repetition_penalty=1.2), context=[5])
-    assert _written(reply, logits, lambda token: logits) == [3, 4]
-
-
-def test_a_request_may_have_a_penalty_of_its_own() -> None:
     logits = torch.tensor([0.0, 0.0, 0.0, 2.0, 1.9, 2.1, 0.0, 0.0, 0.0, 0.0])
     for of_checkpoint, of_request, written in (
         (1.2, 1.0, [5, 5]),
@@ -116,13 +90,13 @@ def test_a_request_may_have_a_penalty_of_its_own() -> None:
 UNEVEN = torch.linspace(0, 3, VOCABULARY)
 
 
-def _drawn(**settings: Any) -> list[int]:
+def _drawn(**settings):
     return _written(
         _writing(up_to(40, **settings), Generation(frozenset())), UNEVEN, lambda token: UNEVEN
     )
 
 
-def test_draws_hang_on_the_seed_alone() -> None:
+def test_draws_hang_on_the_seed_alone():
     torch.manual_seed(5)
     one = _drawn(temperature=1.0, seed=1)
     torch.manual_seed(6)
@@ -131,7 +105,7 @@ def test_draws_hang_on_the_seed_alone() -> None:
     assert len(set(one)) > 3
 
 
-def test_draws_leave_torchs_own_alone() -> None:
+def test_draws_leave_torchs_own_alone():
     torch.manual_seed(5)
     expected = torch.rand(1)
     torch.manual_seed(5)
@@ -139,9 +113,9 @@ def test_draws_leave_torchs_own_alone() -> None:
     assert torch.equal(torch.rand(1), expected)
 
 
-def test_draws_are_those_of_transformers_warpers() -> None:
+def test_draws_are_those_of_transformers_warpers():
     draws = torch.Generator().manual_seed(3)
-    scores = TopPLogitsWarper(0.7)(None, TemperatureLogitsWarper(1.5)(None, UNEVEN[None]))  # type: ignore[arg-type]
+    scores = TopPLogitsWarper(0.7)(None, TemperatureLogitsWarper(1.5)(None, UNEVEN[None]))
     expected = [
         int(torch.multinomial(scores[0].softmax(-1), 1, generator=draws)) for _ in range(40)
     ]
@@ -149,7 +123,7 @@ def test_draws_are_those_of_transformers_warpers() -> None:
 
 
 @pytest.mark.parametrize("settings", [{"temperature": 1e-4}, {"temperature": 5.0, "top_p": 1e-4}])
-def test_hardly_any_temperature_or_nucleus_is_greedy(settings: dict[str, float]) -> None:
+def test_hardly_any_temperature_or_nucleus_is_greedy(settings):
     assert set(_drawn(**settings)) == {VOCABULARY - 1}
 
 
@@ -162,20 +136,18 @@ def test_hardly_any_temperature_or_nucleus_is_greedy(settings: dict[str, float])
         ([(4, 4)], [4, 4]),
     ],
 )
-def test_a_reply_is_held_to_its_choices(
-    choices: list[tuple[int, ...]], expected: list[int]
-) -> None:
+def test_a_reply_is_held_to_its_choices(choices, expected):
     reply = _writing(up_to(5), choices=choices)
     assert _written(reply, UNEVEN, lambda token: UNEVEN) == expected
     assert reply.choice == str(tuple(expected))
 
 
-def test_the_longer_choice_is_given_where_the_model_does_not_want_to_end() -> None:
+def test_the_longer_choice_is_given_where_the_model_does_not_want_to_end():
     reply = _writing(up_to(5), Generation(frozenset({0})), choices=[(8,), (8, 1), (8, 2, 5)])
     assert _written(reply, UNEVEN, lambda token: UNEVEN) == [8, 2, 5]
 
 
-def test_drawn_choices_are_all_given_at_some_time() -> None:
+def test_drawn_choices_are_all_given_at_some_time():
     choices = [(1,), (1, 2), (6, 6)]
     sampled = set()
     for seed in range(40):
@@ -185,11 +157,11 @@ def test_drawn_choices_are_all_given_at_some_time() -> None:
 
 
 @pytest.mark.parametrize(("eos", "ends"), [(None, set()), (3, {3}), ([3, 4], {3, 4})])
-def test_end_tokens_come_from_the_checkpoint(eos: Any, ends: set[int]) -> None:
+def test_end_tokens_come_from_the_checkpoint(eos, ends):
     assert read_generation(GenerationConfig(eos_token_id=eos)) == Generation(frozenset(ends))
 
 
-def test_sampling_settings_do_not_matter() -> None:
+def test_sampling_settings_do_not_matter():
     config = GenerationConfig(
         eos_token_id=1, do_sample=True, temperature=0.1, top_k=1, repetition_penalty=1.05
     )
@@ -199,7 +171,7 @@ def test_sampling_settings_do_not_matter() -> None:
 @pytest.mark.parametrize(
     "setting", [{"num_beams": 4}, {"no_repeat_ngram_size": 3}, {"suppress_tokens": [1]}]
 )
-def test_settings_that_would_change_replies_are_refused(setting: dict[str, Any]) -> None:
+def test_settings_that_would_change_replies_are_refused(setting):
     with pytest.raises(ModelError, match=next(iter(setting))):
         read_generation(GenerationConfig(eos_token_id=1, **setting))
 
@@ -213,7 +185,5 @@ def test_settings_that_would_change_replies_are_refused(setting: dict[str, Any])
         ("stop", ("stop",), ""),
     ],
 )
-def test_text_is_cut_before_the_first_stop_string(
-    text: str, stop: tuple[str, ...], cut: str | None
-) -> None:
+def test_text_is_cut_before_the_first_stop_string(text, stop, cut):
     assert cut_at_stop(text, stop) == cut

@@ -10,13 +10,13 @@ HEADS, SIZE = 2, 4
 OPERATIONS = st.lists(st.integers(-40, 40), max_size=20)
 
 
-def _states(n_tokens: int, generator: torch.Generator) -> tuple[torch.Tensor, torch.Tensor]:
+def _states(n_tokens, generator):
     keys, values = torch.randn(2, 1, HEADS, n_tokens, SIZE, generator=generator)
     return keys, values
 
 
 @given(OPERATIONS)
-def test_holds_what_a_dynamic_cache_holds(operations: list[int]) -> None:
+def test_holds_what_a_dynamic_cache_holds(operations):
     generator = torch.Generator().manual_seed(0)
     ours, theirs = BufferedCache(LlamaConfig()), DynamicCache()
     for count in operations:
@@ -34,7 +34,7 @@ def test_holds_what_a_dynamic_cache_holds(operations: list[int]) -> None:
         assert ours.get_seq_length() == theirs.get_seq_length()
 
 
-def test_neither_a_cut_nor_a_refill_moves_memory() -> None:
+def test_neither_a_cut_nor_a_refill_moves_memory():
     generator = torch.Generator().manual_seed(0)
     cache = BufferedCache(LlamaConfig())
     cache.reserve(100)
@@ -49,7 +49,7 @@ def test_neither_a_cut_nor_a_refill_moves_memory() -> None:
         assert layer.keys.shape == (1, HEADS, 90, SIZE)
 
 
-def test_grows_beyond_what_was_reserved() -> None:
+def test_grows_beyond_what_was_reserved():
     generator = torch.Generator().manual_seed(0)
     cache = BufferedCache(LlamaConfig())
     cache.reserve(10)
@@ -64,7 +64,7 @@ def test_grows_beyond_what_was_reserved() -> None:
 HYBRID = Qwen3NextConfig(num_hidden_layers=2, layer_types=["linear_attention", "full_attention"])
 
 
-def _read(cache: BufferedCache, n_tokens: int) -> None:
+def _read(cache, n_tokens):
     """Let the first layer's state be the number of tokens that it has read."""
     old = cache.get_seq_length()
     state = torch.full((1, 1, 2, 2), float(old + n_tokens))
@@ -74,11 +74,11 @@ def _read(cache: BufferedCache, n_tokens: int) -> None:
     cache.update(*states, 1)
 
 
-def _state(cache: BufferedCache) -> float:
+def _state(cache):
     return float(cache.layers[0].recurrent_states[0].max())
 
 
-def test_a_layer_with_one_state_goes_back_to_the_last_mark() -> None:
+def test_a_layer_with_one_state_goes_back_to_the_last_mark():
     cache = BufferedCache(HYBRID)
     assert cache.needs_marks
     _read(cache, 5)
@@ -95,7 +95,7 @@ def test_a_layer_with_one_state_goes_back_to_the_last_mark() -> None:
     assert not cache.has_previous_state(0)
 
 
-def test_few_marks_are_kept_and_those_that_are_used() -> None:
+def test_few_marks_are_kept_and_those_that_are_used():
     cache = BufferedCache(HYBRID)
     _read(cache, 1)
     cache.mark()
@@ -106,7 +106,7 @@ def test_few_marks_are_kept_and_those_that_are_used() -> None:
     assert cache.cut_before(6) == 6
 
 
-def test_a_cache_whose_layers_all_attend_can_be_cut_anywhere() -> None:
+def test_a_cache_whose_layers_all_attend_can_be_cut_anywhere():
     cache = BufferedCache(LlamaConfig())
     assert not cache.needs_marks
     cache.mark()

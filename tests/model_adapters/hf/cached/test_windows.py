@@ -1,15 +1,10 @@
 """Continuations answered together by language models whose layers attend to a window or a chunk of
 what is before, against the same asked one by one."""
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import pytest
 import torch
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import load
 from model_adapters.hf.cached.branch_attention import BranchAttention
 
@@ -43,14 +38,12 @@ QUESTIONS = (
     "\nWho?",
 )
 
-Load = Callable[..., Any]
-
 
 @pytest.fixture
-def load_llava(tmp_path: Path) -> Load:
+def load_llava(tmp_path):
     """Saves a LLaVA with a language model of these settings, and loads it."""
 
-    def load_saved(text: dict[str, Any], **options: str) -> Any:
+    def load_saved(text, **options):
         torch.manual_seed(0)
         save_llava(tmp_path, **text)
         return load("hf-vlm", {"pretrained": str(tmp_path), "device": "cpu", **options}, seed=0)
@@ -58,7 +51,7 @@ def load_llava(tmp_path: Path) -> Load:
     return load_saved
 
 
-def _asked(model: Any, frames: list[FrameRef], size: int) -> list[tuple[int, ...]]:
+def _asked(model, frames, size):
     """Replies to all questions behind more tokens than a window has, so many at a time."""
     talk = model.conversation()
     talk.append(*frames[:2], "\nThe mug was put into the sink of the kitchen, then on a table.")
@@ -69,24 +62,20 @@ def _asked(model: Any, frames: list[FrameRef], size: int) -> list[tuple[int, ...
 
 
 @pytest.mark.parametrize("name", WINDOWED)
-def test_what_a_layer_attends_to_is_asked_of_the_model(
-    name: str, load_llava: Load, frames: list[FrameRef]
-) -> None:
+def test_what_a_layer_attends_to_is_asked_of_the_model(name, load_llava, frames):
     model = load_llava(WINDOWED[name], chunk_tokens="30")
     assert model.windows == {16}
     assert model.capabilities.batch_size == 64
     assert _asked(model, frames, 5) == _asked(model, frames, 1)
 
 
-def test_a_model_that_counts_positions_by_its_cache_is_asked_one_by_one(
-    load_llava: Load, frames: list[FrameRef]
-) -> None:
+def test_a_model_that_counts_positions_by_its_cache_is_asked_one_by_one(load_llava, frames):
     model = load_llava({**STEADY, "attn_temperature_tuning": True, "floor_scale": 16})
     assert model.capabilities.batch_size == 1
     assert _asked(model, frames, 5) == _asked(model, frames, 1)
 
 
-def test_a_model_that_adds_to_its_scores_is_asked_one_by_one(load_llava: Load) -> None:
+def test_a_model_that_adds_to_its_scores_is_asked_one_by_one(load_llava):
     model = load_llava({"model_type": "gemma2", "query_pre_attn_scalar": 32})
     assert model.capabilities.batch_size == 1
     # Whatever transformers would choose: torch's kernel does not cap scores.
@@ -96,12 +85,12 @@ def test_a_model_that_adds_to_its_scores_is_asked_one_by_one(load_llava: Load) -
 @pytest.mark.parametrize("size", [16, 4096])
 @pytest.mark.parametrize("text", [STEADY, QWEN, PHI], ids=["llama4", "qwen2_moe", "phimoe"])
 def test_masks_without_their_windows_are_found_when_a_checkpoint_is_loaded(
-    text: dict[str, Any], size: int, load_llava: Load, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    text, size, load_llava, monkeypatch
+):
     asked = BranchAttention._mask
 
-    def ignore_windows(self: BranchAttention, **settings: Any) -> torch.Tensor:
-        def sees(batch: Any, head: Any, at: torch.Tensor, other: torch.Tensor) -> torch.Tensor:
+    def ignore_windows(self, **settings):
+        def sees(batch, head, at, other):
             return other <= at
 
         return asked(self, **settings | {"mask_function": sees})
@@ -118,7 +107,7 @@ def test_masks_without_their_windows_are_found_when_a_checkpoint_is_loaded(
     assert getattr(model.loaded.model.get_decoder().config, window) == size
 
 
-def test_the_sample_leaves_windows_and_kernel_as_they_were(load_llava: Load) -> None:
+def test_the_sample_leaves_windows_and_kernel_as_they_were(load_llava):
     model = load_llava({**PHI, "sliding_window": 4096})
     config = model.loaded.model.get_decoder().config
     assert (config.sliding_window, config._attn_implementation) == (4096, "sdpa")

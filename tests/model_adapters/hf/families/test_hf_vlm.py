@@ -3,17 +3,14 @@ has no code for."""
 
 import json
 import shutil
-from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
+from functools import partial
 
 import pytest
 import torch
 from transformers import LlamaConfig, Qwen2VLConfig
 
 from infthor_eval.errors import ModelError, UsageError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.prompting.prompt import token_ids
@@ -22,48 +19,32 @@ from model_adapters.tiny.pixtral import PixtralTiny
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny, save_tiny_checkpoint
 from model_adapters.tiny.twin import HIDDEN
 
-from ...asking import up_to, user
+from ...asking import ask, load_saved, talk_of, up_to, user
 
-
-def _load(folder: Path, **options: str) -> Any:
-    return load("hf-vlm", {"pretrained": str(folder), "device": "cpu", **options}, seed=0)
+_load = partial(load_saved, "hf-vlm")
 
 
 @pytest.mark.parametrize("name", ["llava", "idefics3", "deepseek-vl-1.3b"])
-def test_an_unknown_family_shares_prefixes_and_replies_as_generate(
-    name: str, checkpoints: dict[str, Path], frames: list[FrameRef]
-) -> None:
-    shared, whole = _load(checkpoints[name]), _load(checkpoints[name], share_prefix="false")
-    assert isinstance(shared, TransformersModel)
-    assert isinstance(whole, UncachedModel)
+def test_an_unknown_family_shares_prefixes_and_replies_as_generate(name, checkpoints, frames):
+    shared, whole = _both(checkpoints[name], frames)
     check_adapter(shared)
     check_adapter(whole)
-    _require_equal_replies(shared, whole, frames)
 
 
-def test_frames_are_split_as_the_option_says(
-    checkpoints: dict[str, Path], frames: list[FrameRef]
-) -> None:
+def test_frames_are_split_as_the_option_says(checkpoints, frames):
     by_default = _load(checkpoints["idefics3"])
     counts = {}
-    for splitting, named in (("true", True), ("false", False)):
+    for splitting in (True, False):
         model = _load(checkpoints["idefics3"], image_splitting=splitting)
-        assert model.identity()["image_processor"]["do_image_splitting"] is named
-        counts[named] = model.tokens_per_frame(frames[0])
-        model.close()
+        assert model.identity()["image_processor"]["do_image_splitting"] is splitting
+        counts[splitting] = model.tokens_per_frame(frames[0])
     assert by_default.tokens_per_frame(frames[0]) == counts[True] > counts[False]
-    by_default.close()
     with pytest.raises(ModelError, match="cannot split frames; leave image_splitting out"):
         _load(checkpoints["llava"], image_splitting="true")
 
 
-def test_an_image_seen_in_both_directions_shares_prefixes(
-    checkpoints: dict[str, Path], frames: list[FrameRef]
-) -> None:
-    shared = _load(checkpoints["gemma3"], chunk_tokens="40")
-    whole = _load(checkpoints["gemma3"], share_prefix="false")
-    assert isinstance(shared, TransformersModel)
-    _require_equal_replies(shared, whole, frames)
+def test_an_image_seen_in_both_directions_shares_prefixes(checkpoints, frames):
+    shared, whole = _both(checkpoints["gemma3"], frames, chunk_tokens=40)
     # The same behind two frames and behind one: the latter leaves frames to the continuations.
     for n_shared in (2, 1):
         turns = [
@@ -74,8 +55,11 @@ def test_an_image_seen_in_both_directions_shares_prefixes(
         assert [one.token_ids for one in together] == [one.token_ids for one in alone]
 
 
-def _require_equal_replies(shared: Any, whole: Any, frames: list[FrameRef]) -> None:
-    """Compare replies behind a prefix, with those of transformers' `generate`."""
+def _both(folder, frames, **options):
+    """The model with shared prefixes and without, once their replies behind a prefix are equal."""
+    shared, whole = _load(folder, **options), _load(folder, share_prefix=False)
+    assert isinstance(shared, TransformersModel)
+    assert isinstance(whole, UncachedModel)
     replies = []
     for model in (shared, whole):
         talk = model.conversation()
@@ -88,15 +72,12 @@ def _require_equal_replies(shared: Any, whole: Any, frames: list[FrameRef]) -> N
         replies.append(heard)
     assert replies[0] == replies[1]
     assert shared.tokens_per_frame(frames[0]) == whole.tokens_per_frame(frames[0])
+    return shared, whole
 
 
-def test_any_architecture_runs_without_sharing(
-    checkpoints: dict[str, Path], frames: list[FrameRef]
-) -> None:
+def test_any_architecture_runs_without_sharing(checkpoints, frames):
     model = _load(checkpoints["gemma3"], share_prefix="false", margins="true")
-    parts = (frames[0], "\nWhat is it?")
-    talk = model.conversation()
-    talk.append(*parts)
+    talk = talk_of(model, user(frames[0], "\nWhat is it?"))
     inputs = process_turns(model._processor, model._loaded.template, talk.turns)
     output = model._loaded.model.generate(
         **inputs,
@@ -118,58 +99,45 @@ def test_any_architecture_runs_without_sharing(
     assert model.identity()["share_prefix"] is False
 
 
-def test_the_end_token_is_no_part_of_a_reply_without_sharing(
-    checkpoints: dict[str, Path], tmp_path: Path, frames: list[FrameRef]
-) -> None:
-    model = _load(checkpoints["llava"], share_prefix="false")
-    talk = model.conversation()
-    talk.append(frames[0], "\nWhat is it?")
-    whole = talk.reply(up_to(6)).token_ids
+def test_the_end_token_is_no_part_of_a_reply_without_sharing(checkpoints, tmp_path, frames):
+    parts = (*frames[:2], "\nWhat is it?")
+    whole = ask(_load(checkpoints["llava"], share_prefix=False), *parts, new=6).token_ids
     folder = shutil.copytree(checkpoints["llava"], tmp_path / "llava")
     (folder / "generation_config.json").write_text(json.dumps({"eos_token_id": whole[3]}))
-    ended = _load(folder, share_prefix="false").conversation()
-    ended.append(*talk.turns[0].parts)
-    assert ended.reply(up_to(6)).token_ids == whole[: whole.index(whole[3])]
+    ended = ask(_load(folder, share_prefix=False), *parts, new=6)
+    assert ended.token_ids == whole[: whole.index(whole[3])]
 
 
-def test_samples_may_be_longer_than_the_context_limit(checkpoints: dict[str, Path]) -> None:
+def test_samples_may_be_longer_than_the_context_limit(checkpoints):
     for options in ({}, {"share_prefix": "false"}):
         assert _load(checkpoints["llava"], max_tokens="20", **options).capabilities.max_tokens == 20
 
 
-def test_known_families_need_no_processor(tmp_path: Path, frames: list[FrameRef]) -> None:
+def test_known_families_need_no_processor(tmp_path, frames):
     save_tiny_checkpoint(tmp_path / "qwen", seed=0)
     PixtralTiny.twin.save(tmp_path / "pixtral", seed=0)
     for folder in ("qwen", "pixtral"):
         (tmp_path / folder / "processor_config.json").unlink()
         model = _load(tmp_path / folder)
         assert isinstance(model, TransformersModel)
-        talk = model.conversation()
-        talk.append(*frames[:2], "?")
+        talk = talk_of(model, user(*frames[:2], "?"))
         assert talk.reply(up_to(2)).n_context_tokens == talk.n_tokens
 
 
-def _qwen2_vl_config(ids: Mapping[str, int], vocab_size: int) -> Qwen2VLConfig:
+def _qwen2_vl_config(ids, vocab_size):
     newer = Qwen25VLTiny.twin.config(ids, vocab_size)
     text = newer.text_config.to_dict()
     del text["model_type"]
     names = ("image_token_id", "video_token_id", "vision_start_token_id", "vision_end_token_id")
+    sizes = {"depth": 2, "embed_dim": 32, "hidden_size": HIDDEN, "num_heads": 2, "mlp_ratio": 2}
     return Qwen2VLConfig(
         text_config=text,
-        vision_config={
-            "depth": 2,
-            "embed_dim": 32,
-            "hidden_size": HIDDEN,
-            "num_heads": 2,
-            "mlp_ratio": 2,
-        },
+        vision_config=sizes,
         **{name: getattr(newer, name) for name in names},
     )
 
 
-def test_qwen2_vl_runs_as_its_successor_and_as_transformers_has_it(
-    tmp_path: Path, frames: list[FrameRef]
-) -> None:
+def test_qwen2_vl_runs_as_its_successor_and_as_transformers_has_it(tmp_path, frames):
     replace(Qwen25VLTiny.twin, config=_qwen2_vl_config).save(tmp_path, seed=0)
     model = _load(tmp_path, chunk_tokens="30")
     parts = ("Goal.", *frames[:3], "\nWhat is it?")
@@ -187,49 +155,43 @@ def test_qwen2_vl_runs_as_its_successor_and_as_transformers_has_it(
     assert type(bare).__name__ == "Qwen2VLForConditionalGeneration"
 
 
-def test_no_checkpoint_is_a_usage_error() -> None:
+def test_no_checkpoint_is_a_usage_error():
     with pytest.raises(UsageError, match=r"hf-vlm needs pretrained=\.\.\."):
         load("hf-vlm", {}, seed=0)
 
 
-def test_a_model_without_images_is_refused(tmp_path: Path) -> None:
+def test_a_model_without_images_is_refused(tmp_path):
     LlamaConfig(vocab_size=10).save_pretrained(tmp_path)
     with pytest.raises(ModelError, match="is a llama checkpoint, which has no vision"):
         _load(tmp_path)
 
 
-def test_a_processor_that_disagrees_with_the_model_is_refused(
-    checkpoints: dict[str, Path], tmp_path: Path
-) -> None:
-    folder = shutil.copytree(checkpoints["llava"], tmp_path / "llava")
-    file = folder / "processor_config.json"
-    settings = json.loads(file.read_text())
-    file.write_text(json.dumps(settings | {"patch_size": 28}))
-    with pytest.raises(ModelError, match=r"do not match, .* do they belong to one checkpoint\?$"):
-        _load(folder)
-
-
 @pytest.mark.parametrize(
-    ("piece", "complaint"),
+    ("name", "piece", "other", "complaint"),
     [
-        ("'<image>'", "0 image placeholders for 3 frames"),
-        ("part.text", "drops the text 'The first view:'"),
+        (
+            "processor_config.json",
+            '"patch_size": 14',
+            '"patch_size": 28',
+            r"do not match, .* do they belong to one checkpoint\?$",
+        ),
+        ("chat_template.jinja", "<image>", "", "0 image placeholders for 3 frames"),
+        ("chat_template.jinja", "part.text", "''", "drops the text 'The first view:'"),
     ],
 )
-def test_a_template_without_images_or_texts_is_refused(
-    checkpoints: dict[str, Path], tmp_path: Path, piece: str, complaint: str
-) -> None:
+def test_a_processor_or_template_of_another_model_is_refused(
+    checkpoints, tmp_path, name, piece, other, complaint
+):
     folder = shutil.copytree(checkpoints["llava"], tmp_path / "llava")
-    file = folder / "chat_template.jinja"
-    file.write_text(file.read_text().replace(piece, "''"))
+    written = (folder / name).read_text()
+    assert piece in written
+    (folder / name).write_text(written.replace(piece, other))
     with pytest.raises(ModelError, match=complaint):
         _load(folder)
 
 
 @pytest.mark.parametrize("name", ["llava", "gemma3"])
-def test_what_is_read_has_the_same_hashes_with_and_without_sharing(
-    name: str, checkpoints: dict[str, Path], frames: list[FrameRef]
-) -> None:
+def test_what_is_read_has_the_same_hashes_with_and_without_sharing(name, checkpoints, frames):
     replies = []
     for options in ({"share_prefix": "true", "margins": "true"}, {"share_prefix": "false"}):
         talk = _load(checkpoints[name], **options).conversation()

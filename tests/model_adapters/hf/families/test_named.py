@@ -1,18 +1,13 @@
 """Models with a name of their own, on tiny checkpoints of their families."""
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 from infthor_eval.errors import ModelError, UsageError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import load, options
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.uncached import UncachedModel
 
-from ...asking import up_to
-from ...conftest import TinyFamily
+from ...asking import ask, load_saved
 
 # Name to the family of its tiny checkpoint, and a usual checkpoint.
 NAMED = {
@@ -30,35 +25,25 @@ NAMED = {
 }
 
 
-def _load(name: str, folder: Path, **settings: str) -> Any:
-    return load(name, {"pretrained": str(folder), "device": "cpu", **settings}, seed=0)
-
-
 @pytest.mark.parametrize("name", NAMED)
-def test_a_name_runs_its_family_as_hf_vlm_does(
-    name: str, tiny_family: TinyFamily, frames: list[FrameRef]
-) -> None:
+def test_a_name_runs_its_family_as_hf_vlm_does(name, tiny_family, frames):
     family, usual = NAMED[name]
     assert f"pretrained={usual}" in options(name)
     shares = name != "molmo2"
     settings = {} if shares else {"share_prefix": "false"}
     model, generic = (
-        _load(name, tiny_family(family)),
-        _load("hf-vlm", tiny_family(family), **settings),
+        load_saved(name, tiny_family(family)),
+        load_saved("hf-vlm", tiny_family(family), **settings),
     )
     assert isinstance(model, TransformersModel if shares else UncachedModel)
-    replies = []
-    for each in (model, generic):
-        talk = each.conversation()
-        talk.append(*frames[:2], "\nWhat is it?")
-        replies.append(talk.reply(up_to(4)))
-    assert replies[0] == replies[1]
+    parts = (*frames[:2], "\nWhat is it?")
+    assert ask(model, *parts) == ask(generic, *parts)
     assert model.identity() | {"adapter": "hf-vlm"} == generic.identity()
 
 
-def test_a_checkpoint_of_another_model_is_refused(tiny_family: TinyFamily) -> None:
+def test_a_checkpoint_of_another_model_is_refused(tiny_family):
     with pytest.raises(ModelError, match=r"is a gemma3 checkpoint, not qwen3_vl; try hf-vlm"):
-        _load("qwen3-vl", tiny_family("gemma3"))
+        load_saved("qwen3-vl", tiny_family("gemma3"))
 
 
 @pytest.mark.parametrize(
@@ -70,15 +55,15 @@ def test_a_checkpoint_of_another_model_is_refused(tiny_family: TinyFamily) -> No
     ],
 )
 def test_a_size_of_frames_changes_their_tokens_and_the_identity(
-    name: str, setting: str, value: str, tiny_family: TinyFamily, frames: list[FrameRef]
-) -> None:
+    name, setting, value, tiny_family, frames
+):
     folder = tiny_family(NAMED[name][0])
-    usual, changed = _load(name, folder), _load(name, folder, **{setting: value})
+    usual, changed = load_saved(name, folder), load_saved(name, folder, **{setting: value})
     fewer, more = sorted(each.tokens_per_frame(frames[0]) for each in (usual, changed))
     assert fewer < more
     assert usual.identity()["image_processor"] != changed.identity()["image_processor"]
 
 
-def test_sizes_that_gemma_4_does_not_know_are_refused() -> None:
+def test_sizes_that_gemma_4_does_not_know_are_refused():
     with pytest.raises(UsageError, match="soft_tokens=100 is not 70, 140, 280, 560, 1120"):
         load("gemma4", {"soft_tokens": "100"}, 0)

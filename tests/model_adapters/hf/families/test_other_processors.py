@@ -6,42 +6,24 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
 import torch
 from PIL import Image
 from transformers import (
     Cohere2VisionProcessor,
-    Idefics2Config,
-    Idefics2ForConditionalGeneration,
-    Idefics2Processor,
-    JanusConfig,
-    JanusForConditionalGeneration,
-    JanusProcessor,
-    MllamaConfig,
-    MllamaForConditionalGeneration,
-    MllamaProcessor,
-    PaliGemmaConfig,
-    PaliGemmaForConditionalGeneration,
-    PaliGemmaProcessor,
 )
 from transformers.models.got_ocr2.image_processing_pil_got_ocr2 import GotOcr2ImageProcessorPil
-from transformers.models.idefics2.image_processing_pil_idefics2 import Idefics2ImageProcessorPil
-from transformers.models.janus.image_processing_pil_janus import JanusImageProcessorPil
-from transformers.models.mllama.image_processing_pil_mllama import MllamaImageProcessorPil
-from transformers.models.siglip.image_processing_pil_siglip import SiglipImageProcessorPil
 
 import model_adapters
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
-from model_adapters import load
 from model_adapters.hf.uncached import expand_image_tokens, image_token
+from model_adapters.tiny.tokenizer import train_tokenizer
 
-from ...asking import up_to
-from ...checkpoints import TEMPLATE, TEXT, VISION, other_tokenizer, save_llava, save_parts
+from ...asking import ask, load_saved, talk_of, up_to, user
+from ...checkpoints import save_llava
 from ...conftest import PEERS
 
 # Runs in a process of its own, because the stand-ins for torchvision's compiled half must come
@@ -86,173 +68,46 @@ counts = [(image_token(each), n_image_tokens(each, image)) for each in (gemma4, 
 print(json.dumps(counts))
 """
 SIZE = {"height": 56, "width": 56}
-LLAMA = {"model_type": "llama", "initializer_range": 0.2, **TEXT}
 
 
-def _load(folder: Path, **options: str) -> Any:
-    return load("hf-vlm", {"pretrained": str(folder), "device": "cpu", **options}, seed=0)
+_load = partial(load_saved, "hf-vlm")
 
 
-def _janus(folder: Path) -> None:
-    names = {"image_token": "<image>", "boi_token": "<boi>", "eoi_token": "<eoi>"}
-    tokenizer = other_tokenizer(tuple(names.values()), **names)
-    config = JanusConfig(
-        image_token_id=tokenizer.convert_tokens_to_ids("<image>"),
-        text_config={"vocab_size": len(tokenizer), **LLAMA},
-        vision_config={**VISION, "projection_dim": TEXT["hidden_size"], "num_image_tokens": 16},
-        vq_config={
-            "base_channels": 32,
-            "channel_multiplier": [1],
-            "num_embeddings": 16,
-            "num_patches": 4,
-            "projection_dim": TEXT["hidden_size"],
-            "image_token_embed_dim": TEXT["hidden_size"],
-            "num_res_blocks": 1,
-        },
-    )
-    processor = JanusProcessor(
-        JanusImageProcessorPil(size=SIZE, min_size=14),
-        tokenizer,
-        num_image_tokens=16,
-        chat_template=TEMPLATE.replace("IMAGE", "<image>"),
-    )
-    save_parts(folder, JanusForConditionalGeneration(config), processor)
+SLOTS = {"idefics2": 4 + 1, "mllama": 1, "paligemma": 16}  # and a marker between two frames
 
 
-def _idefics2(folder: Path) -> None:
-    names = {"image_token": "<image>", "image_boundary_token": "<fake_token_around_image>"}
-    tokenizer = other_tokenizer((*names.values(), "<end_of_utterance>"), **names)
-    config = Idefics2Config(
-        image_token_id=tokenizer.convert_tokens_to_ids("<image>"),
-        vision_config=VISION,
-        perceiver_config={
-            "hidden_size": TEXT["hidden_size"],
-            "resampler_n_latents": 4,
-            "resampler_depth": 1,
-            "resampler_n_heads": 2,
-            "resampler_head_dim": 16,
-            "num_key_value_heads": 1,
-        },
-        text_config={**LLAMA, "model_type": "mistral", "vocab_size": len(tokenizer)},
-    )
-    processor = Idefics2Processor(
-        Idefics2ImageProcessorPil(
-            size={"shortest_edge": 28, "longest_edge": 56}, do_image_splitting=False
-        ),
-        tokenizer,
-        image_seq_len=4,
-        chat_template=TEMPLATE.replace("IMAGE", "<image>"),
-    )
-    save_parts(folder, Idefics2ForConditionalGeneration(config), processor)
+@pytest.mark.parametrize(("family", "slots"), SLOTS.items())
+def test_a_frame_has_the_tokens_that_one_more_takes(family, slots, tiny_family, frames):
+    model = _load(tiny_family(family), share_prefix=False)
+    assert model.tokens_per_frame(frames[0]) == slots
+    counts = [talk_of(model, user(*frames[:n], "\nWhat is it?")).n_tokens for n in (1, 2, 3)]
+    assert {later - earlier for earlier, later in itertools.pairwise(counts)} == {slots}
 
 
-def _mllama(folder: Path) -> None:
-    tokenizer = other_tokenizer(("<|python_tag|>", "<|image|>"), image_token="<|image|>")
-    config = MllamaConfig(
-        image_token_index=tokenizer.convert_tokens_to_ids("<|image|>"),
-        vision_config={
-            "hidden_size": 32,
-            "intermediate_size": 64,
-            "num_hidden_layers": 2,
-            "num_global_layers": 1,
-            "attention_heads": 2,
-            "image_size": 56,
-            "vision_output_dim": 64,
-            "intermediate_layers_indices": [0],
-            "max_num_tiles": 4,
-        },
-        text_config={
-            **LLAMA,
-            "model_type": "mllama_text_model",
-            "vocab_size": len(tokenizer),
-            "cross_attention_layers": [1],
-            "pad_token_id": tokenizer.pad_token_id,
-        },
-    )
-    processor = MllamaProcessor(
-        MllamaImageProcessorPil(size=SIZE, max_image_tiles=4),
-        tokenizer,
-        chat_template=TEMPLATE.replace("IMAGE", "<|image|>"),
-    )
-    save_parts(folder, MllamaForConditionalGeneration(config), processor)
+@pytest.mark.parametrize("family", SLOTS)
+def test_an_architecture_that_would_be_run_wrongly_is_refused(family, tiny_family):
+    with pytest.raises(ModelError, match=r"with shared prefixes.*; use share_prefix=false"):
+        _load(tiny_family(family))
 
 
-def _paligemma(folder: Path) -> None:
-    tokenizer = other_tokenizer(("<image>",), image_token="<image>")
-    images = SiglipImageProcessorPil(size=SIZE)
-    images.image_seq_length = 16
-    processor = PaliGemmaProcessor(
-        images, tokenizer, chat_template=TEMPLATE.replace("IMAGE", "<image>")
-    )
-    config = PaliGemmaConfig(
-        image_token_index=tokenizer.convert_tokens_to_ids("<image>"),
-        projection_dim=TEXT["hidden_size"],
-        hidden_size=TEXT["hidden_size"],
-        vision_config={
-            "model_type": "siglip_vision_model",
-            "vision_use_head": False,
-            "projection_dim": TEXT["hidden_size"],
-            **VISION,
-        },
-        text_config={**LLAMA, "model_type": "gemma", "vocab_size": len(tokenizer)},
-    )
-    save_parts(folder, PaliGemmaForConditionalGeneration(config), processor)
-
-
-SLOTS = {_idefics2: 4 + 1, _mllama: 1, _paligemma: 16}  # and a marker between two frames
-
-
-@pytest.mark.parametrize("save", SLOTS, ids=lambda save: save.__name__)
-def test_a_frame_has_the_tokens_that_one_more_takes(
-    save: Callable[[Path], None], tmp_path: Path, frames: list[FrameRef]
-) -> None:
-    torch.manual_seed(0)
-    save(tmp_path)
-    model = _load(tmp_path, share_prefix="false")
-    assert model.tokens_per_frame(frames[0]) == SLOTS[save]
-    counts = []
-    for n in (1, 2, 3):
-        talk = model.conversation()
-        talk.append(*frames[:n], "\nWhat is it?")
-        counts.append(talk.n_tokens)
-    assert {later - earlier for earlier, later in itertools.pairwise(counts)} == {SLOTS[save]}
-
-
-def test_a_generate_that_chooses_its_own_tokens_is_refused(tmp_path: Path) -> None:
-    torch.manual_seed(0)
-    _janus(tmp_path)
+def test_a_generate_that_chooses_its_own_tokens_is_refused(tiny_family):
     with pytest.raises(
         ModelError, match=r"^JanusForCond.*generate returns other tokens .* use share_prefix=true$"
     ):
-        _load(tmp_path, share_prefix="false")
+        _load(tiny_family("janus"), share_prefix=False)
 
 
-def test_janus_replies_as_its_generate_with_shared_prefixes(
-    tmp_path: Path, frames: list[FrameRef]
-) -> None:
-    torch.manual_seed(0)
-    _janus(tmp_path)
-    model = _load(tmp_path)
-    talk = model.conversation()
-    talk.append(frames[0], "\nWhat is it?")
-    reply = talk.reply(up_to(4))
-    assert reply.n_reply_tokens > 0
+def test_janus_replies_with_shared_prefixes(tiny_family, frames):
+    model = _load(tiny_family("janus"))
+    assert ask(model, frames[0], "\nWhat is it?").n_reply_tokens > 0
     assert model.tokens_per_frame(frames[0]) == 16 + 2
 
 
-@pytest.mark.parametrize("save", [_idefics2, _mllama, _paligemma], ids=lambda save: save.__name__)
-def test_an_architecture_that_would_be_run_wrongly_is_refused(
-    save: Callable[[Path], None], tmp_path: Path
-) -> None:
-    torch.manual_seed(0)
-    save(tmp_path)
-    with pytest.raises(ModelError, match=r"with shared prefixes.*; use share_prefix=false"):
-        _load(tmp_path)
-
-
-def test_a_processor_expands_its_image_token_and_not_the_marker_of_its_begin() -> None:
+def test_a_processor_expands_its_image_token_and_not_the_marker_of_its_begin():
     names = {"image_token": "<image>", "boi_token": "<boi>", "eoi_token": "<eoi>"}
-    tokenizer = other_tokenizer((*names.values(), "<line>"), **names, img_line_break_token="<line>")
+    special = ("<s>", "</s>", *names.values(), "<line>")
+    named = {**names, "img_line_break_token": "<line>"}
+    tokenizer = train_tokenizer(special, begin="<s>", end="</s>", pad="</s>", named=named)
     # Pixels as its own processor makes them, which needs torchvision.
     images = GotOcr2ImageProcessorPil(size=SIZE, crop_to_patches=False)
     images.patch_size = 3
@@ -262,9 +117,7 @@ def test_a_processor_expands_its_image_token_and_not_the_marker_of_its_begin() -
     assert ids.shape[1] == 1 + 3 * 3 + 1 + 1
 
 
-def test_a_model_that_only_fails_with_shared_prefixes_is_said_to_run_without(
-    tmp_path: Path, frames: list[FrameRef]
-) -> None:
+def test_a_model_that_only_fails_with_shared_prefixes_is_said_to_run_without(tmp_path, frames):
     torch.manual_seed(0)
     # Layers that attend and keep a state, too.
     sizes = {"mamba_d_ssm": 64, "mamba_n_heads": 4, "mamba_d_head": 16, "mamba_d_state": 8}
@@ -273,12 +126,11 @@ def test_a_model_that_only_fails_with_shared_prefixes_is_said_to_run_without(
         ModelError, match=r"llava cannot be run with shared .* \(.+\); use share_prefix=false$"
     ):
         _load(tmp_path)
-    talk = _load(tmp_path, share_prefix="false").conversation()
-    talk.append(frames[0], "\nWhat is it?")
+    talk = talk_of(_load(tmp_path, share_prefix=False), user(frames[0], "\nWhat is it?"))
     assert talk.reply(up_to(2)).n_context_tokens == talk.n_tokens
 
 
-def test_processors_that_need_torchvision_count_what_one_more_frame_takes() -> None:
+def test_processors_that_need_torchvision_count_what_one_more_frame_takes():
     if not PEERS.is_dir():
         pytest.skip("torchvision is not set aside in test-peers (make test does it)")
     root = Path(model_adapters.__file__).parents[1]

@@ -1,7 +1,5 @@
 """What a checkpoint's card says of its training."""
 
-from pathlib import Path
-
 import pytest
 
 from infthor_eval.storage.folders import packaged_folder
@@ -22,21 +20,21 @@ CARDS = {
 
 
 @pytest.mark.parametrize("text", CARDS)
-def test_the_words_stand_in_the_metadata(tmp_path: Path, text: str) -> None:
+def test_the_words_stand_in_the_metadata(tmp_path, text):
     (tmp_path / "README.md").write_text(text)
     assert read_card_words(tmp_path) == CARDS[text]
 
 
-def test_a_checkpoint_need_not_have_a_card(tmp_path: Path) -> None:
+def test_a_checkpoint_need_not_have_a_card(tmp_path):
     assert read_card_words(tmp_path) is None
     assert "trained_words" not in origin(tmp_path, None, "x")
 
 
-def test_the_words_are_part_of_the_identity(tmp_path: Path) -> None:
+def test_the_words_are_part_of_the_identity(tmp_path):
     (tmp_path / "README.md").write_text("---\ninfthor_words: natural\n---\n")
     for commit in (None, "abc"):
         assert origin(tmp_path, commit, "x")["trained_words"] == "natural"
 
 
-def test_the_bundled_model_was_trained_on_published_words() -> None:
+def test_the_bundled_model_was_trained_on_published_words():
     assert read_card_words(packaged_folder("models/qwen2.5-vl-nano")) == "published"

@@ -1,7 +1,6 @@
 """Image processors give the bits of transformers' own ones, whatever they are."""
 
 import json
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -16,7 +15,7 @@ from model_adapters.options.checkpoints import FrameScaling
 from model_adapters.options.families import HfVlmOptions
 
 _SMALL = {"height": 48, "width": 48}
-_PROCESSORS: dict[str, dict[str, Any]] = {
+_PROCESSORS = {
     "Qwen2VLImageProcessor": {"size": {"shortest_edge": 3136, "longest_edge": 20000}},
     "LlavaOnevisionImageProcessor": {
         "size": _SMALL,
@@ -50,24 +49,24 @@ _PROCESSORS: dict[str, dict[str, Any]] = {
 }
 
 
-def _folder(place: Path, name: str, **settings: Any) -> Path:
+def _folder(place, name, **settings):
     place.mkdir(exist_ok=True)
     written = {"image_processor_type": name, **_PROCESSORS[name], **settings}
     (place / "preprocessor_config.json").write_text(json.dumps(written))
     return place
 
 
-def _own(folder: Path) -> Any:
+def _own(folder):
     return cast(Any, transformers).AutoImageProcessor.from_pretrained(folder, backend="pil")
 
 
-def _image(width: int, height: int) -> Image.Image:
+def _image(width, height):
     noise = np.random.default_rng(width).integers(0, 256, (height, width, 3), np.uint8)
     return Image.fromarray(noise)
 
 
 @pytest.mark.parametrize("name", _PROCESSORS)
-def test_pixels_are_those_of_transformers(name: str, tmp_path: Path) -> None:
+def test_pixels_are_those_of_transformers(name, tmp_path):
     folder = _folder(tmp_path / "model", name)
     own, quick = _own(folder), load_image_processor(folder)
     for image in (_image(75, 75), _image(110, 50), _image(75, 75)):
@@ -79,7 +78,7 @@ def test_pixels_are_those_of_transformers(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", _PROCESSORS)
-def test_settings_are_those_of_transformers(name: str, tmp_path: Path) -> None:
+def test_settings_are_those_of_transformers(name, tmp_path):
     folder = _folder(tmp_path / "model", name)
     own, quick = _own(folder), load_image_processor(folder)
     quick(images=[_image(75, 75)], return_tensors="pt")
@@ -93,9 +92,7 @@ def test_settings_are_those_of_transformers(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "name", ["Qwen2VLImageProcessor", "DeepseekVLHybridImageProcessor", "SmolVLMImageProcessor"]
 )
-def test_pillow_resizes_nothing_once_a_size_is_known(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pillow_resizes_nothing_once_a_size_is_known(name, tmp_path, monkeypatch):
     quick = load_image_processor(_folder(tmp_path / "model", name))
     quick(images=[_image(75, 75)], return_tensors="pt")
     monkeypatch.setattr(Image.Image, "resize", None)
@@ -104,7 +101,7 @@ def test_pillow_resizes_nothing_once_a_size_is_known(
         quick(images=[_image(76, 75)], return_tensors="pt")
 
 
-def test_other_settings_than_the_checkpoints_are_used(tmp_path: Path) -> None:
+def test_other_settings_than_the_checkpoints_are_used(tmp_path):
     quick = load_image_processor(
         _folder(tmp_path / "model", "Qwen2VLImageProcessor"), max_pixels=5000
     )
@@ -120,22 +117,20 @@ def test_other_settings_than_the_checkpoints_are_used(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("splitting", [True, False])
-def test_frames_are_split_as_the_option_says(
-    name: str, setting: str, splitting: bool, tmp_path: Path
-) -> None:
+def test_frames_are_split_as_the_option_says(name, setting, splitting, tmp_path):
     folder = _folder(tmp_path / "model", name)
     quick = load_image_processor(folder, FrameScaling(image_splitting=splitting))
     assert splitting_setting(quick) == setting
     assert json.loads(quick.to_json_string())[setting] is splitting
 
 
-def test_splitting_is_refused_where_there_is_none(tmp_path: Path) -> None:
+def test_splitting_is_refused_where_there_is_none(tmp_path):
     folder = _folder(tmp_path / "model", "CLIPImageProcessor")
     with pytest.raises(ModelError, match="cannot split frames; leave image_splitting out"):
         load_image_processor(folder, HfVlmOptions(image_splitting=False))
 
 
-def test_torchvision_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_torchvision_is_named_where_it_is_missing(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     with pytest.raises(ValueError, match="pip install torchvision"):
         FrameScaling(image_backend="torchvision")

@@ -12,7 +12,7 @@ from model_adapters.hf.families.qwen2_5_vl import NANO_FOLDER
 from model_adapters.hf.loading.packed_attention import pack_attention
 
 
-def _tower(attention: str = "sdpa"):
+def _tower(attention="sdpa"):
     config = AutoConfig.from_pretrained(packaged_folder(NANO_FOLDER))
     config.vision_config.fullatt_block_indexes = [1]
     torch.manual_seed(0)
@@ -21,7 +21,7 @@ def _tower(attention: str = "sdpa"):
 
 
 @torch.inference_mode()
-def _features(tower, grids: list[tuple[int, int, int]]) -> torch.Tensor:
+def _features(tower, grids):
     n_patches = sum(time * height * width for time, height, width in grids)
     size = tower.patch_embed.proj.weight[0].numel()
     pixels = torch.randn(n_patches, size, generator=torch.Generator().manual_seed(1))
@@ -73,5 +73,5 @@ def test_only_modules_that_attend_by_the_kernel_are_changed(attention):
     assert tower.config._attn_implementation == attention
 
 
-def _has_config(module) -> bool:
+def _has_config(module):
     return hasattr(module, "config")

@@ -1,14 +1,9 @@
 """Nothing of transformers' progress bars and warnings reaches the terminal."""
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any
-
 import pytest
 from transformers.utils import logging
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.training.export import export
 from model_adapters import load
@@ -29,7 +24,7 @@ LOADED = [
 
 
 @pytest.fixture(autouse=True)
-def verbose() -> Iterator[None]:
+def verbose():
     """The defaults of transformers, whatever other tests have left."""
     verbosity, has_bars = logging.get_verbosity(), logging.is_progress_bar_enabled()
     logging.set_verbosity_warning()
@@ -42,19 +37,13 @@ def verbose() -> Iterator[None]:
 
 @pytest.mark.parametrize(("name", "checkpoint", "options"), LOADED)
 def test_a_model_is_loaded_asked_and_exported_in_silence(
-    name: str,
-    checkpoint: str | None,
-    options: dict[str, str],
-    checkpoints: dict[str, Path],
-    frames: list[FrameRef],
-    tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+    name, checkpoint, options, checkpoints, frames, tmp_path, capfd
+):
     settings = {"device": "cpu", **options} | (
         {"pretrained": str(checkpoints[checkpoint])} if checkpoint else {}
     )
     capfd.readouterr()
-    model: Any = load(name, settings, seed=0)
+    model = load(name, settings, seed=0)
     talk = model.conversation()
     talk.append(frames[0], "\nWhat is it?")
     talk.reply(up_to(2))
@@ -62,9 +51,7 @@ def test_a_model_is_loaded_asked_and_exported_in_silence(
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_clip_model_is_loaded_and_asked_in_silence(
-    make_clip: Callable[[], Path], frames: list[FrameRef], capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_clip_model_is_loaded_and_asked_in_silence(make_clip, frames, capfd):
     folder = make_clip()
     capfd.readouterr()
     retriever = Retriever(str(folder))
@@ -73,7 +60,7 @@ def test_a_clip_model_is_loaded_and_asked_in_silence(
     assert capfd.readouterr() == ("", "")
 
 
-def test_errors_are_kept_and_the_settings_of_transformers_restored() -> None:
+def test_errors_are_kept_and_the_settings_of_transformers_restored():
     with (
         pytest.raises(ModelError, match=r"the checkpoint x cannot be loaded \(broken\)"),
         wrap_loading_errors("x"),

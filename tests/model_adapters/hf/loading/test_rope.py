@@ -2,10 +2,8 @@
 frequencies of one pass."""
 
 import math
-from collections.abc import Sequence
 from importlib import import_module
 from itertools import combinations
-from typing import Any
 
 import pytest
 import torch
@@ -14,7 +12,7 @@ from transformers.modeling_rope_utils import ROPE_INIT_FUNCTIONS
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Part, load
+from model_adapters import load
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.loading.checkpoint import assemble
 from model_adapters.hf.loading.rope import apply_rope
@@ -28,11 +26,11 @@ ROPES = ["linear:2", "dynamic:4", "yarn:4", "longrope:8", "longrope-scaled:8"]
 TWINS = {"qwen2_5_vl": "Qwen25VLTiny", "pixtral": "PixtralTiny"}  # multimodal and plain RoPE
 
 
-def _twin(name: str) -> Any:
+def _twin(name):
     return getattr(import_module(f"model_adapters.tiny.{name}"), TWINS[name]).twin
 
 
-def _model(name: str, rope: str | None, **options: Any) -> tuple[TransformersModel, Any]:
+def _model(name, rope, **options):
     """Ours with an extension, and transformers' own model with the same config and weights."""
     twin = _twin(name)
     tokenizer = twin.tokenizer()
@@ -56,10 +54,10 @@ def _model(name: str, rope: str | None, **options: Any) -> tuple[TransformersMod
     return TransformersModel(name, loaded, HfOptions(max_tokens=0, rope=rope, **options)), models[1]
 
 
-def _plain_logits(model: TransformersModel, peer: Any, parts: Sequence[Part]) -> torch.Tensor:
+def _plain_logits(model, peer, parts):
     """One forward pass of transformers' own model over the whole prompt, pixels and all."""
     ids = torch.tensor([list(token_ids(model.pieces(user(*parts))))])
-    processor = model._loaded.family._image_processor  # type: ignore[attr-defined]
+    processor = model._loaded.family._image_processor
     images = [part.load() for part in parts if isinstance(part, FrameRef)]
     inputs = dict(processor(images=images, return_tensors="pt"))
     if hasattr(peer.model, "get_rope_index"):
@@ -70,13 +68,11 @@ def _plain_logits(model: TransformersModel, peer: Any, parts: Sequence[Part]) ->
 
 @pytest.mark.parametrize("rope", ROPES)
 @pytest.mark.parametrize("name", TWINS)
-def test_chunks_and_prefixes_see_the_frequencies_of_one_pass(
-    name: str, rope: str, frames: list[FrameRef]
-) -> None:
+def test_chunks_and_prefixes_see_the_frequencies_of_one_pass(name, rope, frames):
     model, peer = _model(name, rope, chunk_tokens=20)
-    short: list[Part] = [frames[0], "?"]
-    long: list[Part] = [*frames, *frames, "RotateLeft " * 30, "\nWhere?"]
-    longer: list[Part] = [*long[:-1], "MoveAhead " * 5, "\nWhere is it?"]
+    short = [frames[0], "?"]
+    long = [*frames, *frames, "RotateLeft " * 30, "\nWhere?"]
+    longer = [*long[:-1], "MoveAhead " * 5, "\nWhere is it?"]
     for parts in (long, longer, short, long):
         pieces = model.pieces(user(*parts))
         shared = model._prefix.rewind_to(pieces)
@@ -87,9 +83,7 @@ def test_chunks_and_prefixes_see_the_frequencies_of_one_pass(
 @pytest.mark.parametrize(
     ("rope", "shares"), [("yarn:4", True), ("longrope:4", True), ("dynamic:4", False)]
 )
-def test_prefixes_are_shared_where_frequencies_are_equal(
-    rope: str, shares: bool, frames: list[FrameRef]
-) -> None:
+def test_prefixes_are_shared_where_frequencies_are_equal(rope, shares, frames):
     model, _ = _model("qwen2_5_vl", rope)
     talk = model.conversation()
     talk.append(*frames, "RotateLeft " * 40)
@@ -103,8 +97,8 @@ def test_prefixes_are_shared_where_frequencies_are_equal(
 
 
 @pytest.mark.parametrize("rope", ROPES)
-def test_an_extension_changes_long_prompts(rope: str, frames: list[FrameRef]) -> None:
-    parts: list[Part] = [*frames, "RotateLeft " * 40]
+def test_an_extension_changes_long_prompts(rope, frames):
+    parts = [*frames, "RotateLeft " * 40]
     logits = []
     for each in (None, rope):
         model, _ = _model("qwen2_5_vl", each)
@@ -112,7 +106,7 @@ def test_an_extension_changes_long_prompts(rope: str, frames: list[FrameRef]) ->
     assert (logits[0] - logits[1]).abs().max() > 1e-2
 
 
-def test_yarn_is_written_as_transformers_wants_it() -> None:
+def test_yarn_is_written_as_transformers_wants_it():
     config = _twin("qwen2_5_vl").model_config(_twin("qwen2_5_vl").tokenizer())
     assert apply_rope(config, "yarn:4") == 4 * 128_000
     assert config.text_config.rope_parameters == {
@@ -124,29 +118,27 @@ def test_yarn_is_written_as_transformers_wants_it() -> None:
     }
 
 
-def test_yarn_scales_attention_by_its_own_rule() -> None:
+def test_yarn_scales_attention_by_its_own_rule():
     _, peer = _model("qwen2_5_vl", "yarn:4")
     rotary = peer.model.language_model.rotary_emb
     assert rotary.rope_type == "yarn"
     assert rotary.attention_scaling == pytest.approx(0.1 * math.log(4) + 1)
 
 
-def _logits(rope: str | None, parts: Sequence[Part]) -> torch.Tensor:
+def _logits(rope, parts):
     model, _ = _model("qwen2_5_vl", rope)
     return model.encode(model.pieces(user(*parts)))
 
 
-def test_the_published_longrope_is_plain_within_the_original_length(frames: list[FrameRef]) -> None:
-    short: list[Part] = [frames[0], "Where?"]
+def test_the_published_longrope_is_plain_within_the_original_length(frames):
+    short = [frames[0], "Where?"]
     plain = _logits(None, short)
     assert torch.equal(_logits("longrope:4", short), plain)
     assert not torch.allclose(_logits("longrope-scaled:4", short), plain, atol=1e-4)
 
 
-def test_the_forms_of_longrope_differ_beyond_the_original_length_too(
-    frames: list[FrameRef],
-) -> None:
-    long: list[Part] = [*frames, "RotateLeft " * 40]
+def test_the_forms_of_longrope_differ_beyond_the_original_length_too(frames):
+    long = [*frames, "RotateLeft " * 40]
     published, scaled, plain = (
         _logits(rope, long) for rope in ("longrope:4", "longrope-scaled:4", None)
     )
@@ -154,7 +146,7 @@ def test_the_forms_of_longrope_differ_beyond_the_original_length_too(
         assert not torch.allclose(one, other, atol=1e-4)
 
 
-def test_longrope_is_what_the_published_scripts_ask_for() -> None:
+def test_longrope_is_what_the_published_scripts_ask_for():
     config = Qwen2Config(hidden_size=64, num_attention_heads=4, max_position_embeddings=100)
     published = {
         "long_factor": 4.0,
@@ -174,16 +166,14 @@ def test_longrope_is_what_the_published_scripts_ask_for() -> None:
         assert our_scale == scale == 1.0
 
 
-def test_scaled_longrope_scales_attention_by_its_authors_rule() -> None:
+def test_scaled_longrope_scales_attention_by_its_authors_rule():
     _, peer = _model("qwen2_5_vl", "longrope-scaled:4")
     scaling = math.sqrt(1 + math.log(4) / math.log(ORIGINAL))
     assert peer.model.language_model.rotary_emb.attention_scaling == pytest.approx(scaling)
 
 
 @pytest.mark.parametrize(("rope", "long_factor"), [("longrope-scaled:4", 2.0), ("longrope:4", 4.0)])
-def test_only_scaled_longrope_takes_the_checkpoints_own_factors(
-    rope: str, long_factor: float
-) -> None:
+def test_only_scaled_longrope_takes_the_checkpoints_own_factors(rope, long_factor):
     config = Qwen2Config(hidden_size=64, num_attention_heads=4, max_position_embeddings=100)
     config.rope_parameters = {
         "rope_type": "longrope",
@@ -195,14 +185,14 @@ def test_only_scaled_longrope_takes_the_checkpoints_own_factors(
     assert config.rope_parameters["long_factor"] == [long_factor] * 8
 
 
-def test_without_extension_nothing_changes() -> None:
+def test_without_extension_nothing_changes():
     config = LlamaConfig(max_position_embeddings=100)
     before = dict(config.rope_parameters)
     assert apply_rope(config, None) == 100
     assert config.rope_parameters == before
 
 
-def test_a_model_with_several_ropes_is_refused() -> None:
+def test_a_model_with_several_ropes_is_refused():
     config = LlamaConfig(max_position_embeddings=100)
     config.rope_parameters = {
         "full_attention": {"rope_theta": 1e4},
@@ -215,12 +205,12 @@ def test_a_model_with_several_ropes_is_refused() -> None:
 @pytest.mark.parametrize(
     "rope", ["yarn", "yarn:x", "yarn:1", "yarn:-2", "other:4", "yarn:nan", "yarn:inf", ":4"]
 )
-def test_a_malformed_extension_is_a_usage_error(rope: str) -> None:
+def test_a_malformed_extension_is_a_usage_error(rope):
     with pytest.raises(UsageError, match=f"rope={rope} is not TYPE:FACTOR"):
         load("qwen2.5-vl-tiny", {"rope": rope}, seed=0)
 
 
-def test_limit_and_identity_tell_the_extension() -> None:
+def test_limit_and_identity_tell_the_extension():
     plain, extended = (
         load("qwen2.5-vl-tiny", options, seed=0) for options in ({}, {"rope": "yarn:4"})
     )

@@ -1,8 +1,6 @@
 """Checkpoints are saved by their published names, and transformers loads the same weights from
 them."""
 
-from pathlib import Path
-
 import pytest
 import torch
 from safetensors import safe_open
@@ -35,11 +33,11 @@ from ...checkpoints import twin
         ("language_model.model.embed_tokens.weight", "language_model.model.embed_tokens.weight"),
     ],
 )
-def test_only_flat_towers_get_a_level(name: str, published: str) -> None:
+def test_only_flat_towers_get_a_level(name, published):
     assert published_name(name) == published
 
 
-def test_a_saved_checkpoint_has_them_and_loads_as_it_was(tmp_path: Path) -> None:
+def test_a_saved_checkpoint_has_them_and_loads_as_it_was(tmp_path):
     description = twin("llava-onevision")
     description.save(tmp_path, seed=3)
     with safe_open(tmp_path / "model.safetensors", "pt") as weights:

@@ -5,8 +5,6 @@ import os
 import subprocess
 import sys
 from importlib import import_module
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -55,7 +53,7 @@ torch.save(
 """
 
 
-def _images(folder: Path) -> list[Image.Image]:
+def _images(folder):
     draw = np.random.default_rng(0)
     images = []
     for number, (width, height) in enumerate(SIZES):
@@ -65,11 +63,11 @@ def _images(folder: Path) -> list[Image.Image]:
     return images
 
 
-def _class_name(family: str) -> str:
+def _class_name(family):
     return str(IMAGE_PROCESSOR_MAPPING_NAMES[family]["torchvision"])
 
 
-def test_pixels_are_those_of_torchvision(tmp_path: Path) -> None:
+def test_pixels_are_those_of_torchvision(tmp_path):
     if not PEERS.is_dir():
         pytest.skip("torchvision is not set aside in test-peers (make test does it)")
     images = _images(tmp_path)
@@ -92,9 +90,7 @@ def test_pixels_are_those_of_torchvision(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_transformers_finds_what_is_registered_and_no_torchvision(
-    family: str, tmp_path: Path
-) -> None:
+def test_transformers_finds_what_is_registered_and_no_torchvision(family, tmp_path):
     from transformers import CONFIG_MAPPING, AutoImageProcessor
 
     if family not in CONFIG_MAPPING:  # Molmo 2 came with 5.20
@@ -111,15 +107,15 @@ def test_transformers_finds_what_is_registered_and_no_torchvision(
     assert type(loaded).__name__ == _class_name(family)
 
 
-def test_what_torch_cannot_do_alone_is_named() -> None:
+def test_what_torch_cannot_do_alone_is_named():
     with torchvision_or_stand_in():
-        processor_class: Any = available_class(transformers.Llama4ImageProcessor)
+        processor_class = available_class(transformers.Llama4ImageProcessor)
         processor = processor_class(resample=Image.Resampling.LANCZOS)
     with pytest.raises(NotImplementedError, match=r"resample=1 requires the torchvision library"):
         processor(images=[Image.new("RGB", (60, 60))], return_tensors="pt")
 
 
-def test_a_family_with_an_image_processor_of_pil_keeps_it() -> None:
+def test_a_family_with_an_image_processor_of_pil_keeps_it():
     from transformers import Gemma4Config
 
     with torchvision_or_stand_in():

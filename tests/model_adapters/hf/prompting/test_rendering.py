@@ -1,12 +1,8 @@
 """What chat templates make of turns, and which of them are refused."""
 
-from collections.abc import Sequence
-from typing import Any
-
 import pytest
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import Turn
 from model_adapters.hf.prompting.rendering import Marks, render
 from model_adapters.tiny.tokenizer import train_tokenizer
@@ -45,17 +41,17 @@ SAID = (*user("What?"), ANSWER, MORE)
 
 
 @pytest.fixture(scope="module")
-def tokenizer() -> Any:
+def tokenizer():
     return train_tokenizer(
         ("</s>", "<image>"), end="</s>", pad="</s>", named={"image_token": "<image>"}
     )
 
 
-def _render(tokenizer: Any, template: str, turns: Sequence[Turn]) -> str:
+def _render(tokenizer, template, turns):
     return render(tokenizer, template, turns, Marks("<image>"))
 
 
-def test_all_turns_are_rendered(tokenizer: Any, frames: list[FrameRef]) -> None:
+def test_all_turns_are_rendered(tokenizer, frames):
     turns = (SYSTEM, Turn("user", ("See ", frames[0], "?")), ANSWER, Turn("user", (frames[1],)))
     assert (
         _render(tokenizer, PLAIN, turns)
@@ -63,7 +59,7 @@ def test_all_turns_are_rendered(tokenizer: Any, frames: list[FrameRef]) -> None:
     )
 
 
-def test_frames_stay_in_their_places_in_every_turn(tokenizer: Any, frames: list[FrameRef]) -> None:
+def test_frames_stay_in_their_places_in_every_turn(tokenizer, frames):
     turns = (
         Turn("user", ("See ", frames[0], "?")),
         ANSWER,
@@ -73,9 +69,7 @@ def test_frames_stay_in_their_places_in_every_turn(tokenizer: Any, frames: list[
     assert _render(tokenizer, IMAGES_FIRST, turns) == text
 
 
-def test_a_turn_is_written_the_same_whatever_comes_after_it(
-    tokenizer: Any, frames: list[FrameRef]
-) -> None:
+def test_a_turn_is_written_the_same_whatever_comes_after_it(tokenizer, frames):
     turns = (
         *user("x", frames[0]),
         ANSWER,
@@ -108,21 +102,19 @@ def test_a_turn_is_written_the_same_whatever_comes_after_it(
         (PRINTED, SAID, "writes lists instead of texts"),
     ],
 )
-def test_turns_that_a_template_does_not_take_are_one_line(
-    tokenizer: Any, template: str, turns: Sequence[Turn], complaint: str
-) -> None:
+def test_turns_that_a_template_does_not_take_are_one_line(tokenizer, template, turns, complaint):
     with pytest.raises(ModelError, match=complaint) as caught:
         _render(tokenizer, template, turns)
     assert "\n" not in str(caught.value)
 
 
-def test_a_text_that_is_said_twice_and_written_once_is_left_out(tokenizer: Any) -> None:
+def test_a_text_that_is_said_twice_and_written_once_is_left_out(tokenizer):
     turns = (*user("Sure?"), Turn("assistant", ("Sure?",)), *user("Why?"))
     with pytest.raises(ModelError, match=r"drops the text 'Sure\?'"):
         _render(tokenizer, ONLY_USERS, turns)
 
 
-def test_the_systems_words_are_a_string_where_the_template_joins_them(tokenizer: Any) -> None:
+def test_the_systems_words_are_a_string_where_the_template_joins_them(tokenizer):
     text = "[Be brief.\n]<user>What?<assistant>A mug.<user>Sure?"
     assert _render(tokenizer, JOINED, SAID) == text.replace("Be brief.", "")
     # A string is no list of texts for the assistant's turn.
@@ -135,6 +127,6 @@ def test_the_systems_words_are_a_string_where_the_template_joins_them(tokenizer:
     assert _render(tokenizer, template, (SYSTEM, *SAID)) == text
 
 
-def test_a_template_that_writes_the_date_writes_the_same_every_day(tokenizer: Any) -> None:
+def test_a_template_that_writes_the_date_writes_the_same_every_day(tokenizer):
     dated = "{{- strftime_now('%Y-%m-%d') }}: " + PLAIN
     assert _render(tokenizer, dated, user("What?")).startswith("2025-01-01:")

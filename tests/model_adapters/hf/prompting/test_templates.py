@@ -4,16 +4,12 @@ processors take them."""
 import json
 import re
 import shutil
-from collections.abc import Callable
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 from transformers import AutoTokenizer
 
 from infthor_eval.errors import ModelError, UsageError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import Turn, check_adapter, load, registry
 from model_adapters.built_in import BUILT_IN
 from model_adapters.hf.families.hf_vlm import ProcessorFamily
@@ -21,7 +17,7 @@ from model_adapters.hf.prompting.templates import chat_template, plain_template
 from model_adapters.hf.uncached import UncachedModel
 from model_adapters.tiny.tokenizer import train_tokenizer
 
-from ...asking import require_same
+from ...asking import load_saved, require_same, talk_of, user
 from ...checkpoints import FAMILIES, OTHERS
 
 NEW = 6
@@ -52,7 +48,7 @@ TEMPLATE = """\
 
 
 @pytest.fixture(scope="module")
-def conversations(frames: list[FrameRef]) -> list[tuple[Turn, ...]]:
+def conversations(frames):
     return [
         (
             Turn(
@@ -69,28 +65,20 @@ def conversations(frames: list[FrameRef]) -> list[tuple[Turn, ...]]:
     ]
 
 
-def _load(name: str, folder: Path, **options: str) -> Any:
-    defaults = {
-        "pretrained": str(folder),
-        "device": "cpu",
-        "dtype": "float32",
-        "max_tokens": "0",
-        "prompt": "plain",
-    }
-    return load(name if name in FAMILIES else "hf-vlm", defaults | options, seed=0)
+def _load(name, folder, **options):
+    defaults = {"dtype": "float32", "max_tokens": 0, "prompt": "plain"}
+    return load_saved(name if name in FAMILIES else "hf-vlm", folder, **defaults | options)
 
 
-def _without_template(checkpoint: Path, folder: Path) -> Path:
+def _without_template(checkpoint, folder):
     shutil.copytree(checkpoint, folder)
     (folder / "chat_template.jinja").unlink()
     return folder
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_turns_are_written_one_after_the_other(
-    family: str, conversations: list[tuple[Turn, ...]]
-) -> None:
-    model: Any = load(f"{family}-tiny", {"prompt": "plain"}, seed=0)
+def test_turns_are_written_one_after_the_other(family, conversations):
+    model = load(f"{family}-tiny", {"prompt": "plain"}, seed=0)
     placeholder = model._loaded.family.placeholder_id
     texts = ["<|goal|>Wash {{ it }}.  <|goal|>@@\nMove@Ahead ", "You wash.\n@LookUpNow? @"]
     for turns, text in zip(conversations, texts, strict=True):
@@ -101,11 +89,8 @@ def test_turns_are_written_one_after_the_other(
 
 
 def test_ids_and_replies_are_those_of_transformers_on_the_bare_sequence(
-    checkpoints: dict[str, Path],
-    tmp_path: Path,
-    conversations: list[tuple[Turn, ...]],
-    answer_plainly: Any,
-) -> None:
+    checkpoints, tmp_path, conversations, answer_plainly
+):
     # Like gemma3 but for its vocabulary.
     names = (*FAMILIES, *OTHERS.keys() - {"gemma3-line-breaks"})
     folders = {name: _without_template(checkpoints[name], tmp_path / name) for name in names}
@@ -123,8 +108,8 @@ def test_ids_and_replies_are_those_of_transformers_on_the_bare_sequence(
 
 @pytest.mark.parametrize("name", ["qwen2.5-vl", "llava"])
 def test_a_checkpoint_without_a_template_is_asked_plainly_or_not_at_all(
-    name: str, checkpoints: dict[str, Path], tmp_path: Path
-) -> None:
+    name, checkpoints, tmp_path
+):
     folder = _without_template(checkpoints[name], tmp_path / "bare")
     for share_prefix in ("true", "false"):
         with pytest.raises(ModelError, match=r"has no chat template; add .*, or set prompt=plain"):
@@ -156,8 +141,8 @@ NAMED = [{"name": "tool_use", "template": "T"}, {"name": "default", "template": 
     ],
 )
 def test_of_all_places_and_names_transformers_default_is_taken(
-    files: dict[str, Any], template: str, checkpoints: dict[str, Path], tmp_path: Path
-) -> None:
+    files, template, checkpoints, tmp_path
+):
     folder = _without_template(checkpoints["llava"], tmp_path / "named")
     for name, content in files.items():
         path = folder / name
@@ -172,16 +157,15 @@ def test_of_all_places_and_names_transformers_default_is_taken(
             chat_template(folder, tokenizer)
 
 
-def test_the_way_of_asking_is_part_of_the_identity(checkpoints: dict[str, Path]) -> None:
+def test_the_way_of_asking_is_part_of_the_identity(checkpoints):
+    folder = checkpoints["llava"]
     for share_prefix in ("true", "false"):
-        identities = [
-            _load(
-                "llava", checkpoints["llava"], share_prefix=share_prefix, **prompt_option
-            ).identity()
-            for prompt_option in ({}, {"prompt": "chat"})
-        ]
-        assert [identity["prompt"] for identity in identities] == ["plain", "chat"]
-        assert identities[0]["chat_template"] != identities[1]["chat_template"]
+        plain, chat = (
+            _load("llava", folder, share_prefix=share_prefix, prompt=prompt).identity()
+            for prompt in ("plain", "chat")
+        )
+        assert (plain["prompt"], chat["prompt"]) == ("plain", "chat")
+        assert plain["chat_template"] != chat["chat_template"]
     default, chat = (
         load("qwen2.5-vl-tiny", prompt_option, seed=0).identity()
         for prompt_option in ({}, {"prompt": "chat"})
@@ -189,25 +173,20 @@ def test_the_way_of_asking_is_part_of_the_identity(checkpoints: dict[str, Path])
     assert default == chat
 
 
-def test_the_model_without_sharing_is_asked_plainly_too(
-    checkpoints: dict[str, Path], frames: list[FrameRef]
-) -> None:
-    model = _load("gemma3", checkpoints["gemma3"], share_prefix="false")
-    assert isinstance(model, UncachedModel)
-    lengths = []
-    for prompt in ("plain", "chat"):
-        talk = _load(
-            "gemma3", checkpoints["gemma3"], share_prefix="false", prompt=prompt
-        ).conversation()
-        talk.append("mug", frames[0])
-        lengths.append(talk.n_tokens)
-    assert lengths[0] < lengths[1]
+def test_the_model_without_sharing_is_asked_plainly_too(checkpoints, frames):
+    plain, chat = (
+        _load("gemma3", checkpoints["gemma3"], share_prefix=False, prompt=prompt)
+        for prompt in ("plain", "chat")
+    )
+    assert isinstance(plain, UncachedModel)
+    turns = user("mug", frames[0])
+    assert talk_of(plain, turns).n_tokens < talk_of(chat, turns).n_tokens
 
 
 @pytest.mark.parametrize(
     "name", sorted(BUILT_IN.keys() - POLICIES - {"human", "openai", "anthropic", "gemini"})
 )
-def test_every_model_has_the_option(name: str) -> None:
+def test_every_model_has_the_option(name):
     assert "prompt=chat" in registry.options(name)
     with pytest.raises(UsageError, match="prompt=plane is not chat or plain"):
         registry.check_options(name, {"prompt": "plane"})
@@ -227,11 +206,9 @@ def test_every_model_has_the_option(name: str) -> None:
         ({"image_start_token_id": "<a>"}, "<image>", "<image>"),
     ],
 )
-def test_markers_around_a_frame_are_written_unless_the_processor_does(
-    config: dict[str, str], expanded: str, written: str
-) -> None:
+def test_markers_around_a_frame_are_written_unless_the_processor_does(config, expanded, written):
     tokenizer = train_tokenizer(("</s>", "<image>", "<a>", "<z>"), end="</s>", pad="</s>", named={})
-    ids: Callable[[str], Any] = tokenizer.convert_tokens_to_ids
+    ids = tokenizer.convert_tokens_to_ids
     settings = SimpleNamespace(
         image_token_id=ids("<image>"), **{name: ids(token) for name, token in config.items()}
     )
@@ -239,7 +216,7 @@ def test_markers_around_a_frame_are_written_unless_the_processor_does(
     class Processor:
         image_token = "<image>"
 
-        def __call__(self, **_: Any) -> Any:
+        def __call__(self, **_):
             return tokenizer([expanded], return_tensors="pt")
 
     family = ProcessorFamily(SimpleNamespace(config=settings), None, tokenizer, Processor())

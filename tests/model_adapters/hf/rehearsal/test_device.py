@@ -7,7 +7,7 @@ import torch
 from model_adapters.hf.rehearsal.device import DEVICE, ShapesDevice
 
 
-def test_integers_keep_their_values_and_numbers_do_not() -> None:
+def test_integers_keep_their_values_and_numbers_do_not():
     device = ShapesDevice()
     with device.running():
         ids = torch.tensor([[3, 1, 2]], device=DEVICE)
@@ -20,7 +20,7 @@ def test_integers_keep_their_values_and_numbers_do_not() -> None:
     assert device.holds(more) and device.holds(embedded)
 
 
-def test_what_is_elsewhere_is_computed_and_not_counted() -> None:
+def test_what_is_elsewhere_is_computed_and_not_counted():
     device = ShapesDevice()
     with device.running():
         product = torch.ones(64, 64) @ torch.ones(64, 64)
@@ -28,7 +28,7 @@ def test_what_is_elsewhere_is_computed_and_not_counted() -> None:
     assert (device.allocated, device.peak) == (0, 0)
 
 
-def test_memory_is_what_is_allocated_at_a_time() -> None:
+def test_memory_is_what_is_allocated_at_a_time():
     device = ShapesDevice()
     with device.running():
         kept = torch.empty(1000, dtype=torch.bfloat16, device=DEVICE)
@@ -48,7 +48,7 @@ def test_memory_is_what_is_allocated_at_a_time() -> None:
         assert (device.allocated, device.peak) == (2000, 2500)
 
 
-def test_a_long_mask_takes_memory_without_values() -> None:
+def test_a_long_mask_takes_memory_without_values():
     device = ShapesDevice()
     n_queries, n_keys = 1000, 1_000_000
     with device.running():
@@ -58,7 +58,7 @@ def test_a_long_mask_takes_memory_without_values() -> None:
     assert device.allocated >= n_queries * n_keys
 
 
-def test_experts_are_chosen_in_turn() -> None:
+def test_experts_are_chosen_in_turn():
     device = ShapesDevice()
     with device.running():
         scores = torch.empty(6, 4, device=DEVICE)
@@ -69,7 +69,7 @@ def test_experts_are_chosen_in_turn() -> None:
     assert counts.tolist() == [3, 3, 3, 3]
 
 
-def test_attention_is_noted_and_takes_no_square_of_the_context() -> None:
+def test_attention_is_noted_and_takes_no_square_of_the_context():
     device = ShapesDevice()
     with device.running():
         query = torch.empty(1, 8, 1024, 64, dtype=torch.bfloat16, device=DEVICE)

@@ -3,21 +3,14 @@
 import pytest
 import torch
 
-from model_adapters.hf.rehearsal.kernels import EFFICIENT, FLASH, MATH, Attention, attention_of
+from model_adapters.hf.rehearsal.kernels import EFFICIENT, FLASH, MATH, attention_of
 
 HALF = torch.bfloat16
 
 
 def called(
-    n_queries: int = 64,
-    n_keys: int = 64,
-    head: int = 128,
-    *,
-    value_head: int | None = None,
-    dtype: torch.dtype = HALF,
-    mask: bool = False,
-    is_causal: bool = False,
-) -> Attention:
+    n_queries=64, n_keys=64, head=128, *, value_head=None, dtype=HALF, mask=False, is_causal=False
+):
     """A call with 8 heads, 2 of which have keys."""
     query = torch.empty(1, 8, n_queries, head, dtype=dtype, device="meta")
     key = torch.empty(1, 2, n_keys, head, dtype=dtype, device="meta")
@@ -42,20 +35,18 @@ def called(
         ({"dtype": torch.float64}, MATH),
     ],
 )
-def test_the_kernel_is_the_first_that_takes_the_call(
-    settings: dict[str, object], kernel: str
-) -> None:
-    call = called(**settings)  # type: ignore[arg-type]
+def test_the_kernel_is_the_first_that_takes_the_call(settings, kernel):
+    call = called(**settings)
     assert (call.kernel, call.has_mask) == (kernel, bool(settings.get("mask")))
 
 
-def test_a_mask_of_truth_values_becomes_one_of_numbers_in_rows_of_eight() -> None:
+def test_a_mask_of_truth_values_becomes_one_of_numbers_in_rows_of_eight():
     aligned = called(100, 8000, mask=True).own_bytes
     assert aligned == 100 * 8000 * 2
     assert called(100, 8001, mask=True).own_bytes == 2 * 100 * 8001 * 2
 
 
-def test_only_the_last_resort_has_all_scores_at_a_time() -> None:
+def test_only_the_last_resort_has_all_scores_at_a_time():
     scores = 8 * 1000 * 4000 * 4
     assert called(1000, 4000, head=20, mask=True).own_bytes > 2 * scores
     assert called(1000, 4000, mask=True).own_bytes < scores

@@ -18,7 +18,7 @@ PUBLISHED = {
 
 
 @pytest.mark.parametrize("repository", known_checkpoints())
-def test_the_model_has_the_published_number_of_parameters(repository: str) -> None:
+def test_the_model_has_the_published_number_of_parameters(repository):
     known = known_checkpoints()[repository]
     rehearsed = load_shapes(HfVlmOptions(pretrained=repository))
     assert rehearsed.options.pretrained == repository
@@ -30,13 +30,13 @@ def test_the_model_has_the_published_number_of_parameters(repository: str) -> No
 
 
 @pytest.mark.parametrize(("repository", "tokens"), PUBLISHED.items())
-def test_a_frame_has_the_published_number_of_tokens(repository: str, tokens: int) -> None:
+def test_a_frame_has_the_published_number_of_tokens(repository, tokens):
     family = load_shapes(HfVlmOptions(pretrained=repository)).family
     placeholder = family.placeholder_id
     written = family.template_ids(placeholder)
     assert len(family.frame_ids((300, 300))) + len(written) - 1 == tokens
 
 
-def test_the_published_models_usual_checkpoints_are_kept() -> None:
+def test_the_published_models_usual_checkpoints_are_kept():
     usual = {read_options(name, {}).pretrained for name in FAMILIES}
     assert usual == set(PUBLISHED) <= set(known_checkpoints())

@@ -5,10 +5,7 @@ import json
 import socket
 import struct
 import threading
-from collections.abc import Callable
 from contextlib import suppress
-from http.server import BaseHTTPRequestHandler
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,26 +15,24 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
 from model_adapters.policies.http import adapter
 from model_adapters.policies.http.adapter import decode_numbers, encode_array
-from model_adapters.policies.policy import VlaPolicy
 
-from ..servers import Answer, policy_answers, read_image, send, serve
+from ..servers import policy_answers, read_image, send, serve
 
-Frames = tuple[FrameRef, FrameRef]
 ACTION = [0.1, 0.2, 0.3, -0.1, -0.2, -0.3, 1.0]
 
 
 @pytest.fixture(autouse=True)
-def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def at_once(monkeypatch):
     """No waiting between attempts."""
     monkeypatch.setattr(adapter, "_FIRST_WAIT_S", 0.001)
 
 
-def _act(url: str, frame: FrameRef, **settings: str) -> Any:
-    policy: Any = load("vla-http", {"url": url, "timeout_s": "600", **settings}, 0)
+def _act(url, frame, **settings):
+    policy = load("vla-http", {"url": url, "timeout_s": "600", **settings}, 0)
     return policy.act(frame, "pick up the mug")
 
 
-def _refused(answer: Answer, frame: FrameRef, **settings: str) -> str:
+def _refused(answer, frame, **settings):
     with serve(answer) as url, pytest.raises(ModelError) as caught:
         _act(url, frame, **settings)
     assert f"{url}/act" in str(caught.value)
@@ -47,12 +42,10 @@ def _refused(answer: Answer, frame: FrameRef, **settings: str) -> str:
 
 @pytest.mark.parametrize("image", ["json_numpy", "list"])
 @pytest.mark.parametrize("ending", ["", "/", "/act"])
-def test_a_frame_and_an_instruction_are_sent_and_an_action_comes_back(
-    image: str, ending: str, plain_frames: Frames
-) -> None:
-    requests: list[dict[str, Any]] = []
+def test_a_frame_and_an_instruction_are_sent_and_an_action_comes_back(image, ending, plain_frames):
+    requests = []
 
-    def answer(request: dict[str, Any], _handler: Any) -> Any:
+    def answer(request, _handler):
         requests.append(request)
         return ACTION
 
@@ -70,24 +63,22 @@ def test_a_frame_and_an_instruction_are_sent_and_an_action_comes_back(
     assert (seen.shape, seen.dtype, np.unique(seen).tolist()) == ((300, 300, 3), np.uint8, [255])
 
 
-def test_without_a_key_none_is_sent(plain_frames: Frames) -> None:
+def test_without_a_key_none_is_sent(plain_frames):
     requests = []
     with serve(lambda request, _: requests.append(request) or ACTION) as url:
         _act(url, plain_frames[0])
     assert "unnorm_key" not in requests[0]
 
 
-def test_chunks_are_taken_and_cut(plain_frames: Frames) -> None:
+def test_chunks_are_taken_and_cut(plain_frames):
     with serve(lambda *_: [ACTION] * 4) as url:
         assert len(_act(url, plain_frames[0])) == 4
         assert len(_act(url, plain_frames[0], execute="2")) == 2
 
 
-def test_a_policy_behind_a_server_acts_as_it_does_here(
-    policies: dict[str, VlaPolicy], plain_frames: Frames
-) -> None:
+def test_a_policy_behind_a_server_acts_as_it_does_here(policies, plain_frames):
     with serve(policy_answers(policies["openvla"])) as url:
-        policy: Any = load("vla-http", {"url": url}, 0)
+        policy = load("vla-http", {"url": url}, 0)
         check_adapter(policy)
         assert policy.act(plain_frames[1], "close the fridge") == policies["openvla"].act(
             plain_frames[1], "close the fridge"
@@ -108,16 +99,14 @@ def test_a_policy_behind_a_server_acts_as_it_does_here(
         ([10**400, *ACTION[1:]], "answers without an action of numbers"),
     ],
 )
-def test_a_reply_that_is_no_action_is_refused(
-    reply: Any, message: str, plain_frames: Frames
-) -> None:
+def test_a_reply_that_is_no_action_is_refused(reply, message, plain_frames):
     assert message in _refused(lambda *_: reply, plain_frames[0])
 
 
-def test_an_error_of_the_server_is_told_and_not_tried_again(plain_frames: Frames) -> None:
+def test_an_error_of_the_server_is_told_and_not_tried_again(plain_frames):
     n_asked = 0
 
-    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+    def answer(_request, handler):
         nonlocal n_asked
         n_asked += 1
         send(handler, 500, b"CUDA out\nof memory")
@@ -128,15 +117,15 @@ def test_an_error_of_the_server_is_told_and_not_tried_again(plain_frames: Frames
     assert n_asked == 1
 
 
-def test_what_is_no_json_is_refused(plain_frames: Frames) -> None:
+def test_what_is_no_json_is_refused(plain_frames):
     message = _refused(
         lambda _, handler: send(handler, 200, b"<html>hello</html>"), plain_frames[0]
     )
     assert "answers with something that is not JSON: '<html>hello</html>'" in message
 
 
-def test_a_redirect_is_not_followed(plain_frames: Frames) -> None:
-    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+def test_a_redirect_is_not_followed(plain_frames):
+    def answer(_request, handler):
         handler.send_response(302)
         handler.send_header("Location", "http://127.0.0.1:1/elsewhere")
         handler.send_header("Content-Length", "0")
@@ -156,10 +145,10 @@ _SLOW_PIECES = {
 
 
 @pytest.mark.parametrize("slow", _SLOW_PIECES)
-def test_a_server_that_takes_too_long_is_not_waited_for(slow: str, plain_frames: Frames) -> None:
+def test_a_server_that_takes_too_long_is_not_waited_for(slow, plain_frames):
     done = threading.Event()
 
-    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+    def answer(_request, handler):
         if slow.startswith("while"):
             send(handler, 500 if "wrong" in slow else 200, b"[0.1,", length=10_000)
         elif slow.startswith("in"):
@@ -183,12 +172,10 @@ def test_a_server_that_takes_too_long_is_not_waited_for(slow: str, plain_frames:
     ],
     ids=["closed", "cut off"],
 )
-def test_a_lost_connection_is_tried_again(
-    fail: Callable[[Any], None], plain_frames: Frames
-) -> None:
+def test_a_lost_connection_is_tried_again(fail, plain_frames):
     n_asked = 0
 
-    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> Any:
+    def answer(_request, handler):
         nonlocal n_asked
         n_asked += 1
         if n_asked < 3:
@@ -207,7 +194,7 @@ def test_a_lost_connection_is_tried_again(
             _act(url, plain_frames[0], retries="1")
 
 
-def test_a_server_that_is_not_there_is_one_line(plain_frames: Frames) -> None:
+def test_a_server_that_is_not_there_is_one_line(plain_frames):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         url = f"http://127.0.0.1:{taken.getsockname()[1]}"
@@ -215,9 +202,7 @@ def test_a_server_that_is_not_there_is_one_line(plain_frames: Frames) -> None:
             _act(url, plain_frames[0])
 
 
-def test_a_reply_without_end_is_not_read(
-    monkeypatch: pytest.MonkeyPatch, plain_frames: Frames
-) -> None:
+def test_a_reply_without_end_is_not_read(monkeypatch, plain_frames):
     monkeypatch.setattr(adapter, "_LARGEST", 1000)
     message = _refused(
         lambda _, handler: send(handler, 200, b"[" + b"0.1," * 5000), plain_frames[0]
@@ -225,7 +210,7 @@ def test_a_reply_without_end_is_not_read(
     assert "answers more than 1000 bytes" in message
 
 
-def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames: Frames) -> None:
+def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames):
     with pytest.raises(DataError):
         _act("http://127.0.0.1:1", FrameRef(plain_frames[0].path.with_name("none.png")))
 
@@ -245,13 +230,13 @@ def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames: Frames) 
         ({"execute": "0"}, "execute=0"),
     ],
 )
-def test_misuse_is_refused_and_no_secret_told(settings: dict[str, str], message: str) -> None:
+def test_misuse_is_refused_and_no_secret_told(settings, message):
     with pytest.raises(UsageError, match=message) as caught:
         load("vla-http", settings, 0)
     assert "secret" not in str(caught.value)
 
 
-def test_the_identity_is_how_it_is_asked() -> None:
+def test_the_identity_is_how_it_is_asked():
     policy = load("vla-http", {"url": "https://host:1/base", "unnorm_key": "b"}, 0)
     assert policy.identity() == {
         "adapter": "vla-http",
@@ -263,7 +248,7 @@ def test_the_identity_is_how_it_is_asked() -> None:
     assert not policy.capabilities.deterministic
 
 
-def test_an_array_is_its_bytes_its_type_and_its_shape() -> None:
+def test_an_array_is_its_bytes_its_type_and_its_shape():
     assert encode_array(np.array([[1, 2, 255]], dtype=np.uint8)) == {
         "__numpy__": "AQL/",
         "dtype": "|u1",
@@ -271,7 +256,7 @@ def test_an_array_is_its_bytes_its_type_and_its_shape() -> None:
     }
 
 
-def test_an_array_that_is_a_view_is_written_in_its_own_order() -> None:
+def test_an_array_that_is_a_view_is_written_in_its_own_order():
     turned = np.array([[1, 2], [3, 4]], dtype=np.uint8).T
     assert base64.b64decode(encode_array(turned)["__numpy__"]) == bytes([1, 3, 2, 4])
 
@@ -296,7 +281,7 @@ ARRAY = {
         (encode_array(np.array([[1.5]], dtype=">f4")), [[1.5]]),
     ],
 )
-def test_numbers_come_in_several_forms(value: Any, expected: Any) -> None:
+def test_numbers_come_in_several_forms(value, expected):
     assert decode_numbers(value).tolist() == expected
 
 
@@ -316,6 +301,6 @@ def test_numbers_come_in_several_forms(value: Any, expected: Any) -> None:
         ({"__numpy__": ARRAY["__numpy__"]}, "damaged array"),
     ],
 )
-def test_anything_else_is_refused(value: Any, message: str) -> None:
+def test_anything_else_is_refused(value, message):
     with pytest.raises(ValueError, match=message):
         decode_numbers(value)

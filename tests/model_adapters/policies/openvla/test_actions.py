@@ -8,7 +8,7 @@ from model_adapters.policies.openvla.actions import ActionBins
 BINS = ActionBins(vocabulary=32_000, n_bins=256)
 
 
-def test_the_legal_ids_are_the_last_256_before_the_padding() -> None:
+def test_the_legal_ids_are_the_last_256_before_the_padding():
     assert (BINS.action_ids.start, BINS.action_ids.stop) == (31_744, 32_000)
 
 
@@ -24,11 +24,11 @@ def test_the_legal_ids_are_the_last_256_before_the_padding() -> None:
         (31_744, 254 / 255),  # a border more than bins: the lowest id means the last bin too
     ],
 )
-def test_tokens_mean_the_middles_of_their_bins(token: int, number: float) -> None:
+def test_tokens_mean_the_middles_of_their_bins(token, number):
     assert BINS.decode([token] * 7)[0] == pytest.approx([number] * 7, abs=1e-12)
 
 
-def test_seven_tokens_make_one_action_in_their_order() -> None:
+def test_seven_tokens_make_one_action_in_their_order():
     tokens = [31_999, 31_745, 31_872, 31_999, 31_745, 31_872, 31_745]
     expected = np.array([-254, 254, 0, -254, 254, 0, 254]) / 255
     assert BINS.decode(tokens) == pytest.approx(expected[None])

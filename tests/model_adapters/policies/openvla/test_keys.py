@@ -5,6 +5,7 @@ vit_so400m_patch14_siglip_224 with `gamma` called `scale_factor`; those of the l
 transformers'.
 """
 
+import math
 import re
 from collections import Counter
 
@@ -13,7 +14,7 @@ from transformers import LlamaConfig
 
 from model_adapters.policies.openvla.network import OpenVLAWeights, weights_layout
 from model_adapters.policies.openvla.vision import TOWERS
-from model_adapters.policies.weights import Layout, Shape, empty_parameters
+from model_adapters.policies.weights import empty_parameters
 
 DINO, SIGLIP, LLAMA = (
     "vision_backbone.featurizer",
@@ -21,7 +22,7 @@ DINO, SIGLIP, LLAMA = (
     "language_model.model",
 )
 
-SHAPES: dict[str, Shape] = {
+SHAPES = {
     "language_model.lm_head.weight": (32_064, 4096),
     f"{LLAMA}.embed_tokens.weight": (32_064, 4096),
     f"{LLAMA}.norm.weight": (4096,),
@@ -53,19 +54,19 @@ SHAPES: dict[str, Shape] = {
 
 
 @pytest.fixture(scope="module")
-def layout() -> Layout:
+def layout():
     towers = tuple(TOWERS.values())
     with empty_parameters():
-        weights = OpenVLAWeights(towers, 224, LlamaConfig(vocab_size=32_064, pad_token_id=32_000))  # type: ignore[arg-type]
-    return weights_layout(weights, towers)  # type: ignore[arg-type]
+        weights = OpenVLAWeights(towers, 224, LlamaConfig(vocab_size=32_064, pad_token_id=32_000))
+    return weights_layout(weights, towers)
 
 
-def test_names_and_shapes(layout: Layout) -> None:
+def test_names_and_shapes(layout):
     expected = layout.all_shapes()
     assert {key: expected.get(key) for key in SHAPES} == SHAPES
 
 
-def test_how_many_there_are_of_each_part(layout: Layout) -> None:
+def test_how_many_there_are_of_each_part(layout):
     expected = layout.all_shapes()
     parts = Counter(".".join(key.split(".")[:2]) for key in expected)
     # 14 a block and 7 beside them; 12 a block and 18 beside them; 9 a layer and embeddings, norm
@@ -77,12 +78,12 @@ def test_how_many_there_are_of_each_part(layout: Layout) -> None:
     assert len(expected) == 982
 
 
-def test_no_parameter_is_known_by_two_names(layout: Layout) -> None:
+def test_no_parameter_is_known_by_two_names(layout):
     assert not layout.parameters.keys() & layout.unused.keys()
     assert all(key == name for key, name in layout.parameters.items())
 
 
-def test_what_no_feature_depends_on_is_known_not_ignored(layout: Layout) -> None:
+def test_what_no_feature_depends_on_is_known_not_ignored(layout):
     unused = Counter(re.sub(r"blocks\.(\d+)\..*", r"blocks.\1", key) for key in layout.unused)
     assert unused[f"{DINO}.blocks.23"] == 14
     assert unused[f"{SIGLIP}.blocks.26"] == 12
@@ -100,17 +101,12 @@ def test_what_no_feature_depends_on_is_known_not_ignored(layout: Layout) -> None
     assert len(layout.unused) == 14 + 12 + 4 + 13
 
 
-def test_it_is_a_model_of_seven_billion(layout: Layout) -> None:
-    n_weights = 0
-    for shape in layout.all_shapes().values():
-        size = 1
-        for side in shape:
-            size *= side
-        n_weights += size
+def test_it_is_a_model_of_seven_billion(layout):
+    n_weights = sum(map(math.prod, layout.all_shapes().values()))
     assert n_weights == pytest.approx(7.54e9, rel=0.002)
 
 
-def test_the_defaults_that_the_published_config_leaves_out_are_llama_2_s() -> None:
+def test_the_defaults_that_the_published_config_leaves_out_are_llama_2_s():
     config = LlamaConfig()
     sizes = (
         config.hidden_size,

@@ -1,37 +1,34 @@
 """OpenVLA's network: what it is asked, what it sees, and that its cache changes nothing."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 import torch
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import load
 from model_adapters.policies.decoding import embed_ids
 from model_adapters.policies.openvla.network import OpenVLANetwork, prompt, prompt_ids
 from model_adapters.policies.openvla.vision import Tower, TowerShape
-from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.preprocessing import crop_centre, normalise, resize
+
+from ...asking import load_saved
 
 
 @pytest.fixture
-def network(policies: dict[str, VlaPolicy]) -> OpenVLANetwork:
+def network(policies):
     port = policies["openvla"]._network
     assert isinstance(port, OpenVLANetwork)
     return port
 
 
-def test_the_prompt_is_the_one_of_training_in_lower_case() -> None:
+def test_the_prompt_is_the_one_of_training_in_lower_case():
     assert (
         prompt("Pick up the Mug")
         == "In: What action should the robot take to pick up the mug?\nOut:"
     )
 
 
-def test_the_space_before_actions_ends_the_prompt_once(network: OpenVLANetwork) -> None:
+def test_the_space_before_actions_ends_the_prompt_once(network):
     ids = prompt_ids(network.tokenizer, "pick up the mug")
     assert ids[-1] == 29_871
     assert ids.count(29_871) == 1
@@ -39,7 +36,7 @@ def test_the_space_before_actions_ends_the_prompt_once(network: OpenVLANetwork) 
     assert network.tokenizer.decode(ids[1:-1]) == prompt("pick up the mug")
 
 
-def test_frames_are_squashed_by_pil_and_normalised_by_channel() -> None:
+def test_frames_are_squashed_by_pil_and_normalised_by_channel():
     image = Image.new("RGB", (300, 200), (255, 0, 51))
     pixels = resize(image, 224)
     assert pixels.shape == (3, 224, 224)
@@ -48,7 +45,7 @@ def test_frames_are_squashed_by_pil_and_normalised_by_channel() -> None:
     assert seen[:, 0, 0].tolist() == pytest.approx([1.0, -1.0, 2.0])
 
 
-def test_a_crop_is_the_middle_nine_tenths_of_the_area_as_tensorflow_makes_it() -> None:
+def test_a_crop_is_the_middle_nine_tenths_of_the_area_as_tensorflow_makes_it():
     ramps = np.zeros((101, 201, 3), dtype=np.uint8)
     ramps[..., 0] = np.arange(201)
     ramps[..., 1] = np.arange(101)[:, None]
@@ -65,16 +62,14 @@ def test_a_crop_is_the_middle_nine_tenths_of_the_area_as_tensorflow_makes_it() -
         assert crop_centre(plain, 8).getextrema() == ((level, level),) * 3
 
 
-def test_frames_are_cropped_where_the_option_says_so(
-    policy_checkpoints: dict[str, Path], tmp_path: Path
-) -> None:
+def test_frames_are_cropped_where_the_option_says_so(policy_checkpoints, tmp_path):
     noise = np.random.default_rng(0).integers(0, 256, (224, 224, 3), dtype=np.uint8)
     whole, cropped = tmp_path / "whole.png", tmp_path / "cropped.png"
     Image.fromarray(noise).save(whole)
     crop_centre(Image.fromarray(noise), 56).save(cropped)
-    options = {"pretrained": str(policy_checkpoints["openvla"]), "device": "cpu"}
     plain, cropping = (
-        load("openvla", {**options, **more}, 0) for more in ({}, {"center_crop": "true"})
+        load_saved("openvla", policy_checkpoints["openvla"], center_crop=crops)
+        for crops in (False, True)
     )
     steps = [policy.act(FrameRef(whole), "pick up the mug") for policy in (plain, cropping)]
     assert steps[0] != steps[1] == plain.act(FrameRef(cropped), "pick up the mug")
@@ -83,7 +78,7 @@ def test_frames_are_cropped_where_the_option_says_so(
 
 
 @pytest.mark.parametrize("kind", ["dinov2", "siglip"])
-def test_a_tower_gives_features_of_patches_alone_in_reading_order(kind: Any) -> None:
+def test_a_tower_gives_features_of_patches_alone_in_reading_order(kind):
     torch.manual_seed(0)
     tower = Tower(TowerShape(kind, 16, 3, 2, 24), 56)
     for parameter in tower.parameters():
@@ -99,9 +94,7 @@ def test_a_tower_gives_features_of_patches_alone_in_reading_order(kind: Any) -> 
 
 
 @torch.inference_mode()
-def test_actions_with_a_cache_are_those_of_reading_all_anew(
-    network: OpenVLANetwork, plain_frames: tuple[FrameRef, FrameRef]
-) -> None:
+def test_actions_with_a_cache_are_those_of_reading_all_anew(network, plain_frames):
     """The patches go in behind the begin token; every token is chosen from the whole sequence so
     far."""
     weights, model = network.weights, network.weights.language_model
@@ -109,7 +102,7 @@ def test_actions_with_a_cache_are_those_of_reading_all_anew(
     patches = weights.projector(weights.vision_backbone(resize(image, 56)[None]))
     assert patches.shape == (1, 16, 64)
     ids = prompt_ids(network.tokenizer, "pick up the mug")
-    written: list[int] = []
+    written = []
     for _ in range(7):
         text = embed_ids(model, [*ids, *written])
         scores = model(inputs_embeds=torch.cat([text[:, :1], patches, text[:, 1:]], dim=1)).logits[
@@ -119,14 +112,3 @@ def test_actions_with_a_cache_are_those_of_reading_all_anew(
     assert len(set(written)) > 1
     expected = network.bins.decode(written)
     assert (network.predict(image, "pick up the mug", constrained=True) == expected).all()
-
-
-def test_without_the_constraint_a_policy_still_acts(
-    policy_checkpoints: dict[str, Path], plain_frames: Any
-) -> None:
-    from model_adapters import check_adapter, load
-
-    policy = load(
-        "openvla", {"pretrained": str(policy_checkpoints["openvla"]), "constrained": "false"}, 0
-    )
-    check_adapter(policy)  # type: ignore[arg-type]

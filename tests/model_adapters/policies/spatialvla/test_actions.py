@@ -1,7 +1,6 @@
 """SpatialVLA's action tokens against numbers computed by hand from the published borders."""
 
 import math
-from typing import Any
 
 import msgspec
 import pytest
@@ -18,11 +17,11 @@ STILL = ROTATIONS, GRIPPERS
 
 
 @pytest.fixture(scope="module")
-def bins() -> SpatialBins:
+def bins():
     return SpatialBins(BEGIN, **BINS)
 
 
-def test_each_place_of_a_step_has_its_own_tokens(bins: SpatialBins) -> None:
+def test_each_place_of_a_step_has_its_own_tokens(bins):
     assert [(place.start, place.stop) for place in bins.action_ids] == [
         (257_153, 261_249),
         (261_249, 265_345),
@@ -30,7 +29,7 @@ def test_each_place_of_a_step_has_its_own_tokens(bins: SpatialBins) -> None:
     ]
 
 
-def test_the_gripper_is_closed_or_open(bins: SpatialBins) -> None:
+def test_the_gripper_is_closed_or_open(bins):
     ids = [BEGIN, ROTATIONS, GRIPPERS, BEGIN, ROTATIONS, GRIPPERS + 1]
     assert bins.decode(ids)[:, 6].tolist() == [0.0, 1.0]
 
@@ -47,9 +46,7 @@ def test_the_gripper_is_closed_or_open(bins: SpatialBins) -> None:
         ("r", 6, 1.03105),  # (0.9228 + 1.1393) / 2
     ],
 )
-def test_the_outer_bins_of_each_spherical_axis(
-    bins: SpatialBins, axis: str, number: int, middle: float
-) -> None:
+def test_the_outer_bins_of_each_spherical_axis(bins, axis, number, middle):
     place = {"theta": 0, "phi": 0, "r": 0, axis: number}
     token = BEGIN + (place["theta"] * 32 + place["phi"]) * 8 + place["r"]
     at = {"theta": 0.35335, "phi": -2.8507, "r": 0.0984, axis: middle}
@@ -64,7 +61,7 @@ def test_the_outer_bins_of_each_spherical_axis(
 
 
 @pytest.mark.parametrize("axis", ["theta", "phi", "r"])
-def test_every_bin_lies_between_its_borders(bins: SpatialBins, axis: str) -> None:
+def test_every_bin_lies_between_its_borders(bins, axis):
     """Direction and length of each decoded translation fall into the very bin that the token
     counts."""
     step = {"theta": 32 * 8, "phi": 8, "r": 1}[axis]
@@ -83,7 +80,7 @@ def test_every_bin_lies_between_its_borders(bins: SpatialBins, axis: str) -> Non
         assert clipped or value == pytest.approx(middle, abs=1e-9)
 
 
-def test_a_translation_beyond_one_is_clipped(bins: SpatialBins) -> None:
+def test_a_translation_beyond_one_is_clipped(bins):
     # theta in bin 0 (0.35335), the longest r: (1.1393 + 1.7321) / 2 = 1.4357; its z is 1.4357 cos
     # 0.35335 = 1.3470
     assert 1.4357 * math.cos(0.35335) > 1
@@ -101,15 +98,15 @@ def test_a_translation_beyond_one_is_clipped(bins: SpatialBins) -> None:
         (4095, (0.8381, 0.855, 0.849)),  # (0.6762 + 1) / 2, (0.71 + 1) / 2, (0.698 + 1) / 2
     ],
 )
-def test_rotations(bins: SpatialBins, token: int, expected: tuple[float, float, float]) -> None:
+def test_rotations(bins, token, expected):
     assert bins.decode([BEGIN, ROTATIONS + token, GRIPPERS])[0, 3:6] == pytest.approx(
         expected, abs=1e-9
     )
 
 
-def _config(**changes: Any) -> ProcessorConfig:
+def _config(**changes):
     counts = {name: len(borders) - 1 for name, borders in BINS.items()}
-    content: dict[str, Any] = {
+    content = {
         "action_chunk_size": 4,
         "intrinsic_config": {},
         "statistics": {},
@@ -135,7 +132,7 @@ def _config(**changes: Any) -> ProcessorConfig:
     return msgspec.convert(content, ProcessorConfig)
 
 
-def test_bins_are_read_from_the_processor_s_config(bins: SpatialBins) -> None:
+def test_bins_are_read_from_the_processor_s_config(bins):
     assert SpatialBins.of(_config(), BEGIN, 8194, "mine") == bins
 
 
@@ -148,8 +145,6 @@ def test_bins_are_read_from_the_processor_s_config(bins: SpatialBins) -> None:
         ({}, 8190, "mine has 8190 action tokens and 8194 bins"),
     ],
 )
-def test_bins_that_do_not_fit_the_tokens_are_refused(
-    changes: dict[str, Any], n_tokens: int, message: str
-) -> None:
+def test_bins_that_do_not_fit_the_tokens_are_refused(changes, n_tokens, message):
     with pytest.raises(ModelError, match=message):
         SpatialBins.of(_config(**changes), BEGIN, n_tokens, "mine")

@@ -13,26 +13,26 @@ DEFAULT = CameraIntrinsics(640, 480, [[623.588, 0, 319.501], [0, 623.588, 239.54
 OTHER = CameraIntrinsics(224, 224, [[100, 0, 112], [0, 100, 112], [0, 0, 1]])
 
 
-def test_the_published_camera_is_squashed_with_the_frame() -> None:
+def test_the_published_camera_is_squashed_with_the_frame():
     intrinsics = published_intrinsics({"default": DEFAULT}, "bridge_orig/1.0.0", 224, "mine")
     # 623.588 * 224/640, 319.501 * 224/640; 623.588 * 224/480, 239.545 * 224/480
     rows = [[218.2558, 0, 111.82535], [0, 291.007733, 111.787667], [0, 0, 1]]
     assert intrinsics.tolist() == [pytest.approx(row) for row in rows]
 
 
-def test_a_dataset_s_own_camera_comes_before_the_default() -> None:
+def test_a_dataset_s_own_camera_comes_before_the_default():
     cameras = {"default": DEFAULT, "mine": OTHER}
     assert published_intrinsics(cameras, "mine", 224, "x")[0, 0] == 100
     assert published_intrinsics(cameras, "yours", 224, "x")[0, 0] == pytest.approx(218.2558)
 
 
-def test_thor_s_camera_of_a_square_frame() -> None:
+def test_thor_s_camera_of_a_square_frame():
     # 90 degrees: f is half the height. At 224 pixels: 112.
     rows = [[112, 0, 112], [0, 112, 112], [0, 0, 1]]
     assert thor_intrinsics(90, (300, 300), 224).tolist() == [pytest.approx(row) for row in rows]
 
 
-def test_the_field_of_view_is_vertical() -> None:
+def test_the_field_of_view_is_vertical():
     # f = 100 / tan 30 = 173.205 pixels of a frame of 400 x 200; squashed to 224: 96.9948 across,
     # 193.9897 down.
     intrinsics = thor_intrinsics(60, (400, 200), 224)
@@ -43,7 +43,7 @@ def test_the_field_of_view_is_vertical() -> None:
     assert [intrinsics[0, 2], intrinsics[1, 2]] == [112, 112]
 
 
-def test_the_option_is_read() -> None:
+def test_the_option_is_read():
     assert parse_field_of_view("default") is None
     assert parse_field_of_view("thor:59.7") == 59.7
 
@@ -51,7 +51,7 @@ def test_the_option_is_read() -> None:
 @pytest.mark.parametrize(
     "text", ["thor", "thor:", "thor:0", "thor:180", "thor:nan", "unity:90", "90", ""]
 )
-def test_another_form_is_refused(text: str) -> None:
+def test_another_form_is_refused(text):
     with pytest.raises(ValueError, match="is not default or thor:DEGREES"):
         parse_field_of_view(text)
 
@@ -64,7 +64,7 @@ def test_another_form_is_refused(text: str) -> None:
         {"default": CameraIntrinsics(9, 9, [[1]])},
     ],
 )
-def test_a_checkpoint_without_a_camera_is_refused(cameras: dict[str, CameraIntrinsics]) -> None:
+def test_a_checkpoint_without_a_camera_is_refused(cameras):
     with pytest.raises(
         ModelError, match=r"mine has no intrinsics for bridge and no default; give intrinsics=thor:"
     ):

@@ -2,7 +2,6 @@
 
 import math
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 import torch
@@ -13,7 +12,7 @@ from model_adapters.policies.spatialvla.ego3d import Ego3DEmbedding, back_projec
 INTRINSICS = torch.tensor([[10.0, 0, 14], [0, 20.0, 14], [0, 0, 1]])
 
 
-def test_points_of_a_wall_lie_on_the_rays_through_the_middles_of_cells() -> None:
+def test_points_of_a_wall_lie_on_the_rays_through_the_middles_of_cells():
     depth = torch.full((1, 1, 28, 28), 2.0)
     points = back_project(depth, INTRINSICS, patch=14, resolution=2)
     assert points.shape == (1, 4, 12)
@@ -30,7 +29,7 @@ def test_points_of_a_wall_lie_on_the_rays_through_the_middles_of_cells() -> None
     assert points[0, 1].tolist() == pytest.approx(second)
 
 
-def test_pixels_are_as_coarse_as_the_weights() -> None:
+def test_pixels_are_as_coarse_as_the_weights():
     unit = torch.eye(3)
     coarse = back_project(
         torch.ones(1, 1, 224, 224, dtype=torch.bfloat16), unit, patch=14, resolution=2
@@ -42,7 +41,7 @@ def test_pixels_are_as_coarse_as_the_weights() -> None:
     assert coarse[0, 0, :3].tolist() == [3.5, 3.5, 1.0]
 
 
-def test_depth_is_averaged_over_a_cell() -> None:
+def test_depth_is_averaged_over_a_cell():
     depth = torch.zeros(1, 1, 28, 28)
     depth[..., :7, :7] = torch.arange(49.0).reshape(7, 7)
     assert back_project(depth, INTRINSICS, patch=14, resolution=2)[0, 0, 2] == pytest.approx(24.0)
@@ -51,13 +50,13 @@ def test_depth_is_averaged_over_a_cell() -> None:
 class Seen(nn.Module):
     """Keeps what it is shown, and answers with a ramp from left to right."""
 
-    def forward(self, pixel_values: torch.Tensor) -> Any:
+    def forward(self, pixel_values):
         self.shown = pixel_values
         size = pixel_values.shape[-1]
         return SimpleNamespace(predicted_depth=torch.linspace(0, 1, size).expand(1, size, size))
 
 
-def test_depth_is_estimated_on_a_mirrored_border_that_is_cut_off_again() -> None:
+def test_depth_is_estimated_on_a_mirrored_border_that_is_cut_off_again():
     zoe = Seen()
     pixels = torch.zeros(1, 3, 224, 224)
     pixels[:, 0] = 1.0
@@ -71,7 +70,7 @@ def test_depth_is_estimated_on_a_mirrored_border_that_is_cut_off_again() -> None
     assert depth[0, 0, 0, -1] == pytest.approx(254 / 285, abs=1e-3)
 
 
-def test_coordinates_are_taken_around_two_metres_ahead_and_encoded_by_frequencies() -> None:
+def test_coordinates_are_taken_around_two_metres_ahead_and_encoded_by_frequencies():
     module = Ego3DEmbedding(n_points=1, n_freqs=2, width=15)
     module.position_embedding_head = nn.Sequential(nn.Identity())
     module.register_parameter("dtype_of", nn.Parameter(torch.zeros(1)))

@@ -9,14 +9,14 @@ import pytest
 
 from model_adapters.policies.spatialvla.config import SpatialVLAConfig
 from model_adapters.policies.spatialvla.network import SpatialVLAWeights, checkpoint_key
-from model_adapters.policies.weights import Layout, Shape, empty_parameters
+from model_adapters.policies.weights import empty_parameters
 
 from .published import CONFIG
 
 BEIT = "vision_zoe_model.backbone.encoder.layer.23"
 SIGLIP = "vision_tower.vision_model"
 
-SHAPES: dict[str, Shape] = {
+SHAPES = {
     "language_model.model.embed_tokens.weight": (265_347, 2304),
     "language_model.lm_head.weight": (265_347, 2304),
     "language_model.model.layers.25.self_attn.q_proj.weight": (2048, 2304),
@@ -54,7 +54,7 @@ SHAPES: dict[str, Shape] = {
 }
 
 
-def _layout(**text: object) -> Layout:
+def _layout(**text):
     config = msgspec.convert(
         CONFIG | {"text_config": CONFIG["text_config"] | text}, SpatialVLAConfig
     )
@@ -63,16 +63,16 @@ def _layout(**text: object) -> Layout:
 
 
 @pytest.fixture(scope="module")
-def layout() -> Layout:
+def layout():
     return _layout()
 
 
-def test_names_and_shapes(layout: Layout) -> None:
+def test_names_and_shapes(layout):
     expected = layout.all_shapes()
     assert {key: expected.get(key) for key in SHAPES} == SHAPES
 
 
-def test_how_many_there_are_of_each_part(layout: Layout) -> None:
+def test_how_many_there_are_of_each_part(layout):
     parts = Counter(key.split(".")[0] for key in layout.all_shapes())
     assert parts["language_model"] == 26 * 11 + 3
     assert parts["vision_tower"] == 27 * 16 + 5
@@ -84,24 +84,24 @@ def test_how_many_there_are_of_each_part(layout: Layout) -> None:
     assert len(layout.all_shapes()) == 1382
 
 
-def test_it_is_a_model_of_four_billion(layout: Layout) -> None:
+def test_it_is_a_model_of_four_billion(layout):
     assert sum(math.prod(shape) for shape in layout.all_shapes().values()) == pytest.approx(
         4.03e9, rel=0.005
     )
 
 
-def test_nothing_is_unused_and_no_key_means_two_parameters(layout: Layout) -> None:
+def test_nothing_is_unused_and_no_key_means_two_parameters(layout):
     assert not layout.unused
     assert len(set(layout.parameters.values())) == len(layout.parameters)
 
 
-def test_no_name_of_transformers_5_is_expected_of_a_file(layout: Layout) -> None:
+def test_no_name_of_transformers_5_is_expected_of_a_file(layout):
     new = ("backbone.beit.", "q_proj.", "o_proj.", ".layers.")
     beit = [key for key in layout.all_shapes() if key.startswith("vision_zoe_model.backbone.")]
     assert not [key for key in beit if any(part in key for part in new)]
 
 
-def test_tied_embeddings_have_one_key() -> None:
+def test_tied_embeddings_have_one_key():
     keys = _layout(tie_word_embeddings=True).all_shapes()
     assert "language_model.lm_head.weight" not in keys
     assert "language_model.model.embed_tokens.weight" in keys
@@ -134,5 +134,5 @@ def test_tied_embeddings_have_one_key() -> None:
         ),
     ],
 )
-def test_names_and_keys(name: str, key: str) -> None:
+def test_names_and_keys(name, key):
     assert checkpoint_key(name) == key

@@ -1,32 +1,27 @@
 """SpatialVLA's network: what it is asked, where its embeddings are, and that its cache changes
 nothing."""
 
-from pathlib import Path
-
 import pytest
 import torch
 from safetensors.torch import load_file
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
-from model_adapters import check_adapter, load
 from model_adapters.policies.decoding import embed_ids
-from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.spatialvla.network import SpatialVLANetwork, prompt
+
+from ...asking import load_saved
 
 N_ACTIONS, N_PATCHES, HIDDEN = 8194, 16, 64
 
 
 @pytest.fixture
-def network(policies: dict[str, VlaPolicy]) -> SpatialVLANetwork:
+def network(policies):
     result = policies["spatialvla"]._network
     assert isinstance(result, SpatialVLANetwork)
     return result
 
 
-def test_the_prompt_stands_behind_the_image_tokens_and_ends_a_line(
-    network: SpatialVLANetwork,
-) -> None:
+def test_the_prompt_stands_behind_the_image_tokens_and_ends_a_line(network):
     ids = network.prompt_ids("pick up the Mug")
     assert ids[:N_PATCHES] == [network.image_id] * N_PATCHES
     assert ids[N_PATCHES] == network.tokenizer.token_to_id("<bos>")
@@ -38,7 +33,7 @@ def test_the_prompt_stands_behind_the_image_tokens_and_ends_a_line(
     )
 
 
-def test_a_tokenizer_without_image_tokens_is_refused(network: SpatialVLANetwork) -> None:
+def test_a_tokenizer_without_image_tokens_is_refused(network):
     other = SpatialVLANetwork(
         network.weights, network.tokenizer, network.bins, 4, network.image_id + 1, network.view
     )
@@ -47,8 +42,8 @@ def test_a_tokenizer_without_image_tokens_is_refused(network: SpatialVLANetwork)
 
 
 def test_action_tokens_have_the_embeddings_kept_apart_and_all_are_scaled(
-    network: SpatialVLANetwork, policy_checkpoints: dict[str, Path]
-) -> None:
+    network, policy_checkpoints
+):
     kept = load_file(policy_checkpoints["spatialvla"] / "model.safetensors")
     model = network.weights.language_model
     begin = network.bins.begin
@@ -62,14 +57,12 @@ def test_action_tokens_have_the_embeddings_kept_apart_and_all_are_scaled(
 
 
 @torch.inference_mode()
-def test_actions_with_a_cache_are_those_of_reading_all_anew(
-    network: SpatialVLANetwork, plain_frames: tuple[FrameRef, FrameRef]
-) -> None:
+def test_actions_with_a_cache_are_those_of_reading_all_anew(network, plain_frames):
     """Positions count from 1, the prefix is read in both directions, and what follows by what came
     before."""
     model, image = network.weights.language_model, plain_frames[1].load()
     ids = network.prompt_ids("pick up the mug")
-    written: list[int] = []
+    written = []
     for place in range(12):
         fed = embed_ids(model, [*ids, *written])
         fed[:, :N_PATCHES] = network.features(image)
@@ -84,38 +77,18 @@ def test_actions_with_a_cache_are_those_of_reading_all_anew(
             },
             position_ids=torch.arange(1, length + 1)[None],
         )
-        action_ids = network.bins.action_ids[place % 3]
-        written.append(
-            action_ids.start
-            + int(output.logits[0, -1, action_ids.start : action_ids.stop].argmax())
-        )
-    assert (
-        network.predict(image, "pick up the mug", constrained=True) == network.bins.decode(written)
-    ).all()
+        legal = network.bins.action_ids[place % 3]
+        written.append(legal.start + int(output.logits[0, -1, legal.start : legal.stop].argmax()))
+    acted = network.predict(image, "pick up the mug", constrained=True)
+    assert (acted == network.bins.decode(written)).all()
 
 
-def test_the_camera_changes_what_is_seen(
-    policy_checkpoints: dict[str, Path], plain_frames: tuple[FrameRef, FrameRef]
-) -> None:
+def test_the_camera_changes_what_is_seen(policy_checkpoints, plain_frames):
     seen = []
     for intrinsics in ("default", "thor:60", "thor:90"):
-        settings = {
-            "pretrained": str(policy_checkpoints["spatialvla"]),
-            "device": "cpu",
-            "intrinsics": intrinsics,
-        }
-        policy = load("spatialvla", settings, 0)
+        policy = load_saved("spatialvla", policy_checkpoints["spatialvla"], intrinsics=intrinsics)
         assert policy.identity()["intrinsics"] == intrinsics
         with torch.inference_mode():
-            seen.append(policy._network.features(plain_frames[0].load()))  # type: ignore[union-attr]
+            seen.append(policy._network.features(plain_frames[0].load()))
     assert not torch.equal(seen[0], seen[1])
     assert not torch.equal(seen[1], seen[2])
-
-
-def test_without_the_constraint_a_policy_still_acts(policy_checkpoints: dict[str, Path]) -> None:
-    policy = load(
-        "spatialvla",
-        {"pretrained": str(policy_checkpoints["spatialvla"]), "constrained": "false"},
-        0,
-    )
-    check_adapter(policy)  # type: ignore[arg-type]

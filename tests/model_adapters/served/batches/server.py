@@ -13,10 +13,10 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, ClassVar
 from urllib.parse import parse_qs, urlsplit
 
+from ....helpers.http_servers import SilentHandler, run_server
 from ..talking import completion
 
 __all__ = ["BatchServer", "failed", "serve_batches"]
@@ -168,7 +168,7 @@ def _uploaded(headers: Any, body: bytes) -> bytes:
 def serve_batches(server: BatchServer) -> Iterator[BatchServer]:
     """Serve, for as long as it is needed."""
 
-    class Handler(BaseHTTPRequestHandler):
+    class Handler(SilentHandler):
         def do(self) -> None:
             body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
             with server.lock:
@@ -191,17 +191,6 @@ def serve_batches(server: BatchServer) -> Iterator[BatchServer]:
 
         do_GET = do_POST = do
 
-        def log_message(self, *args: Any) -> None:
-            pass
-
-    http = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    http.daemon_threads = True
-    thread = threading.Thread(target=http.serve_forever, kwargs={"poll_interval": 0.01})
-    thread.start()
-    server.url = f"http://127.0.0.1:{http.server_port}{server.root}"
-    try:
+    with run_server(Handler) as address:
+        server.url = address + server.root
         yield server
-    finally:
-        http.shutdown()
-        http.server_close()
-        thread.join()

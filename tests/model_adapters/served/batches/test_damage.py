@@ -2,24 +2,20 @@
 
 import json
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import pytest
 
-from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs import read_run
 from model_adapters.served.batches import transfer
 
+from ....helpers.journals import read_records
 from ..anthropic.server import AnthropicServer, message
-from ..conftest import Ask
 from ..gemini.server import GeminiServer, content
 from ..talking import completion
 from .server import BatchServer, serve_batches
 
 Damage = Callable[[bytes], bytes]
 
-SERVERS: dict[str, Callable[[], BatchServer]] = {
+SERVERS = {
     "openai": lambda: BatchServer(answer=lambda _: completion("yes")),
     "anthropic": lambda: AnthropicServer(answer=lambda _: message()),
     "gemini": lambda: GeminiServer(answer=lambda _: content(), last_status="succeeded"),
@@ -32,11 +28,11 @@ _BODY = {
 }
 
 
-def _damages(model: str) -> dict[str, Damage]:
+def _damages(model):
     """What becomes of a line with a reply."""
     before = _BODY[model]
 
-    def instead(value: bytes) -> Damage:
+    def instead(value):
         return lambda line: line[: line.index(before) + len(before)] + value + b"}"
 
     error = {
@@ -65,45 +61,38 @@ def _damages(model: str) -> dict[str, Damage]:
 CASES = [(model, name) for model in SERVERS for name in _damages(model)]
 
 
-def _damage(server: BatchServer, damage: Callable[[list[bytes]], list[bytes]]) -> None:
+def _damage(server, damage):
     """Damage the lines of each list of replies."""
     answer_to = server.answer_to
 
-    def answer(method: str, path: str, headers: Any, body: bytes) -> Any:
+    def answer(method, path, headers, body):
         status, said, *more = answer_to(method, path, headers, body)
         if path.partition("?")[0].endswith(_LISTS):
             said = b"\n".join(damage(said.splitlines()))
         return (status, said, *more)
 
-    server.answer_to = answer  # type: ignore[method-assign]
-
-
-def _records(folder: Path) -> list[Any]:
-    (results,) = folder.rglob("results.json")
-    return read_run(results.parent, RECORDS)[1]
+    server.answer_to = answer
 
 
 @pytest.mark.parametrize(("model", "name"), CASES)
-def test_a_damaged_line_is_the_fault_of_its_request_alone(
-    ask: Ask, tmp_path: Path, model: str, name: str
-) -> None:
+def test_a_damaged_line_is_the_fault_of_its_request_alone(ask, tmp_path, model, name):
     with serve_batches(SERVERS[model]()) as server:
         answer_to = server.answer_to
         _damage(server, lambda lines: [_damages(model)[name](lines[0]), *lines[1:]])
         code, _, err = ask(server, model=model)
         assert (code, "Traceback" in err) == (1, False), err
-        failures = [record.failure for record in _records(tmp_path / "out")]
+        failures = [record.failure for record in read_records(tmp_path / "out")]
         (failure,) = filter(None, failures)
         assert "gives no reply in a batch: it " in failure
         assert [n for n, _ in server.sizes] == [5]
-        server.answer_to = answer_to  # type: ignore[method-assign]
+        server.answer_to = answer_to
         code, _, err = ask(server, model=model)  # asks this one alone
     assert code == 0, err
     assert "1 evaluated now, 4 resumed" in err
 
 
 @pytest.mark.parametrize("model", SERVERS)
-def test_lines_of_nobody_are_left_out(ask: Ask, model: str) -> None:
+def test_lines_of_nobody_are_left_out(ask, model):
     noise = [b"", b"\xff\xfe", b"<html>", b"[" * 100_000, b'{"custom_id": "x-y", "key": "z"}', b"7"]
     with serve_batches(SERVERS[model]()) as server:
         _damage(server, lambda lines: [*noise, *lines, *noise])
@@ -113,33 +102,31 @@ def test_lines_of_nobody_are_left_out(ask: Ask, model: str) -> None:
 
 
 @pytest.mark.parametrize("model", SERVERS)
-def test_a_page_in_place_of_the_lines_is_fetched_again_and_not_paid_again(
-    ask: Ask, model: str
-) -> None:
+def test_a_page_in_place_of_the_lines_is_fetched_again_and_not_paid_again(ask, model):
     with serve_batches(SERVERS[model]()) as server:
         answer_to = server.answer_to
         _damage(server, lambda _: [b"<html>", b"busy"])
         code, _, err = ask(server, model=model)
         assert code == 2 and "answers without a line of a batch" in err.splitlines()[-1]
-        server.answer_to = answer_to  # type: ignore[method-assign]
+        server.answer_to = answer_to
         code, _, err = ask(server, model=model)
         assert code == 0, err
     assert [n for n, _ in server.sizes] == [5]
 
 
 @pytest.mark.parametrize("model", SERVERS)
-def test_of_two_replies_that_differ_none_counts(ask: Ask, tmp_path: Path, model: str) -> None:
+def test_of_two_replies_that_differ_none_counts(ask, tmp_path, model):
     with serve_batches(SERVERS[model]()) as server:
         _damage(server, lambda lines: [*lines, lines[0].replace(b"yes", b"no"), lines[1]])
         code, _, err = ask(server, model=model)
     assert code == 1, err
     assert "4 answered, 1 not" in err
-    failures = [record.failure for record in _records(tmp_path / "out") if record.failure]
+    failures = [record.failure for record in read_records(tmp_path / "out") if record.failure]
     assert len(failures) == 1 and "it gives several that differ, and none counts" in failures[0]
     assert [n for n, _ in server.sizes] == [5]
 
 
-def test_a_reply_counts_beside_a_fault(ask: Ask) -> None:
+def test_a_reply_counts_beside_a_fault(ask):
     with serve_batches(SERVERS["openai"]()) as server:
         fault = {"response": None, "error": {"code": "batch_expired", "message": "m"}}
         _damage(
@@ -160,9 +147,7 @@ def test_a_reply_counts_beside_a_fault(ask: Ask) -> None:
         ({"error": {"code": 400, "message": "no fridge"}}, 5),
     ],
 )
-def test_errors_inside_a_success_are_asked_again_if_that_may_help(
-    ask: Ask, broken: dict[str, Any], n_asked: int
-) -> None:
+def test_errors_inside_a_success_are_asked_again_if_that_may_help(ask, broken, n_asked):
     outcomes = iter([broken, broken])
     with serve_batches(BatchServer(answer=lambda _: next(outcomes, completion("yes")))) as server:
         code, _, err = ask(server)
@@ -172,7 +157,7 @@ def test_errors_inside_a_success_are_asked_again_if_that_may_help(
     assert server.n_asked == 7
 
 
-def test_what_an_earlier_version_kept_as_a_reply_is_asked_again(ask: Ask, tmp_path: Path) -> None:
+def test_what_an_earlier_version_kept_as_a_reply_is_asked_again(ask, tmp_path):
     with serve_batches(SERVERS["openai"]()) as server:
         assert ask(server)[0] == 0
         (kept,) = tmp_path.rglob("*.replies.jsonl")
@@ -190,18 +175,18 @@ BAD_NAMES = ["a\r\nX-Key: b", "a" * 2**20, "", "a b", "?x", "é\x00"]
 
 @pytest.mark.parametrize("name", BAD_NAMES)
 @pytest.mark.parametrize("model", SERVERS)
-def test_a_name_that_breaks_addresses_is_one_line(ask: Ask, model: str, name: str) -> None:
+def test_a_name_that_breaks_addresses_is_one_line(ask, model, name):
     with serve_batches(SERVERS[model]()) as server:
         answer_to = server.answer_to
 
-        def rename(method: str, path: str, headers: Any, body: bytes) -> Any:
+        def rename(method, path, headers, body):
             status, said, *more = answer_to(method, path, headers, body)
             if isinstance(said, dict) and method == "POST":
                 field = "name" if model == "gemini" else "id"
                 said.get("file", said)[field] = name
             return (status, said, *more)
 
-        server.answer_to = rename  # type: ignore[method-assign]
+        server.answer_to = rename
         code, _, err = ask(server, model=model)
     assert (code, "Traceback" in err) == (2, False), err
     last = err.splitlines()[-1]
@@ -209,10 +194,10 @@ def test_a_name_that_breaks_addresses_is_one_line(ask: Ask, model: str, name: st
 
 
 @pytest.mark.parametrize("url", ["http://[", "http://127.0.0.1:9/x", "x", "https://127.0.0.1/é"])
-def test_an_address_for_an_upload_is_the_servers_own(ask: Ask, url: str) -> None:
+def test_an_address_for_an_upload_is_the_servers_own(ask, url):
     with serve_batches(SERVERS["gemini"]()) as server:
         server.before = lambda _, path: (
-            (200, b"", {"X-Goog-Upload-URL": url}) if path.startswith("/upload") else None  # type: ignore[return-value]
+            (200, b"", {"X-Goog-Upload-URL": url}) if path.startswith("/upload") else None
         )
         code, _, err = ask(server, model="gemini")
     assert code == 2, err
@@ -221,13 +206,11 @@ def test_an_address_for_an_upload_is_the_servers_own(ask: Ask, url: str) -> None
 
 @pytest.mark.parametrize("is_new", [False, True])
 @pytest.mark.parametrize("model", SERVERS)
-def test_a_list_without_end_is_one_line(
-    ask: Ask, model: str, is_new: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_list_without_end_is_one_line(ask, model, is_new, monkeypatch):
     monkeypatch.setattr(transfer, "_MOST_PAGES", 20)
     n_pages = 0
 
-    def page() -> dict[str, Any]:
+    def page():
         nonlocal n_pages
         n_pages += 1
         name = f"b{n_pages if is_new else 0}"
@@ -240,7 +223,7 @@ def test_a_list_without_end_is_one_line(
 
     with serve_batches(SERVERS[model]()) as server:
 
-        def lose(method: str, path: str) -> tuple[int, bytes] | None:
+        def lose(method, path):
             if method == "POST" and path.endswith(("batches", ":batchGenerateContent")):
                 return 0, b""
             is_list = method == "GET" and "batches?" in path

@@ -8,13 +8,9 @@ import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
-from typing import Any
-
-from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs import read_run
 
 from ....helpers.command_line import option_words
+from ....helpers.journals import read_outcome
 from ....helpers.waiting import PATIENCE_S, wait_until
 from ..talking import completion
 from .server import BatchServer, serve_batches
@@ -29,30 +25,28 @@ main()
 N_KILLS = 10
 
 
-def _command(server: BatchServer, data: Path, output: Path) -> list[str]:
+def _command(server, data, output):
     model_args = f"base_url={server.url},model=m,batch=true,batch_requests=2"
     words = option_words(model="openai", model_args=model_args, tasks="nieh_gt", data=data)
     return [sys.executable, "-c", CODE, *map(str, words), "--out", str(output)]
 
 
-def _start(command: list[str]) -> "subprocess.Popen[str]":
+def _start(command):
     return subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ}
     )
 
 
-def _says(body: dict[str, Any]) -> dict[str, Any]:
+def _says(body):
     """A reply that follows from the question, so that no two are confused."""
     return completion(f"yes, {body['messages'][-1]['content'][-1]['text']}"[:60])
 
 
-def _replies(output: Path) -> dict[Any, Any]:
-    (results,) = output.rglob("results.json")
-    _, records = read_run(results.parent, RECORDS)
-    return {record.key: record.payload.reply for record in records}
+def _replies(output):
+    return {record.key: record.payload.reply for record in read_outcome(output)[0]}
 
 
-def test_ten_kills_at_any_moment_change_nothing(make_nieh_set: Any, tmp_path: Path) -> None:
+def test_ten_kills_at_any_moment_change_nothing(make_nieh_set, tmp_path):
     data = make_nieh_set(size=56)
     drawn = random.Random(5)
     with serve_batches(BatchServer(answer=_says, looks=1)) as server:
@@ -77,13 +71,13 @@ def test_ten_kills_at_any_moment_change_nothing(make_nieh_set: Any, tmp_path: Pa
     assert set(server.asked.values()) == {1}
 
 
-def _kill_at(server: BatchServer, command: list[str], moment: int, before: bool) -> None:
+def _kill_at(server, command, moment, before):
     """Kill a run while its request of this number is under way."""
     reached = threading.Event()
     killed = threading.Event()
     n_seen = 0
 
-    def before_request(method: str, path: str) -> tuple[int, Any] | None:
+    def before_request(method, path):
         nonlocal n_seen
         n_seen += 1
         if n_seen != moment:
@@ -103,7 +97,7 @@ def _kill_at(server: BatchServer, command: list[str], moment: int, before: bool)
         server.before = lambda *_: None
 
 
-def test_ctrl_c_leaves_the_batches_to_the_server(make_nieh_set: Any, tmp_path: Path) -> None:
+def test_ctrl_c_leaves_the_batches_to_the_server(make_nieh_set, tmp_path):
     data = make_nieh_set(size=56)
     with serve_batches(BatchServer(answer=_says, looks=10**9)) as server:
         command = _command(server, data, tmp_path / "out")
@@ -124,7 +118,7 @@ def test_ctrl_c_leaves_the_batches_to_the_server(make_nieh_set: Any, tmp_path: P
     assert set(server.asked.values()) == {1}
 
 
-def test_a_bundled_set_is_asked_once_however_often_the_run_is_killed(tmp_path: Path) -> None:
+def test_a_bundled_set_is_asked_once_however_often_the_run_is_killed(tmp_path):
     """Not at chosen requests, but after random times, on a bundled set."""
     model_args = "model=m,batch=true,batch_requests=30"
     drawn = random.Random(7)
@@ -141,9 +135,9 @@ def test_a_bundled_set_is_asked_once_however_often_the_run_is_killed(tmp_path: P
     assert server.n_asked == len(_replies(tmp_path)) == 126
 
 
-def _kill_after(server: BatchServer, command: list[str], n: int, seconds: float) -> None:
+def _kill_after(server, command, n, seconds):
     """Kill a run some time after its request of this number came, if it comes so far."""
-    seen: list[str] = []
+    seen = []
     server.before = lambda _, path: seen.append(path)
     process = _start(command)
     wait_until(lambda: len(seen) >= n or process.poll() is not None)

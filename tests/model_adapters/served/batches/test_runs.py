@@ -1,33 +1,22 @@
 """Whole runs in batches, as their user types them."""
 
 import json
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import pytest
 
-from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs import read_run
 from model_adapters.served.batches import queue
 
 from ....helpers.command_line import assert_refused, option_words
-from ..conftest import Ask
+from ....helpers.journals import read_outcome
 from ..talking import completion
 from .server import BatchServer, failed, serve_batches
 
 
-def _run(folder: Path) -> tuple[list[Any], dict[str, Any]]:
-    """The records of the one run in a folder, and its results."""
-    (results,) = folder.rglob("results.json")
-    return read_run(results.parent, RECORDS)[1], json.loads(results.read_text())
-
-
-def _first_time(outcome: Any) -> Callable[[dict[str, Any]], Any]:
+def _first_time(outcome):
     """Gives an outcome for the first two requests, and replies from then on."""
     n_asked = 0
 
-    def answer(_body: dict[str, Any]) -> Any:
+    def answer(_body):
         nonlocal n_asked
         n_asked += 1
         return outcome if n_asked <= 2 else completion("yes", (100, 10, 40))
@@ -35,9 +24,7 @@ def _first_time(outcome: Any) -> Callable[[dict[str, Any]], Any]:
     return answer
 
 
-def test_questions_are_asked_in_one_batch_and_their_cost_is_in_the_results(
-    ask: Ask, tmp_path: Path
-) -> None:
+def test_questions_are_asked_in_one_batch_and_their_cost_is_in_the_results(ask, tmp_path):
     prices = {"price_per_m_input": 1, "price_per_m_cached": 0.5, "price_per_m_output": 5}
     with serve_batches(BatchServer()) as server:
         code, out, err = ask(server, **prices)
@@ -49,7 +36,7 @@ def test_questions_are_asked_in_one_batch_and_their_cost_is_in_the_results(
         again, _, err = ask(server, **prices)
         assert (again, server.n_asked) == (0, 5)
         assert "0 evaluated now, 5 resumed from the journal" in err
-    records, results = _run(tmp_path / "out")
+    records, results = read_outcome(tmp_path / "out")
     each = (60 * 1 + 40 * 0.5 + 10 * 5) / 1e6
     assert [record.payload.reply for record in records] == ["yes"] * 5
     assert results["usage"] == {
@@ -61,7 +48,7 @@ def test_questions_are_asked_in_one_batch_and_their_cost_is_in_the_results(
     assert "(200 of them cached, 40.0 %)" in out
 
 
-def test_a_run_may_go_on_with_or_without_batches(ask: Ask, tmp_path: Path) -> None:
+def test_a_run_may_go_on_with_or_without_batches(ask, tmp_path):
     with serve_batches(BatchServer(answer=_first_time(failed(400, "no fridge")))) as server:
         assert ask(server)[0] == 1
         code, _, err = ask(server, batch=False)
@@ -75,16 +62,14 @@ def test_a_run_may_go_on_with_or_without_batches(ask: Ask, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("model_args", "sizes"), [({"batch_requests": 2}, [2, 2, 1]), ({"batch_mb": 1}, [5])]
 )
-def test_a_batch_is_no_larger_than_it_may_be(
-    ask: Ask, model_args: dict[str, int], sizes: list[int]
-) -> None:
+def test_a_batch_is_no_larger_than_it_may_be(ask, model_args, sizes):
     with serve_batches(BatchServer()) as server:
         assert ask(server, **model_args)[0] == 0
     assert [n for n, _ in server.sizes] == sizes
     assert server.n_asked == 5
 
 
-def test_batches_are_split_by_their_size(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_batches_are_split_by_their_size(ask, monkeypatch):
     with serve_batches(BatchServer()) as server:
         assert ask(server)[0] == 0
         largest = server.sizes[0][1] // 2
@@ -95,9 +80,7 @@ def test_batches_are_split_by_their_size(ask: Ask, monkeypatch: pytest.MonkeyPat
     assert server.n_asked == 10
 
 
-def test_a_request_that_no_batch_can_hold_fails_alone(
-    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_request_that_no_batch_can_hold_fails_alone(ask, tmp_path, monkeypatch):
     with serve_batches(BatchServer()) as server:
         assert ask(server, batch_requests=1)[0] == 0
         sizes = sorted(size for _, size in server.sizes)
@@ -105,7 +88,7 @@ def test_a_request_that_no_batch_can_hold_fails_alone(
         code, _, err = ask(server, "--fresh", batch_mb=1)
     assert code == 1
     assert "the request has 1.0 MB, more than a batch may have" in err
-    records, _ = _run(tmp_path / "out")
+    records, _ = read_outcome(tmp_path / "out")
     assert 1 <= sum(record.failure is not None for record in records) < 5
 
 
@@ -117,21 +100,19 @@ def test_a_request_that_no_batch_can_hold_fails_alone(
         ("batch_expired", "gives no reply in a batch: batch_expired m"),
     ],
 )
-def test_what_passes_is_asked_again_and_told(
-    ask: Ask, tmp_path: Path, outcome: Any, fault: str
-) -> None:
+def test_what_passes_is_asked_again_and_told(ask, tmp_path, outcome, fault):
     with serve_batches(BatchServer(answer=_first_time(outcome))) as server:
         code, _, err = ask(server)
     assert code == 0, err
     assert [n for n, _ in server.sizes] == [5, 2]
     assert "3 answered, 2 not" in err
     assert "2 request(s) were not processed, and are asked again" in err
-    faults = [fault for record in _run(tmp_path / "out")[0] for fault in record.faults]
+    faults = [fault for record in read_outcome(tmp_path / "out")[0] for fault in record.faults]
     assert len(faults) == 2
     assert all(fault in line for line in faults)
 
 
-def test_what_does_not_pass_fails_and_is_asked_by_the_next_run(ask: Ask, tmp_path: Path) -> None:
+def test_what_does_not_pass_fails_and_is_asked_by_the_next_run(ask, tmp_path):
     with serve_batches(BatchServer(answer=lambda _: failed(500, "out of memory"))) as server:
         code, _, err = ask(server)
         assert code == 1
@@ -139,19 +120,19 @@ def test_what_does_not_pass_fails_and_is_asked_by_the_next_run(ask: Ask, tmp_pat
         assert [n for n, _ in server.sizes] == [5, 5]
         server.answer = lambda _: completion("yes")
         assert ask(server)[0] == 0
-    assert [record.failure for record in _run(tmp_path / "out")[0]] == [None] * 5
+    assert [record.failure for record in read_outcome(tmp_path / "out")[0]] == [None] * 5
 
 
-def test_a_refusal_is_not_asked_again(ask: Ask, tmp_path: Path) -> None:
+def test_a_refusal_is_not_asked_again(ask, tmp_path):
     with serve_batches(BatchServer(answer=_first_time(failed(400, "no fridge")))) as server:
         assert ask(server)[0] == 1
     assert len(server.sizes) == 1
-    failures = [record.failure for record in _run(tmp_path / "out")[0] if record.failure]
+    failures = [record.failure for record in read_outcome(tmp_path / "out")[0] if record.failure]
     assert len(failures) == 2
     assert all("in a batch answers 400 Bad Request" in failure for failure in failures)
 
 
-def test_a_batch_that_expires_gives_what_it_has(ask: Ask) -> None:
+def test_a_batch_that_expires_gives_what_it_has(ask):
     server = BatchServer(answer=_first_time("batch_expired"), last_status="expired")
     with serve_batches(server):
         code, _, err = ask(server)
@@ -160,10 +141,10 @@ def test_a_batch_that_expires_gives_what_it_has(ask: Ask) -> None:
     assert server.n_asked == 5
 
 
-def test_lines_that_are_missing_are_asked_again(ask: Ask) -> None:
+def test_lines_that_are_missing_are_asked_again(ask):
     with serve_batches(BatchServer()) as server:
 
-        def drop(method: str, path: str) -> tuple[int, bytes] | None:
+        def drop(method, path):
             if "/content" not in path:
                 return None
             server.before = lambda *_: None
@@ -176,7 +157,7 @@ def test_lines_that_are_missing_are_asked_again(ask: Ask) -> None:
     assert [n for n, _ in server.sizes] == [5, 2]
 
 
-def test_who_cancels_a_batch_is_not_asked_to_pay_for_another(ask: Ask) -> None:
+def test_who_cancels_a_batch_is_not_asked_to_pay_for_another(ask):
     server = BatchServer(answer=_first_time("batch_cancelled"), last_status="cancelled")
     with serve_batches(server):
         code, _, err = ask(server)
@@ -185,7 +166,7 @@ def test_who_cancels_a_batch_is_not_asked_to_pay_for_another(ask: Ask) -> None:
     assert "gives no reply in a batch: batch_cancelled m; run the same command again" in err
 
 
-def test_a_batch_that_is_refused_ends_the_run_in_one_line(ask: Ask) -> None:
+def test_a_batch_that_is_refused_ends_the_run_in_one_line(ask):
     errors = [{"code": "billing_hard_limit_reached", "message": "pay first", "line": None}]
     with serve_batches(BatchServer(last_status="failed", errors=errors)) as server:
         code, _, err = ask(server)
@@ -197,12 +178,12 @@ def test_a_batch_that_is_refused_ends_the_run_in_one_line(ask: Ask) -> None:
     assert server.n_asked == 5
 
 
-def test_a_server_with_too_much_in_its_queue_gets_the_rest_later(ask: Ask) -> None:
+def test_a_server_with_too_much_in_its_queue_gets_the_rest_later(ask):
     errors = [{"code": "token_limit_exceeded", "message": "Enqueued token limit reached"}]
     server = BatchServer(errors=errors)
     n_finished = 0
 
-    def refuse_the_second(method: str, path: str) -> None:
+    def refuse_the_second(method, path):
         nonlocal n_finished
         if path.startswith("/v1/batches/"):
             server.last_status = "failed" if path.endswith("batch_4") else "completed"
@@ -221,7 +202,7 @@ def test_a_server_with_too_much_in_its_queue_gets_the_rest_later(ask: Ask) -> No
     assert "takes no further batch now; run the same command again later" in err
 
 
-def test_caps_are_kept_batch_by_batch(ask: Ask, tmp_path: Path) -> None:
+def test_caps_are_kept_batch_by_batch(ask, tmp_path):
     with serve_batches(BatchServer()) as server:
         code, _, err = ask(server, "--max-tokens-total", 330)  # 110 for each question
         assert code == 1
@@ -231,7 +212,7 @@ def test_caps_are_kept_batch_by_batch(ask: Ask, tmp_path: Path) -> None:
     assert server.n_asked == 5
 
 
-def test_a_batch_whose_name_was_lost_is_found_again(ask: Ask) -> None:
+def test_a_batch_whose_name_was_lost_is_found_again(ask):
     with serve_batches(BatchServer()) as server:
         for _ in range(5):  # batches of others, on pages before it
             server.add_batch(
@@ -245,7 +226,7 @@ def test_a_batch_whose_name_was_lost_is_found_again(ask: Ask) -> None:
                 }
             )
 
-        def lose(method: str, path: str) -> tuple[int, bytes] | None:
+        def lose(method, path):
             if (method, path) != ("POST", "/v1/batches"):
                 return None
             server.before = lambda *_: None
@@ -267,10 +248,10 @@ def test_a_batch_whose_name_was_lost_is_found_again(ask: Ask) -> None:
     assert len(server.sizes) == 6
 
 
-def test_a_batch_that_the_server_lists_a_moment_later_is_not_submitted_again(ask: Ask) -> None:
+def test_a_batch_that_the_server_lists_a_moment_later_is_not_submitted_again(ask):
     with serve_batches(BatchServer()) as server:
 
-        def lose(method: str, path: str) -> tuple[int, bytes] | None:
+        def lose(method, path):
             if (method, path) == ("POST", "/v1/batches"):
                 newest = list(server.files)[-1]
                 server.add_batch(
@@ -285,7 +266,7 @@ def test_a_batch_that_the_server_lists_a_moment_later_is_not_submitted_again(ask
                 return 0, b""
             return None
 
-        def hide(method: str, path: str) -> tuple[int, bytes] | None:
+        def hide(method, path):
             if method == "GET" and path.startswith("/v1/batches?"):
                 server.before = lambda *_: None
                 return 200, b'{"data": [], "has_more": false}'
@@ -298,16 +279,16 @@ def test_a_batch_that_the_server_lists_a_moment_later_is_not_submitted_again(ask
     assert (server.n_asked, len(server.sizes)) == (5, 1)
 
 
-def _name_in(content: bytes) -> str:
+def _name_in(content):
     name = json.loads(content.splitlines()[0])["custom_id"].partition("-")[2]
     return str(name)
 
 
-def test_a_server_that_is_away_for_a_while_is_waited_for(ask: Ask) -> None:
+def test_a_server_that_is_away_for_a_while_is_waited_for(ask):
     with serve_batches(BatchServer()) as server:
         n_down = 7
 
-        def down(method: str, path: str) -> tuple[int, bytes] | None:
+        def down(method, path):
             nonlocal n_down
             if not path.startswith("/v1/batches/") or n_down == 0:
                 return None
@@ -321,7 +302,7 @@ def test_a_server_that_is_away_for_a_while_is_waited_for(ask: Ask) -> None:
     assert server.n_asked == 5
 
 
-def test_the_key_is_in_no_file(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_key_is_in_no_file(ask, tmp_path, monkeypatch):
     key = "sk-0123456789abcdef0123456789"
     monkeypatch.setenv("OPENAI_API_KEY", key)
     outcomes = iter([failed(401, f"no {key}"), completion(f"The key is {key}.")])
@@ -334,9 +315,7 @@ def test_the_key_is_in_no_file(ask: Ask, tmp_path: Path, monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("left", ["no requests file", "a half one", "a bad batch", "bad replies"])
-def test_what_is_found_in_the_folder_is_taken_or_refused_in_one_line(
-    ask: Ask, tmp_path: Path, left: str
-) -> None:
+def test_what_is_found_in_the_folder_is_taken_or_refused_in_one_line(ask, tmp_path, left):
     with serve_batches(BatchServer()) as server:
         assert ask(server)[0] == 0
         (folder,) = tmp_path.rglob("batches")
@@ -370,8 +349,8 @@ def test_what_is_found_in_the_folder_is_taken_or_refused_in_one_line(
     ],
 )
 def test_what_cannot_be_asked_together_is_refused_in_one_line(
-    run_cli: Any, make_nieh_set: Any, tmp_path: Path, tasks: str, options: Any, message: str
-) -> None:
+    run_cli, make_nieh_set, tmp_path, tasks, options, message
+):
     data = ("--data", make_nieh_set(size=56)) if tasks == "nieh_memory_notes" else ()
     task = option_words(
         model="openai", model_args="base_url=http://127.0.0.1:1/v1,model=m,batch=true", tasks=tasks
@@ -380,9 +359,7 @@ def test_what_cannot_be_asked_together_is_refused_in_one_line(
     assert_refused(ended, message, after_notes=True)
 
 
-def test_a_plan_measures_with_single_requests_and_prices_what_is_cached(
-    run_cli: Any, make_nieh_set: Any
-) -> None:
+def test_a_plan_measures_with_single_requests_and_prices_what_is_cached(run_cli, make_nieh_set):
     prices = "price_per_m_input=1000,price_per_m_cached=100,price_per_m_output=5000"
     with serve_batches(BatchServer()) as server:
         given = f"base_url={server.url},model=m,batch=true,{prices}"

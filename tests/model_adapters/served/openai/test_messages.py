@@ -2,7 +2,6 @@
 
 import base64
 from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,13 +14,13 @@ from model_adapters.served.frames import EncodedFrames
 from model_adapters.served.openai import to_messages
 
 
-def _pixels(address: str) -> np.ndarray:
+def _pixels(address):
     return np.asarray(
         Image.open(BytesIO(base64.b64decode(address.partition(",")[2]))).convert("RGB")
     )
 
 
-def test_texts_and_frames_keep_their_order(frames: list[FrameRef]) -> None:
+def test_texts_and_frames_keep_their_order(frames):
     encoded = EncodedFrames("png")
     turns = (
         Turn("system", ("Be brief.",)),
@@ -50,16 +49,14 @@ def test_texts_and_frames_keep_their_order(frames: list[FrameRef]) -> None:
 
 
 @pytest.mark.parametrize("role", ["system", "assistant"])
-def test_frames_are_the_users_alone(role, frames: list[FrameRef]) -> None:
+def test_frames_are_the_users_alone(role, frames):
     with pytest.raises(
         ModelError, match=f"m accepts frames in user turns only, not in a turn of the {role}"
     ):
         to_messages("m", (Turn(role, (frames[0],)),), EncodedFrames("png"), None)
 
 
-def test_png_loses_nothing_and_jpeg_little_and_both_are_the_same_bytes_each_time(
-    frames: list[FrameRef],
-) -> None:
+def test_png_loses_nothing_and_jpeg_little_and_both_are_the_same_bytes_each_time(frames):
     seen = np.asarray(frames[0].load())
     png, jpeg = EncodedFrames("png").url(frames[0]), EncodedFrames("jpeg").url(frames[0])
     assert png.startswith("data:image/png;base64,")
@@ -70,9 +67,7 @@ def test_png_loses_nothing_and_jpeg_little_and_both_are_the_same_bytes_each_time
     assert EncodedFrames("jpeg").url(frames[0]) == jpeg
 
 
-def test_a_frame_is_encoded_once_by_its_content(
-    tmp_path: Path, frames: list[FrameRef], monkeypatch
-) -> None:
+def test_a_frame_is_encoded_once_by_its_content(tmp_path, frames, monkeypatch):
     twin = FrameRef(tmp_path / "twin.png")
     twin.path.write_bytes(frames[0].path.read_bytes())
     loaded, load = [], FrameRef.load
@@ -82,7 +77,7 @@ def test_a_frame_is_encoded_once_by_its_content(
     assert len(loaded) == 1
 
 
-def test_no_more_is_kept_than_there_is_room_for(frames: list[FrameRef], monkeypatch) -> None:
+def test_no_more_is_kept_than_there_is_room_for(frames, monkeypatch):
     sizes = [len(EncodedFrames("png").base64(frame)) for frame in frames[:3]]
     encoded = EncodedFrames("png", max_bytes=sum(sizes) - 1)
     loaded, load = [], FrameRef.load
@@ -93,6 +88,6 @@ def test_no_more_is_kept_than_there_is_room_for(frames: list[FrameRef], monkeypa
     assert loaded == [frames[0], frames[1], frames[2], frames[1]]
 
 
-def test_a_frame_that_cannot_be_read_is_a_fault_of_the_data(tmp_path: Path) -> None:
+def test_a_frame_that_cannot_be_read_is_a_fault_of_the_data(tmp_path):
     with pytest.raises(DataError):
         EncodedFrames("png").url(FrameRef(tmp_path / "none.png"))

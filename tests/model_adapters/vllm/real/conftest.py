@@ -1,40 +1,28 @@
 """Models in real vLLM; `make test-vllm` makes an environment that has it."""
 
 import importlib.util
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any
 
 import pytest
 
-from model_adapters import load
+from ...asking import load_with
 
 
 @pytest.fixture(scope="session", autouse=True)
-def installed() -> None:
+def installed():
     """Skips where vLLM is not installed."""
     if importlib.util.find_spec("vllm") is None:
         pytest.skip("vLLM is not installed (make test-vllm makes an environment with it)")
 
 
 @pytest.fixture
-def start(
-    checkpoints: dict[str, Path], monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Callable[..., Any]]:
+def start(checkpoints, monkeypatch):
     """Starts a model of a tiny checkpoint in vLLM, and ends it with the test."""
     monkeypatch.setenv("VLLM_CPU_KVCACHE_SPACE", "1")
-    started: list[Any] = []
+    started = []
 
-    def start(family: str = "qwen2.5-vl", name: str | None = None, **options: object) -> Any:
-        settings = {
-            "pretrained": checkpoints[family],
-            "dtype": "float32",
-            "enforce_eager": True,
-            **options,
-        }
-        started.append(
-            load(f"{name or family}@vllm", {key: str(value) for key, value in settings.items()}, 0)
-        )
+    def start(family="qwen2.5-vl", name=None, **options):
+        usual = {"pretrained": checkpoints[family], "dtype": "float32", "enforce_eager": True}
+        started.append(load_with(f"{name or family}@vllm", **usual | options))
         return started[-1]
 
     yield start

@@ -2,38 +2,26 @@
 
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
 from model_adapters.vllm.cpu import runs_on_cpu
 
 from ...asking import up_to, user
 from ..families import adapter_of
 
-Start = Callable[..., Any]
 
-
-def _keys(folder: Path) -> list[str]:
+def _keys(folder):
     with safe_open(folder / "model.safetensors", "pt") as weights:
         return list(weights.keys())
 
 
 @pytest.mark.parametrize("family", ["llava-onevision", "llava"])
-def test_towers_of_both_forms_are_loaded(
-    family: str,
-    start: Start,
-    in_process: Start,
-    checkpoints: dict[str, Path],
-    frames: list[FrameRef],
-    tmp_path: Path,
-) -> None:
+def test_towers_of_both_forms_are_loaded(family, start, in_process, checkpoints, frames, tmp_path):
     flat = Path(shutil.copytree(checkpoints[family], tmp_path / "flat"))
     weights = load_file(flat / "model.safetensors")
     renamed = {
@@ -58,9 +46,7 @@ def test_towers_of_both_forms_are_loaded(
         model.close()
 
 
-def test_heads_that_a_cpu_has_no_kernel_for_are_refused_at_the_start(
-    start: Start, checkpoints: dict[str, Path], tmp_path: Path
-) -> None:
+def test_heads_that_a_cpu_has_no_kernel_for_are_refused_at_the_start(start, checkpoints, tmp_path):
     if not runs_on_cpu():
         pytest.skip("this vLLM runs on a GPU")
     small = Path(shutil.copytree(checkpoints["pixtral"], tmp_path / "small"))

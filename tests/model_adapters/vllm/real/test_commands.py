@@ -5,13 +5,10 @@ import os
 import random
 import signal
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from infthor_eval.runs import UnitRecord
 from infthor_eval.storage.folders import packaged_folder
 from model_adapters.hf.families.qwen2_5_vl import NANO_FOLDER
 from tests.helpers.command_line import option_words
@@ -21,10 +18,9 @@ from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_traje
 from tests.helpers.waiting import PATIENCE_S, wait_until
 
 ENGINES = ("vllm", "transformers")
-Run = Callable[..., list[UnitRecord[Any]]]
 
 
-def _arguments(engine: str, output: Path, *more: object) -> list[str]:
+def _arguments(engine, output, *more):
     model_args = f"pretrained={packaged_folder(NANO_FOLDER)},dtype=float32"
     model_args += ",enforce_eager=true" if engine == "vllm" else ",device=cpu"
     typed = [
@@ -35,11 +31,11 @@ def _arguments(engine: str, output: Path, *more: object) -> list[str]:
 
 
 @pytest.fixture
-def run_engine(run_cli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+def run_engine(run_cli, tmp_path, monkeypatch):
     """Runs a command with one of the engines; its records."""
     monkeypatch.setenv("VLLM_CPU_KVCACHE_SPACE", "1")
 
-    def run_engine(engine: str, *more: object) -> list[UnitRecord[Any]]:
+    def run_engine(engine, *more):
         output = tmp_path / engine / str(random.getrandbits(32))
         code, _, err = run_cli(*_arguments(engine, output, *more))
         assert code == 0, err
@@ -48,7 +44,7 @@ def run_engine(run_cli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     return run_engine
 
 
-def test_questions_are_answered_alike(run_engine: Run) -> None:
+def test_questions_are_answered_alike(run_engine):
     ours, theirs = (
         run_engine(engine, "--tasks", "nieh_mini_gt,nieh_mini_full", "--limit", 40)
         for engine in ENGINES
@@ -63,9 +59,7 @@ def test_questions_are_answered_alike(run_engine: Run) -> None:
     assert cached > 0.5 * read
 
 
-def test_switches_are_tried_before_the_run(
-    run_cli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_switches_are_tried_before_the_run(run_cli, tmp_path, monkeypatch):
     monkeypatch.setenv("VLLM_CPU_KVCACHE_SPACE", "1")
     tasks = ("--tasks", "nieh_mini_gt", "--limit", 6, "--check-equality", 6)
     switches = "max_num_batched_tokens=256,kv_cache_dtype=fp8"
@@ -79,9 +73,7 @@ def test_switches_are_tried_before_the_run(
 
 
 @pytest.mark.parametrize("more", [("--greedy",), ("--greedy", "--constrained")])
-def test_plans_are_carried_out_alike(
-    more: tuple[str, ...], run_engine: Run, tmp_path: Path
-) -> None:
+def test_plans_are_carried_out_alike(more, run_engine, tmp_path):
     data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 6), cut_trajectory(CANDLE, 4))
     ours, theirs = (
         run_engine(engine, "--tasks", "infthor_plans", "--data", data, *more) for engine in ENGINES
@@ -90,7 +82,7 @@ def test_plans_are_carried_out_alike(
     assert [record.payload for record in ours] == [record.payload for record in theirs]
 
 
-def test_two_workers_answer_as_one(run_engine: Run) -> None:
+def test_two_workers_answer_as_one(run_engine):
     one, two = (
         run_engine("vllm", "--tasks", "nieh_mini_gt", "--limit", 24, *more)
         for more in ((), ("--workers", 2))
@@ -100,7 +92,7 @@ def test_two_workers_answer_as_one(run_engine: Run) -> None:
     }
 
 
-def test_plans_are_carried_out_by_workers(run_engine: Run, tmp_path: Path) -> None:
+def test_plans_are_carried_out_by_workers(run_engine, tmp_path):
     data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 3), cut_trajectory(CANDLE, 3))
     words = ("--tasks", "infthor_plans", "--data", data, "--greedy")
     one, two = (run_engine("vllm", *words, *more) for more in ((), ("--workers", 2)))
@@ -109,13 +101,13 @@ def test_plans_are_carried_out_by_workers(run_engine: Run, tmp_path: Path) -> No
     }
 
 
-def test_a_run_that_was_killed_goes_on(run_engine: Run, tmp_path: Path) -> None:
+def test_a_run_that_was_killed_goes_on(run_engine, tmp_path):
     words = ("--tasks", "nieh_mini_full", "--limit", 40)
     output = tmp_path / "killed"
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[4])}
     command = cli_words(*_arguments("vllm", output, *words))
 
-    def n_lines() -> int:
+    def n_lines():
         return sum(path.read_bytes().count(b"\n") for path in output.rglob("worker-0.jsonl"))
 
     process = subprocess.Popen(

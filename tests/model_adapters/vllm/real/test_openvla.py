@@ -2,20 +2,16 @@
 language model."""
 
 import copy
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import msgspec
 import pytest
 
-from infthor_eval.formats.frames import FrameRef
 from model_adapters import load
 from model_adapters.policies.openvla.config import OpenVLAConfig
 from model_adapters.policies.openvla.network import OpenVLAWeights, weights_layout
 from model_adapters.policies.openvla.vision import TOWERS
-from model_adapters.policies.weights import Layout, empty_parameters
+from model_adapters.policies.weights import empty_parameters
 from model_adapters.tiny.openvla import OpenVLATiny
 from model_adapters.tiny.twin import HEAD, HIDDEN
 
@@ -24,15 +20,15 @@ SIZE = 224  # of the published towers' frames, which vLLM has no others for
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     """A checkpoint of 3 GB in float32."""
-    config: dict[str, Any] = copy.deepcopy(dict(OpenVLATiny.twin.files["config.json"]))
+    config = copy.deepcopy(dict(OpenVLATiny.twin.files["config.json"]))
     del config["vision_towers"]
     config["image_sizes"] = [SIZE, SIZE]
     heads = {"num_attention_heads": HIDDEN // HEAD, "num_key_value_heads": HIDDEN // HEAD}
     config["text_config"] |= {"hidden_size": HIDDEN, "max_position_embeddings": 2048, **heads}
 
-    def layout() -> Layout:
+    def layout():
         towers = tuple(TOWERS.values())
         with empty_parameters():
             weights = OpenVLAWeights(
@@ -46,13 +42,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return checkpoint
 
 
-def test_actions_are_those_of_the_native_port(
-    folder: Path, make_frames: Callable[..., list[FrameRef]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_actions_are_those_of_the_native_port(folder, make_frames, monkeypatch):
     monkeypatch.setenv("VLLM_CPU_KVCACHE_SPACE", "1")
     options = {"pretrained": str(folder), "dtype": "float32"}
-    ours: Any = load("openvla@vllm", {**options, "enforce_eager": "true"}, 0)
-    theirs: Any = load("openvla", {**options, "device": "cpu"}, 0)
+    ours = load("openvla@vllm", {**options, "enforce_eager": "true"}, 0)
+    theirs = load("openvla", {**options, "device": "cpu"}, 0)
     requests = [
         (frame, text)
         for frame in make_frames(2, 300, 300)

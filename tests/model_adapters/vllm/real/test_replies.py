@@ -1,21 +1,15 @@
 """Replies of real vLLM: token for token those of transformers, in float32 and greedy, for all
 families."""
 
-from collections.abc import Callable
-from typing import Any
-
 import pytest
 
-from infthor_eval.formats.frames import FrameRef
-from model_adapters import Part, check_adapter
+from model_adapters import check_adapter
 
 from ...asking import up_to, user
 from ..families import FAMILIES, adapter_of, facts
 
-Start = Callable[..., Any]
 
-
-def _prompts(frames: list[FrameRef]) -> list[tuple[Part, ...]]:
+def _prompts(frames):
     return [
         ("What do you see?",),
         (frames[0], "\nWhat is it?"),
@@ -27,9 +21,7 @@ def _prompts(frames: list[FrameRef]) -> list[tuple[Part, ...]]:
 
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("cached", [True, False])
-def test_replies_are_those_of_transformers(
-    family: str, cached: bool, start: Start, in_process: Start, frames: list[FrameRef]
-) -> None:
+def test_replies_are_those_of_transformers(family, cached, start, in_process, frames):
     ours = start(family, adapter_of(family), **({} if cached else {"prefix_caching": False}))
     theirs = in_process(family, adapter_of(family))
     for parts in _prompts(frames):
@@ -48,8 +40,8 @@ _SMALL_STEPS = {
 
 @pytest.mark.parametrize("options", [_SMALL_STEPS, {"tensor_parallel_size": 2}])
 def test_replies_in_small_steps_or_by_two_processes_are_the_same(
-    options: dict[str, Any], start: Start, in_process: Start, frames: list[FrameRef]
-) -> None:
+    options, start, in_process, frames
+):
     models = (start(**options), in_process("qwen2.5-vl"))
     continuations = [[*parts] for parts in _prompts(frames)]
     replies = [model.conversation().replies(continuations, up_to(50)) for model in models]
@@ -57,13 +49,11 @@ def test_replies_in_small_steps_or_by_two_processes_are_the_same(
 
 
 @pytest.mark.parametrize("family", ["qwen2.5-vl", "pixtral", "llava"])
-def test_it_keeps_the_contract(family: str, start: Start) -> None:
+def test_it_keeps_the_contract(family, start):
     check_adapter(start(family, adapter_of(family)), (84, 84))
 
 
-def test_of_continuations_the_others_find_the_prefix_of_the_first(
-    start: Start, in_process: Start, frames: list[FrameRef]
-) -> None:
+def test_of_continuations_the_others_find_the_prefix_of_the_first(start, in_process, frames):
     continuations = [[f"\nQuestion {number}: what is it?"] for number in range(5)]
     models, replies = (start(), in_process("qwen2.5-vl")), []
     for model in models:
@@ -76,9 +66,7 @@ def test_of_continuations_the_others_find_the_prefix_of_the_first(
     assert all(reply.n_cached_tokens >= 128 for reply in replies[0][1:])
 
 
-def test_a_reply_is_held_to_choices(
-    start: Start, in_process: Start, frames: list[FrameRef]
-) -> None:
+def test_a_reply_is_held_to_choices(start, in_process, frames):
     decoding = up_to(30, choices=("on the table", "in the sink", "in the fridge"))
     ours, theirs = start(), in_process("qwen2.5-vl")
     for frame in frames:
@@ -87,9 +75,7 @@ def test_a_reply_is_held_to_choices(
         assert theirs.answer(turns, decoding).text in decoding.choices
 
 
-def test_a_stop_string_ends_and_cuts_the_reply_where_transformers_does(
-    start: Start, in_process: Start, frames: list[FrameRef]
-) -> None:
+def test_a_stop_string_ends_and_cuts_the_reply_where_transformers_does(start, in_process, frames):
     ours, theirs, turns = start(), in_process("qwen2.5-vl"), user(frames[0], "Where?")
     # An untrained model writes halves of characters, too, which vLLM holds back and transformers
     # decodes.
@@ -101,7 +87,7 @@ def test_a_stop_string_ends_and_cuts_the_reply_where_transformers_does(
         assert facts(replies[0]) == facts(replies[1])
 
 
-def test_draws_repeat_with_their_seed(start: Start, frames: list[FrameRef]) -> None:
+def test_draws_repeat_with_their_seed(start, frames):
     model, turns = start(), user(frames[0], "Say it.")
     replies = [
         model.answer(turns, up_to(20, temperature=1.5, top_p=0.9, seed=seed)).text
@@ -113,9 +99,7 @@ def test_draws_repeat_with_their_seed(start: Start, frames: list[FrameRef]) -> N
 @pytest.mark.parametrize(
     ("family", "rope"), [("qwen2.5-vl", "yarn:4"), ("pixtral", "yarn:2"), ("pixtral", "linear:2")]
 )
-def test_an_extended_model_answers_as_in_transformers(
-    family: str, rope: str, start: Start, in_process: Start, frames: list[FrameRef]
-) -> None:
+def test_an_extended_model_answers_as_in_transformers(family, rope, start, in_process, frames):
     ours, theirs = start(family, rope=rope), in_process(family, rope=rope)
     for parts in _prompts(frames):
         turns = user(*parts, "Where is the mug? " * 40)

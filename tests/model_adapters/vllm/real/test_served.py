@@ -3,17 +3,12 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any
 
 import psutil
 import pytest
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
-from infthor_eval.runs import UnitRecord
 from infthor_eval.storage.folders import packaged_folder
 from model_adapters import load
 from model_adapters.hf.families.qwen2_5_vl import NANO_FOLDER
@@ -24,7 +19,7 @@ from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_traje
 from tests.helpers.waiting import PATIENCE_S, wait_until
 
 from ...asking import up_to
-from ...serving import free_port, wait_for_server
+from ...serving import free_port, run_each, wait_for_server
 
 SERVER = "vllm.entrypoints.openai.api_server"
 MODEL = str(packaged_folder(NANO_FOLDER))
@@ -32,7 +27,7 @@ MOST_FRAMES = 200  # more than a context of `nieh_mini_full` has
 
 
 @contextmanager
-def _server(port: int, log: Path) -> Iterator["subprocess.Popen[bytes]"]:
+def _server(port, log):
     """vLLM's server with the small trained model, on a port."""
     limits = [
         "--max-model-len",
@@ -67,7 +62,7 @@ def _server(port: int, log: Path) -> Iterator["subprocess.Popen[bytes]"]:
 
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
+def served(tmp_path_factory):
     """The small trained model behind vLLM's server; the options of `--model openai` for it."""
     port = free_port()
     with _server(port, tmp_path_factory.mktemp("served") / "log"):
@@ -75,45 +70,31 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]
 
 
 @pytest.fixture
-def both(
-    served: dict[str, str], tmp_path: Path, run_cli: Any
-) -> Callable[..., list[list[UnitRecord[Any]]]]:
+def both(served, tmp_path, run_cli):
     """Runs the same tasks behind the server and in this process; the records of both."""
 
-    def both(*arguments: object, **more: str) -> list[list[UnitRecord[Any]]]:
+    def both(*arguments, **more):
         here = {"pretrained": served["model"], "device": "cpu", "dtype": "float32"}
-        records = []
-        for model, settings in (("openai", served | more), ("qwen2.5-vl", here)):
-            options = ",".join(f"{name}={value}" for name, value in settings.items())
-            code, _, err = run_cli(
-                *option_words(model=model, model_args=options, name=model, out=tmp_path / "out"),
-                *arguments,
-            )
-            assert code == 0, err
-            records.append(read_records(tmp_path / "out" / model))
-        return records
+        models = {"openai": served | more, "qwen2.5-vl": here}
+        return run_each(run_cli, tmp_path / "out", models, *arguments)
 
     return both
 
 
-def test_questions_are_answered_as_in_this_process(
-    both: Callable[..., list[list[UnitRecord[Any]]]],
-) -> None:
+def test_questions_are_answered_as_in_this_process(both):
     behind, here = both("--tasks", "nieh_mini_gt,nieh_mini_full", "--limit", 20)
     assert [record.payload.reply for record in behind] == [record.payload.reply for record in here]
     assert sum(record.tokens.cached or 0 for record in behind) > 0
 
 
-def test_plans_stop_at_special_tokens(
-    both: Callable[..., list[list[UnitRecord[Any]]]], tmp_path: Path
-) -> None:
+def test_plans_stop_at_special_tokens(both, tmp_path):
     data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 3), cut_trajectory(CANDLE, 2))
     behind, here = both("--tasks", "infthor_plans", "--data", data, "--greedy")
     assert [record.payload for record in behind] == [record.payload for record in here]
 
 
-def test_choices_hold(served: dict[str, str], frames: list[FrameRef]) -> None:
-    model: Any = load("openai", served | {"guided": "vllm"}, 0)
+def test_choices_hold(served, frames):
+    model = load("openai", served | {"guided": "vllm"}, 0)
     talk = model.conversation()
     talk.append(frames[0], "Where is the mug?")
     assert talk.reply(up_to(20, choices=("on the table", "in the sink"))).text in (
@@ -123,10 +104,8 @@ def test_choices_hold(served: dict[str, str], frames: list[FrameRef]) -> None:
     model.close()
 
 
-def test_more_frames_than_the_server_takes_are_refused_with_its_option(
-    served: dict[str, str], make_frames: Callable[..., list[FrameRef]]
-) -> None:
-    model: Any = load("openai", served, 0)
+def test_more_frames_than_the_server_takes_are_refused_with_its_option(served, make_frames):
+    model = load("openai", served, 0)
     talk = model.conversation()
     talk.append(*make_frames(MOST_FRAMES + 1, 28, 28), "What is it?")
     with pytest.raises(
@@ -137,14 +116,14 @@ def test_more_frames_than_the_server_takes_are_refused_with_its_option(
 
 
 def test_a_server_that_dies_costs_nothing_that_was_answered_and_goes_on_once_it_is_back(
-    tmp_path: Path, run_cli: Any
-) -> None:
+    tmp_path, run_cli
+):
     port, output = free_port(), tmp_path / "out"
     model_args = f"base_url=http://127.0.0.1:{port}/v1,model={MODEL},retries=1,max_in_flight=1"
     words = option_words(model="openai", model_args=model_args, tasks="nieh_mini_full", limit="40")
     command = cli_words(*words, "--out", output)
 
-    def n_answered() -> int:
+    def n_answered():
         lines = [
             line
             for path in output.rglob("worker-*.jsonl")
