@@ -16,9 +16,13 @@ def read_one_line(caught: pytest.ExceptionInfo[Exception]) -> str:
     return message
 
 
-def assert_raises_one_line(do: Callable[[], object], expected: str) -> None:
-    """Hold that something is refused in one line that says what is expected."""
-    with pytest.raises(InfthorError) as caught:
+def assert_raises_one_line(
+    do: Callable[[], object],
+    expected: str,
+    errors: type[InfthorError] | tuple[type[InfthorError], ...] = InfthorError,
+) -> None:
+    """Hold that something is refused in one line that says what is expected, by one of `errors`."""
+    with pytest.raises(errors) as caught:
         do()
     message = read_one_line(caught)
     assert expected in message

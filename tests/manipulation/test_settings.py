@@ -129,7 +129,7 @@ def test_settings_have_defaults_and_all_of_them_act(data):
     ({"bundled": "nothing"}, "the installation lacks its data folder 'sets/nothing'"),
 ])  # fmt: skip
 def test_a_setting_that_would_not_act_is_refused(data, settings, expected):
-    assert_raises_one_line(lambda: task_of(data, **settings), expected)
+    assert_raises_one_line(lambda: task_of(data, **settings), expected, (DataError, UsageError))
 
 
 # -- trajectories

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from infthor_eval.errors import DataError, UsageError
 from infthor_eval.runs import execute
 
 from ..helpers.refusals import assert_raises_one_line
@@ -54,7 +55,7 @@ def task_file(task_files: Path):
 )
 def test_a_setting_that_would_not_act_is_refused(prepare_run, task_file, settings, expected):
     task_file(settings)
-    assert_raises_one_line(prepare_run, expected)
+    assert_raises_one_line(prepare_run, expected, (DataError, UsageError))
 
 
 def test_settings_of_a_task_file_act_and_options_go_before_them(prepare_run, task_file):
