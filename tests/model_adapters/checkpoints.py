@@ -67,6 +67,8 @@ def save(name: str, folder: Path) -> None:
         # words.
         save_family("gemma3", folder, special=("\n", "\n\n", "\n\n\n", "\n\n\n\n"))
     elif name in OTHERS:
-        save_family(OTHERS[name], folder)
+        # Frames in their places, where LLaVA's own template has them before the words.
+        chat = replace(_benchmarks()[0][OTHERS[name]].chat, images_first=False)
+        save_family(OTHERS[name], folder, chat=chat)
     else:
         twin(name).save(folder, seed=0)

@@ -13,7 +13,7 @@ from infthor_eval.formats.pictures.video import FILM_FPS, sample_positions
 from model_adapters import Video, load
 from model_adapters.hf.family import ClipShape
 
-from ..asking import require_same, up_to, user
+from ..asking import ask, load_saved, require_same, talk_of, up_to, user
 
 LOGS = Path(__file__).parents[4] / "../shared/data/published_sets/replies"
 QUESTION = "\nWhat do you see?"
@@ -28,11 +28,8 @@ def published(make_frames):
 
 
 def vision_tokens(model, video):
-    talk = model.conversation()
-    talk.append(QUESTION)
-    without = talk.n_tokens
-    talk.append(video)
-    return int(talk.n_tokens) - int(without)
+    without, with_it = (talk_of(model, user(*more, QUESTION)) for more in ((), (video,)))
+    return with_it.n_tokens - without.n_tokens
 
 
 def published_tokens(n_frames, fps):
@@ -111,7 +108,7 @@ def test_replies_are_those_of_the_whole_processor_and_generate(
         {checkpoints[family]: turns for family, turns in requests.items()}, new
     )
     for family, turns in requests.items():
-        model = load(family, {"pretrained": str(checkpoints[family]), "device": "cpu"}, seed=0)
+        model = load_saved(family, checkpoints[family])
         for one, (ids, reply) in zip(turns, answers[checkpoints[family]], strict=True):
             require_same(model, one, ids, reply, new)
         model.close()
@@ -126,14 +123,8 @@ def test_sharing_and_chunks_change_no_reply(tiny, plain, make_frames):
         (frames[1], films[1], "\nWhat now?"),
     ]
     for parts in requests:
-        replies = []
-        for model in (tiny, plain):
-            talk = model.conversation()
-            talk.append(*parts)
-            replies.append(talk.reply(up_to(6)))
-        assert replies[0].token_ids == replies[1].token_ids
-    talk = tiny.conversation()
-    talk.append(films[0])
+        assert ask(tiny, *parts, new=6).token_ids == ask(plain, *parts, new=6).token_ids
+    talk = talk_of(tiny, user(films[0]))
     _, two = talk.replies([["\nIs it?"], ["\nWhat is it?"]], up_to(1))
     assert two.n_cached_tokens >= 2 * 144
 
@@ -180,12 +171,10 @@ def test_a_models_own_token_of_a_video_has_the_position_of_a_text(tiny):
 def test_models_without_a_video_input_refuse_videos(frames):
     for name in ("pixtral-tiny", "qwen2.5-vl-nano"):
         model = load(name, {}, seed=0)
-        talk = model.conversation()
-        talk.append(Video(tuple(frames), 1.0), QUESTION)
         with pytest.raises(
             ModelError, match=f"{name} has no video input; give it the video's frames as images"
         ):
-            talk.reply(up_to(1))
+            ask(model, Video(tuple(frames), 1.0), QUESTION)
         model.close()
 
 

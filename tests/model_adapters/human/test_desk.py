@@ -1,12 +1,13 @@
 """Where a question waits for its answer."""
 
 import threading
-import time
 
 import pytest
 
 from model_adapters import Decoding, Notice, Turn
 from model_adapters.human.desk import Answer, Desk, Inquiry, ScreenClock, StaleError
+
+from ...helpers.waiting import wait_until
 
 ASKED = Inquiry((Turn("user", ("Where is the mug?",)),), Decoding(max_new_tokens=5), Notice())
 
@@ -23,16 +24,8 @@ def asking(desk):
 
     thread = threading.Thread(target=ask, daemon=True)
     thread.start()
-    until(lambda: desk.question is not None)
+    wait_until(lambda: desk.question is not None)
     return thread, answers
-
-
-def until(holds):
-    for _ in range(1000):
-        if holds():
-            return
-        time.sleep(0.005)
-    pytest.fail("it never came to hold")
 
 
 def test_a_question_waits_for_its_answer_and_is_gone_then():
@@ -100,26 +93,26 @@ def test_who_waits_for_a_change_learns_of_it():
     assert desk.is_closed and desk.version > seen
 
 
-def test_it_ends_when_a_page_has_learned_of_it_or_when_there_is_none():
+def test_it_ends_at_once_where_nobody_has_asked():
     desk = Desk()
     desk.close()
-    desk.wait_until_informed(60.0, 60.0)  # nobody has asked: returns at once
-    with desk.reading():
-        pass
-    ending = threading.Thread(target=desk.wait_until_informed, args=(0.0, 60.0), daemon=True)
-    ending.start()
-    ending.join(0.05)
-    assert ending.is_alive()
-    desk.report_closed()
-    ending.join(60.0)
-    assert not ending.is_alive()
+    desk.wait_until_informed(60.0, 60.0)
 
 
-def test_a_page_that_waits_for_news_is_waited_for_longer_than_one_that_may_be_closed():
+@pytest.mark.parametrize(
+    ("is_waiting", "patience"),
+    [(False, (0.0, 60.0)), (True, (60.0, 0.0))],  # of a page that waits for news, longer
+)
+def test_it_ends_when_a_page_has_learned_of_it(is_waiting, patience):
     desk = Desk()
-    with desk.reading():
+    if is_waiting:
+        with desk.reading():
+            desk.close()
+    else:
         desk.close()
-    ending = threading.Thread(target=desk.wait_until_informed, args=(60.0, 0.0), daemon=True)
+        with desk.reading():
+            pass
+    ending = threading.Thread(target=desk.wait_until_informed, args=patience, daemon=True)
     ending.start()
     ending.join(0.05)
     assert ending.is_alive()

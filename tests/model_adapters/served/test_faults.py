@@ -15,7 +15,15 @@ from infthor_eval.errors import ModelError
 from model_adapters.served import endpoint, wire
 
 from ..policies.servers import send
-from .talking import always_send, ask_once, completion, open_model, read_refusal, talkative
+from .talking import (
+    always_send,
+    ask_once,
+    completion,
+    keep_requests,
+    open_model,
+    read_refusal,
+    talkative,
+)
 
 
 def _resets(_request, handler):
@@ -93,41 +101,34 @@ PASSING = {
 @pytest.mark.parametrize("fault", PASSING)
 def test_what_passes_is_sent_again_and_told(fault):
     fail, message = PASSING[fault]
-    n_asked = 0
+    asked = []
 
-    def answer(request, handler):
-        nonlocal n_asked
-        n_asked += 1
-        return fail(request, handler) if n_asked < 3 else talkative(request, handler)
+    def fail_twice(request, handler):
+        return (fail if len(asked) < 3 else talkative)(request, handler)
 
+    answer = keep_requests(asked, fail_twice)
     with open_model(answer, retries=2) as model:
         reply = ask_once(model)
-    assert n_asked == 3
+    assert len(asked) == 3
     assert len(reply.faults) == 2
     for line in reply.faults:
         assert message in line
         assert line.startswith("http://127.0.0.1:")
         assert "\n" not in line
-    n_asked = 0
-    assert f"{message}" in (line := read_refusal(answer, retries=1))
+    asked.clear()
+    assert message in (line := read_refusal(answer, retries=1))
     assert ", in 2 attempts; " in line
-    assert n_asked == 2
+    assert len(asked) == 2
 
 
 @pytest.mark.parametrize(
     ("code", "hint"), [(400, "check"), (401, "set the environment variable"), (402, "check your")]
 )
 def test_what_does_not_pass_is_not_asked_again_inside_a_200_either(code, hint):
-    n_asked = 0
-
-    def answer(*_):
-        nonlocal n_asked
-        n_asked += 1
-        return {"error": {"code": code, "message": "no such fridge"}}
-
-    line = read_refusal(answer, retries=3)
+    asked, said = [], {"error": {"code": code, "message": "no such fridge"}}
+    line = read_refusal(keep_requests(asked, lambda *_: said), retries=3)
     assert f"answers {code} " in line and "no such fridge" in line and hint in line
-    assert n_asked == 1
+    assert len(asked) == 1
 
 
 @pytest.mark.parametrize(
@@ -146,18 +147,16 @@ def test_a_reply_that_ended_well_is_none(document):
 
 
 def test_a_server_that_is_down_is_not_waited_for_by_every_unit():
-    down, n_asked = True, 0
+    down, asked = True, []
 
     def answer(request, handler):
-        nonlocal n_asked
-        n_asked += 1
         return send(handler, 503, b"") if down else talkative(request, handler)
 
-    with open_model(answer, retries=3) as model:
+    with open_model(keep_requests(asked, answer), retries=3) as model:
         for n_expected in (4, 5, 6):
             with pytest.raises(ModelError, match="answers 503"):
                 ask_once(model)
-            assert n_asked == n_expected
+            assert len(asked) == n_expected
         down = False
         assert ask_once(model).faults == ()
         down = True
@@ -166,20 +165,14 @@ def test_a_server_that_is_down_is_not_waited_for_by_every_unit():
 
 
 def test_a_server_that_is_only_busy_is_asked_as_patiently_by_every_unit():
-    n_asked = 0
-
-    def answer(_request, handler):
-        nonlocal n_asked
-        n_asked += 1
-        send(handler, 429, b"slow down")
-
-    with open_model(answer, retries=2) as model:
+    asked = []
+    with open_model(keep_requests(asked, always_send(429, b"slow down")), retries=2) as model:
         for n_expected in (3, 6):
             with pytest.raises(
                 ModelError, match="answers 429 Too Many Requests: 'slow down', in 3 attempts; lower"
             ):
                 ask_once(model)
-            assert n_asked == n_expected
+            assert len(asked) == n_expected
 
 
 def test_a_server_that_is_not_there_is_one_line():

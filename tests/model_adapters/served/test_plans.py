@@ -10,7 +10,7 @@ from tests.helpers.journals import read_outcome
 from tests.helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 
 from ..policies.servers import send
-from .talking import completion, serve_chat
+from .talking import completion, keep_requests, serve_chat
 
 MOVES = ("RotateLeft", "RotateRight", "LookUp", "LookDown", "MoveAhead")
 
@@ -70,15 +70,13 @@ def test_episodes_at_once_find_what_one_after_the_other_finds(played, tmp_path):
 def test_a_plan_that_fails_in_the_middle_says_what_it_took_and_the_next_one_is_played(
     played, tmp_path
 ):
-    n_asked = 0
+    asked = []
 
-    def answer(request, handler):
-        nonlocal n_asked
-        n_asked += 1
-        return send(handler, 400, b"no") if n_asked == 3 else completion("RotateLeft", (100, 3))
+    def answer(_request, handler):
+        return send(handler, 400, b"no") if len(asked) == 3 else completion("RotateLeft", (100, 3))
 
     data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 2))
-    with serve_chat(answer) as url:
+    with serve_chat(keep_requests(asked, answer)) as url:
         code, (first, second), results = played(url, data)
     assert code == 1
     assert "answers 400 Bad Request: 'no'" in first.failure
@@ -87,15 +85,13 @@ def test_a_plan_that_fails_in_the_middle_says_what_it_took_and_the_next_one_is_p
 
 
 def test_a_survived_fault_stands_in_the_plans_record(played, tmp_path):
-    n_asked = 0
+    asked = []
 
-    def answer(request, handler):
-        nonlocal n_asked
-        n_asked += 1
-        return send(handler, 503, b"busy") if n_asked == 2 else completion("RotateLeft")
+    def answer(_request, handler):
+        return send(handler, 503, b"busy") if len(asked) == 2 else completion("RotateLeft")
 
     data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 1))
-    with serve_chat(answer) as url:
+    with serve_chat(keep_requests(asked, answer)) as url:
         code, (record,), _ = played(url, data, retries=1)
     assert code == 0
     (fault,) = record.faults

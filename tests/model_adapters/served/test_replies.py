@@ -11,7 +11,15 @@ from model_adapters.served.completion import decode_reply
 from model_adapters.served.openai import ChatCompletion
 
 from ..policies.servers import send
-from .talking import always_say, always_send, ask_once, completion, open_model, read_refusal
+from .talking import (
+    always_say,
+    always_send,
+    ask_once,
+    completion,
+    keep_requests,
+    open_model,
+    read_refusal,
+)
 
 KEY = "sk-0123456789abcdef0123456789"
 
@@ -127,15 +135,9 @@ SHAPES = {
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_reply_of_any_shape_is_one_line_and_not_asked_for_again(shape):
     answer, message = SHAPES[shape]
-    n_asked = 0
-
-    def counted(request, handler):
-        nonlocal n_asked
-        n_asked += 1
-        return answer(request, handler)
-
-    assert message in read_refusal(counted, retries=3)
-    assert n_asked == 1
+    asked = []
+    assert message in read_refusal(keep_requests(asked, answer), retries=3)
+    assert len(asked) == 1
 
 
 _VALUES = st.recursive(
