@@ -1,11 +1,19 @@
 """Journals: those of runs that nobody ran, and what is in those of runs."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Protocol
 
-from infthor_eval.runs import RecordTypes, RunHeader, UnitRecord, read_header, read_run
+from infthor_eval.runs import (
+    RecordTypes,
+    RunHeader,
+    StoredRequest,
+    UnitRecord,
+    read_header,
+    read_run,
+)
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.suites import find_suite
 
@@ -28,10 +36,16 @@ class RecordedRun(Protocol):
 
 
 def write_journal(
-    folder: Path, header: RunHeader, records: Sequence[UnitRecord[Any]], types: RecordTypes[Any]
+    folder: Path,
+    header: RunHeader,
+    records: Sequence[UnitRecord[Any]],
+    types: RecordTypes[Any],
+    requests: Mapping[str, StoredRequest] = MappingProxyType({}),
 ) -> Path:
     """Write the journal of a run as the driver does; returns the run's folder."""
     with Journal(folder, header, types) as journal:
+        for name, request in requests.items():
+            journal.cache_artifact(name, request)
         for record in records:
             journal.append(record)
     return folder

@@ -16,7 +16,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.nieh.validation import JudgedQuestion
 from infthor_eval.report.inspection import write_inspection_page
-from infthor_eval.runs import read_run
+from infthor_eval.runs.journals.shards import read_run_log
 from tests.helpers.browser import Opened
 from tests.helpers.journals import write_journal
 
@@ -71,7 +71,7 @@ def hostile_runs(hostile_set: Path, tmp_path_factory: pytest.TempPathFactory) ->
     assert ended.value.code == 0
     renamed = []
     for number, folder in enumerate(sorted(output.glob("*/nieh*"))):
-        header, records = read_run(folder, RECORDS)
+        header, log = read_run_log(folder, RECORDS)
         name = f"{HOSTILE}{number}"
         model = header.config.model | {"name": name, "checkpoint": HOSTILE}
         config = msgspec.structs.replace(header.config, model=model)
@@ -80,9 +80,10 @@ def hostile_runs(hostile_set: Path, tmp_path_factory: pytest.TempPathFactory) ->
             msgspec.structs.replace(
                 record, payload=msgspec.structs.replace(record.payload, reply=REPLIES[at])
             )
-            for at, record in enumerate(records)
+            for at, record in enumerate(log.records)
         ]
-        renamed.append(write_journal(output / f"hostile-{number}", header, given, RECORDS))
+        renamed.append(output / f"hostile-{number}")
+        write_journal(renamed[-1], header, given, RECORDS, log.requests)
     return renamed
 
 
