@@ -91,13 +91,12 @@ class Pairs(Generic[W]):
 
     def scores(self) -> list[PairScore]:
         """Return the score of each pair in each variant, over its repetitions."""
-        return [
-            PairScore(
-                *name, self.cluster_of(pairs[0][0]), PairShares.mean(map(self._shares, pairs))
-            )
-            for name, same in groupby(self.pairs, key=lambda pair: self.name_of(pair[0]))
-            if (pairs := list(same))
-        ]
+        scores = []
+        for name, same in groupby(self.pairs, key=lambda pair: self.name_of(pair[0])):
+            pairs = list(same)
+            shares = PairShares.mean(map(self._shares, pairs))
+            scores.append(PairScore(*name, self.cluster_of(pairs[0][0]), shares))
+        return scores
 
     def rates(self, n_all: int) -> dict[str, Rate]:
         """Return the means of pairs, of `n_all` that were to be answered, by metric."""

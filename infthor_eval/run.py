@@ -250,6 +250,11 @@ class Run:
         return tasks
 
     @property
+    def is_baseline(self) -> bool:
+        """Whether a baseline replied, and no model."""
+        return "baseline" in self.own_header.config.model
+
+    @property
     def simulator(self) -> str:
         """Names of the frames' simulators, separated by commas; empty if not known."""
         return ", ".join(self.own_header.config.simulators)

@@ -77,31 +77,27 @@ class EpisodeRunner(Generic[E, P]):
         self.usage = NOTHING
         self.request = None
         start = time.perf_counter()
-        outcome: tuple[EpisodeResult[P], tuple[str, ...]] | InfthorError
         try:
-            outcome = with_retries(self._simulator, run, self._drop_environment)
+            result, faults = with_retries(self._simulator, run, self._drop_environment)
+        except (InfeasibleError, SceneError) as error:
+            keep_request(self.request, session)  # that of a later episode may continue it
+            return unit.record_exclusion(str(error), fingerprint)
         except InfthorError as error:
-            outcome = error
-        request = keep_request(self.request, session)
-        if isinstance(outcome, (InfeasibleError, SceneError)):
-            return unit.record_exclusion(str(outcome), fingerprint)
-        if isinstance(outcome, InfthorError):
             begun = unit if self.begun is None else replace(unit, payload=self.begun)
             return begun.record_failure(
-                session.describe_failure(unit, outcome),
+                session.describe_failure(unit, error),
                 fingerprint,
-                asked=not isinstance(outcome, NotAskedError),
+                asked=not isinstance(error, NotAskedError),
                 usage=self.usage,
-                request=request,
+                request=keep_request(self.request, session),
             )
-        result, faults = outcome
         return unit.record(
             fingerprint,
             result.payload,
             faults=(*faults, *result.faults),
             seconds=round(time.perf_counter() - start, 4),
             usage=self.usage,
-            request=request,
+            request=keep_request(self.request, session),
             **({} if result.tokens is None else {"tokens": result.tokens}),
         )
 

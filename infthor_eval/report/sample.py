@@ -96,11 +96,6 @@ class Sample:
         return self.record.failure or self.record.excluded or ""
 
     @property
-    def is_baseline(self) -> bool:
-        """Whether a baseline replied, and no model."""
-        return "baseline" in self.run.header.config.model
-
-    @property
     def is_episode(self) -> bool:
         """Whether it is an episode, and no reply to a request."""
         return self.run.presenter.replay is not None
@@ -121,7 +116,7 @@ class Sample:
     @property
     def request_problem(self) -> str:
         """Why the request is not known; empty if it is, and for a baseline, which is sent none."""
-        if self.request is not None or self.is_baseline:
+        if self.request is not None or self.run.is_baseline:
             return ""
         if self.record.request:
             return "it is not in the journal; its line there is missing or bad"

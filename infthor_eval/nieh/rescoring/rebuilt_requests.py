@@ -1,7 +1,8 @@
 """The requests of a stored run, made again from its header and its set.
 
-A journal has the hash of each request, not the request. A request that was made again is returned
-only if it has that hash, so what is shown is what was sent.
+A journal has the texts of a request and the places of its frames, but no pictures; and what a
+stranger's journal says was sent is not to be believed. A request that was made again is returned
+only if it has the hash in the record, so its frames are those that were sent.
 """
 
 from collections.abc import Iterator, Mapping

@@ -101,10 +101,10 @@ class _Source:
         requests = self.run.requests(sample.record)
         if not requests:
             prompt = Prompt(problem=sample.request_problem)
-            return None if sample.is_baseline else self.texts.prompts.number(prompt)
+            return None if self.run.is_baseline else self.texts.prompts.number(prompt)
         number = None
         for request in requests:
-            note = _OF_BASELINES if sample.is_baseline else ""
+            note = _OF_BASELINES if self.run.is_baseline else ""
             prompt = Prompt(request.parts, request.shown, number, note=note)
             number = self.texts.prompts.number(prompt)
         return number

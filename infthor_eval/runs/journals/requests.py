@@ -25,7 +25,7 @@ class StoredFrames(msgspec.Struct, frozen=True, omit_defaults=True):
         n: number of frames.
         places: where in the trajectory they are, in the order shown; empty where they are no frames
             of it.
-        what: what they are, in words ("blank frames", "video of 1 frames per second").
+        what: what they are, in words ("frames (blank)", "video of 1 frames per second").
     """
 
     n: Count
