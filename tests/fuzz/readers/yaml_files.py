@@ -4,15 +4,16 @@ YAML, too."""
 import json
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import click
 
 from infthor_eval.cli.commands.run import command as run_command
+from infthor_eval.episodes.curves import Curve, Facet, RewardCurves, RunCurves
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.report.suites.reward_curves import read_panels
 from infthor_eval.runs.catalog import Catalog
+from infthor_eval.statistics import MeanEstimate
 from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.suites import find_suite
 from infthor_eval.training.recipe import read_recipe
@@ -88,7 +89,14 @@ def _parse_options(folder: Path) -> None:
         assert "\n" not in error.message
 
 
-_CURVES: Any = SimpleNamespace(runs=[SimpleNamespace(label="A"), SimpleNamespace(label="B")])
+_CURVE = Curve((0.0, 10.0), (MeanEstimate(0.5, 0.1, 0.3, 0.7, 4, 2),) * 2)
+_CURVES = RewardCurves(
+    task="infthor_plans",
+    facets={"steps": Facet("steps")},
+    runs=tuple(RunCurves(label, False, True, {"steps": _CURVE}, {}) for label in ("A", "B")),
+    n_trajectories=1,
+    notes=(),
+)
 _PANELS = {"one": ["A", "B"], "two": ["A"]}
 READERS = (
     *(
