@@ -33,7 +33,7 @@ from infthor_eval.training.network import SequenceModel, freeze
 from infthor_eval.training.ranks import assign_ranks
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.prompt import Prompter
-from model_adapters.options.tiny import TinyOptions
+from model_adapters.registry import read_options
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 
 N_FRAMES = 8  # different frames, which the sequence repeats
@@ -86,7 +86,7 @@ def measure(rank: int, n_ranks: int, n_tokens: int, folder: Path) -> None:
     """Write the numbers of one process: MB kept, kept if recomputed, at the peak; seconds; loss."""
     torch.set_num_threads(1)
     dist.init_process_group("gloo", f"file://{folder / 'meeting'}", world_size=n_ranks, rank=rank)
-    loaded = Wider.build("wider", TinyOptions(), 0)._loaded
+    loaded = Wider.build("wider", read_options("qwen2.5-vl-tiny", {}), 0)._loaded
     model = SequenceModel(loaded).train()
     freeze(model, ["vision", "embeddings"])
     long, short = (batch_of(loaded, folder, length) for length in (n_tokens, n_tokens // 16))

@@ -55,7 +55,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.report.differences import margin_of_difference
 from model_adapters import Decoding
 from model_adapters.hf.cached.model import TransformersModel
-from model_adapters.options.tiny import TinyOptions
+from model_adapters.options.checkpoints import HfOptions
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 from model_adapters.tiny.twin import TinyAdapter
 
@@ -186,7 +186,7 @@ def _arguments() -> argparse.Namespace:
         parser.error("--largest needs --device cuda, as a CPU swaps memory and has no clear limit")
     options.machine = options.machine or options.largest
     options.chunk_tokens = options.chunk_tokens or [
-        TinyOptions().chunk_size(torch.device(options.device).type)
+        HfOptions().chunk_size(torch.device(options.device).type)
     ]
     if options.without_cudnn:
         torch.backends.cuda.enable_cudnn_sdp(False)
@@ -200,12 +200,13 @@ def build(options: argparse.Namespace) -> TransformersModel:
     if options.model_size == "7b":
         twin, dtype = replace(twin, config=_real_shape), "bfloat16"
     adapter = type("Adapter", (TinyAdapter,), {"twin": twin})
-    settings = TinyOptions(
+    settings = HfOptions(
         device=options.device,
         dtype=dtype,
         attn_implementation=options.attention,
         chunk_tokens=options.chunk_tokens[0],
         batch_size=options.batch_size[0],
+        threads=1,
         max_tokens=0,
         margins=options.margins,
     )

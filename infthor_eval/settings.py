@@ -92,7 +92,8 @@ class Declared(NamedTuple):
         """What its values are, in words: "whole number", "list of numbers"."""
         if typing.get_origin(self.kind) is tuple:
             return f"list of {_KINDS[_bare(typing.get_args(self.kind)[0])]}s"
-        return _KINDS[typing.get_origin(self.kind) or self.kind]
+        kind = typing.get_origin(self.kind) or self.kind
+        return _KINDS.get(kind, kind.__name__)
 
     @property
     def valid(self) -> str:
@@ -113,6 +114,14 @@ class Declared(NamedTuple):
             if limits.get(name, _LARGE) < _LARGE
         ]
         return " ".join((words, ", ".join(bounds))).rstrip()
+
+    @property
+    def about(self) -> str:
+        """What it does and, where only some values are allowed, which."""
+        setting = self.setting
+        if not setting.choices:
+            return setting.help
+        return f"{setting.help} ({', '.join(map(str, setting.choices))})".lstrip()
 
     def takes(self, value: Any) -> bool:
         """Return whether a value is a valid one."""

@@ -6,7 +6,6 @@ names, and the options of built-in models, is fast. Packages add theirs by the e
 `./my_adapter.py:MyModel`.
 """
 
-import dataclasses
 import inspect
 import re
 from collections.abc import Mapping
@@ -16,12 +15,13 @@ from typing import Any, cast
 
 from infthor_eval.errors import ModelError, UsageError, unknown_name
 from infthor_eval.plugins import import_target
+from infthor_eval.settings import Declared, settings_of
 from model_adapters.adapter_identity import package_identity
 from model_adapters.built_in import BUILT_IN
 from model_adapters.check.clauses import ContractError, check_members
 from model_adapters.functions import function_adapter
 from model_adapters.guarded import guard
-from model_adapters.options import describe, parse, with_defaults
+from model_adapters.options import parse, with_defaults
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
 from model_adapters.protocols import Adapter, Model, Policy
 from model_adapters.refusals import wrap_adapter_errors
@@ -70,14 +70,14 @@ def model_description(name: str) -> str:
     return BUILT_IN[name].description if name in BUILT_IN else ""
 
 
-def options(name: str) -> str:
-    """Return the model's options with their defaults, as one line of text.
+def options(name: str) -> dict[str, Declared]:
+    """Return the model's options by name, with types, defaults, and what each does.
 
     Raises:
         UsageError: the name is unknown.
         ModelError: the adapter cannot be imported.
     """
-    return describe(_options(name))
+    return settings_of(_options(name))
 
 
 def model_note(name: str) -> str:
@@ -159,7 +159,7 @@ def has_option(name: str, option: str) -> bool:
         UsageError: the name is unknown.
         ModelError: the adapter cannot be imported.
     """
-    return option in {field.name for field in dataclasses.fields(_options(name))}
+    return option in options(name)
 
 
 def switches(name: str) -> tuple[str, ...]:
@@ -180,13 +180,12 @@ def switched_on(name: str, options: Mapping[str, str]) -> dict[str, str]:
         UsageError: a name is unknown, or a value does not fit its option.
         ModelError: the adapter cannot be imported.
     """
-    of_model = _options(name)
-    parsed = parse(name, of_model, options)
-    defaults = {field.name: field.default for field in dataclasses.fields(of_model)}
+    parsed = read_options(name, options)
+    known = settings_of(type(parsed))
     return {
         option: options[option]
         for option in switches(name)
-        if option in options and getattr(parsed, option) != defaults[option]
+        if option in options and getattr(parsed, option) != known[option].default
     }
 
 

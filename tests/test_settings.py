@@ -3,14 +3,19 @@
 import json
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import pytest
 from msgspec import Meta
 
+from infthor_eval.cli.main import main
+from infthor_eval.errors import UsageError
 from infthor_eval.quantities import Share, Total
 from infthor_eval.settings import Declared, Setting
+from model_adapters.options.checkpoints import HfOptions
+from model_adapters.registry import read_options
 
 # In a process of its own, before anything has read the settings of NIEH.
 PLANTING = """
@@ -129,6 +134,24 @@ def test_it_is_refused_where_it_has_no_effect(found: dict[str, Any]) -> None:
 
 def test_a_difference_in_it_has_its_cause(found: dict[str, Any]) -> None:
     assert "the context or its window stride - 3" in found["explained"]
+
+
+def test_an_option_of_a_model_stands_in_one_place_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    @dataclass(frozen=True, kw_only=True)
+    class Planted(HfOptions):
+        stride: Annotated[Total | None, Setting(help="Every how many steps a frame is shown.")] = (
+            None
+        )
+
+    monkeypatch.setattr(sys.modules[HfOptions.__module__], "HfOptions", Planted)
+    assert main(["ls", "models", "pixtral-tiny"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "stride none Every how many steps a frame is shown." in printed
+    assert read_options("pixtral-tiny", {"stride": "3"}).stride == 3
+    with pytest.raises(UsageError, match="stride=0: give a whole number from 1"):
+        read_options("pixtral-tiny", {"stride": "0"})
 
 
 @pytest.mark.parametrize(

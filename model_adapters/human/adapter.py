@@ -1,41 +1,35 @@
 """The adapter `human`: a person, on a page of this machine."""
 
-import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from infthor_eval.errors import UsageError
+from msgspec import Meta
+
 from infthor_eval.pages.server import listen, require_page_extra
+from infthor_eval.settings import Setting
 
 if TYPE_CHECKING:
     from model_adapters.human.model import HumanModel
 
-_READER = re.compile(r"[\w.-]{1,40}")
-
 
 @dataclass(frozen=True, kw_only=True)
 class HumanOptions:
-    """Options of the page that a person answers on.
+    """Options of the page that a person answers on."""
 
-    Attributes:
-        reader: who answers: a name or a number, which tells people apart in tables and folders.
-        port: port of the page; 0 for any that is free.
-        browser: open the page in the browser of this machine, if it has a screen.
-    """
-
-    reader: str = "1"
-    port: int = 0
-    browser: bool = True
-
-    def __post_init__(self) -> None:
-        """Check all values; raise `UsageError` for one that is out of its range."""
-        if not _READER.fullmatch(str(self.reader)):
-            raise UsageError(
-                f"human: reader is {self.reader!r:.60}; write a name of at most 40 letters, "
-                "digits, '.', '-' and '_'"
-            )
-        if not 0 <= self.port <= 65_535:
-            raise UsageError(f"human: port must be between 0 and 65535, not {self.port}")
+    reader: Annotated[
+        str,
+        Meta(pattern=r"^[\w.-]{1,40}$"),
+        Setting(
+            help="Who answers: a name or a number, which tells people apart in tables and folders.",
+            is_a="a name of at most 40 letters, digits, '.', '-' and '_'",
+        ),
+    ] = "1"
+    port: Annotated[
+        int, Meta(ge=0, le=65_535), Setting(help="Port of the page; 0 for any that is free.")
+    ] = 0
+    browser: Annotated[
+        bool, Setting(help="Open the page in the browser of this machine, if it has a screen.")
+    ] = True
 
 
 class Human:

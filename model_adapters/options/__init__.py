@@ -4,6 +4,12 @@ Nothing here imports torch or transformers, so that listing models and reporting
 no time.
 """
 
-from model_adapters.options.parsing import NoOptions, describe, parse, with_defaults
+from model_adapters.options.parsing import (
+    NoOptions,
+    describe,
+    parse,
+    shown_default,
+    with_defaults,
+)
 
-__all__ = ["NoOptions", "describe", "parse", "with_defaults"]
+__all__ = ["NoOptions", "describe", "parse", "shown_default", "with_defaults"]

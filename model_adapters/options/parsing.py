@@ -2,12 +2,12 @@
 
 import dataclasses
 import difflib
-import types
 import typing
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from infthor_eval.errors import UsageError
+from infthor_eval.settings import Declared, settings_of
 
 _LARGEST = 2**63  # limit of the numbers in a run config
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
@@ -20,28 +20,23 @@ class NoOptions:
 
 def describe(options: type) -> str:
     """Return the options with their defaults, as `a=1, b=x`, or "no options"."""
-    texts = []
-    for field in dataclasses.fields(options):
-        if is_required(field):
-            texts.append(f"{field.name} (required)")
-            continue
-        default = field.default_factory() if callable(field.default_factory) else field.default
-        is_keyword = default is None or isinstance(default, bool)
-        texts.append(f"{field.name}={str(default).lower() if is_keyword else default}")
-    return ", ".join(texts) or "no options"
+    declared = settings_of(options).items()
+    return ", ".join(_with_default(name, each) for name, each in declared) or "no options"
 
 
-def is_required(field: dataclasses.Field[Any]) -> bool:
-    """Return whether an option has no default."""
-    missing = dataclasses.MISSING
-    return field.init and field.default is missing and field.default_factory is missing
+def shown_default(declared: Declared) -> str:
+    """Return the default of an option as it is typed, or that it must be given."""
+    default = declared.default
+    if default is dataclasses.MISSING:
+        return "(required)"
+    return str(default).lower() if default is None or isinstance(default, bool) else str(default)
 
 
 def with_defaults(options: type, defaults: Mapping[str, Any]) -> type:
     """Return the options with other defaults for some of them."""
     if not defaults:
         return options
-    hints = typing.get_type_hints(options)
+    hints = typing.get_type_hints(options, include_extras=True)
     return dataclasses.make_dataclass(
         options.__name__,
         [(name, hints[name], value) for name, value in defaults.items()],
@@ -56,44 +51,49 @@ def parse(model: str, options: type, texts: Mapping[str, str]) -> Any:
 
     Args:
         model: name of the model, for the message.
-        options: a dataclass, whose fields are str, int, float, bool, or one of these or None; one
-            without a default must be given.
+        options: a dataclass, whose fields are str, int, float, bool, or one of these or None, with
+            limits where they have some (`infthor_eval.settings`); one without a default must be
+            given.
         texts: option names to values as typed.
     """
-    hints = typing.get_type_hints(options)
+    known = settings_of(options)
     for name in texts:
-        if name not in hints:
-            near = difflib.get_close_matches(name, hints, n=1)
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
             hint = f"; did you mean {near[0]}?" if near else ";"
             raise UsageError(
                 f"{model} has no option {name}{hint} it takes: {describe(options)} (of several "
                 f"models, MODEL:{name}=VALUE in --model gives it to one)"
             )
-    for field in dataclasses.fields(options):
-        if is_required(field) and field.name not in texts:
+    for name, declared in known.items():
+        if declared.default is dataclasses.MISSING and name not in texts:
             raise UsageError(
-                f"{model}: the option {field.name} has no default; give it (--model-args "
-                f"{field.name}=VALUE), or give its field a default"
+                f"{model}: the option {name} has no default; give it (--model-args "
+                f"{name}=VALUE), or give its field a default"
             )
     try:
-        return options(**{name: _value(name, hints[name], text) for name, text in texts.items()})
+        return options(**{name: _value(name, known[name], text) for name, text in texts.items()})
     except ValueError as error:
         raise UsageError(f"{model}: {error}; it takes: {describe(options)}") from error
 
 
-def _value(name: str, hint: Any, text: str) -> Any:
-    accepted = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
-    if types.NoneType in accepted and text.lower() in ("none", ""):
+def _with_default(name: str, declared: Declared) -> str:
+    default = shown_default(declared)
+    is_required = declared.default is dataclasses.MISSING
+    return f"{name} {default}" if is_required else f"{name}={default}"
+
+
+def _value(name: str, declared: Declared, text: str) -> Any:
+    if text.lower() in ("none", "") and declared.takes(None):
         return None
-    convert = next(each for each in accepted if each is not types.NoneType)
     try:
-        value = _BOOLEANS[text.lower()] if convert is bool else convert(text)
-        if convert in (int, float) and not abs(value) < _LARGEST:
-            raise ValueError("too large, or not a number")
-        return value
-    except (KeyError, ValueError) as error:
-        expected = "true or false" if convert is bool else convert.__name__
-        raise ValueError(f"option {name}={text} is not {expected}") from error
+        value = _BOOLEANS[text.lower()] if declared.kind is bool else declared.kind(text)
+    except (KeyError, ValueError):
+        value = None
+    too_large = declared.kind in (int, float) and value is not None and not abs(value) < _LARGEST
+    if value is None or too_large or not declared.takes(value):
+        raise ValueError(f"{name}={text}: give {declared.valid}")
+    return value
 
 
 def read_pairs(texts: Iterable[str], option: str) -> dict[str, str]:

@@ -1,14 +1,20 @@
-"""Options of policies in this process and behind a server."""
+"""Options of policies in this process and behind a server; default checkpoints are in
+`built_in.py`."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
+from msgspec import Meta
+
+from infthor_eval.quantities import Total
+from infthor_eval.settings import Setting
 from model_adapters.addresses import act_url
-from model_adapters.options.checkpoints import CheckpointSource, Placement
+from model_adapters.options.checkpoints import CheckpointSource, ModelOptions, Placement
 
 DEFAULT_INTRINSICS = "default"
-_ENSEMBLES = ("none", "exp")
-_ATTENTION = ("eager", "sdpa")  # implementations that SpatialVLA supports
-_ENCODINGS = ("json_numpy", "list")
+_Execute = Annotated[
+    Total | None, Setting(help="Steps of a chunk that are returned; default: all.", of="steps")
+]
 
 
 def parse_field_of_view(text: str) -> float | None:
@@ -33,42 +39,44 @@ def parse_field_of_view(text: str) -> float | None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ActionOptions:
-    """Decoding and use of a policy's actions, on any engine; decoding is always greedy.
+class ActionOptions(ModelOptions):
+    """Decoding and use of a policy's actions, on any engine; decoding is always greedy."""
 
-    Attributes:
-        unnorm_key: dataset whose statistics scale actions to metres and radians; None if the
-            checkpoint has only one.
-        constrained: decode among action tokens only; false decodes among all tokens and clips, as
-            the originals do.
-        ensemble: none returns chunks as they are; exp averages overlapping chunks and returns one
-            step a call.
-        execute: steps of a chunk that are returned; all where None.
-    """
-
-    unnorm_key: str | None = None
-    constrained: bool = True
-    ensemble: str = "none"
-    execute: int | None = None
+    unnorm_key: Annotated[
+        str | None,
+        Setting(
+            help="Dataset whose statistics scale actions to metres and radians; default: the "
+            "checkpoint's, if it has only one."
+        ),
+    ] = None
+    constrained: Annotated[
+        bool,
+        Setting(
+            help="Decode among action tokens only; false decodes among all tokens and clips, as "
+            "the originals do."
+        ),
+    ] = True
+    ensemble: Annotated[
+        str,
+        Setting(
+            help="none returns chunks as they are; exp averages overlapping chunks and returns one "
+            "step a call.",
+            choices=("none", "exp"),
+        ),
+    ] = "none"
+    execute: _Execute = None
 
     def __post_init__(self) -> None:
-        if self.ensemble not in _ENSEMBLES:
-            raise ValueError(f"ensemble={self.ensemble} is not {' or '.join(_ENSEMBLES)}")
-        if self.execute is not None and self.execute < 1:
-            raise ValueError(f"execute={self.execute} returns no step; use 1 or more")
         if self.ensemble == "exp" and self.execute not in (None, 1):
             raise ValueError(
                 f"execute={self.execute} contradicts ensemble=exp, which returns one step a call"
             )
+        super().__post_init__()
 
 
 @dataclass(frozen=True, kw_only=True)
 class PolicyOptions(ActionOptions, Placement):
     """Options of a policy whose network runs in this process."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        Placement.__post_init__(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,81 +86,91 @@ class CheckpointPolicyOptions(CheckpointSource, PolicyOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class FrameCrop:
-    """What OpenVLA gets of a frame, on any engine.
+    """What OpenVLA gets of a frame, on any engine."""
 
-    Attributes:
-        center_crop: 90 % of the area, for checkpoints fine-tuned on random crops (for LIBERO).
-    """
-
-    center_crop: bool = False
+    center_crop: Annotated[
+        bool,
+        Setting(
+            help="Show 90 % of the area, for checkpoints fine-tuned on random crops (for LIBERO)."
+        ),
+    ] = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class OpenVLAOptions(FrameCrop, CheckpointPolicyOptions):
     """Options of `openvla`."""
 
-    pretrained: str = "openvla/openvla-7b"
+
+@dataclass(frozen=True, kw_only=True)
+class OpenVLATinyOptions(FrameCrop, PolicyOptions):
+    """Options of `openvla-tiny`, which has no checkpoint."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpatialVLAOptions(PolicyOptions):
-    """Options of SpatialVLA.
+    """Options of SpatialVLA: only these implementations attend to the prefix in both directions."""
 
-    Attributes:
-        attn_implementation: eager caps attention scores, as Gemma 2 was trained; sdpa is faster and
-            does not.
-        ensemble: exp as in the published evaluations in SimplerEnv.
-        intrinsics: default for the camera of the checkpoint's dataset, or thor:DEGREES for a
-            simulator's camera with this vertical field of view.
-    """
-
-    attn_implementation: str = "eager"
-    ensemble: str = "exp"
-    intrinsics: str = DEFAULT_INTRINSICS
+    attn_implementation: Annotated[
+        str,
+        Setting(
+            help="eager caps attention scores, as Gemma 2 was trained; sdpa is faster and does "
+            "not.",
+            choices=("eager", "sdpa"),
+        ),
+    ] = "eager"
+    ensemble: Annotated[
+        str,
+        Setting(
+            help="exp, as in the published evaluations in SimplerEnv, averages overlapping chunks; "
+            "none returns them as they are.",
+            choices=("none", "exp"),
+        ),
+    ] = "exp"
+    intrinsics: Annotated[
+        str,
+        Setting(
+            help="default for the camera of the checkpoint's dataset, or thor:DEGREES for a "
+            "simulator's camera with this vertical field of view."
+        ),
+    ] = DEFAULT_INTRINSICS
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         parse_field_of_view(self.intrinsics)
-        if self.attn_implementation not in _ATTENTION:
-            raise ValueError(
-                f"attn_implementation={self.attn_implementation} cannot attend to the prefix in "
-                f"both directions; use {' or '.join(_ATTENTION)}"
-            )
+        super().__post_init__()
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpatialVLACheckpointOptions(SpatialVLAOptions, CheckpointPolicyOptions):
+class SpatialVLACheckpointOptions(CheckpointSource, SpatialVLAOptions):
     """Options of `spatialvla`."""
-
-    pretrained: str = "IPEC-COMMUNITY/spatialvla-4b-224-pt"
 
 
 @dataclass(frozen=True, kw_only=True)
 class VlaHttpOptions:
-    """Options of a policy behind a server.
+    """Options of a policy behind a server."""
 
-    Attributes:
-        url: address of the server, without `/act`.
-        unnorm_key: dataset key sent with every request; not sent where None.
-        image: json_numpy sends frames in base 64, as OpenVLA's server expects; list sends nested
-            lists of numbers.
-        execute: steps of a chunk that are returned; all where None.
-        timeout_s: limit for a whole reply, in seconds.
-        retries: repetitions of a request after a failed connection.
-    """
-
-    url: str = "http://localhost:8000"
-    unnorm_key: str | None = None
-    image: str = "json_numpy"
-    execute: int | None = None
-    timeout_s: float = 60.0
-    retries: int = 3
+    url: Annotated[str, Setting(help="Address of the server, without /act.")] = (
+        "http://localhost:8000"
+    )
+    unnorm_key: Annotated[
+        str | None, Setting(help="Dataset key sent with every request; default: none is sent.")
+    ] = None
+    image: Annotated[
+        str,
+        Setting(
+            help="json_numpy sends frames in base 64, as OpenVLA's server expects; list sends "
+            "nested lists of numbers.",
+            choices=("json_numpy", "list"),
+        ),
+    ] = "json_numpy"
+    execute: _Execute = None
+    timeout_s: Annotated[
+        float, Meta(gt=0, le=86_400), Setting(help="Limit for a whole reply, in seconds.")
+    ] = 60.0
+    retries: Annotated[
+        int,
+        Meta(ge=0, le=10),
+        Setting(help="Repetitions of a request after a failed connection."),
+    ] = 3
 
     def __post_init__(self) -> None:
         act_url(self.url)
-        if self.image not in _ENCODINGS:
-            raise ValueError(f"image={self.image} is not {' or '.join(_ENCODINGS)}")
-        if self.execute is not None and self.execute < 1:
-            raise ValueError(f"execute={self.execute} returns no step; use 1 or more")
-        if not 0 < self.timeout_s <= 86_400 or not 0 <= self.retries <= 10:
-            raise ValueError("timeout_s must be above 0 and at most a day, retries 0 to 10")

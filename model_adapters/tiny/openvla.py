@@ -5,7 +5,7 @@ from typing import Any
 import msgspec
 from tokenizers import Tokenizer
 
-from model_adapters.options.tiny import OpenVLATinyOptions
+from model_adapters.options.policies import OpenVLATinyOptions
 from model_adapters.policies.openvla.adapter import MODEL_TYPE, load_openvla
 from model_adapters.policies.openvla.config import OpenVLAConfig
 from model_adapters.policies.openvla.network import OpenVLAWeights, weights_layout

@@ -8,7 +8,7 @@ from transformers import Qwen2_5_VLConfig
 from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLImageProcessorPil
 
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
-from model_adapters.options.tiny import Qwen25VLTinyOptions
+from model_adapters.options.families import TinyPixelOptions
 from model_adapters.tiny.twin import HIDDEN, SPREAD, TinyAdapter, Twin, text_config
 
 SPECIAL = (
@@ -78,7 +78,7 @@ def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
 class Qwen25VLTiny(TinyAdapter):
     """The adapter `qwen2.5-vl-tiny`."""
 
-    Options = Qwen25VLTinyOptions
+    Options = TinyPixelOptions
     twin = Twin(
         special=SPECIAL,
         end="<|im_end|>",

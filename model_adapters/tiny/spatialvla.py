@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import norm
 from tokenizers import Tokenizer
 
-from model_adapters.options.tiny import SpatialVLATinyOptions
+from model_adapters.options.policies import SpatialVLAOptions
 from model_adapters.policies.spatialvla.adapter import MODEL_TYPE, load_spatialvla
 from model_adapters.policies.spatialvla.config import SpatialVLAConfig
 from model_adapters.policies.spatialvla.network import SpatialVLAWeights
@@ -163,7 +163,7 @@ def _layout() -> Layout:
 class SpatialVLATiny(TinyPolicyAdapter):
     """The adapter `spatialvla-tiny`."""
 
-    Options = SpatialVLATinyOptions
+    Options = SpatialVLAOptions
     twin = PolicyTwin(
         files={"config.json": _CONFIG, "processor_config.json": _processor()},
         tokenizer=_tokenizer,

@@ -16,7 +16,7 @@ from model_adapters.hf.loading.checkpoint import assemble, resolve_device, resol
 from model_adapters.hf.loading.rope import apply_rope
 from model_adapters.hf.loading.tower_names import with_published_names
 from model_adapters.hf.prompting.templates import plain_template
-from model_adapters.options.tiny import TinyOptions
+from model_adapters.options.checkpoints import HfOptions
 from model_adapters.tiny.tokenizer import train_tokenizer
 
 # Standard deviation of the weights. Ten times the usual one, so that replies of an untrained model
@@ -161,11 +161,11 @@ def siglip_config(patch_size: int) -> dict[str, Any]:
 class TinyAdapter:
     """Base of the adapters of tiny models."""
 
-    Options: ClassVar[type] = TinyOptions
+    Options: ClassVar[type] = HfOptions
     twin: ClassVar[Twin]
 
     @classmethod
-    def build(cls, name: str, options: TinyOptions, seed: int) -> TransformersModel:
+    def build(cls, name: str, options: HfOptions, seed: int) -> TransformersModel:
         """Build a model with random weights of this seed."""
         twin = cls.twin
         tokenizer = twin.tokenizer()

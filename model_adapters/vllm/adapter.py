@@ -25,13 +25,7 @@ from model_adapters.vllm.arguments import frame_limit, model_arguments, token_li
 from model_adapters.vllm.cpu import check_kernels, runs_on_cpu
 from model_adapters.vllm.engine import Engine, import_vllm, require_version
 from model_adapters.vllm.model import VllmModel
-from model_adapters.vllm.options import (
-    HfVlmOnVllmOptions,
-    LlavaOnevisionOnVllmOptions,
-    PixtralOnVllmOptions,
-    Qwen25VLOnVllmOptions,
-    VllmOptions,
-)
+from model_adapters.vllm.options import PixelVllmOptions, VllmOptions
 
 
 class _FamilyOnVllm:
@@ -50,31 +44,29 @@ class _FamilyOnVllm:
 class Qwen25VLOnVllm(_FamilyOnVllm):
     """The adapter `qwen2.5-vl@vllm`."""
 
-    Options = Qwen25VLOnVllmOptions
+    Options = PixelVllmOptions
     hf_adapter = Qwen25VL
 
 
 class LlavaOnevisionOnVllm(_FamilyOnVllm):
     """The adapter `llava-onevision@vllm`."""
 
-    Options = LlavaOnevisionOnVllmOptions
     hf_adapter = LlavaOnevision
 
 
 class PixtralOnVllm(_FamilyOnVllm):
     """The adapter `pixtral@vllm`."""
 
-    Options = PixtralOnVllmOptions
     hf_adapter = Pixtral
 
 
 class HfVlmOnVllm:
     """The adapter `hf-vlm@vllm`."""
 
-    Options: ClassVar[type] = HfVlmOnVllmOptions
+    Options: ClassVar[type] = VllmOptions
 
     @classmethod
-    def build(cls, name: str, options: HfVlmOnVllmOptions, seed: int) -> VllmModel:  # noqa: ARG003
+    def build(cls, name: str, options: VllmOptions, seed: int) -> VllmModel:  # noqa: ARG003
         """Start vLLM with any checkpoint that it supports."""
         import_vllm(name)
         located = HfVlm.locate(name, options)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 from rich import box
+from rich.markup import escape
 from rich.table import Table as RichTable
 
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
@@ -27,6 +28,7 @@ from infthor_eval.tables import Column, Row, Table, answered_cell
 from infthor_eval.terminal import console, print_line
 from model_adapters import has_option, is_known, names, options
 from model_adapters.built_in import BUILT_IN
+from model_adapters.options import shown_default
 from model_adapters.registry import model_description
 
 _TaskRow = tuple[str, str, str]  # name, description, data
@@ -49,7 +51,7 @@ def command(context: click.Context) -> None:
 @command.command("models", cls=ExampleCommand, example="infthor-eval ls models qwen2.5-vl")
 @click.argument("name", required=False)
 def _models(name: str | None) -> None:
-    """Models and baselines, one a line; or the options of model NAME, with their defaults."""
+    """Models and baselines, one a line; or the options of model NAME, with what each does."""
     if name is not None:
         _print_options(name)
         return
@@ -71,10 +73,13 @@ def _print_options(model: str) -> None:
     if suites is None and not is_known(model):
         raise unknown_name("model", model, [*baseline_suites(), *names()])
     about = _baseline_text(suites) if suites is not None else model_description(model)
-    table = RichTable("model", "options and defaults (--model-args)", box=box.SIMPLE_HEAD)
-    text = "no options" if suites is not None else options(model)
-    table.add_row(model, f"{about}; {text}" if about else text)
-    console().print(table, soft_wrap=False)
+    known = {} if suites is not None else options(model)
+    print_line(f"{model}: {about or _checkpoint(model)}" + ("" if known else "; no options"))
+    if known:
+        table = RichTable("--model-args", "default", "what it does", box=box.SIMPLE_HEAD)
+        for name, declared in known.items():
+            table.add_row(name, shown_default(declared), escape(declared.about))
+        table_console().print(table, soft_wrap=False)
 
 
 def _baseline_text(suites: Sequence[str]) -> str:
@@ -83,8 +88,8 @@ def _baseline_text(suites: Sequence[str]) -> str:
 
 def _checkpoint(model: str) -> str:
     """Return the checkpoint that a model loads unless told otherwise; an empty text for none."""
-    default = re.search(r"\bpretrained=([^,]+)", options(model))
-    return f"usually {default[1]}" if default else ""
+    pretrained = options(model).get("pretrained")
+    return f"usually {pretrained.default}" if pretrained and pretrained.default else ""
 
 
 def _engine(model: str) -> str:

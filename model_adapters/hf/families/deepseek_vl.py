@@ -7,7 +7,6 @@ import torch
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.family import Pixels
-from model_adapters.options.families import DeepseekVLOptions
 
 
 class DeepseekVLFamily(PlainFamily):
@@ -25,6 +24,5 @@ class DeepseekVLFamily(PlainFamily):
 class DeepseekVL(CheckpointAdapter):
     """The adapter `deepseek-vl`."""
 
-    Options = DeepseekVLOptions
     family = DeepseekVLFamily
     model_types = ("deepseek_vl_hybrid",)

@@ -16,7 +16,6 @@ from PIL import Image
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.family import ClipShape, Pixels
-from model_adapters.options.families import LlavaOnevisionOptions
 
 _POOLED = 2  # patches along a side that are pooled to one token
 
@@ -47,7 +46,6 @@ class LlavaOnevisionFamily(PlainFamily):
 class LlavaOnevision(CheckpointAdapter):
     """The adapter `llava-onevision`."""
 
-    Options = LlavaOnevisionOptions
     family = LlavaOnevisionFamily
     model_types = ("llava_onevision",)
 

@@ -10,7 +10,6 @@ from infthor_eval.errors import ModelError
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.family import Pixels, Size
-from model_adapters.options.families import PixtralOptions
 
 
 class PixtralFamily(PlainFamily):
@@ -56,6 +55,5 @@ class PixtralFamily(PlainFamily):
 class Pixtral(CheckpointAdapter):
     """The adapter `pixtral`."""
 
-    Options = PixtralOptions
     family = PixtralFamily
     model_types = ("llava",)

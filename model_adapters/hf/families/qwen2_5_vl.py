@@ -21,7 +21,7 @@ from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.families.plain import PlainFamily, three_axis_positions
 from model_adapters.hf.family import ClipShape, Pixels, Shape, Size
 from model_adapters.options.checkpoints import CheckpointOptions
-from model_adapters.options.families import Qwen25VLNanoOptions, Qwen25VLOptions
+from model_adapters.options.families import PixelOptions
 
 NANO_FOLDER = "models/qwen2.5-vl-nano"
 # Limits of qwen-vl-utils (VIDEO_MIN_PIXELS, VIDEO_MAX_PIXELS, VIDEO_TOTAL_PIXELS), in pixels.
@@ -113,7 +113,7 @@ class Qwen25VLFamily(PlainFamily):
 class Qwen25VL(CheckpointAdapter):
     """The adapter `qwen2.5-vl`."""
 
-    Options = Qwen25VLOptions
+    Options = PixelOptions
     family = Qwen25VLFamily
     model_types = ("qwen2_5_vl",)
 
@@ -121,7 +121,7 @@ class Qwen25VL(CheckpointAdapter):
 class Qwen25VLNano(CheckpointAdapter):
     """The adapter `qwen2.5-vl-nano`."""
 
-    Options = Qwen25VLNanoOptions
+    Options = PixelOptions
     family = Qwen25VLFamily
     model_types = ("qwen2_5_vl",)
 

@@ -7,8 +7,7 @@ from tokenizers import Tokenizer
 
 from infthor_eval.errors import ModelError
 from model_adapters.hf.loading.checkpoint import wrap_loading_errors
-from model_adapters.options.policies import OpenVLAOptions
-from model_adapters.options.tiny import OpenVLATinyOptions
+from model_adapters.options.policies import OpenVLAOptions, OpenVLATinyOptions
 from model_adapters.policies.checkpoint import PolicyCheckpoint
 from model_adapters.policies.openvla.actions import ActionBins
 from model_adapters.policies.openvla.config import OpenVLAConfig

@@ -42,7 +42,7 @@ def test_a_broken_frame_fails_its_question_only(frames, tmp_path):
 
 
 def test_options_are_checked():
-    with pytest.raises(UsageError, match="frame_threads=-1 is not from 0 to"):
+    with pytest.raises(UsageError, match="frame_threads=-1: give a whole number from 0"):
         load("qwen2.5-vl-tiny", {"frame_threads": "-1"}, 0)
     with pytest.raises(UsageError, match="frames_ahead_mb"):
         load("qwen2.5-vl-tiny", {"frames_ahead_mb": "-1"}, 0)

@@ -1,5 +1,7 @@
 import pytest
 
+from infthor_eval.errors import UsageError
+from model_adapters.options import parse
 from model_adapters.options.checkpoints import HfOptions
 
 
@@ -13,5 +15,5 @@ def test_a_gpu_gets_larger_chunks_unless_their_size_is_given():
 
 
 def test_a_chunk_has_a_token_at_least():
-    with pytest.raises(ValueError, match="chunk_tokens and batch_size must be positive"):
-        HfOptions(chunk_tokens=0)
+    with pytest.raises(UsageError, match="m: chunk_tokens=0: give a whole number from 1;"):
+        parse("m", HfOptions, {"chunk_tokens": "0"})

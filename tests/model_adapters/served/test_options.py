@@ -24,19 +24,19 @@ ASKED = {"model": "m"}
         ({"api_key_env": SECRET}, "api_key_env is not the name of an environment variable"),
         ({"api_key_env": ""}, "api_key_env is not the name"),
         ({"api_key": SECRET}, "no option api_key; did you mean api_key_env"),
-        ({"image_format": "gif"}, "image_format=gif is not png or jpeg"),
-        ({"detail": "fine"}, "detail=fine is not auto or low or high"),
-        ({"max_tokens_field": "max_new_tokens"}, "is not max_tokens or max_completion_tokens"),
-        ({"guided": "sglang"}, "guided=sglang is not vllm"),
-        ({"max_in_flight": "0"}, "max_in_flight=0 is not from 1 to 256"),
-        ({"timeout_s": "0"}, "timeout_s=0.0 is not from 0.01"),
-        ({"timeout_s": "nan"}, "timeout_s=nan is not float"),
-        ({"retries": "-1"}, "retries=-1 is not from 0 to 20"),
-        ({"requests_per_minute": "0"}, "requests_per_minute=0.0 is not above 0"),
-        ({"max_tokens_total": "0"}, "max_tokens_total=0 is not above 0"),
+        ({"image_format": "gif"}, "image_format=gif: give png or jpeg"),
+        ({"detail": "fine"}, "detail=fine: give one of auto, low, high"),
+        ({"max_tokens_field": "max_new_tokens"}, "give max_tokens or max_completion_tokens"),
+        ({"guided": "sglang"}, "guided=sglang: give one of vllm"),
+        ({"max_in_flight": "0"}, "max_in_flight=0: give a whole number from 1, at most 256"),
+        ({"timeout_s": "0"}, "timeout_s=0: give a number of seconds from 0.01"),
+        ({"timeout_s": "nan"}, "timeout_s=nan: give a number"),
+        ({"retries": "-1"}, "retries=-1: give a whole number from 0, at most 20"),
+        ({"requests_per_minute": "0"}, "requests_per_minute=0: give a number above 0"),
+        ({"max_tokens_total": "0"}, "max_tokens_total=0: give a whole number from 1"),
         (
             {"price_per_m_input": "-1", "price_per_m_output": "1"},
-            "price_per_m_input=-1.0 is below 0",
+            "price_per_m_input=-1: give a number from 0",
         ),
         ({"max_cost": "1"}, "max_cost needs price_per_m_input and price_per_m_output; give both"),
         (
@@ -73,8 +73,8 @@ def test_another_machine_may_be_asked_in_the_open_where_that_is_said():
 
 def test_options_are_listed_with_their_defaults():
     listed = options("openai")
-    assert "api_key_env=OPENAI_API_KEY" in listed
-    assert "max_cost=none" in listed
+    assert listed["api_key_env"].default == "OPENAI_API_KEY"
+    assert listed["max_cost"].default is None
 
 
 @pytest.mark.parametrize(

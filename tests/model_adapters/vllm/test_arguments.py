@@ -142,7 +142,9 @@ def test_an_older_vllm_has_no_size_for_it(start, vllm, monkeypatch):
 
 
 def test_limits_of_a_frames_area_are_the_processors():
-    typed = Qwen25VLOnVllm.Options(min_pixels=100, max_pixels=200, image_backend="torchvision")
+    typed = Qwen25VLOnVllm.Options(
+        pretrained="x", min_pixels=100, max_pixels=200, image_backend="torchvision"
+    )
     arguments = model_arguments(FOLDER, _qwen("yarn:2"), typed, max_tokens=10, max_frames=1)
     assert arguments["mm_processor_kwargs"] == {
         "use_fast": True,
@@ -248,17 +250,20 @@ def test_three_axes_of_another_family_are_not_extended_unknown():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"dtype": "int8"}, "dtype=int8 is not auto, bfloat16"),
-        ({"gpu_memory_utilization": "0"}, "gpu_memory_utilization=0.0 is not above 0"),
+        ({"dtype": "int8"}, "dtype=int8: give one of auto, bfloat16"),
+        (
+            {"gpu_memory_utilization": "0"},
+            "gpu_memory_utilization=0: give a number above 0, at most 1",
+        ),
         ({"gpu_memory_utilization": "nan"}, "gpu_memory_utilization=nan"),
-        ({"max_model_len": "0"}, "max_model_len=0 is not from 1"),
-        ({"tensor_parallel_size": "0"}, "tensor_parallel_size=0 is not from 1"),
-        ({"max_frames": "0"}, "max_frames=0 is not from 1"),
-        ({"mm_processor_cache_gb": "-1"}, "mm_processor_cache_gb=-1.0 is not from 0"),
+        ({"max_model_len": "0"}, "max_model_len=0: give a whole number from 1"),
+        ({"tensor_parallel_size": "0"}, "tensor_parallel_size=0: give a whole number from 1"),
+        ({"max_frames": "0"}, "max_frames=0: give a whole number from 1"),
+        ({"mm_processor_cache_gb": "-1"}, "mm_processor_cache_gb=-1: give a number from 0"),
         ({"data_parallel_size": "2"}, "external_launcher in vLLM; use --workers 2 instead"),
         ({"rope": "yarn"}, "rope=yarn is not TYPE:FACTOR"),
-        ({"prompt": "loud"}, "prompt=loud is not chat or plain"),
-        ({"max_pixels": "0"}, "max_pixels=0 is not between"),
+        ({"prompt": "loud"}, "prompt=loud: give chat or plain"),
+        ({"max_pixels": "0"}, "max_pixels=0: give a whole number of pixels from 1"),
         ({"device": "cpu"}, "has no option device"),
     ],
 )
@@ -275,8 +280,5 @@ def test_a_policys_options_are_refused_likewise(settings):
 
 @pytest.mark.parametrize("name", ["qwen2.5-vl", "llava-onevision", "pixtral", "openvla"])
 def test_both_engines_load_the_same_checkpoint_where_none_is_named(name):
-    named = [
-        next(each for each in options(known).split(", ") if "pretrained=" in each)
-        for known in (name, f"{name}@vllm")
-    ]
-    assert named[0] == named[1] != "pretrained="
+    named = [options(known)["pretrained"].default for known in (name, f"{name}@vllm")]
+    assert named[0] == named[1] != ""

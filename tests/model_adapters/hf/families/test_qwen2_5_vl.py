@@ -165,7 +165,7 @@ def test_quantisation_without_its_library_is_one_line(checkpoint, value):
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
-        ("quantization", "q5", " is not bnb4, bnb8 or none"),
+        ("quantization", "q5", ": give bnb4 or bnb8"),
         ("dtype", "float33", ""),
         ("device", "abacus", ""),
     ],

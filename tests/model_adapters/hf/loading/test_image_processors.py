@@ -9,7 +9,8 @@ import torch
 import transformers
 from PIL import Image
 
-from infthor_eval.errors import ModelError
+from infthor_eval.errors import ModelError, UsageError
+from model_adapters import check_options
 from model_adapters.hf.loading.image_processors import load_image_processor, splitting_setting
 from model_adapters.options.checkpoints import FrameScaling
 from model_adapters.options.families import HfVlmOptions
@@ -127,12 +128,12 @@ def test_frames_are_split_as_the_option_says(name, setting, splitting, tmp_path)
 def test_splitting_is_refused_where_there_is_none(tmp_path):
     folder = _folder(tmp_path / "model", "CLIPImageProcessor")
     with pytest.raises(ModelError, match="cannot split frames; leave image_splitting out"):
-        load_image_processor(folder, HfVlmOptions(image_splitting=False))
+        load_image_processor(folder, HfVlmOptions(pretrained="x", image_splitting=False))
 
 
 def test_torchvision_is_named_where_it_is_missing(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     with pytest.raises(ValueError, match="pip install torchvision"):
         FrameScaling(image_backend="torchvision")
-    with pytest.raises(ValueError, match="image_backend=cv2 is not pil or torchvision"):
-        HfVlmOptions(image_backend="cv2")
+    with pytest.raises(UsageError, match="image_backend=cv2: give pil or torchvision"):
+        check_options("hf-vlm", {"image_backend": "cv2"})
