@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,7 +11,6 @@ from typing import Annotated, Any
 import pytest
 from msgspec import Meta
 
-from infthor_eval.cli.main import main
 from infthor_eval.errors import UsageError
 from infthor_eval.quantities import Share, Total
 from infthor_eval.settings import Declared, Setting
@@ -137,7 +137,7 @@ def test_a_difference_in_it_has_its_cause(found: dict[str, Any]) -> None:
 
 
 def test_an_option_of_a_model_stands_in_one_place_too(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, run_cli: Callable[..., tuple[int, str, str]]
 ) -> None:
     @dataclass(frozen=True, kw_only=True)
     class Planted(HfOptions):
@@ -146,8 +146,7 @@ def test_an_option_of_a_model_stands_in_one_place_too(
         )
 
     monkeypatch.setattr(sys.modules[HfOptions.__module__], "HfOptions", Planted)
-    assert main(["ls", "models", "pixtral-tiny"]) == 0
-    printed = " ".join(capsys.readouterr().out.split())
+    printed = " ".join(run_cli("ls", "models", "pixtral-tiny")[1].split())
     assert "stride none Every how many steps a frame is shown." in printed
     assert read_options("pixtral-tiny", {"stride": "3"}).stride == 3
     with pytest.raises(UsageError, match="stride=0: give a whole number from 1"):
