@@ -133,9 +133,10 @@ def test_a_compact_copy_has_the_same_frames(pairs, tmp_path):
 
 @pytest.mark.slow
 def test_twins_are_built_again_byte_for_byte(pairs, tmp_path):
-    """Of one trajectory: the same worlds, of which another choice of questions is made."""
+    """Of one trajectory: the same worlds, of which another choice of questions is made. Not of
+    the two that sets/README.md names, whose episodes are drawn otherwise today."""
     manifest = _manifest()
-    part = msgspec.structs.replace(manifest, trajectories=manifest.trajectories[:1])
+    part = msgspec.structs.replace(manifest, trajectories=manifest.trajectories[2:3])
     strict = partial(score, scorer="strict")
     built, numbers = build_twins(part, strict, tmp_path / "one")
     again, _ = build_twins(part, strict, tmp_path / "other")
