@@ -67,6 +67,12 @@ def write_run(run: RecordedRun, output: Path, name: str | None = None) -> Path:
     return write_journal(folder, run.header, run.records, find_suite(run.header.suite).records)
 
 
+def count_records(output: Path, kind: str = "unit") -> int:
+    """The records of a kind that the journals below a folder have so far."""
+    tag = f'"type":"{kind}"'.encode()
+    return sum(path.read_bytes().count(tag) for path in output.rglob("worker-*.jsonl"))
+
+
 def read_records(output: Path) -> list[UnitRecord[Any]]:
     """The records of the one run below a folder."""
     (journal,) = output.rglob("journal")

@@ -52,7 +52,7 @@ def test_a_broken_memory_has_a_line_for_each_clause(tmp_path, run_cli):
         ),
         (
             option_words(model="oracle", tasks="nieh_mini_memory", memory="last", retriever="x"),
-            "--retriever:",
+            "--retriever x: no context of nieh_mini_memory retrieves frames",
         ),
     ],
 )

@@ -11,6 +11,7 @@ from model_adapters.options import shown_default
 
 from ...helpers.command_line import assert_refused, option_words, read_success
 from ...helpers.files import find_one
+from ...helpers.journals import count_records
 from ...helpers.printed import read_rows
 from ...helpers.processes import finish, start_cli
 from ...helpers.questions import make_question
@@ -91,7 +92,7 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(
     arguments = option_words(model="oracle", data=make_nieh_set(size=56), out=tmp_path / "out")
     out, _ = read_success(run_cli(*arguments, "--tasks", "nieh_gt,nieh_own", "--full"))
     rows = [line.split() for line in out.splitlines()]
-    (own,) = [row for row in rows if row[:2] == ["oracle", "nieh_own"] and len(row) > 7]
+    own = next(row for row in rows if row[:2] == ["oracle", "nieh_own"] and len(row) > 7)
     # By clues: 3, 2 and 2 letters of 20; 10; 10.
     assert (own[2], own[3:10:2]) == ("letters", ["11.67", "50.00", "50.00", "27.00"])
     assert ["oracle", "nieh_gt", "strict", *FULL_MARKS] in rows
@@ -110,13 +111,10 @@ def test_a_killed_run_resumes_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_
         return start_cli(*arguments)
 
     killed = start(tmp_path / "killed")
-    shards = (tmp_path / "killed").rglob  # until some answers, not all, are on disk
-    wait_until(
-        lambda: any(path.read_bytes().count(b"\n") > 3 for path in shards("worker-0.jsonl")), killed
-    )
+    wait_until(lambda: count_records(tmp_path / "killed") >= 3, killed)  # some answers, not all
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
-    n_before = find_one(tmp_path / "killed", "worker-0.jsonl").read_bytes().count(b"\n") - 1
+    n_before = count_records(tmp_path / "killed")
     assert 0 < n_before < n_answers
 
     notes = finish(start(tmp_path / "killed"))

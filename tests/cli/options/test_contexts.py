@@ -11,7 +11,7 @@ from infthor_eval.runs import read_header
 
 from ...helpers.command_line import assert_refused, option_words, read_success
 from ...helpers.files import find_one
-from ...helpers.journals import read_records
+from ...helpers.journals import count_records, read_records
 from ...helpers.processes import finish, start_cli
 from ...helpers.waiting import wait_until
 
@@ -159,21 +159,19 @@ def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_
         return start_cli(*arguments)
 
     killed = start(tmp_path / "killed")
-    shards = (tmp_path / "killed").rglob
-    wait_until(
-        lambda: any(path.read_bytes().count(b"\n") > 2 for path in shards("worker-0.jsonl")), killed
-    )
+    wait_until(lambda: count_records(tmp_path / "killed", "nieh_note") >= 2, killed)
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
-    journal = find_one(tmp_path / "killed", "worker-0.jsonl")
-    before = journal.read_bytes().count(b'"type":"nieh_note"')
-    assert 0 < before < 6  # three windows of twenty frames in each of two trajectories
+    assert (
+        count_records(tmp_path / "killed", "nieh_note") < 6
+    )  # three windows of twenty frames in each of two trajectories
 
     for name in ("killed", "whole"):
         finish(start(tmp_path / name))
-    assert journal.read_bytes().count(b'"type":"nieh_note"') == 6
-    # And what was recalled for each question.
-    assert journal.read_bytes().count(b'\n{"type":"artifact","') == 6 + 6
+    kinds = ("nieh_note", "request", "artifact")
+    n_notes, n_requests, n_artifacts = (count_records(tmp_path / "killed", kind) for kind in kinds)
+    assert n_notes == 6
+    assert n_artifacts == 6 + n_requests + 6  # and what was recalled for each question
     results = [
         find_one(tmp_path / name, "results.json").read_bytes() for name in ("killed", "whole")
     ]
