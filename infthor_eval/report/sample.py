@@ -110,7 +110,7 @@ class Sample:
         """The request as it was sent, of an episode the one before its first step; None if it is
         not known."""
         requests = self.run.requests(self.record)
-        parts = tuple(part for request in requests for part in request.parts)
+        parts = tuple(part for request in requests for part in request.stored)
         return StoredRequest(parts, requests[-1].shown) if requests else None
 
     @property

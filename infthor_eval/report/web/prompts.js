@@ -4,8 +4,10 @@ const promptOf = result => (result?.prompt === undefined ? undefined : prompts[r
 const isKnown = result => promptOf(result) !== undefined && !promptOf(result).problem;
 
 const stretchesOf = places => places.map(([first, last]) => first === last ? `${first}` : `${first}–${last}`).join(", ");
-const framesPart = ({ what = "frames", places = [], n }) => make("span", { class: "frames-part" },
-  `⟦${n} × ${what}${places.length ? `: ${stretchesOf(places)}` : ""}⟧`);
+const framesPart = ({ what = "frames", places = [], others = 0 }) => {
+  const n = places.reduce((count, [first, last]) => count + last - first + 1, others);
+  return make("span", { class: "frames-part" }, `⟦${n} × ${what}${places.length ? `: ${stretchesOf(places)}` : ""}⟧`);
+};
 
 // Labels of the runs by the value that their results have, in the order of the runs.
 const runsByValue = (sample, valueOf) => {

@@ -105,7 +105,7 @@ class _Source:
         number = None
         for request in requests:
             note = _OF_BASELINES if self.run.is_baseline else ""
-            prompt = Prompt(request.parts, request.shown, number, note=note)
+            prompt = Prompt(tuple(request.parts), request.shown, number, note=note)
             number = self.texts.prompts.number(prompt)
         return number
 

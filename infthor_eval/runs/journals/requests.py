@@ -14,6 +14,8 @@ from infthor_eval.formats.pictures.video import Video
 from infthor_eval.quantities import Count
 from infthor_eval.storage.digests import digest
 
+_FRAMES = "frames"
+
 Stretch = tuple[Count, Count]  # first and last place in the trajectory of neighbouring frames
 Places = Callable[[Sequence[FrameRef]], Sequence[int]]
 
@@ -22,15 +24,20 @@ class StoredFrames(msgspec.Struct, frozen=True, omit_defaults=True):
     """Frames that follow each other in a request.
 
     Attributes:
-        n: number of frames.
         places: where in the trajectory they are, in the order shown; empty where they are no frames
             of it.
+        others: number of frames that are none of the trajectory.
         what: what they are, in words ("frames (blank)", "video of 1 frames per second").
     """
 
-    n: Count
     places: tuple[Stretch, ...] = ()
-    what: str = "frames"
+    others: Count = 0
+    what: str = _FRAMES
+
+    @property
+    def n(self) -> int:
+        """Number of frames."""
+        return self.others + sum(last - first + 1 for first, last in self.places)
 
     @property
     def in_words(self) -> str:
@@ -47,8 +54,9 @@ class StoredRequest(
     """A request as it was sent.
 
     Attributes:
-        parts: texts and frames in their order; None stands for the question, which is in the
-            record.
+        stored: texts and frames in their order; None stands for the question, which is in the
+            record, and a number for one frame at that place, as an agent's history has after each
+            step.
         shown: where in the trajectory the frames are that it shows, in time order; those that stand
             for others have the places of these.
         after: name of the request that it continues, whose parts come before its own; empty if it
@@ -56,7 +64,7 @@ class StoredRequest(
         pixels: hash of the digests of all frames in `parts`, in their order; empty without frames.
     """
 
-    parts: tuple[str | StoredFrames | None, ...] = ()
+    stored: tuple[str | Count | StoredFrames | None, ...] = ()
     shown: tuple[Stretch, ...] = ()
     after: str = ""
     pixels: str = ""
@@ -68,7 +76,7 @@ class StoredRequest(
         text: str = "",
         question: str = "",
         places_of: Places = lambda _: (),
-        what: str = "frames",
+        what: str = _FRAMES,
         shown: Sequence[int] = (),
         after: str = "",
     ) -> "StoredRequest":
@@ -91,17 +99,27 @@ class StoredRequest(
         if question and question in text:
             begin, _, end = text.rpartition(question)
             asked = (begin, None, end)
-        parts: list[str | StoredFrames | None] = []
+        parts: list[str | int | StoredFrames | None] = []
         digests: list[str] = []
         for described, same in _in_sequence(context, what):
             if isinstance(same, str):
                 parts.append(same)
                 continue
-            parts.append(StoredFrames(len(same), stretches(places_of(same)), described))
+            places = places_of(same)
+            others = len(same) - len(places)
+            alone = described == _FRAMES and len(same) == len(places) == 1
+            stored = StoredFrames(stretches(places), others, described)
+            parts.append(places[0] if alone else stored)
             digests += [frame.digest for frame in same]
         joined = _joined([part for part in (*parts, *asked) if part != ""])
         pixels = digest("".join(digests), 8) if digests else ""
         return cls(tuple(joined), stretches(sorted(set(shown))), after, pixels)
+
+    @property
+    def parts(self) -> Iterator[str | StoredFrames | None]:
+        """Texts and frames in their order; None stands for the question."""
+        for part in self.stored:
+            yield StoredFrames(((part, part),)) if isinstance(part, int) else part
 
     @property
     def fingerprint(self) -> str:
@@ -139,14 +157,14 @@ def _in_sequence(
         for part in group:
             if isinstance(part, Video):
                 film = f"video of {part.fps:g} frames per second"
-                yield what.replace("frames", film, 1), part.frames
+                yield what.replace(_FRAMES, film, 1), part.frames
             elif isinstance(part, str):
                 yield "", part
 
 
 def _joined(
-    parts: Sequence[str | StoredFrames | None],
-) -> Iterator[str | StoredFrames | None]:
+    parts: Sequence[str | int | StoredFrames | None],
+) -> Iterator[str | int | StoredFrames | None]:
     """Yield parts with neighbouring texts as one."""
     for kind, group in groupby(parts, type):
         same = list(group)

@@ -50,6 +50,12 @@ def test_frames_are_stretches_with_a_digest_of_their_contents(tmp_path):
         ("video of 1 frames per second", ((5, 5),), 1),
     ]
     assert store(first, second).pixels != store(second, first).pixels
+    history = store("a step", first, "a step", third)
+    assert history.stored == ("a step", 4, "a step", 9, None)
+    assert [part.places for part in history.parts if isinstance(part, StoredFrames)] == [
+        ((4, 4),),
+        ((9, 9),),
+    ]
 
 
 @given(st.sets(st.integers(0, 50)))
