@@ -132,6 +132,11 @@ class Declared(NamedTuple):
         return not self.setting.choices or converted in (*self.setting.choices, None)
 
 
+@dataclass(frozen=True)
+class NoOptions:
+    """Options of a model or a suite that has none."""
+
+
 def settings_of(kind: type) -> dict[str, Declared]:
     """Return the settings of a dataclass, by name in the order of its fields."""
     hints = typing.get_type_hints(kind, include_extras=True)

@@ -45,6 +45,7 @@ from infthor_eval.runs import (
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.runs.limiting import limit_items
 from infthor_eval.runs.suite import BaselineSubject, Need
+from infthor_eval.settings import NoOptions
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.tables import Column, Row, Table
 from model_adapters import Decoding, Model, Reply, Subject, check_decoding
@@ -133,11 +134,6 @@ class QuestionSummary(msgspec.Struct, frozen=True):
 
     metric: str
     tasks: dict[str, dict[str, Rate]]
-
-
-@dataclass(frozen=True)
-class NoOptions:
-    """A suite of questions has no options but the settings of its task files."""
 
 
 class QuestionSuite:

@@ -4,12 +4,7 @@ Nothing here imports torch or transformers, so that listing models and reporting
 no time.
 """
 
-from model_adapters.options.parsing import (
-    NoOptions,
-    describe,
-    parse,
-    shown_default,
-    with_defaults,
-)
+from infthor_eval.settings import NoOptions
+from model_adapters.options.parsing import describe, parse, shown_default, with_defaults
 
 __all__ = ["NoOptions", "describe", "parse", "shown_default", "with_defaults"]

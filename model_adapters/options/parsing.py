@@ -13,11 +13,6 @@ _LARGEST = 2**63  # limit of the numbers in a run config
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 
-@dataclasses.dataclass(frozen=True)
-class NoOptions:
-    """Options of an adapter without options."""
-
-
 def describe(options: type) -> str:
     """Return the options with their defaults, as `a=1, b=x`, or "no options"."""
     declared = settings_of(options).items()
