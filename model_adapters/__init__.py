@@ -46,7 +46,7 @@ from model_adapters.registry import (
     model_note,
     name_on_engine,
     names,
-    options,
+    options_of,
     switched_on,
     switches,
 )
@@ -94,7 +94,7 @@ __all__ = [
     "model_note",
     "name_on_engine",
     "names",
-    "options",
+    "options_of",
     "refuse_batches",
     "run_checks",
     "switched_on",

@@ -70,7 +70,7 @@ def model_description(name: str) -> str:
     return BUILT_IN[name].description if name in BUILT_IN else ""
 
 
-def options(name: str) -> dict[str, Declared]:
+def options_of(name: str) -> dict[str, Declared]:
     """Return the model's options by name, with types, defaults, and what each does.
 
     Raises:
@@ -159,7 +159,7 @@ def has_option(name: str, option: str) -> bool:
         UsageError: the name is unknown.
         ModelError: the adapter cannot be imported.
     """
-    return option in options(name)
+    return option in options_of(name)
 
 
 def switches(name: str) -> tuple[str, ...]:

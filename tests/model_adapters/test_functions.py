@@ -9,7 +9,7 @@ from infthor_eval.errors import ModelError, UserCodeError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Decoding, label, load
 from model_adapters.own_function import read_function
-from model_adapters.registry import check_options, options
+from model_adapters.registry import check_options, options_of
 
 SOURCE = """
 def answer(images, text, mark="!", times: int = 1, note=None):
@@ -155,7 +155,7 @@ def test_other_functions_are_refused(own, name, message):
 
 def test_options_are_listed_and_checked(own, tmp_path):
     name = f"{tmp_path}/mine.py:answer"
-    assert options(name)["times"].default == 1
+    assert options_of(name)["times"].default == 1
     with pytest.raises(Exception, match="times"):
         check_options(name, {"times": "many"})
     assert label(name, {}) == "answer"

@@ -17,7 +17,7 @@ from model_adapters import (
     load,
     model_note,
     names,
-    options,
+    options_of,
     registry,
     switched_on,
     switches,
@@ -29,7 +29,7 @@ from model_adapters.registry import model_description
 
 def test_names_and_help_need_neither_torch_nor_transformers():
     code = (
-        "import sys, model_adapters as m; [m.options(name) for name in m.names()]; "
+        "import sys, model_adapters as m; [m.options_of(name) for name in m.names()]; "
         "m.label('hf-vlm', {});"
         "sys.exit(bool({'torch', 'transformers'} & set(sys.modules)))"
     )
@@ -76,7 +76,7 @@ def test_an_adapter_without_options_says_so(monkeypatch):
 
 
 def test_options_are_listed_with_their_defaults():
-    assert options("qwen2.5-vl")["pretrained"].default == "Qwen/Qwen2.5-VL-7B-Instruct"
+    assert options_of("qwen2.5-vl")["pretrained"].default == "Qwen/Qwen2.5-VL-7B-Instruct"
 
 
 @dataclass(frozen=True)
@@ -258,4 +258,4 @@ def test_switches_are_on_where_they_have_not_their_defaults():
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_every_switch_is_an_option(name):
-    assert set(switches(name)) <= options(name).keys()
+    assert set(switches(name)) <= options_of(name).keys()

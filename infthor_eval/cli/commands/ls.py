@@ -26,7 +26,7 @@ from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.suites import baseline_suites, find_suite, split_by_suite
 from infthor_eval.tables import Column, Row, Table, answered_cell
 from infthor_eval.terminal import console, print_line
-from model_adapters import has_option, is_known, names, options
+from model_adapters import has_option, is_known, names, options_of
 from model_adapters.built_in import BUILT_IN
 from model_adapters.options import shown_default
 from model_adapters.registry import model_description
@@ -73,7 +73,7 @@ def _print_options(model: str) -> None:
     if suites is None and not is_known(model):
         raise unknown_name("model", model, [*baseline_suites(), *names()])
     about = _baseline_text(suites) if suites is not None else model_description(model)
-    known = {} if suites is not None else options(model)
+    known = {} if suites is not None else options_of(model)
     print_line(f"{model}: {about or _checkpoint(model)}" + ("" if known else "; no options"))
     if known:
         table = RichTable("--model-args", "default", "what it does", box=box.SIMPLE_HEAD)
@@ -88,7 +88,7 @@ def _baseline_text(suites: Sequence[str]) -> str:
 
 def _checkpoint(model: str) -> str:
     """Return the checkpoint that a model loads unless told otherwise; an empty text for none."""
-    pretrained = options(model).get("pretrained")
+    pretrained = options_of(model).get("pretrained")
     return f"usually {pretrained.default}" if pretrained and pretrained.default else ""
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from infthor_eval.formats.question import Question
 from infthor_eval.suites import baseline_suites
-from model_adapters import names, options
+from model_adapters import names, options_of
 from model_adapters.options import shown_default
 
 from ...helpers.command_line import assert_refused, option_words, read_success
@@ -199,7 +199,7 @@ def test_ls_lists_models_one_a_line_with_engine_and_usual_checkpoint(run_cli):
 def test_ls_prints_the_options_of_a_model(run_cli):
     printed = " ".join(run_cli("ls", "models", "qwen2.5-vl-tiny")[1].split())
     assert "random weights" in printed
-    for name, declared in options("qwen2.5-vl-tiny").items():
+    for name, declared in options_of("qwen2.5-vl-tiny").items():
         assert f"{name} {shown_default(declared)} {declared.about}" in printed
         assert declared.setting.help.endswith(".")
     assert "a baseline of nieh; no options" in run_cli("ls", "models", "blind")[1]

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from infthor_eval.errors import UsageError
-from model_adapters import load, options
+from model_adapters import load, options_of
 from model_adapters.hf.global_settings import torch_threads
 
 from ..asking import up_to
@@ -78,8 +78,8 @@ def test_replies_do_not_depend_on_the_number_of_threads(frames):
 
 
 def test_other_models_take_the_threads_of_the_process_unless_they_are_given_some():
-    assert options("qwen2.5-vl")["threads"].default is None
-    assert options("qwen2.5-vl-tiny")["threads"].default == 1
+    assert options_of("qwen2.5-vl")["threads"].default is None
+    assert options_of("qwen2.5-vl-tiny")["threads"].default == 1
     with torch_threads(None):
         assert torch.get_num_threads() == 2
     with pytest.raises(ZeroDivisionError), torch_threads(1):

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
-from model_adapters import Policy, check_adapter, load, options
+from model_adapters import Policy, check_adapter, load, options_of
 
 from ...helpers.refusals import read_one_line
 from ..asking import load_saved
@@ -101,7 +101,7 @@ def test_tied_embeddings_are_written_by_what_they_are_read_by(altered):
 
 def test_the_published_checkpoints_are_the_defaults():
     openvla, spatialvla = (
-        {name: declared.default for name, declared in options(model).items()}
+        {name: declared.default for name, declared in options_of(model).items()}
         for model in ("openvla", "spatialvla")
     )
     assert openvla["pretrained"] == "openvla/openvla-7b"

@@ -3,7 +3,7 @@
 import pytest
 
 from infthor_eval.errors import UsageError
-from model_adapters import check_options, label, options
+from model_adapters import check_options, label, options_of
 
 SECRET = "sk-0123456789abcdef"
 ASKED = {"model": "m"}
@@ -72,7 +72,7 @@ def test_another_machine_may_be_asked_in_the_open_where_that_is_said():
 
 
 def test_options_are_listed_with_their_defaults():
-    listed = options("openai")
+    listed = options_of("openai")
     assert listed["api_key_env"].default == "OPENAI_API_KEY"
     assert listed["max_cost"].default is None
 

@@ -11,7 +11,7 @@ from transformers import Llama4Config, LlamaConfig, Qwen2_5_VLConfig
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.plugins import import_target
-from model_adapters import check_options, options
+from model_adapters import check_options, options_of
 from model_adapters.hf.loading.rope import apply_rope
 from model_adapters.vllm.adapter import Qwen25VLOnVllm
 from model_adapters.vllm.arguments import (
@@ -280,5 +280,5 @@ def test_a_policys_options_are_refused_likewise(settings):
 
 @pytest.mark.parametrize("name", ["qwen2.5-vl", "llava-onevision", "pixtral", "openvla"])
 def test_both_engines_load_the_same_checkpoint_where_none_is_named(name):
-    named = [options(known)["pretrained"].default for known in (name, f"{name}@vllm")]
+    named = [options_of(known)["pretrained"].default for known in (name, f"{name}@vllm")]
     assert named[0] == named[1] != ""

@@ -3,7 +3,7 @@
 import pytest
 
 from infthor_eval.errors import ModelError, UsageError
-from model_adapters import load, options
+from model_adapters import load, options_of
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.uncached import UncachedModel
 
@@ -28,7 +28,7 @@ NAMED = {
 @pytest.mark.parametrize("name", NAMED)
 def test_a_name_runs_its_family_as_hf_vlm_does(name, tiny_family, frames):
     family, usual = NAMED[name]
-    assert options(name)["pretrained"].default == usual
+    assert options_of(name)["pretrained"].default == usual
     shares = name != "molmo2"
     settings = {} if shares else {"share_prefix": "false"}
     model, generic = (

@@ -187,7 +187,7 @@ def test_the_model_without_sharing_is_asked_plainly_too(checkpoints, frames):
     "name", sorted(BUILT_IN.keys() - POLICIES - {"human", "openai", "anthropic", "gemini"})
 )
 def test_every_model_has_the_option(name):
-    assert registry.options(name)["prompt"].default == "chat"
+    assert registry.options_of(name)["prompt"].default == "chat"
     with pytest.raises(UsageError, match="prompt=plane: give chat or plain"):
         registry.check_options(name, {"prompt": "plane"})
 
