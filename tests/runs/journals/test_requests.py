@@ -52,9 +52,9 @@ def test_frames_are_stretches_with_a_digest_of_their_contents(tmp_path):
     assert store(first, second).pixels != store(second, first).pixels
     history = store("a step", first, "a step", third)
     assert history.stored == ("a step", 4, "a step", 9, None)
-    assert [part.places for part in history.parts if isinstance(part, StoredFrames)] == [
-        ((4, 4),),
-        ((9, 9),),
+    assert [(it.places, it.n) for it in history.parts if isinstance(it, StoredFrames)] == [
+        (((4, 4),), 1),
+        (((9, 9),), 1),
     ]
 
 
