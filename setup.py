@@ -15,7 +15,7 @@ setup(
     package_dir={"infthor_eval.tasks": "tasks", "infthor_eval.results": "results"},
     package_data={
         "infthor_eval": ["py.typed", "models/**/*", "sets/**/*"],
-        "infthor_sim": ["py.typed", "README.md"],
+        "infthor_sim": ["py.typed", "README.md", "ACTIONS.md"],
         "model_adapters": ["py.typed"],
         "infthor_eval.plans": ["*.yaml"],
         "infthor_eval.plans.published": ["*.yaml"],

@@ -78,8 +78,8 @@ def test_its_page_has_its_tables_its_chart_and_its_samples(page):
         "model",
         "task",
         "all",
-        "without carry",
         "with carry",
+        "without carry",
         "questions",
     ]
     assert {row.cells[2] for row in sections["results"].tables[0].rows} == {"right"}

@@ -7,6 +7,7 @@ from msgspec.structs import replace
 
 from infthor_eval.nieh.records import ShownClues, TwinSide
 from infthor_eval.nieh.results.pair_summary import NEVER_CHANGED, score_pairs, summarise_pairs
+from infthor_eval.pairs import PAIR_BOUNDS, PairShares
 from infthor_eval.rates import format_percent
 
 from ...helpers.nieh_runs import make_record
@@ -215,3 +216,10 @@ def test_rates_of_any_replies_agree_with_one_another(replies):
     )
     assert found.net_pairs.mean == pytest.approx(both - found.pairs_exchanged.mean)
     assert found == summary(records[::-1])
+
+
+def test_bounds_of_metrics_of_pairs_are_reached_and_never_passed():
+    shares = [PairShares(*ends).by_metric for ends in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))]
+    for metric, bounds in PAIR_BOUNDS.items():
+        values = [share[metric] for share in shares]
+        assert (min(values), max(values)) == bounds
