@@ -5,7 +5,16 @@ from xml.etree import ElementTree
 
 import pytest
 
-from infthor_eval.report.charts import Chart, Class, Point, Series, counted_classes
+from infthor_eval.rates import Rate
+from infthor_eval.report.charts import (
+    Chart,
+    Class,
+    Point,
+    Series,
+    class_series,
+    counted_classes,
+    point_of,
+)
 from infthor_eval.report.svg import LETTER, WIDTH, draw, ticks_between
 
 LONG = "a run of a very long name, with options (budget=4k, memory=oracle, seed=17) (incomplete)"
@@ -132,3 +141,35 @@ def test_ticks_are_few_and_within(ends):
     ticks = list(ticks_between(*ends))
     assert 1 <= len(ticks) <= 7
     assert all(ends[0] - 1e-6 <= tick <= ends[1] + 1e-6 for tick in ticks)
+
+
+def columns(chart):
+    """Names of a chart's columns, and which have numbers."""
+    return [(column.name, column.is_number) for column in chart.table.columns]
+
+
+def test_names_of_runs_stand_where_there_are_several():
+    classes = [Class("x"), Class("y")]
+    one = rows(classes, [(50, 40, 60, 7), None])
+    assert one.description == "x 50.0; y none"
+    assert columns(one)[:2] == [("class", False), ("%", True)]
+    two = rows(classes, [(50,), None], [(1,), (2,)])
+    assert two.description == f"x {LONG} 0 50.0, {LONG} 1 1.0; y {LONG} 1 2.0"
+    assert columns(two)[:3] == [("class", False), ("run", False), ("%", True)]
+
+
+def test_columns_of_grids_costs_and_steps():
+    sizes = [Series("8K", [Point(0, 100)])]
+    grid = Chart("t", "c", ("depth", "context"), sizes, "grid", [Class("0")])
+    assert columns(grid) == [("depth", False), ("8K", True)]
+    costs = Chart("t", "c", ("tokens", "%"), [Series("a", [Point(2000, 50, 40, 60)])], "log")
+    assert costs.description == "a 50.0 at 2,000"
+    names = ["tokens", "%", "95 % interval"]
+    assert columns(costs) == [("curve", False), *((name, True) for name in names)]
+
+
+def test_shares_are_percents_with_their_intervals():
+    rate = Rate(0.25, 0.05, 0.45, 8)
+    assert point_of(3, rate, rate.n) == Point(3, 25.0, 5.0, 45.0, 8)
+    series = class_series("m", 2, ["x", "y"], {"y": rate})
+    assert series == Series("m", [Point(1, 25.0, 5.0, 45.0, 8)], 2)
