@@ -70,7 +70,10 @@ _MODULES = {
         "infthor_eval/questions/asking.py",
         "tests/questions/test_suite.py tests/nieh/asking",
     ),
-    "sample": ("infthor_eval/report/sample.py", "tests/report/test_sample.py tests/exports"),
+    "sample": (
+        "infthor_eval/report/sample.py",
+        "tests/report/test_sample.py tests/exports tests/cli/commands/test_show.py",
+    ),
     "charts": ("infthor_eval/report/charts.py", "tests/report/test_charts.py"),
 }
 # Hypothesis' profile "ci" draws the same examples each time, remembers none and sets no deadlines.

@@ -3,11 +3,14 @@
 import re
 from pathlib import Path
 
+import msgspec
 import pytest
 
 import infthor_eval
 from infthor_eval.errors import UsageError
 from infthor_eval.nieh.records import RECORDS
+from infthor_eval.report.sample import Sample, TokenCounts
+from infthor_eval.runs import Tokens, Usage
 from tests.helpers.command_line import option_words, read_success
 from tests.helpers.journals import write_journal
 from tests.helpers.nieh_runs import make_config, make_header, make_record
@@ -72,3 +75,21 @@ def test_an_episode_has_its_steps(tmp_path: Path, run_cli) -> None:
     assert len(listed) == len(sample.steps) > 0
     assert all(step.action in line for step, line in zip(sample.steps, listed, strict=True))
     assert sample.request is None
+
+
+@pytest.mark.parametrize(
+    ("tokens", "usage", "counted"),
+    [
+        (Tokens(context=9, cached=4, reply=2), Usage(), (9, 4, 2)),
+        (Tokens(), Usage(requests=1, context=9), (9, 0, 0)),
+        (Tokens(), Usage(requests=1, reply=2), (0, 0, 2)),
+        (Tokens(context=9), Usage(), None),
+    ],
+)
+def test_tokens_are_those_of_the_reply_else_of_all_requests(
+    folder: Path, tokens: Tokens, usage: Usage, counted: tuple[int, int, int] | None
+) -> None:
+    sample = infthor_eval.load_sample(folder, names_of(folder)[0])
+    record = msgspec.structs.replace(sample.record, tokens=tokens, usage=usage)
+    found = Sample(sample.run, record).tokens
+    assert found == (counted and TokenCounts(*counted))
