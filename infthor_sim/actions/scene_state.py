@@ -39,7 +39,9 @@ def set_object_poses(
     poses = [_named_pose(entry) for entry in objectPoses]
     unknown = set_poses(sim.world, poses, keep_moveable=skipMoveable) if poses else []
     if unknown:
-        raise ActionError(f"No Pickupable or Moveable object of name {unknown[-1]} found in scene.")
+        raise ActionError(
+            f"No Pickupable or Moveable object of name {unknown[-1]:.60} found in scene."
+        )
 
 
 def _max_poses() -> int:
@@ -84,9 +86,9 @@ def set_object_toggles(sim: Simulation, objectToggles: list[Any]) -> None:
             sim.world.mark_changed(item)
 
 
-def _check_type(sim: Simulation, name: str) -> None:
+def _check_type(sim: Simulation, name: Any) -> None:
     """Refuse what is no type of object; one that is not in the scene is none the less one."""
-    if name not in OBJECT_TYPES and all(o.object_type != name for o in sim.world.objects.values()):
+    if name not in [*OBJECT_TYPES, *(o.object_type for o in sim.world.objects.values())]:
         raise ActionError(f"{name!r:.60} is not an object type")
 
 

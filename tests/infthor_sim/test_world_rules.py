@@ -251,6 +251,8 @@ def test_random_placement_follows_its_seed(bench):
         ("SetObjectToggles", {"objectToggles": [{"objectType": "Lamp"}]}, "'Lamp' is not an"),
         ("SetObjectStates", {"SetObjectStates": {"stateChange": "openable", "objectType": "Door2"}},
          "'Door2' is not an object type"),
+        ("SetObjectStates", {"SetObjectStates": {"stateChange": "openable", "objectType": ["Mug"]}},
+         "['Mug'] is not an object type"),
     ],
 )  # fmt: skip
 def test_what_names_nothing_changes_nothing(bench, action, arguments, message):

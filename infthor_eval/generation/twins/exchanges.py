@@ -90,8 +90,8 @@ def restored_ids(
     """
     dropped = restore(simulator, scene).lines()
     by_name = {obj.name: obj.object_id for obj in simulator.view.objects.values()}
-    names = {obj.name for obj in objects}
-    if dropped or not names <= by_name.keys():
+    names = [obj.name for obj in objects]
+    if dropped or not by_name.keys() >= set(names):
         raise EditRefused("the exchanged start cannot be restored")
     return {name: by_name[name] for name in names}
 
