@@ -29,6 +29,8 @@ class Controller(ai2thor.controller.Controller):
     temporary files, also where Python is killed.
     """
 
+    server: Any
+
     def __init__(
         self,
         *arguments: Any,
@@ -48,7 +50,7 @@ class Controller(ai2thor.controller.Controller):
             RuntimeError: the simulator has no such scene, or refuses an option.
             SimulatorError: the simulator's process does not start.
         """
-        self._files = tempfile.TemporaryDirectory(prefix="infthor-sim-", ignore_cleanup_errors=True)
+        self._files = _temporary_folder()
         bound = inspect.signature(super().__init__).bind(*arguments, **options)
         scene = bound.arguments.get("scene")
         initialization = bound.arguments.pop("unity_initialization_parameters", {})
@@ -82,6 +84,20 @@ class Controller(ai2thor.controller.Controller):
         # ai2thor takes one from CUDA_VISIBLE_DEVICES, and would run vulkaninfo to find it.
         self.gpu_device = None
         return own_player(super().unity_command(width, height, headless), self._files.name)
+
+    def start(self, *arguments: Any, **options: Any) -> Any:
+        """Start the simulator's process; where it runs already, only return the last event.
+
+        Scripts for older versions of AI2-THOR call it after the constructor.
+        """
+        process = None if self.server is None else self.server.unity_proc
+        if process is not None and process.poll() is None:
+            return self.last_event
+        if self.last_event is not None:  # of a process that has ended, with its pipes
+            self.server = None
+            self._files.cleanup()
+            self._files = _temporary_folder()
+        return super().start(*arguments, **options)
 
     def stop(self) -> None:
         """End the simulator's process and remove its files. Calling it again does nothing."""
@@ -118,3 +134,7 @@ class Controller(ai2thor.controller.Controller):
                 reason = next((line.strip() for line in reversed(log) if line.strip()), "")
                 raise SimulatorError(f"the simulator does not start: {reason}")
         os.set_blocking(pipe, True)
+
+
+def _temporary_folder() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="infthor-sim-", ignore_cleanup_errors=True)

@@ -1,7 +1,7 @@
 """Rearranging a scene's loose objects, to recorded poses or at random."""
 
-from collections import defaultdict
-from collections.abc import Container, Iterable
+from collections import Counter, defaultdict
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,40 +31,50 @@ class NamedPose:
     rotation: Array
 
 
-def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = False) -> None:
+def set_poses(world: World, poses: Sequence[NamedPose], keep_moveable: bool = False) -> list[str]:
     """Give the named objects new poses, and ids by them; loose objects that are not named vanish.
 
-    In a house they keep their ids, as in AI2-THOR.
+    In a house they keep their ids, as in AI2-THOR. What is named again is copied.
 
     A name that the scene does not have means any object of its type: the part of a name after the
-    type differs between versions of AI2-THOR.
+    type differs between versions of AI2-THOR. Where poses name furniture that can be moved, the
+    rest of it vanishes, too. `keep_moveable` leaves it alone, and so do lists that name none: those
+    of 2.1.0 had nothing of it.
+
+    Returns:
+        The names of nothing that can be moved; all others have their poses all the same.
     """
     chooser = _Templates(world)
+    chosen = [chooser.choose(pose.name) for pose in poses]
+    furniture = [o for o in chosen if o is not None and not o.type.pickupable]
+    clears_furniture = bool(furniture) and not keep_moveable
     world.release()
-    for item in [o for o in world.objects.values() if o.type.pickupable]:
-        world.remove(item)
-    for pose in poses:
-        template = chooser.choose(pose.name)
-        if template is None:
+    for item in list(world.objects.values()):
+        is_left = item.type.moveable and clears_furniture and item not in furniture
+        if item.type.pickupable or is_left:
+            world.remove(item)
+    placed: Counter[str] = Counter()
+    for pose, template in zip(poses, chosen, strict=True):
+        if template is None or (keep_moveable and not template.type.pickupable):
             continue
-        if not template.type.pickupable:
-            if not keep_moveable:
-                world.set_pose(template, pose.position, pose.rotation)
+        name = chooser.known_name(pose.name)
+        copies = placed[name]
+        placed[name] += 1
+        if not (copies or template.type.pickupable):
+            world.set_pose(template, pose.position, pose.rotation)
             continue
         if world.keeps_ids:
             new_id = _unused_id(world.objects, template.object_id, "_copy_")
         else:
-            new_id = _unused_id(world.objects, object_id(pose.name.split("_", 1)[0], pose.position))
+            new_id = _unused_id(world.objects, object_id(name.split("_", 1)[0], pose.position))
         item = template.duplicate(new_id)
-        item.name, item.position, item.rotation = (
-            pose.name,
-            pose.position.copy(),
-            pose.rotation.copy(),
-        )
+        item.name = f"{name}(Clone)_copy_{copies}" if copies else name
+        item.position, item.rotation = pose.position.copy(), pose.rotation.copy()
         item.state.picked_up = False
         world.add(item)
     assign_parents(world)
     _lower_supports(world)
+    return [pose.name for pose, template in zip(poses, chosen, strict=True) if template is None]
 
 
 def _lower_supports(world: World) -> None:
@@ -104,20 +114,24 @@ class _Templates:
     """
 
     def __init__(self, world: World) -> None:
-        self._world = world
         self._named: dict[str, SimObject] = {}
         self._typed: dict[str, list[SimObject]] = defaultdict(list)
         for item in [
             *(o for listed in world.templates.values() for o in listed),
-            *world.objects.values(),
+            *(o for o in world.objects.values() if o.type.pickupable or o.type.moveable),
         ]:
             self._named.setdefault(item.name, item)
             self._typed[item.object_type].append(item)
         self._chosen: dict[str, SimObject] = {}
         self._count: dict[str, int] = defaultdict(int)
 
-    def choose(self, name: str) -> SimObject | None:
+    def known_name(self, name: str) -> str:
+        """Return the name without what Unity appends to names of copies, if none here has it."""
+        return name if name in self._named else name.partition("(Clone)")[0]
+
+    def choose(self, listed: str) -> SimObject | None:
         """Return the object that a name means: always the same; for other names, others in turn."""
+        name = self.known_name(listed)
         if name in self._named:
             return self._named[name]
         if name not in self._chosen:

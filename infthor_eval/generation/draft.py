@@ -45,7 +45,9 @@ def initial_scene(settings: TrajectorySettings, view: SimulatorView, start: Init
         init_action=start,
         scene_num=int("".join(filter(str.isdigit, settings.scene)) or 0),
         object_poses=[
-            ObjectPose(loose.name, asdict(loose.position), asdict(loose.rotation))
+            ObjectPose(
+                loose.name.partition("(Clone)")[0], asdict(loose.position), asdict(loose.rotation)
+            )
             for loose in view.objects.values()
             if loose.pickupable
         ],

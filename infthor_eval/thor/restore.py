@@ -136,7 +136,7 @@ def _poses(
     poses = []
     dropped = []
     for pose in recorded:
-        name = pose.name.removesuffix("(Clone)")
+        name = pose.name.partition("(Clone)")[0]  # copies are made anew
         if name not in known and name not in renamed:
             names = spare[_type_of(name, spare)]
             if names:
@@ -272,5 +272,5 @@ def _distances(pose: dict[str, Any], loose: Sequence[ThorObject]) -> Iterator[fl
     """Yield the distances of all objects with a pose's name: several may have it."""
     place = [pose["position"][axis] for axis in "xyz"]
     for obj in loose:
-        if obj.name.removesuffix("(Clone)") == pose["objectName"]:
+        if obj.name.partition("(Clone)")[0] == pose["objectName"]:
             yield math.dist(astuple(obj.position), place)

@@ -1,16 +1,23 @@
 """The next action of an expert that knows the scene, on the way to an object or a point."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from infthor_sim.actions.queries import TILT, nearest_of_type
+from infthor_sim.actions.queries import (
+    TILT,
+    named_object,
+    path_to_point,
+    pose_angles,
+    way_to_object,
+)
 from infthor_sim.actions.registry import Vector3, action
-from infthor_sim.agent import MAX_UP
 from infthor_sim.errors import ActionError
 from infthor_sim.geometry import Array, euler_matrix, to_array
 from infthor_sim.objects import SimObject
 from infthor_sim.physics.crowd import agent_on_way
+from infthor_sim.physics.navigation import CELL
 from infthor_sim.simulation import Simulation
 
 _SAME = 1e-6  # metres
@@ -25,15 +32,19 @@ def expert_action(
 ) -> str | None:
     """Return the name of the next action to see an object or be at a point; None where it is done.
 
-    The object is that of `objectId` or the nearest of `objectType`.
+    The object is that of `objectId` or the only one of `objectType`.
     """
-    _turns(sim)
+    agent = sim.world.agent
     if position is not None:
-        return _next_step(sim, to_array(position))
-    item = nearest_of_type(sim, objectType) if objectId is None else sim.world.get(objectId)
+        return _next_step(sim, _way_to_point(sim, to_array(position)))
+    item = named_object(sim, objectId, objectType)
     if item.object_id in sim.vision.visible_ids():
         return None
-    return _next_step(sim, item.center) or _next_look(sim, item)
+    step = sim.settings.rotate_step
+    turns = [agent.yaw + number * step for number in _turns(sim)]
+    angles = pose_angles(sim)._replace(turns=turns, standings=[agent.standing])
+    way = way_to_object(sim, item, agent.position, angles, yaw=agent.yaw % step)
+    return _next_step(sim, way) or _next_look(sim, item, angles.tilts)
 
 
 def _turns(sim: Simulation) -> list[int]:
@@ -44,40 +55,48 @@ def _turns(sim: Simulation) -> list[int]:
     return sorted((i if i <= count / 2 else i - round(count) for i in range(round(count))), key=abs)
 
 
-def _next_step(sim: Simulation, goal: Array) -> str | None:
-    """Return the step or turn towards the standing place nearest to a point (3,); None there."""
-    world = sim.world
-    here = world.agent.position
-    way = world.nav.path((here[0], here[2]), world.nav.nearest(goal[0], goal[2]))
-    if way is None:
-        raise ActionError("Path to target could not be found")
-    if len(way) == 1:
-        return None
-    corner = next(
-        cell
-        for cell in reversed(way)
-        if cell == way[1] or world.nav.can_walk((here[0], here[2]), cell)
-    )
-    best = (math.dist((here[0], here[2]), corner) - _SAME, 0)
-    chosen: int | None = None
+def _way_to_point(sim: Simulation, goal: Array) -> list[tuple[float, float]]:
+    """Return the places of a way to a point (3,), by the agent's steps if they lead near to it."""
+    agent, size, turn = sim.world.agent, sim.settings.grid_size, sim.settings.rotate_step
+    path = path_to_point(sim, agent.position, goal)
+    if size == CELL and turn <= 90:  # such steps keep near to the cells; quicker
+        return path
+    here = (agent.position[0], agent.position[2])
+    stops = sim.world.nav.walk_out(here, size, agent.yaw % turn)
+    end = min(stops, key=lambda stop: math.dist(stop.place, (goal[0], goal[2])))
+    return end.way() if math.dist(end.place, (goal[0], goal[2])) <= size else path
+
+
+def _next_step(sim: Simulation, way: Sequence[tuple[float, float]]) -> str | None:
+    """Return the step or turn along a way, to as far a place of it as it can; None at its end."""
+    world, size = sim.world, sim.settings.grid_size
+    here = (float(world.agent.position[0]), float(world.agent.position[2]))
+    moves = []
     for turns in _turns(sim):
         angle = math.radians(world.agent.yaw + turns * sim.settings.rotate_step)
-        end = here + np.array([math.sin(angle), 0.0, math.cos(angle)]) * sim.settings.grid_size
-        rank = (round(math.dist((end[0], end[2]), corner), 4), abs(turns))
-        free = world.nav.can_walk((here[0], here[2]), (end[0], end[2]))
-        if free and rank < best and agent_on_way(world, end) is None:
-            best, chosen = rank, turns
-    if chosen is None:
-        return None
-    return "MoveAhead" if chosen == 0 else _turn_name(chosen)
+        end = (here[0] + math.sin(angle) * size, here[1] + math.cos(angle) * size)
+        level = np.array([end[0], world.agent.position[1], end[1]])
+        if world.nav.can_walk(here, end) and agent_on_way(world, level) is None:
+            moves.append((turns, end))
+    for place in reversed(way[1:]):
+        if place != way[1] and not world.nav.can_walk(here, place):
+            continue
+        left = [(round(math.dist(end, place), 4), abs(turns), turns) for turns, end in moves]
+        best = min(left, default=(math.inf, 0, 0))
+        if best[0] < math.dist(here, place) - _SAME:
+            return "MoveAhead" if best[2] == 0 else _turn_name(best[2])
+    if len(way) > 1:
+        raise ActionError(
+            f"Can't seem to move nearer to the target: {len(way) - 1} steps of {size:g} m are left"
+        )
+    return None
 
 
-def _next_look(sim: Simulation, item: SimObject) -> str:
+def _next_look(sim: Simulation, item: SimObject, tilts: Sequence[float]) -> str:
     """Return the turn or tilt of the fewest that show an object from here."""
     agent = sim.world.agent
-    tilts = np.arange(-MAX_UP, agent.max_down + 1.0, TILT)
     poses = [
-        (abs(turns) + abs(float(tilt) - agent.horizon) / TILT, turns, float(tilt))
+        (abs(turns) + abs(tilt - agent.horizon) / TILT, turns, tilt)
         for turns in _turns(sim)
         for tilt in tilts
     ]

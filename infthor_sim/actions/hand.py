@@ -34,7 +34,6 @@ def drop_ahead(
     forceAction: bool = False,
     autoSimulation: bool = True,
     randomMagnitude: float = 0.0,
-    actionSimulationSeconds: float | None = None,
 ) -> None:
     """Drop the held object in front of the agent, farther than its arms hold it."""
     _let_go(sim, _THROW_REACH)

@@ -116,6 +116,7 @@ def _look(
     sign: float,
     sim: Simulation,
     degrees: float = 30.0,
+    speed: float = 1.0,
     forceAction: bool = False,
     manualInteract: bool = False,
 ) -> None:

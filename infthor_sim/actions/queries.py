@@ -1,10 +1,10 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
 """Questions about the scene (at a pixel, outlines, ways, poses), and which objects replies list."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice, product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,16 @@ from infthor_sim.simulation import Simulation
 
 _FINEST = 0.01  # metres; finer grids have millions of points
 TILT = 30.0  # degrees between the horizons that are tried
+_ALLOWED_ERROR = 1e-4  # metres; AI2-THOR's default
+_NEAR = 0.2  # metres within which AI2-THOR looks for floor that one can stand on
+
+
+class PoseAngles(NamedTuple):
+    """Poses that are tried at a place: horizons and rotations in degrees, standing or not."""
+
+    tilts: Sequence[float]
+    turns: Sequence[float]
+    standings: Sequence[bool]
 
 
 @action("GetScenesInBuild", query=True)
@@ -41,51 +51,113 @@ def get_scenes_in_build(sim: Simulation) -> list[str]:
         raise ActionError(str(error), ErrorCode.INVALID_ARGUMENT) from error
 
 
-@action("GetShortestPath", "GetShortestPathToPoint", query=True)
+@action("GetShortestPath", query=True)
 def get_shortest_path(
     sim: Simulation,
     objectId: str | None = None,
     objectType: str | None = None,
     position: Vector3 | None = None,
+    rotation: Vector3 | None = None,
+    allowedError: float = _ALLOWED_ERROR,
+) -> dict[str, Any]:
+    """Return the places of a shortest way to where an object is interactable.
+
+    The rotation at the start changes no way.
+    """
+    item = named_object(sim, objectId, objectType)
+    start = sim.world.agent.position if position is None else to_array(position)
+    return _corners(sim, way_to_object(sim, item, start, pose_angles(sim), allowedError))
+
+
+@action("GetShortestPathToPoint", query=True, overloads=(("target",), ("x", "y", "z")))
+def get_shortest_path_to_point(
+    sim: Simulation,
     target: Vector3 | None = None,
     x: float | None = None,
     y: float | None = None,
     z: float | None = None,
+    position: Vector3 | None = None,
     rotation: Vector3 | None = None,
-    allowedError: float = 0.05,
+    allowedError: float = _ALLOWED_ERROR,
 ) -> dict[str, Any]:
-    """Return the corners of a shortest way to the standing place nearest to an object or point.
+    """Return the places of a shortest way to the standing place nearest to a point."""
+    start = sim.world.agent.position if position is None else to_array(position)
+    goal = np.array([x, y, z], dtype=float) if target is None else to_array(target)
+    return _corners(sim, path_to_point(sim, start, goal, allowedError))
 
-    The point is `target`, or `x`, `y`, `z`. The rotation at the start changes no way.
-    """
-    world = sim.world
-    if x is not None and y is not None and z is not None:
-        target = Vector3(x=x, y=y, z=z)
-    goal = _goal(sim, objectId, objectType, target)
-    start = world.agent.position if position is None else to_array(position)
-    path = world.nav.path((start[0], start[2]), world.nav.nearest(goal[0], goal[2]))
+
+def _corners(sim: Simulation, way: Sequence[tuple[float, float]]) -> dict[str, Any]:
+    height = float(sim.world.agent.position[1])
+    return {"corners": [{"x": x, "y": height, "z": z} for x, z in way]}
+
+
+def named_object(sim: Simulation, object_id: str | None, object_type: str | None) -> SimObject:
+    """Return the object with an id, or the only one of a type, as AI2-THOR's ways have it."""
+    if object_id:
+        return sim.world.get(object_id)
+    named = [o for o in sim.world.objects.values() if o.object_type == object_type]
+    if not named:
+        raise ActionError(f"Object type {object_type} was not found in the scene.")
+    if len(named) > 1:
+        raise ActionError(
+            f"Multiple objects of type {object_type} were found in the scene, "
+            "cannot disambiguate: pass an objectId"
+        )
+    return named[0]
+
+
+def _check_floor(sim: Simulation, allowed: float, **ends: Array) -> None:
+    """Refuse ends (3,) of a way that are not above floor near to where the agent can stand."""
+    low, high = sim.world.scene_bounds()
+    gaps = {}
+    for name, point in ends.items():
+        text = "({:.3f}, {:.3f}, {:.3f})".format(*point)
+        gaps[name] = sim.world.nav.gap(float(point[0]), float(point[2]))
+        if gaps[name] > max(_NEAR, allowed):
+            raise ActionError(f"No point on NavMesh near {name} {text}.")
+        if not low[1] - _NEAR <= point[1] <= high[1]:
+            raise ActionError(f"Raycast could not find the floor from position: {text}")
+    if len(gaps) > 1 and min(gaps.values()) > allowed:
+        far = " and ".join(f"{name} by {gap:.3f} m" for name, gap in gaps.items())
+        raise ActionError(f"Closest point on NavMesh was too far from the agent: {far}.")
+
+
+def path_to_point(
+    sim: Simulation, start: Array, goal: Array, allowed: float = _ALLOWED_ERROR
+) -> list[tuple[float, float]]:
+    """Return the cells of a shortest way between those nearest to two points (3,)."""
+    _check_floor(sim, allowed, startPosition=start, targetPosition=goal)
+    nav = sim.world.nav
+    path = nav.path(nav.nearest(start[0], start[2]), nav.nearest(goal[0], goal[2]))
     if path is None:
-        raise ActionError("Path to target could not be found")
-    height = float(world.agent.position[1])
-    return {"corners": [{"x": x, "y": height, "z": z} for x, z in path]}
+        raise ActionError("Could not find path to targetPosition using the NavMesh.")
+    return path
 
 
-def _goal(
-    sim: Simulation, object_id: str | None, object_type: str | None, target: Vector3 | None
-) -> Any:
-    if target is not None:
-        return to_array(target)
-    if object_id is not None:
-        return sim.world.get(object_id).center
-    return nearest_of_type(sim, object_type).center
-
-
-def nearest_of_type(sim: Simulation, object_type: str | None) -> SimObject:
-    """Return the object of a type that is nearest to the agent."""
-    candidates = [o for o in sim.world.objects.values() if o.object_type == object_type]
-    if not candidates:
-        raise ActionError(f"No object of type {object_type!r} is in the scene")
-    return min(candidates, key=lambda o: (sim.world.distance(o), o.object_id))
+def way_to_object(
+    sim: Simulation,
+    item: SimObject,
+    start: Array,
+    angles: PoseAngles,
+    allowed: float = _ALLOWED_ERROR,
+    yaw: float = 0.0,
+) -> list[tuple[float, float]]:
+    """Return the places of a shortest way, along axes at `yaw`, to where an object is seen."""
+    _check_floor(sim, allowed, startPosition=start)
+    nav = sim.world.nav
+    begin = (float(start[0]), float(start[2]))
+    if not nav.can_stand(*begin):
+        begin = nav.nearest(*begin)
+    poses = _poses_that_see(sim, item, sim.settings.visibility_distance, angles)
+    height = float(sim.world.agent.position[1])
+    for stop in nav.walk_out(begin, sim.settings.grid_size, yaw):
+        if next(poses({"x": stop.place[0], "y": height, "z": stop.place[1]}), None):
+            return stop.way()
+    raise ActionError(
+        f"Target object {item.object_id} is not visible on navigation path given current agent "
+        f"parameters: maxVisibleDistance ({sim.settings.visibility_distance:g}), "
+        f"gridSize ({sim.settings.grid_size:g}), fieldOfView ({sim.settings.field_of_view:g})"
+    )
 
 
 @action("GetObjectInFrame", query=True)
@@ -211,36 +283,46 @@ def get_interactable_poses(
         raise ActionError("maxPoses must be greater than 0")
     item = sim.world.get(objectId)
     reach = sim.settings.visibility_distance if maxDistance is None else maxDistance
-    turns = _range(0.0, 360.0 - 1e-6, sim.settings.rotate_step) if rotations is None else rotations
-    tilts = _range(-MAX_UP, sim.world.agent.max_down, TILT) if horizons is None else horizons
-    heights = [True, False] if standings is None else standings
+    usual = pose_angles(sim)
+    angles = PoseAngles(
+        usual.tilts if horizons is None else horizons,
+        usual.turns if rotations is None else rotations,
+        usual.standings if standings is None else standings,
+    )
     places = get_reachable_positions(sim) if positions is None else positions
-    near = [p for p in places if level_gaps(to_array(p)[[0, 2]], *item.bounds()) <= reach]
-    if sim.world.is_hidden(item):
-        return []
-    return list(islice(_seeing_poses(sim, item, near, (tilts, turns, heights)), maxPoses))
+    poses = _poses_that_see(sim, item, reach, angles)
+    return list(islice((pose for place in places for pose in poses(place)), maxPoses))
 
 
-def _seeing_poses(
-    sim: Simulation,
-    item: SimObject,
-    places: Iterable[Mapping[str, float]],
-    angles: tuple[Sequence[float], Sequence[float], Sequence[bool]],
-) -> Iterator[dict[str, Any]]:
-    """Yield the poses (places by horizons, rotations, standings) from which an object is seen."""
+def pose_angles(sim: Simulation) -> PoseAngles:
+    """Return the directions and heights that AI2-THOR tries."""
+    turns = _range(0.0, 360.0 - 1e-6, sim.settings.rotate_step)
+    return PoseAngles(_range(-MAX_UP, sim.world.agent.max_down, TILT), turns, [True, False])
+
+
+def _poses_that_see(
+    sim: Simulation, item: SimObject, reach: float, angles: PoseAngles
+) -> Callable[[Mapping[str, float]], Iterator[dict[str, Any]]]:
+    """Return a function of a place: it yields the poses there that see an object within reach."""
     tilts, turns, heights = angles
-    if not (tilts and turns and heights):
-        return
+    if sim.world.is_hidden(item) or not (tilts and turns and heights):
+        return lambda _: iter(())
     probe = sim.vision.probe(item)
+    bounds = item.bounds()
     matrices = np.array(
         [euler_matrix((tilt, turn % 360.0, 0.0)) for tilt, turn in product(tilts, turns)]
     ).reshape(len(tilts), len(turns), 3, 3)
-    for place in places:
+
+    def poses(place: Mapping[str, float]) -> Iterator[dict[str, Any]]:
+        if level_gaps(to_array(place)[[0, 2]], *bounds) > reach:
+            return
         agent = replace(sim.world.agent, position=to_array(place))
         seen = [_seen(sim, replace(agent, standing=h), turns, matrices, probe) for h in heights]
         for (i, tilt), (j, turn), (k, standing) in product(*map(enumerate, angles)):
             if seen[k][i, j]:
                 yield {**place, "rotation": turn, "standing": standing, "horizon": tilt}
+
+    return poses
 
 
 def _seen(

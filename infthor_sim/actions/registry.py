@@ -21,7 +21,7 @@ from infthor_sim.simulation import Simulation
 _MESSAGE_KEYS = frozenset(
     "action sequenceId agentId renderImage renderDepthImage renderClassImage renderObjectImage "
     "renderNormalsImage renderFlowImage renderSemanticSegmentation renderInstanceSegmentation "
-    "visibilityDistance fixedDeltaTime physicsSimulationParams".split()
+    "visibilityDistance fixedDeltaTime actionSimulationSeconds physicsSimulationParams".split()
 )
 _LARGEST = 1e9  # of a number; squares of larger ones would overflow in the geometry
 

@@ -11,6 +11,7 @@ from infthor_sim.actions.interaction import set_openness
 from infthor_sim.actions.registry import action, is_vector
 from infthor_sim.errors import ActionError, UsageError
 from infthor_sim.geometry import to_array
+from infthor_sim.object_types import OBJECT_TYPES
 from infthor_sim.rearrange import NamedPose, ids_by_position, set_poses, spawn_randomly
 from infthor_sim.simulation import Simulation
 
@@ -28,14 +29,19 @@ def set_object_poses(
     forceRigidbodySleep: bool = True,
     skipMoveable: bool = False,
 ) -> None:
-    """Place the listed objects by name, copies of those listed twice; other loose ones vanish."""
+    """Place the listed objects by name, copies of those listed twice; others that move vanish."""
     limit = _max_poses()
     if len(objectPoses) > limit:
         raise ActionError(
             f"objectPoses has {len(objectPoses):,} entries, too many for a scene; "
             f"if this is intended, set {_MAX_POSES_VARIABLE} to more than {limit}"
         )
-    set_poses(sim.world, [_named_pose(entry) for entry in objectPoses], keep_moveable=skipMoveable)
+    poses = [_named_pose(entry) for entry in objectPoses]
+    unknown = set_poses(sim.world, poses, keep_moveable=skipMoveable) if poses else []
+    if unknown:
+        raise ActionError(
+            f"No Pickupable or Moveable object of name {unknown[-1]:.60} found in scene."
+        )
 
 
 def _max_poses() -> int:
@@ -60,8 +66,7 @@ def _named_pose(entry: Any) -> NamedPose:
     rotation = entry.get("rotation") or {}
     if not is_vector(position) or not is_vector(rotation):
         raise ActionError(f"objectPoses: {name:.60} has no usable position or rotation")
-    # Unity appends "(Clone)" to the names of copies.
-    return NamedPose(name.removesuffix("(Clone)"), to_array(position), to_array(rotation))
+    return NamedPose(name, to_array(position), to_array(rotation))
 
 
 @action("SetObjectToggles")
@@ -73,11 +78,18 @@ def set_object_toggles(sim: Simulation, objectToggles: list[Any]) -> None:
             raise ActionError(
                 f"objectToggles needs entries with objectType and isOn, not {entry!r}"
             )
+        _check_type(sim, entry["objectType"])
         switched[entry["objectType"]] = bool(entry.get("isOn", False))
     for item in sim.world.objects.values():
         if item.object_type in switched and item.type.toggleable:
             item.state.toggled = switched[item.object_type]
             sim.world.mark_changed(item)
+
+
+def _check_type(sim: Simulation, name: Any) -> None:
+    """Refuse what is no type of object; one that is not in the scene is none the less one."""
+    if name not in [*OBJECT_TYPES, *(o.object_type for o in sim.world.objects.values())]:
+        raise ActionError(f"{name!r:.60} is not an object type")
 
 
 class _StateChange(NamedTuple):
@@ -141,9 +153,10 @@ def set_object_states(sim: Simulation, SetObjectStates: Mapping[str, Any]) -> No
         raise ActionError(
             f"{name!r} is not a stateChange; use one of {', '.join(sorted(_CHANGES))}"
         )
-    _change_all(
-        sim, change, bool(SetObjectStates.get(change.flag, True)), SetObjectStates.get("objectType")
-    )
+    only = SetObjectStates.get("objectType")
+    if only:
+        _check_type(sim, only)
+    _change_all(sim, change, bool(SetObjectStates.get(change.flag, True)), only)
 
 
 def _change_all(sim: Simulation, change: _StateChange, on: bool, only: str | None = None) -> None:
@@ -168,7 +181,7 @@ def remove_from_scene(sim: Simulation, objectId: str) -> None:
 @action("InitialRandomSpawn")
 def initial_random_spawn(
     sim: Simulation,
-    randomSeed: int | None = None,
+    randomSeed: int = 0,
     forceVisible: bool = False,
     numPlacementAttempts: int = 5,
     placeStationary: bool = True,
@@ -181,15 +194,21 @@ def initial_random_spawn(
     """Spread the pickupable objects over the receptacles, the same way for the same seed.
 
     Loose objects get ids by their new positions, moved or not, as AI2-THOR sets up its scene anew.
-    Without `randomSeed` it continues the random numbers that SetRandomSeed started.
+    SetRandomSeed has no part in it, as there.
     """
+    if numPlacementAttempts <= 0:
+        raise ActionError("numPlacementAttempts must be a positive integer.")
+    for name in excludedReceptacles or ():
+        _check_type(sim, name)
+    for object_id in excludedObjectIds or ():
+        sim.world.get(object_id)
     if numDuplicatesOfType:
         raise ActionError(
             "numDuplicatesOfType is not offered by the embedded simulator; use SetObjectPoses"
         )
     spawn_randomly(
         sim.world,
-        sim.random if randomSeed is None else _random_from_seed(randomSeed),
+        _random_from_seed(randomSeed),
         excluded_types=frozenset(excludedReceptacles or ()),
         kept=frozenset(excludedObjectIds or ()),
         in_open_only=forceVisible,

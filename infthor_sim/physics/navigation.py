@@ -3,6 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,22 @@ CELL = 0.25  # metres
 _SAME = 1e-3  # metres between two positions that count as one
 # metres that a recorded position may be off its cell's centre, by rounding in the recordings
 _TOLERANCE = 0.06
+
+
+class Stop(NamedTuple):
+    """A place (x, z) on a walk, and the stop before it."""
+
+    place: tuple[float, float]
+    before: "Stop | None" = None
+
+    def way(self) -> list[tuple[float, float]]:
+        """Return the places from the walk's start to here."""
+        places = [self.place]
+        stop = self
+        while stop.before is not None:
+            stop = stop.before
+            places.append(stop.place)
+        return places[::-1]
 
 
 class NavGrid:
@@ -47,6 +64,15 @@ class NavGrid:
             self._cells.values(), key=lambda cell: ((cell[0] - x) ** 2 + (cell[1] - z) ** 2, cell)
         )
 
+    def gap(self, x: float, z: float) -> float:
+        """Return metres from (x, z) to the nearest point where the agent can stand."""
+        half = CELL / 2 + _TOLERANCE
+        gaps = (
+            math.hypot(max(abs(cell[0] - x) - half, 0.0), max(abs(cell[1] - z) - half, 0.0))
+            for cell in self
+        )
+        return min(gaps, default=math.inf)
+
     def can_walk(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
         """Return whether the agent can stand all along a straight way, checked each 0.1 m."""
         steps = max(1, math.ceil(math.dist(start, end) / 0.1))
@@ -66,30 +92,35 @@ class NavGrid:
         self, x: float, z: float, size: float, yaw: float
     ) -> list[tuple[float, float]]:
         """Return points reachable by steps of `size` metres along axes at `yaw`, sorted."""
+        return sorted(stop.place for stop in self.walk_out((x, z), size, yaw))
+
+    def walk_out(self, start: tuple[float, float], size: float, yaw: float = 0.0) -> Iterator[Stop]:
+        """Yield all stops of walks by steps of `size` metres along axes at `yaw`, nearest first."""
+        key = self._key(*start)
+        cell = self._cells.get(key)
         # Steps of one cell from a cell reach cells: quicker, and the points are those of the grid
         # to the last bit.
-        start = self._cells.get(self._key(x, z))
-        if (
-            size == CELL
-            and yaw % 90 == 0
-            and start is not None
-            and math.dist(start, (x, z)) < _SAME
-        ):
-            return self.reachable_cells(x, z)
-        ahead = (math.sin(math.radians(yaw)) * size, math.cos(math.radians(yaw)) * size)
-        reached = {(0, 0): (x, z)}  # by whole steps aside and ahead
-        queue = deque(reached)
+        on_cells = size == CELL and yaw % 90 == 0 and cell and math.dist(cell, start) < _SAME
+        first = Stop(cell) if cell and on_cells else Stop((round(start[0], 6), round(start[1], 6)))
+        sine, cosine = math.sin(math.radians(yaw)) * size, math.cos(math.radians(yaw)) * size
+        queue = deque([(key if on_cells else (0, 0), first)])  # by cells, or steps aside and ahead
+        reached = {queue[0][0]}
         while queue:
-            key = queue.popleft()
+            key, stop = queue.popleft()
+            yield stop
             for other in _neighbours(key):
-                point = (
-                    x + other[0] * ahead[1] + other[1] * ahead[0],
-                    z - other[0] * ahead[0] + other[1] * ahead[1],
-                )
-                if other not in reached and self.can_walk(reached[key], point):
-                    reached[other] = point
-                    queue.append(other)
-        return sorted((round(px, 6), round(pz, 6)) for px, pz in reached.values())
+                if other in reached:
+                    continue
+                place = self._cells.get(other)
+                if not on_cells:
+                    aside, ahead = other
+                    place = (
+                        round(start[0] + aside * cosine + ahead * sine, 6),
+                        round(start[1] - aside * sine + ahead * cosine, 6),
+                    )
+                if place and (on_cells or self.can_walk(stop.place, place)):
+                    reached.add(other)
+                    queue.append((other, Stop(place, stop)))
 
     def path(
         self, start: tuple[float, float], end: tuple[float, float]
@@ -142,7 +173,8 @@ class NavGrid:
 
 
 def _neighbours(key: tuple[int, int]) -> list[tuple[int, int]]:
-    return [(key[0] + 1, key[1]), (key[0] - 1, key[1]), (key[0], key[1] + 1), (key[0], key[1] - 1)]
+    # in the order in which AI2-THOR tries them
+    return [(key[0] + 1, key[1]), (key[0], key[1] + 1), (key[0] - 1, key[1]), (key[0], key[1] - 1)]
 
 
 def _phase(value: float) -> float:

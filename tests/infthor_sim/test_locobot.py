@@ -125,10 +125,9 @@ def test_what_the_expert_cannot_do():
     bench = bench_of("kitchen-1", rotateStepDegrees=70)
     assert "must be a divisor of 360" in bench.refused("ObjectNavExpertAction", objectType="Egg")
     bench.ok("Initialize", rotateStepDegrees=90, fastActionEmit=False)
-    assert "No object of type 'Ghost'" in bench.refused("ObjectNavExpertAction", objectType="Ghost")
     fridge = bench.first("Fridge")
     inside = bench.object(fridge)["axisAlignedBoundingBox"]["center"]
     egg = {"objectId": bench.first("Egg")}
     bench.force("TeleportObject", **egg, position=inside, rotation={})
-    with pytest.raises(AssertionError, match="is not visible from the end of the way to it"):
+    with pytest.raises(AssertionError, match="is not visible on navigation path"):
         follow(bench, **egg)

@@ -145,6 +145,20 @@ def test_arguments_of_ai2thor_pass_through():
         assert controller.last_event.metadata["arm"]["heldObjects"] == []
 
 
+@pytest.mark.filterwarnings("ignore:start method depreciated")
+def test_start_returns_the_last_event_and_starts_again_what_was_stopped():
+    with Controller(scene="bathroom-1") as controller:
+        event, process = controller.last_event, controller.unity_pid
+        assert controller.start() is event
+        assert controller.unity_pid == process
+        controller.stop()
+        controller.start()
+        assert controller.reset("bathroom-1").metadata["objects"] == event.metadata["objects"]
+        assert controller.unity_pid != process
+    assert not alive(controller)
+    assert not Path(controller.base_dir).exists()
+
+
 def test_a_download_starts_nothing():
     with Controller(download_only=True) as controller:
         assert controller.last_event is None

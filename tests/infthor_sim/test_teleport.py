@@ -71,6 +71,13 @@ def test_a_move_takes_all_of_unitys_arguments(bench):
     of_moves |= {"allowAgentsToIntersect": False, "forceAction": False}
     assert not bench.step("MoveAhead", moveMagnitude=0.25, **of_all, **of_moves)["errorCode"]
     assert not bench.step("RotateLeft", **of_all)["errorCode"]
+    for look in ("LookDown", "LookUp"):
+        bench.ok(look, degrees=15, speed=2.0)
+
+
+@pytest.mark.parametrize("action", ["MoveAhead", "RotateLeft", "LookDown", "Crouch", "Pass"])
+def test_a_time_of_simulation_has_no_effect(bench, action):
+    bench.ok(action, actionSimulationSeconds=0.26, fixedDeltaTime=0.02)
 
 
 def test_a_leash_keeps_the_agent_near_an_object(bench):

@@ -1,7 +1,5 @@
 """What actions do to the world, and what the world refuses."""
 
-import itertools
-
 import pytest
 
 from infthor_sim.arm.holding import pick_up
@@ -221,16 +219,6 @@ def test_teleport_refuses_what_collides(bench, position):
     assert bench.metadata["agent"]["position"] == before
 
 
-def test_shortest_path_leads_to_the_fridge(bench):
-    fridge = bench.first("Fridge")
-    corners = bench.ok("GetShortestPath", fridge)["actionReturn"]["corners"]
-    steps = itertools.pairwise(corners)
-    for a, b in steps:
-        assert abs(a["x"] - b["x"]) + abs(a["z"] - b["z"]) == pytest.approx(0.25, abs=1e-6)
-    end, goal = corners[-1], bench.object(fridge)["position"]
-    assert abs(end["x"] - goal["x"]) + abs(end["z"] - goal["z"]) < 1.5
-
-
 def test_random_placement_follows_its_seed(bench):
     def places() -> list[tuple[str, object]]:
         loose = [o for o in bench.metadata["objects"] if o["pickupable"]]
@@ -245,13 +233,32 @@ def test_random_placement_follows_its_seed(bench):
     bench.ok("InitialRandomSpawn", randomSeed=3)
     assert places() == third
     drawn = []
-    for _ in range(2):
+    for seed in ({}, {"randomSeed": 0}):
         bench.reset("kitchen-1")
         bench.ok("SetRandomSeed", seed=9)
-        bench.ok("InitialRandomSpawn")
+        bench.ok("InitialRandomSpawn", **seed)
         drawn.append(places())
-    assert drawn[0] == drawn[1]
+    assert drawn[0] == drawn[1], "without a seed it is seed 0"
     assert drawn[0] != third
+
+
+@pytest.mark.parametrize(
+    ("action", "arguments", "message"),
+    [
+        ("InitialRandomSpawn", {"numPlacementAttempts": 0}, "must be a positive integer"),
+        ("InitialRandomSpawn", {"excludedReceptacles": ["Fridg"]}, "'Fridg' is not an object type"),
+        ("InitialRandomSpawn", {"excludedObjectIds": ["Mug|1"]}, "Mug|1"),
+        ("SetObjectToggles", {"objectToggles": [{"objectType": "Lamp"}]}, "'Lamp' is not an"),
+        ("SetObjectStates", {"SetObjectStates": {"stateChange": "openable", "objectType": "Door2"}},
+         "'Door2' is not an object type"),
+        ("SetObjectStates", {"SetObjectStates": {"stateChange": "openable", "objectType": ["Mug"]}},
+         "['Mug'] is not an object type"),
+    ],
+)  # fmt: skip
+def test_what_names_nothing_changes_nothing(bench, action, arguments, message):
+    before = bench.metadata["objects"]
+    assert message in bench.refused(action, **arguments)
+    assert bench.ok("Pass")["objects"] == before
 
 
 def test_random_placement_gives_ids_by_the_new_positions(bench):
@@ -317,6 +324,58 @@ def test_a_pile_of_plates_is_carried_however_high_it_is(bench):
         world.attach(plate, pile[-1])
         pile.append(plate)
     assert list(world.descendants(pile[0])) == pile[1:]
+
+
+def pose_of(bench: Bench, object_type: str) -> dict[str, object]:
+    item = bench.object(bench.first(object_type))
+    return {"objectName": item["name"], "position": item["position"], "rotation": item["rotation"]}
+
+
+def names(bench: Bench) -> list[str]:
+    return [o["name"] for o in bench.metadata["objects"] if o["pickupable"] or o["moveable"]]
+
+
+@pytest.mark.parametrize("name", ["Ghost_1", "Mugg_1", "", "Fridge_1", "CounterTop"])
+def test_a_pose_for_nothing_that_can_be_moved_fails_and_the_others_are_set(bench, name):
+    fridge = pose_of(bench, "Fridge")
+    wrong = {**fridge, "objectName": fridge["objectName"] if name == "Fridge_1" else name}
+    message = bench.refused("SetObjectPoses", objectPoses=[pose_of(bench, "Mug"), wrong])
+    assert message.startswith(f"No Pickupable or Moveable object of name {wrong['objectName']} ")
+    bench.ok("Pass")
+    assert [o["objectType"] for o in bench.metadata["objects"] if o["pickupable"]] == ["Mug"]
+    assert pose_of(bench, "Fridge") == fridge
+
+
+def test_no_poses_change_nothing(bench):
+    before = bench.metadata["objects"]
+    assert bench.ok("SetObjectPoses", objectPoses=[])["objects"] == before
+
+
+def test_furniture_vanishes_where_other_furniture_is_listed(bench):
+    mug, chair = pose_of(bench, "Mug"), pose_of(bench, "Chair")
+    moved = {**chair, "position": {**chair["position"], "y": 3.0}}
+    furniture = [o["name"] for o in bench.metadata["objects"] if o["moveable"]]
+    bench.ok("SetObjectPoses", objectPoses=[mug, moved], skipMoveable=True)
+    assert names(bench) == [*furniture, mug["objectName"]]
+    assert pose_of(bench, "Chair") == chair
+    bench.ok("SetObjectPoses", objectPoses=[mug])
+    assert names(bench) == [*furniture, mug["objectName"]]
+    bench.ok("SetObjectPoses", objectPoses=[mug, moved])
+    assert names(bench) == [chair["objectName"], mug["objectName"]]
+    assert pose_of(bench, "Chair") == moved
+
+
+def test_copies_have_names_of_their_own(bench):
+    mug = pose_of(bench, "Mug")
+    above = [{**mug, "position": {**mug["position"], "y": y}} for y in (1.5, 2.0, 2.5)]
+    bench.ok("SetObjectPoses", objectPoses=above)
+    first = mug["objectName"]
+    assert names(bench)[-3:] == [first, f"{first}(Clone)_copy_1", f"{first}(Clone)_copy_2"]
+    second = {**above[0], "objectName": f"{first}(Clone)_copy_2"}
+    bench.ok("SetObjectPoses", objectPoses=[second])
+    assert [o["name"] for o in bench.metadata["objects"] if o["pickupable"]] == [
+        second["objectName"]
+    ]
 
 
 def test_more_poses_than_a_scene_has_are_refused(bench, monkeypatch):

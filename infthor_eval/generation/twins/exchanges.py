@@ -88,10 +88,12 @@ def restored_ids(
         EditRefused: it cannot be restored.
         SimulatorError: the simulator fails.
     """
-    if restore(simulator, scene).lines():
-        raise EditRefused("the exchanged start cannot be restored")
+    dropped = restore(simulator, scene).lines()
     by_name = {obj.name: obj.object_id for obj in simulator.view.objects.values()}
-    return {obj.name: by_name[obj.name] for obj in objects}
+    names = [obj.name for obj in objects]
+    if dropped or not by_name.keys() >= set(names):
+        raise EditRefused("the exchanged start cannot be restored")
+    return {name: by_name[name] for name in names}
 
 
 class ExchangeKind:
