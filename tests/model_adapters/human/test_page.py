@@ -387,7 +387,7 @@ def test_people_are_told_apart(session, data, tmp_path):
     words = cli_words("--model", "human:reader=../x", "--tasks", "nieh_gt", "--data", data)
     refused = subprocess.run(words, capture_output=True, text=True, check=False)
     assert refused.returncode == 2
-    assert "reader is '../x'; write a name" in refused.stderr
+    assert "reader=../x: give a name" in refused.stderr
     for reader in ("ann", "ben"):
         model = f"human:browser=false,reader={reader}"
         one = session("--model", model, "--tasks", "nieh_gt", "--data", data, "--limit", 1)
