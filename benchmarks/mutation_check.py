@@ -68,7 +68,7 @@ _MODULES = {
     ),
     "asking": (
         "infthor_eval/questions/asking.py",
-        "tests/questions/test_suite.py tests/nieh/asking",
+        "tests/questions tests/nieh/asking",
     ),
     "sample": (
         "infthor_eval/report/sample.py",
