@@ -224,9 +224,9 @@ def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames):
         ({"url": "http://[::1"}, "url is not the address of a server"),
         ({"url": "http://me:secret@host"}, "url holds a password"),
         ({"url": "http://host/?token=secret"}, "url holds a password, a query"),
-        ({"image": "png"}, "image=png is not json_numpy or list"),
-        ({"timeout_s": "0"}, "timeout_s must be above 0"),
-        ({"retries": "11"}, "retries 0 to 10"),
+        ({"image": "png"}, "image=png: give json_numpy or list"),
+        ({"timeout_s": "0"}, "timeout_s=0: give a number above 0"),
+        ({"retries": "11"}, "retries=11: give a whole number from 0, at most 10"),
         ({"execute": "0"}, "execute=0"),
     ],
 )
