@@ -25,6 +25,11 @@ def modern_type(object_type: str) -> str:
     return _RENAMED.get(object_type, object_type)
 
 
+def name_of_original(name: str) -> str:
+    """Return the name of the object that one with this name is a copy of, or its own."""
+    return name.partition("(Clone)")[0]
+
+
 class Words(StrEnum):
     """The words in which plans and actions name objects.
 

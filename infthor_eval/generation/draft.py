@@ -12,6 +12,7 @@ from msgspec.structs import asdict
 
 from infthor_eval import __version__
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.object_ids import name_of_original
 from infthor_eval.formats.trajectory import (
     ExpertPlan,
     HighAction,
@@ -45,9 +46,7 @@ def initial_scene(settings: TrajectorySettings, view: SimulatorView, start: Init
         init_action=start,
         scene_num=int("".join(filter(str.isdigit, settings.scene)) or 0),
         object_poses=[
-            ObjectPose(
-                loose.name.partition("(Clone)")[0], asdict(loose.position), asdict(loose.rotation)
-            )
+            ObjectPose(name_of_original(loose.name), asdict(loose.position), asdict(loose.rotation))
             for loose in view.objects.values()
             if loose.pickupable
         ],

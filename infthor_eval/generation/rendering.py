@@ -20,6 +20,7 @@ import msgspec
 from PIL import Image
 
 from infthor_eval.errors import DataError, SimulatorError
+from infthor_eval.formats.object_ids import name_of_original
 from infthor_eval.formats.trajectory import LowAction, Trajectory, TrajectorySource
 from infthor_eval.generation.motion import intermediate_views
 from infthor_eval.generation.replay import ActionReplay, ReplayReport
@@ -197,4 +198,4 @@ class _StepLog:
 
 def _name_of(name: str) -> str:
     """Return the part of a Unity object's name before its number ("Mug_291e6e8a(Clone)")."""
-    return name.split("(Clone)", maxsplit=1)[0].split("_", maxsplit=1)[0]
+    return name_of_original(name).split("_", maxsplit=1)[0]

@@ -16,7 +16,7 @@ import numpy as np
 from msgspec.structs import asdict, astuple
 from numpy.typing import NDArray
 
-from infthor_eval.formats.object_ids import modern_type
+from infthor_eval.formats.object_ids import modern_type, name_of_original
 from infthor_eval.formats.trajectory import ObjectPose, Scene, StartState
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector, teleport_call
@@ -136,7 +136,7 @@ def _poses(
     poses = []
     dropped = []
     for pose in recorded:
-        name = pose.name.partition("(Clone)")[0]  # copies are made anew
+        name = name_of_original(pose.name)  # copies are made anew
         if name not in known and name not in renamed:
             names = spare[_type_of(name, spare)]
             if names:
@@ -272,5 +272,5 @@ def _distances(pose: dict[str, Any], loose: Sequence[ThorObject]) -> Iterator[fl
     """Yield the distances of all objects with a pose's name: several may have it."""
     place = [pose["position"][axis] for axis in "xyz"]
     for obj in loose:
-        if obj.name.partition("(Clone)")[0] == pose["objectName"]:
+        if name_of_original(obj.name) == pose["objectName"]:
             yield math.dist(astuple(obj.position), place)

@@ -35,7 +35,7 @@ class PixelLimits(ModelOptions):
 
     def __post_init__(self) -> None:
         most = IMAGE_MEGAPIXELS.value * 1_000_000
-        for name, value in self._limits().items():
+        for name, value in self.image_settings().items():
             if value > most:
                 raise ValueError(f"{name}={value}: give at most {most:,}, as pictures have")
         if (
@@ -48,9 +48,6 @@ class PixelLimits(ModelOptions):
 
     def image_settings(self) -> dict[str, int]:
         """Return the image processor settings that differ from the checkpoint's."""
-        return self._limits()
-
-    def _limits(self) -> dict[str, int]:
         limits = {"min_pixels": self.min_pixels, "max_pixels": self.max_pixels}
         return {name: value for name, value in limits.items() if value is not None}
 
