@@ -3,12 +3,17 @@ them.
 
     python benchmarks/interpenetrations.py [--rooms 200] [--puts 10] [--against CHECKOUT]
     [--examples]
+    python benchmarks/interpenetrations.py --data FOLDER [--puts 10] [--against CHECKOUT]
+    [--examples]
 
-For each room it looks at the drawn solids, and not at the boxes of the metadata, by points within
-each: at rest, with each door, drawer and lid opened in turn, which shows what is inside and moves
-what opens, and where an agent put things. Two objects interpenetrate if a point of one lies deeper
-than a centimetre (for thin boards: beyond their middle) in a solid of the other, or if a solid
-crosses the wall of a vessel. Counted are pairs of which at least one is loose, or has just been
+With --data it looks at the recorded floor plans of a folder: at rest, where AI2-THOR's boxes and
+our drawings of them differ, and at what puts add.
+
+Else, for each room it looks at the drawn solids, and not at the boxes of the metadata, by points
+within each: at rest, with each door, drawer and lid opened in turn, which shows what is inside and
+moves what opens, and where an agent put things. Two objects interpenetrate if a point of one lies
+deeper than a centimetre (for thin boards: beyond their middle) in a solid of the other, or if a
+solid crosses the wall of a vessel. Counted are pairs of which at least one is loose, or has just been
 opened, or which are not built into one another, and things that go through a wall of the room. It
 prints one JSON object: rooms, pairs by where they are seen, the most frequent pairs of types, and
 objects per room.
@@ -287,15 +292,27 @@ def faults(world: Any) -> dict[str, set[tuple[str, str]]]:
     return found
 
 
-def faults_of_puts(scene: str, n_puts: int, random: np.random.Generator) -> set[tuple[str, str]]:
-    """Return the pairs that arise when an agent puts loose things into or onto what takes them, one
-    after the other."""
+def face(server: Any, object_id: str) -> bool:
+    """Stand where an object can be used; return whether there is such a place."""
+    outcome = server.run({"action": "GetInteractablePoses", "objectId": object_id})[0]
+    poses = outcome.value or []
+    if poses:
+        pose = poses[len(poses) // 2]
+        server.run({"action": "TeleportFull", **pose, "rotation": {"y": pose["rotation"]}})
+    return bool(poses)
+
+
+def faults_of_puts(
+    scene: str, n_puts: int, random: np.random.Generator, data: Path | None = None
+) -> dict[str, set[tuple[str, str]]]:
+    """Return the pairs at rest, and those that arise when an agent puts loose things into or onto
+    what takes them, one after the other."""
     from infthor_sim.object_types import allowed_in
     from infthor_sim.player.server import SimulatorServer
     from infthor_sim.scenes.catalogue import Catalogue
     from infthor_sim.simulation import Simulation
 
-    server = SimulatorServer(sim := Simulation(Catalogue()))
+    server = SimulatorServer(sim := Simulation(Catalogue(data)))
     server.run({"action": "Reset", "sceneName": scene})
     server.run({"action": "Initialize"})
     room, world, found = Room(sim.world), sim.world, set[tuple[str, str]]()
@@ -312,44 +329,47 @@ def faults_of_puts(scene: str, n_puts: int, random: np.random.Generator) -> set[
         server.run({"action": "PickupObject", "objectId": item.object_id, "forceAction": True})
         if home.type.openable and home.state.openness == 0:
             server.run({"action": "OpenObject", "objectId": home.object_id, "forceAction": True})
-        server.run(
-            {
-                "action": "PutObject",
-                "objectId": home.object_id,
-                "forceAction": True,
-                "placeStationary": True,
-            }
-        )
+        # In a recording an agent puts things where it stands and looks: a forced put goes anywhere.
+        if data is not None and not face(server, home.object_id):
+            server.run({"action": "DropHandObject", "forceAction": True})
+            continue
+        server.run({"action": "PutObject", "objectId": home.object_id, "forceAction": data is None})
         if world.agent.held is not None:  # there was no room
             server.run({"action": "DropHandObject", "forceAction": True})
             continue
         found |= {(a, b) for a, b, _ in room.pairs({item.object_id})} - before
-    return found
+    return {"at rest": before, "put": found}
 
 
-def count(n_rooms: int, n_puts: int) -> dict[str, Any]:
+def rooms_looked_at(
+    n_rooms: int, n_puts: int, data: Path | None
+) -> Iterator[tuple[str, int, dict[str, set[tuple[str, str]]]]]:
+    """Yield each room's name, its number of objects, and its pairs by where they are seen."""
+    from infthor_sim.scenes.catalogue import Catalogue, FloorPlanData
+
+    names = [f"{_KINDS[index % 4]}-{1000 + index // 4}" for index in range(n_rooms)]
+    for index, name in enumerate(names if data is None else FloorPlanData(data).scenes()):
+        puts = faults_of_puts(name, n_puts, np.random.default_rng(index), data)
+        world = Catalogue(data).load(name)
+        yield name, len(world.objects), puts if data else {**puts, **faults(world)}
+
+
+def count(n_rooms: int, n_puts: int, data: Path | None = None) -> dict[str, Any]:
     """Return all numbers, see the module's docstring."""
-    from infthor_sim.scenes.procedural import build_scene
-
     pairs, types, examples, n_objects = Counter[str](), Counter[str](), {}, 0
-    with_fault = 0
-    for index in range(n_rooms):
-        kind, seed = _KINDS[index % 4], 1000 + index // 4
-        world = build_scene(kind, seed)
-        n_objects += len(world.objects)
-        found = {
-            **faults(world),
-            "put": faults_of_puts(f"{kind}-{seed}", n_puts, np.random.default_rng(index)),
-        }
+    with_fault = n_looked_at = 0
+    for name, n_in_room, found in rooms_looked_at(n_rooms, n_puts, data):
+        n_looked_at += 1
+        n_objects += n_in_room
         with_fault += any(found.values())
         for where, listed in found.items():
             pairs[where] += len(listed)
             for a, b in listed:
-                key = f"{where}: " + " / ".join(sorted(_type_of(name) for name in (a, b)))
+                key = f"{where}: " + " / ".join(sorted(map(_type_of, (a, b))))
                 types[key] += 1
-                examples.setdefault(key, f"{kind}-{seed}: {a} and {b}")
+                examples.setdefault(key, f"{name}: {a} and {b}")
     return {
-        "rooms": n_rooms, "objects": n_objects, "pairs": sum(pairs.values()),
+        "rooms": n_looked_at, "objects": n_objects, "pairs": sum(pairs.values()),
         "by_place": dict(pairs),
         "rooms_with_a_fault": with_fault, "most_frequent": dict(types.most_common()),
         "examples": examples,
@@ -373,8 +393,11 @@ def main() -> None:
     parser.add_argument(
         "--examples", action="store_true", help="name a pair of objects of each kind of pair"
     )
+    parser.add_argument(
+        "--data", type=Path, metavar="FOLDER", help="recorded floor plans, instead of rooms"
+    )
     options = parser.parse_args()
-    result = count(options.rooms, options.puts)
+    result = count(options.rooms, options.puts, options.data)
     if not options.examples:
         del result["examples"]
     if options.against:
@@ -386,6 +409,7 @@ def main() -> None:
             str(options.rooms),
             "--puts",
             str(options.puts),
+            *(["--data", str(options.data)] if options.data else []),
         ]
         environment = {**os.environ, "PYTHONPATH": str(Path(options.against).resolve())}
         result = {

@@ -76,11 +76,15 @@ class ObjectInFrame(msgspec.Struct, omit_defaults=True):
         box: [xmin, ymin, xmax, ymax] of these pixels, both ends inclusive.
         visible: the simulator's flag, True if the object is in view and within the visibility
             distance.
+        inside, top_inside: shares of its bounding box, and of the top quarter of it, that lie
+            within the frame, whatever hides them.
     """
 
     pixels: int
     box: tuple[int, int, int, int]
     visible: bool = False
+    inside: float = 1.0
+    top_inside: float = 1.0
 
 
 class ObjectState(msgspec.Struct, omit_defaults=True):

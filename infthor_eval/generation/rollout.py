@@ -5,7 +5,7 @@ ends the rollout.
 """
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 from infthor_eval.formats.trajectory import ApiAction, PlannerAction
 from infthor_eval.generation.trace import RolloutError, Trace
@@ -171,12 +171,18 @@ class Rollout:
         if not self._view.objects[acted_on].visible:
             # An object that was just put down or uncovered may not be visible from here.
             self._walker.step_aside(acted_on)
-        force = {} if receptacle is None else _FORCED
-        api = ApiAction(
-            action, object_id=item, receptacle_id=receptacle, force_action=force.get("forceAction"),
-            place_stationary=force.get("placeStationary"),
-        )  # fmt: skip
-        self.trace.act(api, {"objectId": acted_on, **force})
+        call: dict[str, Any] = {"objectId": acted_on}
+        api = ApiAction(action, object_id=item)
+        if receptacle is not None:
+            # A recorded floor plan takes a forced put even where nothing is free; an unforced one
+            # goes to the same places but these, so that what is stored is done again alike.
+            unseen = not self._view.objects[acted_on].visible
+            call |= {"forceAction": unseen, "placeStationary": True}
+            api = ApiAction(
+                action, object_id=item, receptacle_id=receptacle,
+                force_action=True, place_stationary=True,  # as the published generator puts
+            )  # fmt: skip
+        self.trace.act(api, call)
         # a door or an object on the floor may block cells now, or no longer
         self._walker.forget_grid()
 
@@ -233,8 +239,6 @@ class Rollout:
         ).object_id
 
 
-# As the published generator puts.
-_FORCED = {"forceAction": True, "placeStationary": True}
 _SUBGOALS: dict[str, Callable[[Rollout, Operator], None]] = {
     "PickupObject": Rollout._pickup_or_slice,
     "PutObject": Rollout._put,

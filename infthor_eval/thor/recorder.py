@@ -6,6 +6,8 @@ from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.pictures.png import write_png
 from infthor_eval.formats.step_log import LoggedPose, ObjectInFrame, ObjectLog, ObjectState, Step
+from infthor_eval.thor.outline import shares_in_frame
+from infthor_eval.thor.segmentation import Instance
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
 _PNG_LEVEL = 3  # 6 takes twice as long and shrinks rendered frames by a sixth
@@ -131,7 +133,21 @@ def _objects_in_frame(view: SimulatorView) -> dict[str, ObjectInFrame] | None:
     if view.instances is None:
         return None
     return {
-        key: ObjectInFrame(instance.pixels, instance.box, view.objects[key].visible)
+        key: _in_frame(view, view.objects[key], instance)
         for key, instance in sorted(view.instances.items())
         if key in view.objects
     }
+
+
+def _in_frame(view: SimulatorView, obj: ThorObject, instance: Instance) -> ObjectInFrame:
+    shown = ObjectInFrame(instance.pixels, instance.box, obj.visible)
+    if view.segmentation is None or view.camera is None or obj.axis_aligned_bounding_box is None:
+        return shown
+    height, width = view.segmentation.codes.shape
+    left, top, right, bottom = instance.box
+    if min(left, top) > 0 and right < width - 1 and bottom < height - 1:
+        return shown
+    shown.inside, shown.top_inside = shares_in_frame(
+        obj.axis_aligned_bounding_box, view.camera, width, height
+    )
+    return shown

@@ -82,6 +82,21 @@ class AgentPose(msgspec.Struct, frozen=True):
     standing: bool | None = True
 
 
+class Camera(msgspec.Struct, frozen=True):
+    """The agent's camera.
+
+    Attributes:
+        position: in world coordinates, metres.
+        rotation, horizon: as of the agent's pose, degrees.
+        field_of_view: vertical angle, degrees.
+    """
+
+    position: Vector
+    rotation: float
+    horizon: float
+    field_of_view: float
+
+
 class AxisAngle(msgspec.Struct, frozen=True):
     """A rotation by `w` degrees about the axis (x, y, z), a unit vector."""
 
@@ -150,6 +165,7 @@ class SimulatorView:
         instances: objects in the frame by id; None if instance segmentation is not rendered.
         segmentation: which object each pixel shows; None likewise.
         arm: arm of the agent; None if it has none.
+        camera: the agent's; None where a simulator does not report it.
     """
 
     frame: NDArray[np.uint8] | None
@@ -165,6 +181,7 @@ class SimulatorView:
     instances: dict[str, Instance] | None
     segmentation: Segmentation | None = None
     arm: ArmState | None = None
+    camera: Camera | None = None
 
 
 class _InHand(msgspec.Struct):
@@ -215,7 +232,15 @@ def view_of(event: Any) -> SimulatorView:
         instances=None if segmentation is None else segmentation.instances(),
         segmentation=segmentation,
         arm=arm,
+        camera=_camera(metadata, agent),
     )
+
+
+def _camera(metadata: dict[str, Any], agent: AgentPose) -> Camera | None:
+    at, angle = metadata.get("cameraPosition"), metadata.get("fov")
+    if at is None or angle is None:
+        return None
+    return Camera(msgspec.convert(at, Vector), agent.rotation, agent.horizon, float(angle))
 
 
 def _pose(agent: dict[str, Any]) -> AgentPose:

@@ -9,7 +9,7 @@ from infthor_sim.effects import slice_object, toggle
 from infthor_sim.errors import ActionError, ErrorCode
 from infthor_sim.object_types import allowed_in
 from infthor_sim.objects import SimObject
-from infthor_sim.physics.free_places import find_place
+from infthor_sim.physics.free_places import InTheWay, find_place
 from infthor_sim.physics.receptacles import drawer_offset
 from infthor_sim.physics.solids import unfold
 from infthor_sim.settings import HAND_MODES
@@ -79,11 +79,11 @@ def _find_place(
     sim: Simulation, held: SimObject, target: SimObject, force: bool
 ) -> SimObject | None:
     """Return the held object at the best free place; a forced put squeezes in where it is full."""
-    # Best first: without overlap, clear of fixed things, in view. Recorded boxes of fixed things
-    # are too large, so a place within one is better than none; Unity, which has the meshes, would
-    # find room there.
-    for overlap in (0.0, *_CROWDED) if force and sim.world.coarse else (0.0,):
-        for among_fixed in (False, True):
+    # A recording's boxes are too large, so a forced put goes among them where nothing else is free:
+    # Unity, which has the meshes, would find room there. Best first: without overlap, in view.
+    squeezing = force and sim.world.coarse
+    for overlap in (0.0, *_CROWDED) if squeezing else (0.0,):
+        for in_the_way in InTheWay if squeezing else (InTheWay.DRAWN,):
             for point_filter in (sim.vision.in_frame, None):
                 placed = find_place(
                     sim.world,
@@ -91,7 +91,7 @@ def _find_place(
                     target,
                     overlap,
                     point_filter=point_filter,
-                    among_fixed=among_fixed,
+                    in_the_way=in_the_way,
                 )
                 if placed is not None:
                     return placed

@@ -75,8 +75,14 @@ def free_cells(world: World) -> NavGrid:
     if len(world.agents) == 1:
         return world.nav
     height = world.standing_height
+    is_free = world.nav.is_free
+
+    def is_apart(x: float, z: float) -> bool:
+        return agent_at(world, np.array([x, height, z])) is None
+
     return NavGrid(
-        (x, z) for x, z in world.nav if agent_at(world, np.array([x, height, z])) is None
+        (cell for cell in world.nav if is_apart(*cell)),
+        is_free and (lambda x, z: is_free(x, z) and is_apart(x, z)),
     )
 
 

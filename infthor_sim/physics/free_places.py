@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,14 @@ _ON_IT = 0.05  # metres between a surface and the underside of what stands on it
 PointFilter = Callable[[Array], NDArray[np.bool_]]
 
 
+class InTheWay(Enum):
+    """What a thing that is put down must be clear of, beside the loose things around it."""
+
+    DRAWN = "all that is drawn: parts, the inside of vessels, doors, walls"
+    FIXED = "boxes of what is fixed on the surface, as a recording has them"
+    NOTHING = "nothing: a recording's boxes of lamps, appliances and taps are too large"
+
+
 @dataclass(frozen=True)
 class _Obstacles:
     """What is in the way on a surface.
@@ -41,11 +50,13 @@ class _Obstacles:
         loose: boxes of things that may be squeezed against.
         fixed: boxes of what is solid.
         walls: round walls between which a thing must fit.
+        squeeze: metres by which a thing may be higher than the surface's headroom.
     """
 
     loose: list[Box]
     fixed: list[Box]
     walls: list[Wall]
+    squeeze: float = 0.0
 
     def clear_of(
         self, points: Array, size: Array, around: Array, overlap: float
@@ -89,7 +100,7 @@ def find_place(
     overlap: float = 0.0,
     random: np.random.Generator | None = None,
     point_filter: PointFilter | None = None,
-    among_fixed: bool = False,
+    in_the_way: InTheWay = InTheWay.DRAWN,
 ) -> SimObject | None:
     """Return a copy of `item` at the first free place of `receptacle`; None if it is full.
 
@@ -98,21 +109,12 @@ def find_place(
         overlap: share of their size by which neighbours may overlap.
         random: random numbers that choose among the free places; None for the nearest.
         point_filter: function that marks which of some points (n, 3) may be used; None: all.
-        among_fixed: in a recording, allow places within lamps, appliances and taps: their boxes are
-            too large.
+        in_the_way: what it must be clear of.
     """
     ghost = item.duplicate(item.object_id)
     neighbours = [o.bounds() for o in _neighbours(world, item, receptacle)]
     for surface in _sort_by_reach(world, surfaces(receptacle)):
-        if world.coarse:  # recorded boxes are too large to be taken for solid
-            fixed = [] if among_fixed else _fixed_on(world, receptacle, surface)
-            obstacles = _Obstacles([*neighbours, *(o.bounds() for o in fixed)], [], [])
-        else:
-            solid = list(_solid_boxes(world, item, receptacle, surface))
-            walls = list(_inner_walls(receptacle))
-            for outer in world.ancestors(receptacle):
-                walls += _inner_walls(outer)
-            obstacles = _Obstacles(neighbours, solid, walls)
+        obstacles = _obstacles(world, item, receptacle, surface, neighbours, in_the_way)
         for turn in (0.0, 90.0):
             ghost.rotation = np.array([0.0, (surface.yaw + turn) % 360, 0.0])
             around = (
@@ -125,6 +127,23 @@ def find_place(
                 ghost.place_bottom(point)
                 return ghost
     return None
+
+
+def _obstacles(
+    world: World,
+    item: SimObject,
+    receptacle: SimObject,
+    surface: Surface,
+    neighbours: list[Box],
+    in_the_way: InTheWay,
+) -> _Obstacles:
+    """Return what is in an object's way on a surface."""
+    if in_the_way is InTheWay.DRAWN:
+        inside = (receptacle, *world.ancestors(receptacle))
+        solid = list(_solid_boxes(world, item, receptacle, surface))
+        return _Obstacles(neighbours, solid, [w for outer in inside for w in _inner_walls(outer)])
+    fixed = _fixed_on(world, receptacle, surface) if in_the_way is InTheWay.FIXED else ()
+    return _Obstacles([*neighbours, *(o.bounds() for o in fixed)], [], [], _SQUEEZE)
 
 
 def _outline_with_contents(world: World, item: SimObject, ghost: SimObject) -> Array:
@@ -266,7 +285,7 @@ def _free_point(
     """Return a surface's point (3,) for the underside of `ghost`, clear of obstacles, or None."""
     low, high = ghost.bounds()
     height = high[1] - low[1]
-    if height > surface.headroom + (_SQUEEZE if world.coarse else 0.0):
+    if height > surface.headroom + obstacles.squeeze:
         return None
     turn = yaw_matrix(surface.yaw)
     local = np.abs(turn.T @ (high - low)) if surface.yaw % 90 == 0 else high - low

@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,9 @@ CELL = 0.25  # metres
 _SAME = 1e-3  # metres between two positions that count as one
 # metres that a recorded position may be off its cell's centre, by rounding in the recordings
 _TOLERANCE = 0.06
+# metres from a cell's centre at which AI2-THOR still starts its agents, where nothing known is in
+# their way; the next cell, at 0.25, it refused
+_BESIDE = 0.23
 
 
 class Stop(NamedTuple):
@@ -36,15 +39,22 @@ class NavGrid:
 
     Args:
         points: (x, z) positions in metres where the agent can stand; whole cells apart.
+        is_free: whether the agent touches nothing at (x, z), which then decides beside the cells;
+            None: there is no floor beside them.
     """
 
-    def __init__(self, points: Iterable[tuple[float, float]]) -> None:
+    def __init__(
+        self,
+        points: Iterable[tuple[float, float]],
+        is_free: Callable[[float, float], bool] | None = None,
+    ) -> None:
         # Keys are whole multiples of `CELL` from the first point's own offset: a recording's grid
         # need not pass through the origin.
         listed = [(float(x), float(z)) for x, z in points]
         first = listed[0] if listed else (0.0, 0.0)
         self._offset = (_phase(first[0]), _phase(first[1]))
         self._cells = {self._key(x, z): (x, z) for x, z in sorted(listed)}
+        self.is_free = is_free
 
     def __len__(self) -> int:
         return len(self._cells)
@@ -53,9 +63,21 @@ class NavGrid:
         return iter(self._cells.values())
 
     def can_stand(self, x: float, z: float) -> bool:
-        """Return whether the agent can stand at (x, z), near enough to a cell's centre."""
-        cell = self._cells.get(self._key(x, z))
-        return cell is not None and max(abs(cell[0] - x), abs(cell[1] - z)) <= CELL / 2 + _TOLERANCE
+        """Return whether the agent can stand at (x, z): on a cell, or on free floor beside one."""
+        key = self._key(x, z)
+        cell = self._cells.get(key)
+        if cell is not None and max(abs(cell[0] - x), abs(cell[1] - z)) <= CELL / 2 + _TOLERANCE:
+            return True
+        around = ((key[0] + i, key[1] + j) for i in (-1, 0, 1) for j in (-1, 0, 1))
+        return (
+            self.is_free is not None
+            and any(
+                math.dist(self._cells[other], (x, z)) <= _BESIDE
+                for other in around
+                if other in self._cells
+            )
+            and self.is_free(x, z)
+        )
 
     def nearest(self, x: float, z: float) -> tuple[float, float]:
         """Return the cell nearest to (x, z)."""

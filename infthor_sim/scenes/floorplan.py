@@ -139,8 +139,9 @@ def _add_door_cells(world: World) -> None:
     closed. An open door blocks them as it blocks others, see `obstacles`.
     """
     points = np.array(sorted(set(_fringe(world.nav)))).reshape(-1, 2)
-    free = points[_in_reach_of_a_door(world, points) & _clear(world, points)]
-    world.nav = NavGrid([*world.nav, *((float(x), float(z)) for x, z in free)])
+    clear = ClearFloor(world)
+    free = points[_in_reach_of_a_door(world, points) & clear.at(points)]
+    world.nav = NavGrid([*world.nav, *((float(x), float(z)) for x, z in free)], clear)
 
 
 def _fringe(nav: NavGrid) -> Iterator[tuple[float, float]]:
@@ -172,17 +173,34 @@ def _leaves(item: SimObject) -> Iterator[tuple[Array, Array]]:
             yield leaf
 
 
-def _clear(world: World, points: Array) -> NDArray[np.bool_]:
-    """Return at which points (n, 2) the agent's capsule touches neither object nor wall."""
-    low, high = np.array(world.scene_bounds())[:, [0, 2]]
-    floor = world.standing_height - AGENT_HEIGHT
-    clear = np.minimum(points - low, high - points).min(axis=1, initial=np.inf) >= _RADIUS
-    for item in world.objects.values():
-        bottom, top = item.bounds()
-        in_height = top[1] > floor + _KNEE and bottom[1] < floor + 2 * AGENT_HEIGHT
-        if in_height and item.object_type != "Floor":
-            clear &= level_gaps(points, bottom, top) >= _RADIUS
-    return np.asarray(clear)
+class ClearFloor:
+    """Where the agent's capsule touches neither the walls of a room nor an object, by their boxes.
+
+    Args:
+        world: the room, as recorded; what moves in it later moves no floor.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._room = np.array(world.scene_bounds())[:, [0, 2]]
+        floor = world.standing_height - AGENT_HEIGHT
+        boxes = [o.bounds() for o in world.objects.values() if o.object_type != "Floor"]
+        self._boxes = [
+            box
+            for box in boxes
+            if box[1][1] > floor + _KNEE and box[0][1] < floor + 2 * AGENT_HEIGHT
+        ]
+
+    def at(self, points: Array) -> NDArray[np.bool_]:
+        """Return at which points (n, 2) the floor is clear."""
+        low, high = self._room
+        clear = np.minimum(points - low, high - points).min(axis=1, initial=np.inf) >= _RADIUS
+        for box in self._boxes:
+            clear &= level_gaps(points, *box) >= _RADIUS
+        return np.asarray(clear)
+
+    def __call__(self, x: float, z: float) -> bool:
+        """Return whether the floor is clear at (x, z)."""
+        return bool(self.at(np.array([[x, z]]))[0])
 
 
 def _recorded_object(entry: Mapping[str, Any]) -> SimObject:

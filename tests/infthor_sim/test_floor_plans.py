@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from infthor_sim.errors import DataError
+from infthor_sim.geometry import level_gaps
 from infthor_sim.scenes.catalogue import Catalogue
 from infthor_sim.scenes.supplement import read_supplement
 
+from .conftest import need_data
 from .harness import Bench
 
 
@@ -163,3 +165,47 @@ def test_toggles_and_states_of_all(folder):
     bench.ok("SetObjectStates", SetObjectStates=opened)
     assert all(o["isOpen"] for o in bench.metadata["objects"] if o["objectType"] == "Drawer")
     bench.refused("SetStateOfAllObjects", StateChange="CanBeMagic")
+
+
+def test_the_agent_stands_on_free_floor_beside_cells(folder):
+    cells = np.load(folder / "alfred" / "layouts" / "FloorPlan901-layout.npy")
+    bench, taken = Bench(Catalogue(folder), size=20), set()
+    for last in np.unique(cells[:, 0])[1:-1]:  # as if nothing were known of what is behind it
+        np.save(
+            folder / "alfred" / "layouts" / "FloorPlan902-layout.npy", cells[cells[:, 0] <= last]
+        )
+        bench.reset("FloorPlan902")
+        world = bench.sim.world
+        height = float(world.agent.position[1])
+        boxes = [o.bounds() for o in world.objects.values() if o.object_type != "Floor"]
+        stops = [b for b in boxes if b[1][1] > 0.1 and b[0][1] < 1.8]  # from knee to head
+        beside_doors = {z for x, z in world.nav if x > last}  # cells that no layout has
+        for x, z in (cell for cell in world.nav if cell[0] == last and cell[1] not in beside_doors):
+            room = min(float(level_gaps(np.array([x + 0.22, z]), *box)) for box in stops)
+            ends = {step: {"x": x + step, "y": height, "z": z} for step in (0.22, 0.25)}
+            (bench.ok if room >= 0.2 else bench.refused)("Teleport", position=ends[0.22])
+            bench.refused("Teleport", position=ends[0.25])
+            taken.add(room >= 0.2)
+    assert taken == {True, False}
+
+
+# Starts of the base set of EB-Navigation (EmbodiedBench), in AI2-THOR 5.
+@pytest.mark.parametrize(
+    ("number", "x", "z"),
+    [(12, 0.6, 2.9), (19, -0.8, -1.0), (27, 0.2, -0.7), (212, 1.2, -0.1), (215, -1.3, 7.2),
+     (225, -1.4, 2.7), (311, 0.6, 4.1), (316, 1.4, 0.1), (321, 3.4, 1.2), (328, 1.6, 0.7)],
+)  # fmt: skip
+def test_starts_of_ai2thor_between_cells_are_taken(number, x, z):
+    world = Catalogue(need_data()).load(f"FloorPlan{number}")
+    assert world.nav.can_stand(x, z)
+
+
+def test_a_put_in_a_recording_goes_through_nothing_unless_it_is_forced():
+    bench = Bench(Catalogue(need_data()), size=100)
+    bench.reset("FloorPlan301")
+    mug, dresser = bench.first("Mug"), bench.first("Dresser")
+    bench.force("PickupObject", mug)
+    poses = bench.ok("GetInteractablePoses", dresser)["actionReturn"]
+    bench.ok("TeleportFull", **{**poses[0], "rotation": {"y": poses[0]["rotation"]}})
+    assert "No valid positions" in bench.refused("PutObject", dresser)
+    bench.force("PutObject", dresser)

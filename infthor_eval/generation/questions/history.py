@@ -20,6 +20,9 @@ Measured by naming random views blind (benchmarks/drawings.md): at 0.1 % of the 
 some forks and spoons were taken for each other, at 0.2 % none of 40. All other types were named
 right at 0.1 %, but for views in which something hides their telling parts.
 """
+_LEAST_INSIDE = 0.25  # of an object at the frame's edge: less is a sliver that may be anything
+_LEAST_TELLING = 0.5  # of what tells whether it is open
+_LIDS = frozenset({"Box", "Laptop", "Toilet"})  # which their tops tell; others, all of them
 
 
 @dataclass(frozen=True)
@@ -95,13 +98,22 @@ class TrajectoryHistory:
         return self.steps[frame].seen or {}
 
     def shows(self, frame: int, *ids: str) -> bool:
-        """Return True if a frame shows all these objects large enough."""
+        """Return True if a frame shows all these objects large enough, and not by a sliver."""
         seen = self.objects_in_frame(frame)
         return all(
             key in seen
+            and seen[key].inside >= _LEAST_INSIDE
             and seen[key].pixels >= self.min_pixels * SHARE_FACTOR.get(key.partition("|")[0], 1.0)
             for key in ids
         )
+
+    def shows_whether_open(self, frame: int, item: str) -> bool:
+        """Return True if a frame shows an object, and of it what tells whether it is open."""
+        if not self.shows(frame, item):
+            return False
+        shown = self.objects_in_frame(frame)[item]
+        telling = shown.top_inside if item.partition("|")[0] in _LIDS else shown.inside
+        return telling >= _LEAST_TELLING
 
     def shows_apart(self, frame: int, one: str, other: str) -> bool:
         """Return True if a frame shows both objects, and their boxes there do not touch."""
@@ -145,7 +157,7 @@ class TrajectoryHistory:
     def opening_clues(self, event: Event) -> tuple[int, int] | None:
         """Return the two frames that show an opening, closed and open, or None if they do not."""
         before = event.frame - 1
-        shown = self.shows(before, event.target) and self.shows(event.frame, event.target)
+        shown = all(self.shows_whether_open(f, event.target) for f in (before, event.frame))
         return (before, event.frame) if shown else None
 
     def shows_slices(self, frame: int, whole: str) -> bool:

@@ -1,7 +1,7 @@
 """Open state: "Was the fridge open?" (ever); further forms: open when, now, and what was opened."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from infthor_eval.generation.questions.candidates import Candidate, further_type, listing_question
 from infthor_eval.generation.questions.history import Event, TrajectoryHistory
@@ -26,7 +26,7 @@ def open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
             if key in history.states(frame) and history.states(frame)[key].is_open
         ]
         object_type = history.states(len(history) - 1)[key].type
-        frame = history.clearest(open_at or frames, key)
+        frame = _clearest(history, open_at or frames, key)
         if object_type in CONTAINERS and frame is not None:
             names = (with_the(object_type),)
             answer = "yes" if open_at else "no"
@@ -75,7 +75,7 @@ def _phrase(history: TrajectoryHistory, event: Event) -> str:
 def _then(history: TrajectoryHistory, key: str, event: Event, phrase: str) -> Iterator[Candidate]:
     states = history.states(event.frame)
     clues = _event_clues(history, event)
-    if key in states and history.shows(event.frame, key) and clues is not None:
+    if key in states and history.shows_whether_open(event.frame, key) and clues is not None:
         answer = "yes" if states[key].is_open else "no"
         names = (with_the(states[key].type), phrase)
         subjects = (states[key].type, event.object_type)
@@ -101,12 +101,17 @@ def _now(history: TrajectoryHistory, key: str) -> Iterator[Candidate]:
         (frame for frame in range(last, -1, -1) if _is_open(history, frame, key) != state.is_open),
         -1,
     )
-    frame = history.clearest(range(changed + 1, last + 1), key)
+    frame = _clearest(history, range(changed + 1, last + 1), key)
     if frame is not None:
         answer = "yes" if state.is_open else "no"
         yield Candidate(
             FURTHER, "Is {} open now?", (with_the(state.type),), (frame,), (answer,), (state.type,)
         )
+
+
+def _clearest(history: TrajectoryHistory, frames: Iterable[int], key: str) -> int | None:
+    """Return the frame that shows best whether an object is open, or None."""
+    return history.clearest((f for f in frames if history.shows_whether_open(f, key)), key)
 
 
 def _is_open(history: TrajectoryHistory, frame: int, key: str) -> bool | None:

@@ -190,6 +190,32 @@ def test_a_put_is_shown_by_what_was_in_the_hand_before():
         assert not Checker(log.steps, DEFAULT_SHARE).verdict(after).sufficient
 
 
+@pytest.mark.parametrize(
+    ("item", "inside", "top_inside", "asked"),
+    [
+        ("Box|1", 0.5, 0.5, True),
+        ("Box|1", 0.7, 0.0, False),  # its flaps are above the picture
+        (FRIDGE, 0.5, 0.0, True),
+        (FRIDGE, 0.4, 1.0, False),
+    ],
+)
+def test_whether_something_was_open_is_asked_where_a_frame_shows_it(
+    item, inside, top_inside, asked
+):
+    log = history({item: state(item, is_open=True)})
+    shown = log.steps[0].seen[item]
+    shown.inside, shown.top_inside = inside, top_inside
+    assert bool(list(open_state.open_states(log))) == asked
+    assert bool(list(open_state.further_open_states(log))) == asked
+
+
+@pytest.mark.parametrize(("inside", "seen"), [(0.25, True), (0.24, False)])
+def test_a_sliver_at_the_edge_shows_nothing(inside, seen):
+    log = history({**PLACES, APPLE: state(APPLE, TABLE)})
+    log.steps[0].seen[APPLE].inside = inside
+    assert log.shows(0, APPLE) == seen
+
+
 def test_an_opening_is_shown_by_what_was_closed_before():
     closed, opened = (state(FRIDGE, is_open=is_open) for is_open in (False, True))
     log = history(
