@@ -13,10 +13,10 @@ Else, for each room it looks at the drawn solids, and not at the boxes of the me
 within each: at rest, with each door, drawer and lid opened in turn, which shows what is inside and
 moves what opens, and where an agent put things. Two objects interpenetrate if a point of one lies
 deeper than a centimetre (for thin boards: beyond their middle) in a solid of the other, or if a
-solid crosses the wall of a vessel. Counted are pairs of which at least one is loose, or has just been
-opened, or which are not built into one another, and things that go through a wall of the room. It
-prints one JSON object: rooms, pairs by where they are seen, the most frequent pairs of types, and
-objects per room.
+solid crosses the wall of a vessel. Counted are pairs of which at least one is loose, or has just
+been opened, or which are not built into one another, and things that go through a wall of the room.
+It prints one JSON object: rooms, pairs by where they are seen, the most frequent pairs of types,
+and objects per room.
 """
 
 import argparse
