@@ -172,6 +172,14 @@ def aabb_gap(point: Array, low: Array, high: Array) -> float:
     return float(np.linalg.norm(point - nearest))
 
 
+def segment_gaps(points: Array, start: Array, end: Array) -> Array:
+    """Return metres from points (n, 2) to the straight line between two points (2,)."""
+    along = end - start
+    share = np.clip((points - start) @ along / max(float(along @ along), 1e-9), 0.0, 1.0)
+    gaps: Array = np.hypot(*(points - (start + share[:, None] * along)).T)
+    return gaps
+
+
 def level_gaps(points: Array, low: Array, high: Array) -> Array:
     """Return horizontal metres from (x, z), (n, 2) or (2,), to a box by its corners (3,)."""
     nearest = np.clip(points, low[[0, 2]], high[[0, 2]])

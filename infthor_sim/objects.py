@@ -10,6 +10,7 @@ from infthor_sim.physics.footprints import Rect
 
 DOOR_SWING = 85.0  # degrees that a door opens
 DRAWER_SLIDE = 0.8  # share of its depth that a drawer comes out
+_DOUBLE = 1.5  # metres: wider doorways have two leaves
 WALL = 0.02  # thickness in metres of the sides and floors of hollow things
 
 
@@ -99,6 +100,13 @@ class SimObject:
     def front_size(self) -> Array:
         """Width, height and depth of the box seen from its front, metres (3,)."""
         return self.box_size[[2, 1, 0]] if round(self.front / 90) % 2 else self.box_size
+
+    @property
+    def leaf_sides(self) -> tuple[int, ...]:
+        """The sides that leaves of its door hang at, -1 and 1 seen from its front."""
+        if self.type.in_doorway and self.front_size[0] > _DOUBLE:
+            return (-1, 1)
+        return (self.hinge or -1,)
 
     def oriented_corners(self) -> Array:
         """Return the 8 corners (8, 3) of the box, turned with the object."""

@@ -64,6 +64,8 @@ class World:
         scene: name of the scene.
         objects: objects by id, in the order of the metadata.
         nav: cells where an agent can stand.
+        floor: all cells that are free of walls and furniture, of which doors take some; None where
+            no door is.
         agents: its agents, in the order of their ids.
         active: id of the agent that acts, or whose part of a reply is made.
         seed: seed of the scene's random numbers.
@@ -89,6 +91,7 @@ class World:
     seed: int = 0
     version: int = 0
     coarse: bool = False
+    floor: NavGrid | None = None
     walls: tuple[Wall, ...] = ()
     open_at_start: frozenset[str] = frozenset()
     templates: dict[str, list[SimObject]] = field(default_factory=dict)

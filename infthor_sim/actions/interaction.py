@@ -9,6 +9,7 @@ from infthor_sim.effects import slice_object, toggle
 from infthor_sim.errors import ActionError, ErrorCode
 from infthor_sim.object_types import allowed_in
 from infthor_sim.objects import SimObject
+from infthor_sim.physics.doorways import hits_agent, update_floor
 from infthor_sim.physics.free_places import InTheWay, find_place
 from infthor_sim.physics.receptacles import drawer_offset
 from infthor_sim.physics.solids import unfold
@@ -148,9 +149,13 @@ def close_object(sim: Simulation, target: SimObject) -> None:
 
 def set_openness(sim: Simulation, target: SimObject, openness: float) -> None:
     """Open or close an object; the contents of a drawer move with it."""
+    if target.type.in_doorway and hits_agent(sim.world, target, openness):
+        raise ActionError("Object failed to open/close successfully.")
     before = drawer_offset(target)
     unfold(target, openness)
     target.state.openness = float(openness)
+    if target.type.in_doorway:
+        update_floor(sim.world)
     sim.world.shift(sim.world.children(target), drawer_offset(target) - before)
     sim.world.mark_changed(target)
 

@@ -63,6 +63,7 @@ class ObjectType:
         levels: shares of its height at which things stand inside it.
         overhang: things may stick out beyond its edge any distance.
         hinged: it opens a door that can block the agent.
+        in_doorway: it fills a doorway of a wall; what is hinged of it takes floor, open or closed.
         slides: it slides out with its contents, as drawers do.
         unfolds: changes of its box with opening, for types without door or drawer.
         lid: length of a lid that is hinged at its back and stands up when open, as a share of its
@@ -127,6 +128,7 @@ class ObjectType:
     overhang: bool = False
     # behaviour
     hinged: bool = False
+    in_doorway: bool = False
     slides: bool = False
     unfolds: tuple[Unfolding, ...] = ()
     lid: float = 0.0

@@ -16,6 +16,16 @@ _store = partial(ObjectType, receptacle=True, openable=True, encloses=True)
 _dish = partial(portable, receptacle=True, dirtyable=True, open_top=0.8, overhang=True)
 _cutlery = partial(portable, mass=0.06, materials=("Metal",), categories=("cutlery",))
 
+_doorway = partial(
+    ObjectType,
+    size=(1.04, 2.10, 0.17),
+    in_doorway=True,
+    centered=True,
+    materials=("Wood",),
+    beyond_room=True,
+    capacity=None,
+)
+
 TYPES = (
     # Machines, screens and lamps.
     portable("CellPhone", (0.08, 0.01, 0.16), shape="cell_phone", categories=("small", "lounge"),
@@ -67,7 +77,6 @@ TYPES = (
                faces_room=True,
                beyond_room=True),
     ObjectType("DoorFrame"),
-    ObjectType("Doorway", (1.00, 2.10, 0.15), shape="doorway"),
     ObjectType("Faucet", (0.27, 0.21, 0.24), shape="faucet", toggleable=True, runs_water=True),
     ObjectType("Floor", (4.98, 0.44, 5.09), shape="floor", receptacle=True, takes=(),
                beyond_room=True, capacity=None),
@@ -102,6 +111,8 @@ TYPES = (
     _rail("ToiletPaperHanger", (0.23, 0.08, 0.10), shape="paper_hanger", takes=("ToiletPaper",),
           support=-0.25),
     _rail("TowelHolder", (0.66, 0.04, 0.11), shape="rail", takes=("Towel",), support=-13.6),
+    _doorway("Doorframe", shape="doorframe"),
+    _doorway("Doorway", shape="doorway", openable=True, hinged=True),
     _picture("Window", (1.04, 1.55, 0.11), shape="window", breakable=True, materials=("Glass",),
              beyond_room=True),
     # Fruit, vegetables, bread, eggs, and their slices.

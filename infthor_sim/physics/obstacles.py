@@ -21,6 +21,8 @@ def blocking_object(world: World, target: Array) -> str | None:
     for item in world.objects.values():
         if item.object_id in world.open_at_start or item.state.openness <= 0:
             continue
+        if item.type.in_doorway:  # whose floor is not in the grid
+            continue
         leaf = door_leaf(item)
         if leaf is None or leaf[1][1] < _KNEE or leaf[0][1] > _HEAD:
             continue
@@ -41,13 +43,28 @@ def door_leaf(item: SimObject) -> tuple[Array, Array] | None:
                                                                                    height / 2)
                   for z in (0.0, reach)]  # fmt: skip
     else:
-        side = item.hinge or -1
-        swing = yaw_matrix(side * DOOR_SWING * item.state.openness)
-        hinge = np.array([side * width / 2, 0.0, depth / 2])
-        edge = hinge + swing @ np.array([-side * width, 0.0, 0.0])
-        points = [(p[0], y, p[2]) for p in (hinge, edge) for y in (-height / 2, height / 2)]
+        ends = np.concatenate(_swung(item, item.state.openness))
+        points = [(x, y, z) for x, _, z in ends for y in (-height / 2, height / 2)]
     world = np.array(points) @ matrix.T + item.center
     return world.min(axis=0), world.max(axis=0)
+
+
+def leaves(door: SimObject, openness: float) -> list[Array]:
+    """Return both ends (x, z) of each leaf (2, 2) of a door that is open so far, metres."""
+    matrix = door.matrix @ yaw_matrix(door.front)
+    return [(ends @ matrix.T + door.center)[:, [0, 2]] for ends in _swung(door, openness)]
+
+
+def _swung(door: SimObject, openness: float) -> list[Array]:
+    """Return both ends (2, 3) of each leaf in the frame of the door's box and front."""
+    width, _, depth = (door.front_size / 2).tolist()
+    share = 2 / len(door.leaf_sides)
+    listed = []
+    for side in door.leaf_sides:
+        hinge = np.array([side * width, 0.0, depth])
+        swing = yaw_matrix(side * DOOR_SWING * openness)
+        listed.append(np.stack([hinge, hinge + swing @ np.array([-side * share * width, 0, 0])]))
+    return listed
 
 
 def held_object_blocks(world: World, target: Array) -> bool:

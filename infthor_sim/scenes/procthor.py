@@ -4,6 +4,7 @@ import gzip
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,10 @@ import numpy as np
 
 from infthor_sim.agent import AGENT_HEIGHT, Agent
 from infthor_sim.errors import DataError
-from infthor_sim.geometry import Array, level_gaps, to_array
+from infthor_sim.geometry import Array, level_gaps, segment_gaps, to_array
 from infthor_sim.object_types import type_named
 from infthor_sim.objects import SimObject, SimObjectState, style_of
+from infthor_sim.physics.doorways import update_floor
 from infthor_sim.physics.footprints import Rect, polygon_rects
 from infthor_sim.physics.navigation import CELL, NavGrid
 from infthor_sim.rearrange import assign_parents
@@ -30,6 +32,7 @@ _FLOORS = {"Kitchen": "tiles", "Bathroom": "tiles", "Bedroom": "carpet", "Living
 _MALFORMED = (LookupError, TypeError, ValueError, OverflowError, AttributeError)
 _ASSETS = Path("procthor/asset-database.json.gz")
 Span = tuple[float, float, float, float]
+Sizes = Mapping[str, tuple[float, float, float]]
 
 
 def read_asset_sizes(root: Path) -> dict[str, tuple[float, float, float]]:
@@ -51,9 +54,7 @@ def _extents(box: Mapping[str, float]) -> tuple[float, float, float]:
     return max(float(box["x"]), 0.002), max(float(box["y"]), 0.002), max(float(box["z"]), 0.002)
 
 
-def build_house(
-    house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, float]]
-) -> World:
+def build_house(house: Mapping[str, Any], assets: Sizes) -> World:
     """Return the world of a house.
 
     Args:
@@ -66,7 +67,7 @@ def build_house(
         raise DataError(f"house: not in ProcTHOR's form ({error!r})") from error
 
 
-def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, float]]) -> World:
+def _build(house: Mapping[str, Any], assets: Sizes) -> World:
     floors = []
     for room in house["rooms"]:
         outline = [(_metres(point["x"]), _metres(point["z"])) for point in room["floorPolygon"]]
@@ -81,6 +82,8 @@ def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, fl
     for entry in _with_children(house.get("objects", ())):
         item = _object(entry, assets)
         objects[item.object_id] = item
+    for entry in house.get("doors", ()):
+        objects[_text(entry["id"])] = _door(entry, house, assets)
     for entry in house.get("windows", ()):
         if "assetPosition" in entry:
             objects[_text(entry["id"])] = _window(entry, house)
@@ -90,7 +93,9 @@ def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, fl
         for index, (room_type, rects) in enumerate(floors) for r in rects
     )  # fmt: skip
     nav = _nav([r for _, rects in floors for r in rects], walls, list(objects.values()))
-    world = World("Procedural", objects, rooms, nav, [_agent(house, nav)], walls=walls)
+    agent = _agent(house, nav)
+    world = World("Procedural", objects, rooms, nav, [agent], walls=walls, floor=nav)
+    update_floor(world)
     world.keeps_ids = True
     infer_layout(world)
     assign_parents(world)
@@ -119,9 +124,7 @@ def _with_children(entries: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str
         yield from _with_children(entry.get("children", ()))
 
 
-def _object(
-    entry: Mapping[str, Any], assets: Mapping[str, tuple[float, float, float]]
-) -> SimObject:
+def _object(entry: Mapping[str, Any], assets: Sizes) -> SimObject:
     """Return an object; ProcTHOR's position is the middle of the asset's box."""
     object_id = _text(entry["id"])
     declared = type_named(_text(entry.get("objectType") or object_id.split("|", 1)[0]))
@@ -165,6 +168,38 @@ def _floor(room_id: str, room_type: str, rects: Sequence[Rect]) -> SimObject:
     return item
 
 
+def _door(
+    entry: Mapping[str, Any],
+    house: Mapping[str, Any],
+    assets: Sizes,
+) -> SimObject:
+    """Return a doorway's door or frame; it opens to the left of its first wall's direction."""
+    wall = next(w for w in house["walls"] if w["id"] == (entry.get("wall0") or entry.get("wall1")))
+    x0, z0, x1, z1 = _base(wall["polygon"])
+    asset = _text(entry.get("assetId", ""))
+    low, high = (to_array(corner) for corner in _hole(entry))
+    declared = type_named("Doorframe" if asset.startswith("Doorframe") else "Doorway")
+    size = np.array(assets.get(asset) or (*np.abs(high - low)[:2], declared.size[2]))
+    at = to_array(entry["assetPosition"]) if "assetPosition" in entry else (low + high) / 2
+    share = float(at[0]) / max(math.dist((x0, z0), (x1, z1)), 1e-6)
+    object_id = _text(entry["id"])
+    return SimObject(
+        object_id, object_id,
+        replace(declared, openable=declared.openable and bool(entry.get("openable", True))),
+        np.array([x0 + (x1 - x0) * share, at[1], z0 + (z1 - z0) * share]),
+        np.array([0.0, math.degrees(math.atan2(z0 - z1, x1 - x0)) % 360, 0.0]), np.zeros(3),
+        np.maximum(size, 0.01), asset_id=asset, style=style_of(asset or object_id),
+        state=SimObjectState(openness=float(entry.get("openness") or 0.0)),
+    )  # fmt: skip
+
+
+def _hole(entry: Mapping[str, Any]) -> tuple[Mapping[str, float], Mapping[str, float]]:
+    """Return two opposite corners of a doorway: from its wall's start, and upwards."""
+    if "holePolygon" in entry:
+        return entry["holePolygon"][0], entry["holePolygon"][1]
+    return entry["boundingBox"]["min"], entry["boundingBox"]["max"]
+
+
 def _window(entry: Mapping[str, Any], house: Mapping[str, Any]) -> SimObject:
     """Return a window; ProcTHOR gives its position along its wall and its height."""
     wall = next(w for w in house["walls"] if w["id"] == entry["wall0"])
@@ -192,13 +227,7 @@ def _base(polygon: Sequence[Mapping[str, float]]) -> Span:
 def _door_spans(house: Mapping[str, Any]) -> Iterator[tuple[str, float, float]]:
     """Yield a doorway once per wall that it is in: the wall's id, and from and to along it."""
     for door in house.get("doors", ()):
-        if "holePolygon" in door:
-            points = [float(p["x"]) for p in door["holePolygon"]]
-        else:
-            points = [
-                float(door["boundingBox"]["min"]["x"]),
-                float(door["boundingBox"]["max"]["x"]),
-            ]
+        points = [float(corner["x"]) for corner in _hole(door)]
         for key in ("wall0", "wall1"):
             if door.get(key):
                 yield str(door[key]), min(points), max(points)
@@ -246,12 +275,13 @@ def _nav(rects: Sequence[Rect], walls: Sequence[Wall], objects: list[SimObject])
     points: Array = np.array(sorted(cells)).reshape(-1, 2)
     for wall in walls:
         if wall.bottom < 1.0:  # not the part above a doorway
-            points = points[_distance(points, wall) >= _BODY]
+            ends = np.array([[wall.x0, wall.z0], [wall.x1, wall.z1]])
+            points = points[segment_gaps(points, *ends) >= _BODY]
     for item in objects:
         low, high = item.bounds()
         if (
             item.object_type != "Floor"
-            and not item.type.pickupable
+            and not (item.type.pickupable or item.type.in_doorway)
             and low[1] < 1.6
             and high[1] > 0.1
         ):
@@ -259,15 +289,6 @@ def _nav(rects: Sequence[Rect], walls: Sequence[Wall], objects: list[SimObject])
     if not len(points):
         raise DataError("house: its rooms leave nowhere to stand")
     return NavGrid([(float(x), float(z)) for x, z in points])
-
-
-def _distance(points: Array, wall: Wall) -> Array:
-    a = np.array([wall.x0, wall.z0])
-    b = np.array([wall.x1, wall.z1])
-    along = b - a
-    share = np.clip((points - a) @ along / max(float(along @ along), 1e-9), 0.0, 1.0)
-    away: Array = np.hypot(*(points - (a + share[:, None] * along)).T)
-    return away
 
 
 def _agent(house: Mapping[str, Any], nav: NavGrid) -> Agent:

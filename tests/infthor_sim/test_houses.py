@@ -50,6 +50,8 @@ def house() -> dict[str, Any]:
     door = {
         "id": "door|2|3",
         "assetId": "Doorway_1",
+        "openable": True,
+        "openness": 1,
         "room0": "room|2",
         "room1": "room|3",
         "wall0": walls[4]["id"],
@@ -119,6 +121,69 @@ def test_a_house_through_the_controller(launch):
     assert (4.0, 5.0) not in cells, "outside the L"
     opened = controller.step("OpenObject", objectId="Fridge|2|1", forceAction=True)
     assert opened.metadata["lastActionSuccess"]
+
+
+def with_door(**values: Any) -> Bench:
+    made = house()
+    made["doors"][0] |= values
+    bench = Bench.at("Procedural", size=100)
+    bench.ok("CreateHouse", house=made)
+    return bench
+
+
+@pytest.mark.parametrize("openness", [0, 1])
+@pytest.mark.parametrize(("width", "asset"), [(1.0, "Doorway_1"), (2.0, "Doorway_Double_7")])
+def test_a_closed_door_keeps_the_agent_out_and_an_open_one_lets_it_through(openness, width, asset):
+    hole = [point(1.0, 0), point(1.0 + width, 0, 2.1)]
+    bench = with_door(openness=openness, holePolygon=hole, assetId=asset)
+    middle = 1.0 + width / 2
+    bench.teleport(4.0, middle, 90)
+    door = bench.object("door|2|3")
+    assert (door["objectType"], door["openable"], door["isOpen"]) == (
+        "Doorway",
+        True,
+        openness == 1,
+    )
+    assert door["visible"]
+    box, leaf = door["axisAlignedBoundingBox"], width if width == 1 else width / 2
+    assert box["center"]["z"] == pytest.approx(middle, abs=0.05)
+    assert box["size"]["z"] == pytest.approx(width, abs=0.1)
+    assert box["size"]["x"] == pytest.approx(0.17 + openness * leaf, abs=0.02)
+
+    def crosses() -> bool:
+        bench.teleport(4.0, middle, 90)
+        return all(bench.step("MoveAhead")["lastActionSuccess"] for _ in range(8))
+
+    def reaches() -> bool:
+        bench.teleport(2.5, 2.5)
+        cells = bench.ok("GetReachablePositions")["actionReturn"]
+        return any(cell["x"] > 6 for cell in cells)
+
+    assert crosses() == reaches() == (openness == 1)
+    bench.force("CloseObject" if openness else "OpenObject", "door|2|3")
+    assert crosses() == reaches() == (openness == 0)
+
+
+def test_a_door_opens_into_its_first_room_and_hits_nobody():
+    bench = with_door(openness=0)
+    bench.teleport(4.5, 1.5, 90)
+    assert "failed to open/close" in bench.refused("OpenObject", "door|2|3")
+    assert not bench.object("door|2|3")["isOpen"]
+    bench.teleport(5.5, 1.5, 270)  # on the other side, with the door's back in view
+    bench.ok("OpenObject", "door|2|3")
+
+
+@pytest.mark.parametrize(
+    "values", [{"openable": False, "openness": 0}, {"assetId": "Doorframe_3"}], ids=str
+)
+def test_what_cannot_be_opened_says_so(values):
+    bench = with_door(**values)
+    bench.teleport(4.0, 1.5, 90)
+    frame = values.get("assetId", "").startswith("Doorframe")
+    door = bench.object("door|2|3")
+    assert (door["objectType"], door["openable"]) == ("Doorframe" if frame else "Doorway", False)
+    assert "not an Openable object" in bench.refused("OpenObject", "door|2|3", forceAction=True)
+    assert bench.sim.world.nav.can_stand(5.0, 1.5) == frame
 
 
 def test_without_its_doorway_the_rooms_are_apart():

@@ -274,8 +274,8 @@ def paper_hanger(b: Builder) -> None:
 
 
 @draws
-def doorway(b: Builder) -> None:
-    """A door frame."""
+def doorframe(b: Builder) -> None:
+    """The frame of a doorway."""
     x, y = b.thick(0.05, 0), b.thick(0.05, 1)
     for side in (-1, 1):
         b.box((side * (1 - x), 0, 0), (x, 1, 1), WHITE, Material.WOOD)

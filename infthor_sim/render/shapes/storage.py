@@ -1,9 +1,10 @@
-"""Objects with an inside: cabinets, drawers, fridges, microwaves, safes, boxes, bins."""
+"""Doors, and objects with an inside: cabinets, drawers, fridges, microwaves, safes, boxes, bins."""
 
 from infthor_sim.objects import DOOR_SWING, DRAWER_SLIDE, WALL
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
 from infthor_sim.render.shapes.catalogue import draws
+from infthor_sim.render.shapes.fixtures import doorframe
 from infthor_sim.render.shapes.palette import BLACK, CHROME, DARK, STEEL, WHITE, WOODS, pick
 
 _LEAF = 0.02  # thickness of a door, metres
@@ -32,14 +33,16 @@ def _door(
     low: float = -1.0,
     high: float = 1.0,
     grip_in: float = 0.0,
+    side: int = 0,
+    share: float = 1.0,
 ) -> None:
     """Add a hinged door over the front, from height fraction `low` to `high`, as open as it is.
 
     With `grip_in`, the grip is within the object's box, and the door so many metres behind its
-    front.
+    front. It hangs at `side`, -1 or 1, else at the object's own, over a share of the width.
     """
-    side = b.item.hinge or -1
-    width, height, depth = map(float, b.half)
+    side = side or b.item.leaf_sides[0]
+    width, height, depth = map(float, b.half * (share, 1.0, 1.0))
     middle = (low + high) / 2 * height
     half = (high - low) / 2 * height
     angle = side * DOOR_SWING * b.state.openness
@@ -64,6 +67,16 @@ def _door(
         grip,
         Material.METAL,
     )
+
+
+@draws
+def doorway(b: Builder) -> None:
+    """A doorway with its door, of two leaves if it is wide."""
+    doorframe(b)
+    sides = b.item.leaf_sides
+    for side in sides:
+        _door(b, pick(WOODS, b.style), Material.WOOD, CHROME, high=0.97, side=side,
+              share=1 / len(sides))  # fmt: skip
 
 
 @draws
