@@ -35,6 +35,7 @@ KEPT = (
     "tests/test_statistics.py::test_the_interval_covers_the_truth_as_often_as_it_says",
     "tests/formats/test_qa_csv.py::test_what_is_written_is_read_back",
     "tests/docs/test_commands.py::test_the_commands_of_a_page_run_one_after_the_other[docs/own-models.md-0]",
+    "tests/runs/work/test_driver.py::test_two_workers_have_the_results_of_one_process",
     "tests/runs/work/test_worker_executor.py::test_tracebacks_of_workers_are_kept_too",
     "tests/model_adapters/policies/test_adapters.py::test_the_twins_keep_the_contract[openvla-tiny]",
     "tests/plans/actors/test_model.py::test_the_experts_own_words_carry_every_plan_out",

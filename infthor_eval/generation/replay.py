@@ -13,6 +13,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.pictures.png import PngWriter
 from infthor_eval.formats.step_log import write_steps
 from infthor_eval.formats.trajectory import LowAction, Trajectory, TrajectorySource
 from infthor_eval.generation.motion import intermediate_views
@@ -101,9 +102,10 @@ def replay(
     report = ReplayReport(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames)
     actions = ActionReplay(simulator, trajectory, report, on_progress)
     (folder / "img").mkdir()
-    run = _Run(simulator, actions, folder / "img", frames)
-    for index, low in enumerate(trajectory.plan.low_actions):
-        run.act(index, low)
+    with PngWriter(folder / "img") as frame_files:
+        run = _Run(simulator, actions, frame_files, frames)
+        for index, low in enumerate(trajectory.plan.low_actions):
+            run.act(index, low)
     steps = run.recorder.steps
     write_steps(folder, steps)
     (folder / "traj.txt").write_text(sequence_text(trajectory, steps) + "\n")
@@ -235,7 +237,7 @@ class _Run:
     """The recording of one replay."""
 
     def __init__(
-        self, simulator: Simulator, actions: ActionReplay, images: Path, frames: int
+        self, simulator: Simulator, actions: ActionReplay, images: PngWriter, frames: int
     ) -> None:
         self._simulator = simulator
         self._actions = actions

@@ -1,23 +1,19 @@
 """Recording the frames and the step log of an episode."""
 
-from pathlib import Path
-
 from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.object_ids import object_type_of
-from infthor_eval.formats.pictures.png import write_png
+from infthor_eval.formats.pictures.png import PngWriter
 from infthor_eval.formats.step_log import LoggedPose, ObjectInFrame, ObjectLog, ObjectState, Step
 from infthor_eval.thor.outline import shares_in_frame
 from infthor_eval.thor.segmentation import Instance
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
-_PNG_LEVEL = 3  # 6 takes twice as long and shrinks rendered frames by a sixth
-
 
 class Recorder:
     """Turns simulator states into log entries (`steps`, one a frame), and images into a folder."""
 
-    def __init__(self, images: Path | None = None) -> None:
-        """Start without a frame; `images` is an existing folder for frames, None for no files."""
+    def __init__(self, images: PngWriter | None = None) -> None:
+        """Start without a frame; `images` writes the frames, None for no files."""
         self._images = images
         self._states: dict[str, ObjectState] = {}
         self.steps: list[Step] = []
@@ -58,7 +54,11 @@ class Recorder:
             changes=self._changes(view),
         )
         if self._images is not None:
-            self._save(view, self._images / entry.img_filename)
+            if view.frame is None:
+                raise SimulatorError(
+                    f"{entry.img_filename}: the simulator sent no frame; start it with rendering on"
+                )
+            self._images.write(entry.img_filename, view.frame)
         self.steps.append(entry)
         return entry
 
@@ -69,14 +69,6 @@ class Recorder:
             changes[key] = ObjectState(self._states[key].type, exists=False)
         self._states = states
         return changes
-
-    @staticmethod
-    def _save(view: SimulatorView, path: Path) -> None:
-        if view.frame is None:
-            raise SimulatorError(
-                f"{path.name}: the simulator sent no frame; start it with rendering on"
-            )
-        write_png(path, view.frame, _PNG_LEVEL)
 
 
 def object_log(view: SimulatorView) -> ObjectLog:

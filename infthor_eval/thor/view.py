@@ -203,7 +203,7 @@ def view_of(event: Any) -> SimulatorView:
     missing or malformed."""
     metadata = event.metadata
     try:
-        objects = msgspec.convert(metadata["objects"], list[ThorObject])
+        objects = _objects(metadata["objects"])
         agent = _pose(metadata["agent"])
         arm = msgspec.convert(metadata.get("arm"), ArmState | None)
         # The inventory of arm agents is always empty; what they hold is in the arm's state.
@@ -234,6 +234,13 @@ def view_of(event: Any) -> SimulatorView:
         arm=arm,
         camera=_camera(metadata, agent),
     )
+
+
+def _objects(listed: Any) -> list[ThorObject]:
+    """Return the objects of a reply, decoded or as they came."""
+    if isinstance(listed, msgspec.Raw):
+        return msgspec.msgpack.decode(listed, type=list[ThorObject])
+    return msgspec.convert(listed, list[ThorObject])
 
 
 def _camera(metadata: dict[str, Any], agent: AgentPose) -> Camera | None:

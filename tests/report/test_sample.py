@@ -5,10 +5,13 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from PIL import Image
 
 import infthor_eval
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.records import RECORDS
+from infthor_eval.report.descriptions import StepRow
 from infthor_eval.report.sample import Sample, TokenCounts
 from infthor_eval.runs import Tokens, Usage
 from tests.helpers.command_line import option_words, read_success
@@ -74,7 +77,39 @@ def test_an_episode_has_its_steps(tmp_path: Path, run_cli) -> None:
     listed = [line for line in sample.lines() if re.match(r" +\d+\. ", line)]
     assert len(listed) == len(sample.steps) > 0
     assert all(step.action in line for step, line in zip(sample.steps, listed, strict=True))
+    numbers = [int(line.partition(".")[0]) for line in listed]
+    assert numbers == list(range(1, len(listed) + 1))
     assert sample.request is None
+
+
+@pytest.mark.parametrize(
+    ("step", "text"),
+    [
+        (StepRow("MoveAhead"), "MoveAhead"),
+        (StepRow("MoveAhead", reward=0.5), "MoveAhead, reward 0.5"),
+        (StepRow(reward=0.0, error="no action"), "(no action), reward 0: no action"),
+    ],
+)
+def test_a_step_is_told_with_its_reward_and_what_was_wrong(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, step: StepRow, text: str
+) -> None:
+    monkeypatch.setattr(Sample, "steps", (step,))
+    sample = infthor_eval.load_sample(folder, names_of(folder)[0])
+    assert f"     1. {text}" in list(sample.lines())
+
+
+@pytest.mark.parametrize(("count", "note"), [(24, ""), (25, "24 of 25 frames, evenly")])
+def test_a_cell_says_how_many_frames_it_leaves_out(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, count: int, note: str
+) -> None:
+    for number in range(count):
+        Image.new("RGB", (8, 8), (number, 0, 0)).save(tmp_path / f"{number}.png")
+    frames = [FrameRef(tmp_path / f"{number}.png") for number in range(count)]
+    monkeypatch.setattr(Sample, "frames", frames)
+    page = infthor_eval.load_sample(folder, names_of(folder)[0])._repr_html_()
+    assert page.count("data:image/webp") == min(count, 24)
+    assert ("frames, evenly" in page) == bool(note)
+    assert note in page
 
 
 @pytest.mark.parametrize(

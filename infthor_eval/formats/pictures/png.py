@@ -6,12 +6,18 @@ even areas, come out smaller without a filter, and in a third of the time.
 
 import struct
 import zlib
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
+from types import TracebackType
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_LEVEL = 3  # 6 takes twice as long and shrinks rendered frames by a sixth
+_WAITING = 8  # frames that may wait to be written
 _RGB = (8, 2, 0, 0, 0)  # bits, colour type, compression, filter method, not interlaced
 
 
@@ -30,6 +36,34 @@ def write_png(path: Path, frame: NDArray[np.uint8], level: int) -> None:
         _chunk(b"IEND", b""),
     )
     path.write_bytes(_SIGNATURE + b"".join(parts))
+
+
+class PngWriter:
+    """Writes frames into a folder in a thread of its own, while the next ones are drawn.
+
+    Leaving the context waits for all. An error in writing is raised by a later `write`, or there.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._thread = ThreadPoolExecutor(1, "png")
+        self._waiting: deque[Future[None]] = deque()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
+    ) -> None:
+        self._thread.shutdown(cancel_futures=kind is not None)
+        while kind is None and self._waiting:
+            self._waiting.popleft().result()
+
+    def write(self, name: str, frame: NDArray[np.uint8]) -> None:
+        """Write an RGB frame [height, width, 3], which must not change any more."""
+        self._waiting.append(self._thread.submit(write_png, self._folder / name, frame, _LEVEL))
+        if len(self._waiting) > _WAITING:
+            self._waiting.popleft().result()
 
 
 def _chunk(name: bytes, content: bytes) -> bytes:

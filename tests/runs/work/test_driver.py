@@ -197,6 +197,18 @@ def test_what_is_known_is_not_done_again_and_what_failed_is_tried_again(tmp_path
     assert [record.attempt for record in outcome.records] == [1, 1, 2, 2]
 
 
+def test_what_cannot_be_closed_is_told_and_the_results_are_there(tmp_path):
+    class Stuck(Sums):
+        def close(self):
+            raise RuntimeError("the lid is stuck")
+
+    outcome, _ = run(request(tmp_path), make_suite(Stuck))
+    assert "close() fails" in outcome.close_failure
+    assert "the lid is stuck" in outcome.close_failure
+    assert (outcome.folder / "results.json").is_file()
+    assert run(request(tmp_path))[0].close_failure is None
+
+
 def test_the_folder_has_the_command_and_the_results(tmp_path):
     outcome, _ = run(request(tmp_path))
     assert {"run.yaml", "results.json", "scores.jsonl", "usage.json"} <= {
