@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
-import msgspec
-
 from infthor_eval.errors import SceneError, SimulatorError
 from infthor_eval.thor.controller import SafeController, scene_name
 from infthor_eval.thor.launch import Launch
@@ -125,10 +123,8 @@ class Simulator:
         """Raw metadata of the last reply (see `view`); SimulatorError if no scene is loaded."""
         if self._controller is None or self._controller.last_event is None:
             raise SimulatorError("no scene is loaded; reset the simulator to one first")
-        metadata = dict(self._controller.last_event.metadata)
-        if isinstance(metadata["objects"], msgspec.Raw):
-            metadata["objects"] = msgspec.msgpack.decode(metadata["objects"])
-        return metadata
+        metadata = self._controller.last_event.metadata
+        return {**metadata, "objects": metadata["objects"].whole()}
 
     def reset(self, scene: str | dict[str, Any] | None) -> SimulatorView:
         """Load a scene and begin an episode.

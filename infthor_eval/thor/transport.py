@@ -4,8 +4,7 @@ The original server opens its pipes with blocking calls and reads without watchi
 process, so it waits for ever for a simulator that died. This one opens the pipes non-blocking,
 watches the child while it waits, and raises a `PeerFault` that says what failed.
 
-It leaves the objects of a reply as they came, `msgspec.Raw`: they are most of it, and each reader
-wants its own form of them.
+The objects, which are most of a reply, are `ReceivedObjects`.
 """
 
 import contextlib
@@ -25,6 +24,7 @@ from ai2thor.server import DepthFormat, MultiAgentEvent
 
 from infthor_eval.errors import SimulatorError
 from infthor_eval.storage.scratch import ScratchFolder
+from infthor_eval.thor.view import ReceivedObjects
 
 _WATCH_SECONDS = 0.1  # interval at which a waiting read or write checks the child process
 # A frame with ids and depth has 0.9 MB; the default of 64 KiB would cost many wake-ups.
@@ -247,8 +247,11 @@ class SafeFifoServer(FifoServer):
 
 
 def _decoded(parts: dict[str, msgspec.Raw]) -> dict[str, Any]:
-    """Return the parts of a message decoded, but its objects."""
-    return {key: raw if key == "objects" else _decode(raw) for key, raw in parts.items()}
+    """Return the parts of a message decoded."""
+    return {
+        key: ReceivedObjects(raw) if key == "objects" else _decode(raw)
+        for key, raw in parts.items()
+    }
 
 
 def _open_pipe(path: str, mode: int) -> io.FileIO:

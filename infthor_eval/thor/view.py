@@ -1,6 +1,8 @@
 """Typed metadata that the simulator reports after an action, and the call back to a pose."""
 
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import msgspec
@@ -65,6 +67,31 @@ class ThorObject(msgspec.Struct, rename="camel", frozen=True):
     is_filled_with_liquid: bool = False
     temperature: str = "RoomTemp"
     axis_aligned_bounding_box: Box | None = None
+
+
+class ReceivedObjects:
+    """The objects of a reply, as they came over the wire.
+
+    They are decoded at once, as a simulator draws its frames after it has told them, so that this
+    takes no time.
+
+    Args:
+        packed: their list in MessagePack.
+    """
+
+    def __init__(self, packed: msgspec.Raw) -> None:
+        self._packed = packed
+        with suppress(ValueError):  # who reads them is told
+            self.typed  # noqa: B018
+
+    @cached_property
+    def typed(self) -> list[ThorObject]:
+        """The objects; a ValueError if one is malformed."""
+        return msgspec.msgpack.decode(self._packed, type=list[ThorObject])
+
+    def whole(self) -> Any:
+        """Return them with all their fields, as dicts."""
+        return msgspec.msgpack.decode(self._packed)
 
 
 class AgentPose(msgspec.Struct, frozen=True):
@@ -203,7 +230,12 @@ def view_of(event: Any) -> SimulatorView:
     missing or malformed."""
     metadata = event.metadata
     try:
-        objects = _objects(metadata["objects"])
+        listed = metadata["objects"]
+        objects = (
+            listed.typed
+            if isinstance(listed, ReceivedObjects)
+            else msgspec.convert(listed, list[ThorObject])
+        )
         agent = _pose(metadata["agent"])
         arm = msgspec.convert(metadata.get("arm"), ArmState | None)
         # The inventory of arm agents is always empty; what they hold is in the arm's state.
@@ -234,13 +266,6 @@ def view_of(event: Any) -> SimulatorView:
         arm=arm,
         camera=_camera(metadata, agent),
     )
-
-
-def _objects(listed: Any) -> list[ThorObject]:
-    """Return the objects of a reply, decoded or as they came."""
-    if isinstance(listed, msgspec.Raw):
-        return msgspec.msgpack.decode(listed, type=list[ThorObject])
-    return msgspec.convert(listed, list[ThorObject])
 
 
 def _camera(metadata: dict[str, Any], agent: AgentPose) -> Camera | None:
