@@ -35,7 +35,7 @@ from infthor_eval.runs.journals.shards import (
     read_states,
 )
 from infthor_eval.runs.stored.command import StoredCommand, read_stored_command
-from infthor_eval.runs.stored.labels import label_runs, with_frames
+from infthor_eval.runs.stored.labels import label_runs
 from infthor_eval.runs.stored.search import Results, read_results, run_folders
 from infthor_eval.runs.suite import RunSummary
 from infthor_eval.runs.usage import NOTHING, Usage
@@ -232,13 +232,13 @@ class Run:
     def label(self) -> str:
         """Name of the run beside the others, with what replaces the frames, and a mark if the run
         is not whole."""
-        return with_frames(self._marked(self.name), self.listed)
+        return self.listed.with_frames(self._marked(self.name))
 
     @property
     def model(self) -> str:
         """Name of the model, the same for runs that differ in other settings; with what replaces
         the frames, and the mark."""
-        return with_frames(self._marked(self.listed.name), self.listed)
+        return self.listed.with_frames(self._marked(self.listed.name))
 
     def _marked(self, name: str) -> str:
         return mark_incomplete(name, self.units, self.n_missing)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
 from infthor_eval.episodes.summary import EpisodeTaskSummary
-from infthor_eval.runs import RunHeader, RunSummary
+from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, left_out_notes
 
 NAME_COLUMNS = (Column("model", False), Column("task", False))
@@ -16,17 +16,11 @@ _EMBEDDED = (
 T = TypeVar("T", bound=EpisodeTaskSummary)
 
 
-def run_name(header: RunHeader) -> str:
-    """Return the name of a run, with its frames if they are not the actual ones."""
-    frames = header.config.frames
-    return header.name if frames == "shown" else f"{header.name}, {frames} frames"
-
-
 def named_tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, Any]]:
     """Yield each run's name, each task's name, and its results (`EpisodeTaskSummary`)."""
     for run in runs:
         for task_name, task in run.summary.tasks.items():
-            yield run_name(run.header), task_name, task
+            yield run.name, task_name, task
 
 
 def endings_table(

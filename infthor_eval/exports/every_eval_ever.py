@@ -31,7 +31,6 @@ from infthor_eval.exports.samples import unknown_requests
 from infthor_eval.exports.subjects import UNKNOWN, ModelFacts, model_facts
 from infthor_eval.run import Run
 from infthor_eval.runs.results import results_document
-from infthor_eval.runs.stored.labels import with_frames
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
@@ -154,7 +153,7 @@ class _RunExport:
         run = self._run
         return {
             "evaluation_result_id": result_id(measure),
-            "evaluation_name": with_frames(measure.task, run.header),
+            "evaluation_name": run.header.with_frames(measure.task),
             "source_data": self._source_data(measure.task),
             "evaluation_timestamp": self._ran.isoformat(),
             "metric_config": _metric_config(measure, self._describe(measure)),

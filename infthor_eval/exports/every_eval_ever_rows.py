@@ -11,7 +11,6 @@ from infthor_eval.report.descriptions import StepRow
 from infthor_eval.report.sample import Sample
 from infthor_eval.run import Run
 from infthor_eval.runs import StoredFrames, UnitRecord
-from infthor_eval.runs.stored.labels import with_frames
 
 SCHEMA_VERSION = "0.3.0"
 Row = dict[str, Any]
@@ -34,7 +33,7 @@ def sample_rows(run: Run, measures: Sequence[Measure], shared: Row) -> Iterator[
     told: set[str] = set()
     for measure in measures:
         of_metric = shared | {
-            "evaluation_name": with_frames(measure.task, run.header),
+            "evaluation_name": run.header.with_frames(measure.task),
             "evaluation_result_id": result_id(measure),
         }
         for scored in measure.samples:

@@ -18,7 +18,6 @@ from infthor_eval.exports.measures import Measure, find_measures
 from infthor_eval.exports.request import ExportRequest, Written
 from infthor_eval.exports.subjects import UNKNOWN, ModelFacts, model_facts
 from infthor_eval.run import Run
-from infthor_eval.runs.stored.labels import with_frames
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
 _FOLDER = ".eval_results"
@@ -70,7 +69,7 @@ def _entry(run: Run, facts: ModelFacts, measure: Measure, request: ExportRequest
     assert request.dataset is not None
     entry = EvalResultEntry(
         dataset_id=request.dataset,
-        task_id=with_frames(measure.task, run.header),
+        task_id=run.header.with_frames(measure.task),
         value=round(factor * measure.estimate.mean, 4),
         date=run.changed.isoformat(timespec="seconds"),
         source_url=request.source_url,
@@ -107,7 +106,7 @@ def _notes(run: Run, facts: ModelFacts, measure: Measure, factor: int) -> str:
 def _write_tasks(runs: Sequence[Run], request: ExportRequest) -> Path:
     assert request.dataset is not None
     owner, _, name = request.dataset.partition("/")
-    tasks = dict.fromkeys(with_frames(task, run.header) for run in runs for task in run.tasks)
+    tasks = dict.fromkeys(run.header.with_frames(task) for run in runs for task in run.tasks)
     document = {
         "name": name,
         "description": _DESCRIPTION,

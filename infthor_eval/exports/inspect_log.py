@@ -30,7 +30,6 @@ from infthor_eval.exports.subjects import ModelFacts, model_facts
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.sample import Sample, TokenCounts
 from infthor_eval.run import Run
-from infthor_eval.runs.stored.labels import with_frames
 from infthor_eval.storage.digests import fingerprint
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
@@ -117,7 +116,7 @@ class _Log:
             "eval_id": self._id,
             "run_id": config.hash,
             "created": self._ran.isoformat(),
-            "task": with_frames(self._task, run.header),
+            "task": run.header.with_frames(self._task),
             "task_id": self._id,
             "task_version": str(settings.get("metadata", {}).get("version", 0)),
             "task_args": task_document(run, self._task),

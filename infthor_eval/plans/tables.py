@@ -10,7 +10,6 @@ from infthor_eval.episodes.tables import (
     endings_table,
     named_tasks,
     result_notes,
-    run_name,
 )
 from infthor_eval.facets import facet_table
 from infthor_eval.formats.published import PUBLISHED_DATA, published_tables
@@ -157,7 +156,7 @@ def _decoding_notes(runs: Sequence[RunSummary]) -> list[str]:
         if _DRAW_NOTHING.isdisjoint(run.header.config.model):
             for task in run.header.config.tasks.values():
                 names = drawn.setdefault(task.decoding.get("temperature", 0), {})
-                names[run_name(run.header)] = None
+                names[run.name] = None
     return [
         f"Drawn at temperature {temperature:g}, not the likeliest actions (--greedy): "
         f"{', '.join(names)}."

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from infthor_eval.nieh.guessing.audit import Audit, Group
 from infthor_eval.nieh.guessing.balancing import MARGIN, Balanced
 from infthor_eval.nieh.results.above_blind import FormScore
-from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
@@ -98,7 +97,7 @@ def runs_table(runs: Sequence[RunSummary]) -> Table:
                 points = f"{100 * (score.score - score.blind):+.1f}"
                 rows.append(
                     Row(
-                        (name_of(run), name, form, str(score.n), *cells, points),
+                        (run.name, name, form, str(score.n), *cells, points),
                         ends_section=number == len(forms),
                     )
                 )

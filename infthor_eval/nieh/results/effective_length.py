@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from infthor_eval.nieh.results.facets import LENGTH
-from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.summary import NiehSummary, TaskSummary
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
@@ -121,9 +120,7 @@ def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:
                     for point in _points(sized, scorer)
                 ]
                 if points:
-                    yield Series(
-                        name_of(run), context, scorer, _point("", on_clues, scorer), points
-                    )
+                    yield Series(run.name, context, scorer, _point("", on_clues, scorer), points)
 
 
 def _lengths(

@@ -6,7 +6,6 @@ from infthor_eval.facets import facet_table
 from infthor_eval.nieh.results.above_blind import SOLVED, AboveBlind
 from infthor_eval.nieh.results.cells import Cell, mean_cell, score_interval
 from infthor_eval.nieh.results.facets import FACETS, QuestionFacet
-from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.summary import NiehSummary, TaskSummary
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Table, TableCell
@@ -92,7 +91,7 @@ def above_blind_notes(runs: Sequence[RunSummary]) -> list[str]:
 def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]:
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
-        yield from ((name_of(run), name, task) for name, task in run.summary.tasks.items())
+        yield from ((run.name, name, task) for name, task in run.summary.tasks.items())
 
 
 def _cell(cell: Cell | None, metric: str) -> TableCell:

@@ -120,12 +120,6 @@ def frames_of(run: RunSummary) -> str:
     return str(run.header.config.frames)
 
 
-def name_of(run: RunSummary) -> str:
-    """Return the name of a run, with its frame ablation."""
-    frames = frames_of(run)
-    return run.header.name if frames == SHOWN else f"{run.header.name}, {frames} frames"
-
-
 def _without_frames(run: RunSummary) -> NiehConfig:
     config: NiehConfig = run.header.config
     rescored = config.rescored
@@ -159,7 +153,7 @@ def _in_percent(total: MeanEstimate) -> tuple[float | None, ...]:
 def gains_table(runs: Sequence[RunSummary]) -> list[Table]:
     """Return a table of each run's gain over its run on blank frames, if there is a pair."""
     rows = [
-        Row((name_of(gain.run), gain.task, gain.metric, *_gain_cells(gain)))
+        Row((gain.run.name, gain.task, gain.metric, *_gain_cells(gain)))
         for gain in find_gains(runs)
     ]
     if not rows:

@@ -13,7 +13,6 @@ from infthor_eval.nieh.results.gains import (
     Gain,
     difference_cell,
     gain_cell,
-    name_of,
     paired_gain,
 )
 from infthor_eval.nieh.results.memory_summary import subject_of
@@ -84,7 +83,7 @@ def memory_tables(runs: Sequence[RunSummary]) -> list[Table]:
 def _place(run: RunSummary, name: str) -> tuple[str, str, bool, str, int]:
     """Return the place of a row: by subject and task, none first, a memory's budgets in order."""
     memory = run.summary.tasks[name].memory
-    return subject_of(name_of(run)), name, memory.name != _NONE, memory.name, memory.budget or 0
+    return subject_of(run.name), name, memory.name != _NONE, memory.name, memory.budget or 0
 
 
 def _row(run: RunSummary, name: str, runs: Sequence[RunSummary], further: Sequence[str]) -> Row:
@@ -96,7 +95,7 @@ def _row(run: RunSummary, name: str, runs: Sequence[RunSummary], further: Sequen
     }
     more = [made[column](run, name, runs) for column in further]
     at = len(_NAMES) - 2 + _FIRST
-    return Row((subject_of(name_of(run)), name, *cells[:at], *more, *cells[at:]))
+    return Row((subject_of(run.name), name, *cells[:at], *more, *cells[at:]))
 
 
 def _is_none(run: RunSummary, name: str) -> bool:

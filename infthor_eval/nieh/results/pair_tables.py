@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 
 from infthor_eval.facets import Facet, facet_table
-from infthor_eval.nieh.results.gains import name_of
 from infthor_eval.nieh.results.pair_summary import PAIR_FACETS, PairSummary, TwinRecords
 from infthor_eval.nieh.results.summary import NiehSummary
 from infthor_eval.rates import Rate, format_percent
@@ -54,7 +53,7 @@ def _find(runs: Sequence[RunSummary]) -> Iterator[_Found]:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():
             if task.pairs is not None:
-                yield name_of(run), name, task.context, task.pairs
+                yield run.name, name, task.context, task.pairs
 
 
 def _cells(pairs: PairSummary) -> tuple[TableCell | str, ...]:

@@ -26,7 +26,6 @@ from infthor_eval.nieh.results.gains import (
     control_tables,
     frames_of,
     gains_table,
-    name_of,
     without_alike_notes,
 )
 from infthor_eval.nieh.results.memory_tables import memory_tables
@@ -197,7 +196,7 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():
-            yield name_of(run), name, task
+            yield run.name, name, task
 
 
 # -- by number of clues
@@ -246,7 +245,7 @@ def _rows_of(run: RunSummary, *, has_blind: bool) -> list[Row]:
     lines = [(name, task, metric) for _, name, task in _tasks([run]) for metric in task.metrics]
     return [
         Row(
-            (name_of(run), name, metric, *_cells(task, metric, has_blind=has_blind)),
+            (run.name, name, metric, *_cells(task, metric, has_blind=has_blind)),
             ends_section=number == len(lines),
         )
         for number, (name, task, metric) in enumerate(lines, 1)
@@ -436,7 +435,7 @@ def _repeat_tables(runs: Sequence[RunSummary]) -> list[Table]:
                 *map(_percent, shares),
                 *map(_percent, spreads),
             )
-            rows.append(Row((name_of(run), name, *cells)))
+            rows.append(Row((run.name, name, *cells)))
     if not rows:
         return []
     columns = (Column("model", False), Column("task", False), *map(Column, _OF_REPEATS))

@@ -9,7 +9,7 @@ from infthor_eval.nieh.results.above_blind import AboveBlind, FormScore
 from infthor_eval.nieh.results.cells import Cell, mean_cell
 from infthor_eval.nieh.results.evidence_tables import facet_cells, short_name
 from infthor_eval.nieh.results.facets import DEPTH, FACETS, QuestionFacet
-from infthor_eval.nieh.results.gains import find_gains, name_of
+from infthor_eval.nieh.results.gains import find_gains
 from infthor_eval.nieh.results.summary import (
     CLUE_COLUMNS,
     TaskSummary,
@@ -167,7 +167,7 @@ def _gains_chart(runs: Sequence[Run]) -> Chart | None:
     for gain in find_gains(summaries):
         total = gain.total()
         if gain.metric == main_metric(gain.seeing) and total is not None:
-            rows.append((f"{name_of(gain.run)}, {gain.task}", total))
+            rows.append((f"{gain.run.name}, {gain.task}", total))
     caption = "Dots to the right of 0 gain by seeing the frames; lines are 95 % intervals."
     return _by_rows("Gain over blank frames", caption, rows, "gain, in points")
 

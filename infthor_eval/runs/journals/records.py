@@ -92,6 +92,11 @@ class RunHeader(
     units_by_task: dict[str, Count] = {}
     format: int = FORMAT
 
+    def with_frames(self, name: str) -> str:
+        """Return a name of the run, or of a task of it, with its frame ablation if it has one."""
+        frames = self.config.frames
+        return name if frames in ("", "shown") else f"{name}, {frames} frames"
+
 
 class UnitRecord(
     msgspec.Struct,

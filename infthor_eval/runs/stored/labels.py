@@ -38,12 +38,6 @@ def label_runs(
     return _label_by_task(labels, runs) if by_task else labels
 
 
-def with_frames(name: str, header: RunHeader) -> str:
-    """Return the name of a run, with its frame ablation if there is one."""
-    frames = header.config.frames
-    return name if frames in ("", "shown") else f"{name}, {frames} frames"
-
-
 def _label_by_task(labels: Sequence[str], runs: Sequence[tuple[Path, RunHeader]]) -> list[str]:
     """Return the labels; those of runs of one label and frames with their tasks or folders."""
     tasks = ["+".join(sorted(header.config.tasks))[:_LONGEST_TASKS] for _, header in runs]
