@@ -16,6 +16,8 @@ from infthor_eval.generation.questions.generate import generate_questions
 from infthor_eval.storage.digests import digest_of_file, fingerprint
 from infthor_eval.storage.folders import packaged_folder
 
+from .bundled_logs import steps_as_bundled
+
 BUNDLED = packaged_folder("sets/nieh_mini")
 
 
@@ -45,9 +47,15 @@ def test_bundled_trajectories_come_out_again_bit_for_bit(tmp_path, simulator):
     manifest = read_manifest(BUNDLED / MANIFEST)
     part = msgspec.structs.replace(manifest, trajectories=manifest.trajectories[-1:])
     again, _ = build_bundle(part, simulator, tmp_path / "set")
+    logs = [name for name in again.files if name.endswith("/metadata.json")]
     files = {name: digest for name, digest in again.files.items() if name.startswith("metadata/")}
     assert len(files) > 75
-    assert {name: manifest.files[name] for name in files} == files
+    assert {name: manifest.files[name] for name in files} == files | {
+        name: manifest.files[name] for name in logs
+    }
+    for name in logs:
+        folder = Path(name).parent
+        assert steps_as_bundled(tmp_path / "set" / folder) == steps_as_bundled(BUNDLED / folder)
 
 
 def test_a_folder_that_is_not_empty_and_a_scene_that_is_not_there_are_refused(tmp_path, simulator):
