@@ -237,6 +237,7 @@ def view_of(event: Any) -> SimulatorView:
             else msgspec.convert(listed, list[ThorObject])
         )
         agent = _pose(metadata["agent"])
+        camera = _camera(metadata, agent)
         arm = msgspec.convert(metadata.get("arm"), ArmState | None)
         # The inventory of arm agents is always empty; what they hold is in the arm's state.
         in_hand = [
@@ -264,7 +265,7 @@ def view_of(event: Any) -> SimulatorView:
         instances=None if segmentation is None else segmentation.instances(),
         segmentation=segmentation,
         arm=arm,
-        camera=_camera(metadata, agent),
+        camera=camera,
     )
 
 

@@ -110,4 +110,8 @@ def test_the_shortest_ways_of_ai2thor_s_metrics(kitchen):
     assert len(plain) > 1
     assert metrics.get_shortest_path_to_object(kitchen, name, start, turn) == plain
     assert metrics.get_shortest_path_to_object_type(kitchen, "Fridge", start, turn) == plain
-    assert metrics.get_shortest_path_to_point(kitchen, start, at) == plain
+    to_end = metrics.get_shortest_path_to_point(kitchen, start, plain[-1])
+    assert to_end[-1] == plain[-1]
+    assert metrics.path_distance(to_end) == pytest.approx(metrics.path_distance(plain))
+    with pytest.raises(ValueError, match="No point on NavMesh"):  # it is within the fridge
+        metrics.get_shortest_path_to_point(kitchen, start, at)
