@@ -303,16 +303,15 @@ def face(server: Any, object_id: str) -> bool:
 
 
 def faults_of_puts(
-    scene: str, n_puts: int, random: np.random.Generator, data: Path | None = None
+    scene: str, n_puts: int, random: np.random.Generator, catalogue: Any
 ) -> dict[str, set[tuple[str, str]]]:
     """Return the pairs at rest, and those that arise when an agent puts loose things into or onto
     what takes them, one after the other."""
     from infthor_sim.object_types import allowed_in
     from infthor_sim.player.server import SimulatorServer
-    from infthor_sim.scenes.catalogue import Catalogue
     from infthor_sim.simulation import Simulation
 
-    server = SimulatorServer(sim := Simulation(Catalogue(data)))
+    server = SimulatorServer(sim := Simulation(catalogue))
     server.run({"action": "Reset", "sceneName": scene})
     server.run({"action": "Initialize"})
     room, world, found = Room(sim.world), sim.world, set[tuple[str, str]]()
@@ -330,10 +329,12 @@ def faults_of_puts(
         if home.type.openable and home.state.openness == 0:
             server.run({"action": "OpenObject", "objectId": home.object_id, "forceAction": True})
         # In a recording an agent puts things where it stands and looks: a forced put goes anywhere.
-        if data is not None and not face(server, home.object_id):
+        if world.coarse and not face(server, home.object_id):
             server.run({"action": "DropHandObject", "forceAction": True})
             continue
-        server.run({"action": "PutObject", "objectId": home.object_id, "forceAction": data is None})
+        server.run(
+            {"action": "PutObject", "objectId": home.object_id, "forceAction": not world.coarse}
+        )
         if world.agent.held is not None:  # there was no room
             server.run({"action": "DropHandObject", "forceAction": True})
             continue
@@ -347,10 +348,11 @@ def rooms_looked_at(
     """Yield each room's name, its number of objects, and its pairs by where they are seen."""
     from infthor_sim.scenes.catalogue import Catalogue, FloorPlanData
 
+    catalogue = Catalogue(data)
     names = [f"{_KINDS[index % 4]}-{1000 + index // 4}" for index in range(n_rooms)]
     for index, name in enumerate(names if data is None else FloorPlanData(data).scenes()):
-        puts = faults_of_puts(name, n_puts, np.random.default_rng(index), data)
-        world = Catalogue(data).load(name)
+        puts = faults_of_puts(name, n_puts, np.random.default_rng(index), catalogue)
+        world = catalogue.load(name)
         yield name, len(world.objects), puts if data else {**puts, **faults(world)}
 
 

@@ -226,16 +226,14 @@ class _Outcome(msgspec.Struct):
 
 
 def view_of(event: Any) -> SimulatorView:
-    """Convert an `ai2thor.server.Event`; raises SimulatorError if a field of the metadata is
-    missing or malformed."""
+    """Convert an `ai2thor.server.Event` whose objects are `ReceivedObjects`.
+
+    Raises:
+        SimulatorError: a field of the metadata is missing or malformed.
+    """
     metadata = event.metadata
     try:
-        listed = metadata["objects"]
-        objects = (
-            listed.typed
-            if isinstance(listed, ReceivedObjects)
-            else msgspec.convert(listed, list[ThorObject])
-        )
+        objects = metadata["objects"].typed
         agent = _pose(metadata["agent"])
         camera = _camera(metadata, agent)
         arm = msgspec.convert(metadata.get("arm"), ArmState | None)

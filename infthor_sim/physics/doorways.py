@@ -10,7 +10,7 @@ from infthor_sim.physics.navigation import NavGrid
 from infthor_sim.physics.obstacles import leaves
 from infthor_sim.world import World
 
-_BODY = 0.22  # the agent's radius and a margin, metres
+BODY = 0.22  # the agent's radius and a margin, metres
 _SWEEP = 6  # positions of a leaf on its way that are checked
 
 
@@ -22,7 +22,7 @@ def update_floor(world: World) -> None:
     free = np.ones(len(points), dtype=bool)
     for door in world.objects.values():
         if door.type.in_doorway and door.type.hinged:
-            free &= ~_touched(points, door, door.state.openness, _BODY)
+            free &= ~_touched(points, door, door.state.openness, BODY)
     world.nav = NavGrid([(float(x), float(z)) for x, z in points[free]])
 
 

@@ -15,7 +15,7 @@ from infthor_sim.errors import DataError
 from infthor_sim.geometry import Array, level_gaps, segment_gaps, to_array
 from infthor_sim.object_types import type_named
 from infthor_sim.objects import SimObject, SimObjectState, style_of
-from infthor_sim.physics.doorways import update_floor
+from infthor_sim.physics.doorways import BODY, update_floor
 from infthor_sim.physics.footprints import Rect, polygon_rects
 from infthor_sim.physics.navigation import CELL, NavGrid
 from infthor_sim.rearrange import assign_parents
@@ -25,7 +25,6 @@ from infthor_sim.world import FLOOR_STYLES, RoomShell, Wall, World
 # All lengths in metres.
 _HEIGHT = 2.6  # of ceilings
 _FARTHEST = 200.0  # of a floor from the origin, metres: beyond it cells take minutes to count
-_BODY = 0.22  # the agent's radius and a margin
 _DOOR_TOP = 2.05
 _FLOORS = {"Kitchen": "tiles", "Bathroom": "tiles", "Bedroom": "carpet", "LivingRoom": "wood"}
 # What reading a document of another form raises.
@@ -276,7 +275,7 @@ def _nav(rects: Sequence[Rect], walls: Sequence[Wall], objects: list[SimObject])
     for wall in walls:
         if wall.bottom < 1.0:  # not the part above a doorway
             ends = np.array([[wall.x0, wall.z0], [wall.x1, wall.z1]])
-            points = points[segment_gaps(points, *ends) >= _BODY]
+            points = points[segment_gaps(points, *ends) >= BODY]
     for item in objects:
         low, high = item.bounds()
         if (
@@ -285,7 +284,7 @@ def _nav(rects: Sequence[Rect], walls: Sequence[Wall], objects: list[SimObject])
             and low[1] < 1.6
             and high[1] > 0.1
         ):
-            points = points[level_gaps(points, low, high) >= _BODY]
+            points = points[level_gaps(points, low, high) >= BODY]
     if not len(points):
         raise DataError("house: its rooms leave nowhere to stand")
     return NavGrid([(float(x), float(z)) for x, z in points])

@@ -7,8 +7,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import msgpack
+import msgspec
+
 from infthor_eval.formats.floor_plans import write_floor_plan
-from infthor_eval.thor.view import view_of
+from infthor_eval.thor.view import ReceivedObjects, view_of
 from infthor_sim.errors import SimulatorError
 from infthor_sim.player.fifo import FieldType, parse_action
 from infthor_sim.scenes.catalogue import Catalogue
@@ -147,6 +150,12 @@ def _view(folder: Path) -> None:
     except (ValueError, RecursionError):
         return
     if isinstance(metadata, dict):  # else ai2thor's client refuses it before
+        if "objects" in metadata:
+            try:
+                packed = msgpack.packb(metadata["objects"])
+            except (ValueError, OverflowError):  # what no message can carry
+                return
+            metadata["objects"] = ReceivedObjects(msgspec.Raw(packed))
         event = SimpleNamespace(
             metadata=metadata, frame=None, depth_frame=None, instance_segmentation_frame=None
         )
