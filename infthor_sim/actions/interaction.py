@@ -134,7 +134,7 @@ def open_object(
         raise ActionError(f"object already open: {target.object_id}")
     if target.state.toggled and target.type.runs_closed and openness > 0:
         raise ActionError(f"Can't open {target.object_id}: it is on. Turn it off first.")
-    set_openness(sim, target, openness)
+    _swing(sim, target, openness)
 
 
 @object_action("CloseObject")
@@ -144,13 +144,18 @@ def close_object(sim: Simulation, target: SimObject) -> None:
         raise ActionError(f"{target.object_id} is not an Openable object")
     if target.state.openness == 0:
         raise ActionError(f"object already closed: {target.object_id}")
-    set_openness(sim, target, 0.0)
+    _swing(sim, target, 0.0)
+
+
+def _swing(sim: Simulation, target: SimObject, openness: float) -> None:
+    """Open or close an object, unless the door of a room would hit an agent on its way."""
+    if target.type.in_doorway and hits_agent(sim.world, target, openness):
+        raise ActionError("Object failed to open/close successfully.")
+    set_openness(sim, target, openness)
 
 
 def set_openness(sim: Simulation, target: SimObject, openness: float) -> None:
     """Open or close an object; the contents of a drawer move with it."""
-    if target.type.in_doorway and hits_agent(sim.world, target, openness):
-        raise ActionError("Object failed to open/close successfully.")
     before = drawer_offset(target)
     unfold(target, openness)
     target.state.openness = float(openness)
