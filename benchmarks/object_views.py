@@ -3,10 +3,11 @@
 python benchmarks/object_views.py draw OUT --types Fork,Spoon [--views 10] [--pixels 70 115]
 python benchmarks/object_views.py score OUT GUESSES
 
-`draw` puts objects on the furniture of procedural rooms, looks at each from a random cell from
-which it fills as many pixels of the 300 x 300 frame, and writes sheets of the shuffled views, each
-marked and enlarged four times, and a key. GUESSES has a line for each named view: number, type.
-`score` compares the two. Look at the sheets before the key.
+`draw` puts objects on the furniture of procedural rooms (furniture and towels stay where rooms have
+them), looks at each from a random cell from which it fills as many pixels of the 300 x 300 frame,
+and writes sheets of the shuffled views, each marked and enlarged four times, and a key. GUESSES has
+a line for each named view: number, type. `score` compares the two. Look at the sheets before the
+key.
 """
 
 import argparse
@@ -94,8 +95,13 @@ def collect(types: list[str], options: argparse.Namespace) -> list[View]:
                 break
             do(sim, "Reset", sceneName=f"{room}-{number}")
             do(sim, "Initialize", fieldOfView=60)
-            chosen = [str(name) for name in rng.permutation(left)[:_IN_ROOM]]
-            for item in list(add(sim, chosen, rng)):
+            loose = [name for name in left if not stays(name)]
+            chosen = [str(name) for name in rng.permutation(loose)[:_IN_ROOM]]
+            there = [o for o in sim.world.objects.values() if o.object_type in left]
+            there = [o for o in there if stays(o.object_type)]
+            for item in [*there, *add(sim, chosen, rng)]:
+                if len(views[item.object_type]) == options.views:
+                    continue
                 found = look(sim, item, options.pixels, rng, f"{room}-{number}")
                 if found is not None:
                     views[item.object_type].append(found)
@@ -106,6 +112,14 @@ def do(sim: Simulation, action: str, **arguments: object) -> None:
     """Execute one action."""
     method, checked = bind({"action": action, **arguments})
     method.run(sim, **checked)
+
+
+def stays(object_type: str) -> bool:
+    """Return whether objects of a type are looked at where rooms have them."""
+    holders = ("HandTowelHolder", "TowelHolder")
+    return not OBJECT_TYPES[object_type].pickupable or any(
+        allowed_in(object_type, holder) for holder in holders
+    )
 
 
 def add(sim: Simulation, types: list[str], rng: np.random.Generator) -> Iterator[SimObject]:

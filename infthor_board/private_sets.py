@@ -21,7 +21,7 @@ from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import WITHHELD, Question
 from infthor_eval.formats.reading import read_text
 from infthor_eval.formats.replies.answer_key import write_key
-from infthor_eval.formats.set_info import claim_for_simulator
+from infthor_eval.formats.set_info import claim_for_simulator, frames_of
 from infthor_eval.formats.shared_frames import store_picture, write_frame_names
 from infthor_eval.generation.generate_set import generate_with_workers
 from infthor_eval.generation.replay_set import select
@@ -163,7 +163,7 @@ def publish(data: NiehSet, secret: Secret, public: Path) -> Path:
     if public.exists() and any(public.iterdir()):
         raise DataError(f"{public}: is there already; move it away, or give another --out")
     prepare_folder(public)
-    claim_for_simulator(public, data.simulator or "embedded")
+    claim_for_simulator(public, data.simulator or "embedded", frames_of(data.directory))
     by_name = {
         traj_id: f"t{secret.digest(f'name {traj_id}')[:_DIGITS]}"
         for traj_id in {question.traj_id for question in data.questions}

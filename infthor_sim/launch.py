@@ -5,6 +5,9 @@ import shlex
 import sys
 from pathlib import Path
 
+FRAMES = 2
+"""Version of what pictures look like, which sets record: of shapes and of the rooms around them."""
+
 
 def player_command(data: Path | str | None = None, supplement: Path | str | None = None) -> str:
     """Return the command line of the simulator, for ai2thor's `local_executable_path`.

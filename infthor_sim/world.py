@@ -42,6 +42,8 @@ class RoomShell:
         style: index that varies the colour of the walls.
         walled: it has walls along all its edges; False if the world lists its walls one by one.
         openings: doorways, as (side "x-", "x+", "z-" or "z+", from, to).
+        door: a closed door that is only drawn, as in AI2-THOR's rooms: its side and middle.
+        rug: what is drawn of a rug: x_min, x_max, z_min, z_max.
     """
 
     x_min: float
@@ -54,6 +56,8 @@ class RoomShell:
     style: int = 0
     walled: bool = True
     openings: tuple[tuple[str, float, float], ...] = ()
+    door: tuple[str, float] | None = None
+    rug: tuple[float, float, float, float] | None = None
 
 
 @dataclass

@@ -25,6 +25,18 @@ def simulator_of(root: Path) -> str | None:
     return simulator
 
 
+def frames_of(root: Path) -> int | None:
+    """Return the version of the embedded simulator's drawing that a set's frames are of, or None.
+
+    Sets of the first version do not record it.
+    """
+    path = root / _FILE
+    frames = _read(path).get("frames") if path.exists() else None
+    if frames is not None and not isinstance(frames, int):
+        raise DataError(f"{path}: frames is {frames!r:.40}, not a number; write the set again")
+    return frames
+
+
 def writer_of(root: Path) -> str | None:
     """Return the version of infthor-eval that wrote a set, or None if it is not recorded."""
     path = root / _FILE
@@ -32,12 +44,20 @@ def writer_of(root: Path) -> str | None:
     return None if version is None else str(version)
 
 
-def claim_for_simulator(root: Path, simulator: str) -> None:
-    """Record the simulator of a set that is about to be written or continued."""
+def claim_for_simulator(root: Path, simulator: str, frames: int | None = None) -> None:
+    """Record what renders the frames of a set that is about to be written or continued.
+
+    Args:
+        root: folder of the set.
+        simulator: "embedded" or "unity".
+        frames: version of the embedded simulator's drawing.
+    """
     path = root / _FILE
     version = infthor_eval.__version__
     if not is_written(path):
-        info = {"format": FORMAT, "simulator": simulator, "infthor_eval": version}
+        info: dict[str, Any] = {"format": FORMAT, "simulator": simulator, "infthor_eval": version}
+        if frames is not None:
+            info["frames"] = frames
         with (
             wrap_errors(f"{path}: cannot be written", writing_hint(", or give another folder")),
             write_atomically(path) as partial,
@@ -51,6 +71,11 @@ def claim_for_simulator(root: Path, simulator: str) -> None:
         raise DataError(
             f"{root}: its frames are of the {theirs} simulator; give another folder for the "
             f"{simulator} one"
+        )
+    if frames_of(root) != frames:
+        raise DataError(
+            f"{root}: its frames are version {frames_of(root) or 1} of the drawing, this is "
+            f"{frames}; give another folder"
         )
     if wrote != version:
         raise DataError(

@@ -173,7 +173,7 @@ def replay_set(
         advance: called after each trajectory, with True if an earlier run replayed it.
         form: what is written of each.
     """
-    folder = _prepare_set(out, simulator.label, form)
+    folder = _prepare_set(out, simulator.label, simulator.frames, form)
     outcomes = enumerate(_replay_one(item, simulator, folder, form) for item in selection.items)
     return _collect(outcomes, selection, advance)
 
@@ -201,18 +201,18 @@ def replay_with_workers(
         on_progress: called within a trajectory, if this process is the worker.
     """
     shown = on_progress if worker_settings.is_local else ignore_progress
-    folder = _prepare_set(out, launch.label, form)
+    folder = _prepare_set(out, launch.label, launch.frames, form)
     replay_one = partial(_replay_one, out=folder, form=form, on_progress=shown)
     open_simulator = partial(Simulator, launch, **form.simulator_options)
     start = partial(SimulatorWorker, open_simulator, replay_one)
     return _collect(run_jobs(start, selection.items, worker_settings, notify), selection, advance)
 
 
-def _prepare_set(out: Path, label: str, form: ReplayForm) -> Path:
+def _prepare_set(out: Path, label: str, frames: int | None, form: ReplayForm) -> Path:
     """Create the folder of the trajectories' folders."""
     folder = out / form.folder
     folder.mkdir(parents=True, exist_ok=True)
-    claim_for_simulator(out, label)
+    claim_for_simulator(out, label, frames)
     return folder
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from infthor_eval.storage.limits import ACTION_SECONDS, UNITY_ACTION_SECONDS
-from infthor_sim.launch import own_player, player_command
+from infthor_sim.launch import FRAMES, own_player, player_command
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,7 @@ class Launch:
         timeout: time limit of one reply, seconds.
         timeout_hint: the way to raise it, for messages.
         start_timeout: time limit of the first message, seconds.
+        frames: version of the embedded simulator's drawing, which is recorded too; None for others.
     """
 
     executable: str | None = None
@@ -28,6 +29,7 @@ class Launch:
     timeout: float = 100.0
     timeout_hint: str = ""
     start_timeout: float = 300.0
+    frames: int | None = None
 
     @property
     def is_embedded(self) -> bool:
@@ -58,6 +60,7 @@ def embedded_launch(
         timeout=ACTION_SECONDS.value,
         timeout_hint=ACTION_SECONDS.hint,
         start_timeout=start_timeout,
+        frames=FRAMES,
     )
 
 

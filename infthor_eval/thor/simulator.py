@@ -112,6 +112,11 @@ class Simulator:
         return self._launch.label
 
     @property
+    def frames(self) -> int | None:
+        """Version of the embedded simulator's drawing; None of another simulator."""
+        return self._launch.frames
+
+    @property
     def view(self) -> SimulatorView:
         """State after the last action; raises SimulatorError if no scene is loaded."""
         if self._view is None:

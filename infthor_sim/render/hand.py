@@ -33,9 +33,9 @@ _NEAREST = 0.115  # of the gripper: beyond the camera's clipping plane
 # of the object's lowest point below the middle of the picture, as a share of its half height
 _FOOT = 0.97
 # shares of the picture's height: at least, per metre of size, at most
-_SMALLEST = 0.105
-_GROWTH = 0.26
-_LARGEST = 0.2
+_SMALLEST = 0.115
+_GROWTH = 0.42
+_LARGEST = 0.32
 # towards the camera, which so sees into bowls and the faces of flat things
 _TILT = euler_matrix((-24.0, 0.0, 0.0))
 _TURN = 155.0  # degrees: the front, as of screens and clocks, faces the camera and a little aside

@@ -4,6 +4,8 @@ import numpy as np
 
 from infthor_sim.geometry import Array, yaw_matrix
 from infthor_sim.render.primitives import Color, Form, Material, ShapePart, rows
+from infthor_sim.render.shapes.builder import shade_of
+from infthor_sim.render.shapes.palette import CHROME, FLOORS, WOODS, pick
 from infthor_sim.world import RoomShell, Wall, World
 
 SHELL_NAMES = ("Wall", "Ceiling", "Ground")
@@ -11,13 +13,15 @@ _WALLS: tuple[Color, ...] = (
     (0.86, 0.82, 0.74), (0.74, 0.80, 0.82), (0.82, 0.76, 0.72), (0.76, 0.81, 0.73),
     (0.83, 0.83, 0.80),
 )  # fmt: skip
-FLOORS: dict[str, tuple[Color, Material]] = {
-    "wood": ((0.62, 0.44, 0.29), Material.PLANKS),
-    "tiles": ((0.78, 0.76, 0.72), Material.TILES),
-    "carpet": ((0.60, 0.56, 0.52), Material.CARPET),
-}
 _THICK = 0.05  # half thickness of walls, metres
 _DOOR = 2.05  # height of doorways, metres
+_TRIM: Color = (0.93, 0.92, 0.9)
+_RUG_RISE = 0.004  # of a rug's upper side above the floor, metres
+_RUGS: tuple[tuple[Color, Color], ...] = (
+    ((0.55, 0.2, 0.2), (0.85, 0.76, 0.6)), ((0.22, 0.32, 0.5), (0.86, 0.86, 0.82)),
+    ((0.3, 0.42, 0.34), (0.8, 0.72, 0.5)), ((0.62, 0.45, 0.28), (0.3, 0.24, 0.22)),
+    ((0.46, 0.36, 0.5), (0.84, 0.8, 0.84)),
+)  # fmt: skip
 
 
 def shell_rows(world: World) -> Array:
@@ -27,7 +31,7 @@ def shell_rows(world: World) -> Array:
     parts = []
     for room in world.rooms:
         if room.walled:
-            parts.append(rows(_walls(room), origin, straight, 0))
+            parts.append(rows([*_walls(room), *_door(room)], origin, straight, 0))
         width = (room.x_max - room.x_min) / 2
         length = (room.z_max - room.z_min) / 2
         middle = ((room.x_max + room.x_min) / 2, (room.z_max + room.z_min) / 2)
@@ -49,7 +53,7 @@ def shell_rows(world: World) -> Array:
             color,
             material,
         )
-        parts.append(rows([ground], origin, straight, 2))
+        parts.append(rows([ground, *_rug(room)], origin, straight, 2))
     parts.append(rows([_wall_part(wall) for wall in world.walls], origin, straight, 0))
     return np.concatenate(parts)
 
@@ -68,7 +72,6 @@ def _wall_part(wall: Wall) -> ShapePart:
 def _walls(room: RoomShell) -> list[ShapePart]:
     """Return the four walls of a room, with doorways and skirting boards."""
     color = _WALLS[room.style % len(_WALLS)]
-    trim: Color = (0.93, 0.92, 0.9)
     at = {
         "x-": room.x_min - _THICK,
         "x+": room.x_max + _THICK,
@@ -98,10 +101,57 @@ def _walls(room: RoomShell) -> list[ShapePart]:
                         room.floor + 0.05,
                         0.05,
                         _THICK + 0.008,
-                        trim,
+                        _TRIM,
                     )
                 )
     return parts
+
+
+def _door(room: RoomShell) -> list[ShapePart]:
+    """Return the closed door of a room that has one: a frame, a leaf with panels, a handle."""
+    if room.door is None:
+        return []
+    side, middle = room.door
+    inward = 1 if side[1] == "-" else -1
+    face = {"x-": room.x_min, "x+": room.x_max, "z-": room.z_min, "z+": room.z_max}[side]
+    wood = pick(WOODS, room.style)
+    # along the wall, height, half width, half height, metres into the room, colour
+    listed: list[tuple[float, float, float, float, float, Color]] = [
+        (0.0, 1.03, 0.48, 1.03, 0.02, _TRIM),
+        (0.0, 1.0, 0.41, 1.0, 0.03, wood),
+        (0.0, 0.5, 0.28, 0.32, 0.035, shade_of(wood, 0.8)),
+        (0.0, 1.42, 0.28, 0.42, 0.035, shade_of(wood, 0.8)),
+        (0.34, 1.0, 0.015, 0.08, 0.04, CHROME),
+        (0.29, 1.02, 0.06, 0.014, 0.08, CHROME),
+    ]  # fmt: skip
+    return [
+        _slab(side[0] == "z", middle + along, face + inward * out / 2, half, room.floor + level,
+              rise, out / 2, color)
+        for along, level, half, rise, out, color in listed
+    ]  # fmt: skip
+
+
+def _rug(room: RoomShell) -> list[ShapePart]:
+    """Return the rug of a room that has one: a border around a middle with stripes."""
+    if room.rug is None:
+        return []
+    x_min, x_max, z_min, z_max = room.rug
+    x = (x_min + x_max) / 2
+    z = (z_min + z_max) / 2
+    half = ((x_max - x_min) / 2, (z_max - z_min) / 2)
+    outer, inner = _RUGS[room.style % len(_RUGS)]
+    listed = [(1.0, 1.0, 0.0, outer), (0.88, 0.84, 0.0, inner), (0.78, 0.7, 0.0, outer)]
+    listed += [(0.04, 0.7, at, inner) for at in (-0.45, 0.0, 0.45)]
+    return [
+        ShapePart(
+            Form.BOX,
+            (x + along * half[0], room.floor + 0.0003 * index, z),
+            (half[0] * wide, _RUG_RISE, half[1] * deep),
+            color,
+            Material.CARPET,
+        )
+        for index, (wide, deep, along, color) in enumerate(listed)
+    ]
 
 
 def _thresholds(room: RoomShell, color: Color, material: Material) -> list[ShapePart]:

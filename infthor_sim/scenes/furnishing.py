@@ -1,6 +1,8 @@
 # ruff: noqa: SIM905 - tables of names read best as words
 """What stands in procedural kitchens, living rooms, bedrooms and bathrooms."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from infthor_sim.objects import SimObject
@@ -334,3 +336,62 @@ def _place_washstand(plan: RoomPlan, at: float) -> None:
         )
         cabinet.hollow = column == 0  # the sink hangs in it
         cabinet.hinge = 1 if column > 0 else -1
+
+
+# Of rugs, metres: width and length, and how far their middle lies from the room's towards z+.
+_RUGS = {"kitchen": (1.7, 0.7, 0.55), "living-room": (2.4, 1.7, -0.2), "bedroom": (1.5, 1.1, -0.3),
+         "bathroom": (1.1, 0.7, 0.1)}  # fmt: skip
+# Of pictures, metres: so thin that they take no floor from the agent.
+_PICTURES = ((0.9, 0.65, 0.02), (0.55, 0.75, 0.02), (0.6, 0.5, 0.02))
+_PICTURE_Y = (1.45, 1.4, 1.5)
+_WALL_EACH = 2.2  # metres of wall for each picture
+_SPACING = np.array([0.3, 0.03, 0.3])  # around a picture, metres
+_ENTRANCE = (0.96, 2.06, 0.5)  # of a door, and of the floor before it, metres
+
+
+def decorate(plan: RoomPlan, room_type: str) -> None:
+    """Hang pictures by the length of the walls, lay a rug, and give a room without doors one.
+
+    All this is drawn from random numbers of its own: furniture stays where it is without it, and so
+    do loose objects but those that would reach into a picture.
+    """
+    plan.random, furnishing = plan.random.spawn(1)[0], plan.random
+    _lay_rug(plan, *_RUGS[room_type])
+    if not plan.room.openings:
+        _give_door(plan)
+    for side in ("x-", "x+", "z-", "z+"):
+        start, end = plan.span(side)
+        for _ in range(int((end - start) / _WALL_EACH)):
+            index = int(plan.random.integers(len(_PICTURES)))
+            picture = plan.try_against(
+                "Painting", [side], _PICTURES[index], _PICTURE_Y[index], _SPACING
+            )
+            if picture is not None:
+                picture.style = int(plan.random.integers(1000))
+    plan.random = furnishing
+
+
+def _lay_rug(plan: RoomPlan, width: float, length: float, away: float) -> None:
+    room = plan.room
+    x = (room.x_min + room.x_max) / 2
+    z = (room.z_min + room.z_max) / 2 + away
+    rug = (x - width / 2, x + width / 2, z - length / 2, z + length / 2)
+    plan.room = replace(room, rug=rug)
+
+
+def _give_door(plan: RoomPlan) -> None:
+    """Draw a door on a wall where nothing stands before it; a full room has none."""
+    width, height, depth = _ENTRANCE
+    room = plan.room
+    for side in plan.shuffle(("z-", "x-", "x+")):
+        for at in plan.places(side, width):
+            x0, x1, z0, z1 = {
+                "x-": (room.x_min, room.x_min + depth, at - width / 2, at + width / 2),
+                "x+": (room.x_max - depth, room.x_max, at - width / 2, at + width / 2),
+                "z-": (at - width / 2, at + width / 2, room.z_min, room.z_min + depth),
+            }[side]
+            low, high = np.array([x0, 0.01, z0]), np.array([x1, height, z1])
+            if plan.is_clear(low, high):
+                plan.reserved.append((low, high))
+                plan.room = replace(room, door=(side, at))
+                return

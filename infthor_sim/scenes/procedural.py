@@ -8,6 +8,7 @@ import numpy as np
 from infthor_sim.errors import SimulatorError
 from infthor_sim.geometry import level_gaps
 from infthor_sim.scenes.furnishing import (
+    decorate,
     furnish_bathroom,
     furnish_bedroom,
     furnish_kitchen,
@@ -30,6 +31,7 @@ _SIZES = {  # metres: least and most width, least and most length
     "bathroom": (3.4, 4.2, 3.2, 4.0),
 }
 _DOOR = 0.5  # half of a doorway's width, metres
+_DOOR_SIZE = (2 * _DOOR, 2.05, 0.12)
 _DRAWS = 20  # attempts at a scene
 _REACHABLE_SHARE = 0.85  # of a room's free floor that the agent must get to
 _REACH = 0.75  # metres from a place to stand to a receptacle's box
@@ -90,6 +92,7 @@ def _furnish(plan: RoomPlan, room_type: str) -> None:
     switch = plan.try_against("LightSwitch", ["z-", "x-", "x+"], (0.1, 0.14, 0.02), y=1.2)
     if switch is not None:
         switch.state.toggled = True
+    decorate(plan, room_type)
 
 
 def _house_plans(
@@ -116,6 +119,12 @@ def _house_plans(
         "kitchen": (_opening("z-", door_x), _opening("x+", upper_z)),
         "bathroom": (_opening("x-", upper_z),),
     }
+    # the doors open into the rooms that lie behind the living room
+    entrances = {
+        "bedroom": [(gap / 2, door_z, 90.0)],
+        "kitchen": [(door_x, gap / 2, 0.0)],
+        "bathroom": [(gap / 2, upper_z, 90.0)],
+    }
     plans: list[RoomPlan] = []
     for room_type, span in spans.items():
         style = seed + len(plans)
@@ -123,6 +132,9 @@ def _house_plans(
         room = RoomShell(*span, floor_style=_FLOORS[room_type], style=style, openings=doorways)
         plan = RoomPlan(room, random)
         plan.keep_doors_free()
+        for x, z, yaw in entrances.get(room_type, ()):
+            door = plan.place("Doorway", x, z, yaw, size=_DOOR_SIZE)
+            door.state.openness = 1.0
         _furnish(plan, room_type)
         plans.append(plan)
     doors = _doorway_cells(door_x, gap / 2, True)

@@ -1,13 +1,14 @@
 """Furnishing a room: what stands where, the floor that stays free, and the loose objects."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from infthor_sim.agent import AGENT_HEIGHT, Agent
+from infthor_sim.agent import AGENT_HEIGHT, AGENT_RADIUS, Agent
 from infthor_sim.geometry import Array, aabb_overlap, level_gaps
 from infthor_sim.object_types import allowed_in, type_named
 from infthor_sim.objects import SimObject, default_object
+from infthor_sim.physics.doorways import update_floor
 from infthor_sim.physics.footprints import Rect, subtract
 from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.navigation import CELL, NavGrid
@@ -129,7 +130,7 @@ class RoomPlan:
         room = self.room
         return (room.x_min, room.x_max) if side[0] == "z" else (room.z_min, room.z_max)
 
-    def is_clear(self, low: Array, high: Array, margin: float = 0.0) -> bool:
+    def is_clear(self, low: Array, high: Array, margin: float | Array = 0.0) -> bool:
         """Return whether a box, grown by a margin, touches no furniture and no reserved space."""
         return self._is_empty(low - margin, high + margin) and not any(
             aabb_overlap(low - margin, high + margin, a, b) for a, b in self.reserved
@@ -147,27 +148,35 @@ class RoomPlan:
         sides: Iterable[str],
         size: tuple[float, float, float] | None = None,
         y: float = 0.0,
+        margin: float | Array | None = None,
     ) -> SimObject | None:
-        """Put an object at a random free place along the first wall that has one, or None."""
+        """Put an object at a random free place along the first wall that has one, or None.
+
+        `margin` is what stays free around it, metres; None for 5 cm on the floor, 1 cm on walls.
+        """
         width = (type_named(object_type).size if size is None else size)[0]
+        if margin is None:
+            margin = 0.05 if y == 0 else 0.01
         for side in sides:
-            start, end = self.span(side)
-            places = np.arange(start + width / 2 + 0.1, end - width / 2 - 0.1 + 1e-6, 0.15)
-            for at in self.random.permutation(places):
-                item = self._against(
-                    side, object_type, round(float(at), 2), y, size, gap=0.02 if y == 0 else 0.0
-                )
-                blocked = any(
-                    s == side and a - width / 2 < at < b + width / 2
-                    for s, a, b in self.room.openings
-                )
+            for at in self.places(side, width):
+                item = self._against(side, object_type, at, y, size, gap=0.02 if y == 0 else 0.0)
                 to_open = opening_space(item)
-                if blocked or not (to_open is None or self._is_empty(*to_open)):
+                if not (to_open is None or self._is_empty(*to_open)):
                     continue
-                if self.is_clear(*item.bounds(), 0.05 if y == 0 else 0.01):
+                if self.is_clear(*item.bounds(), margin):
                     self._add(item)
                     return item
         return None
+
+    def places(self, side: str, width: float) -> Iterator[float]:
+        """Yield, in a random order, where along a wall a width fits beside its doorways, metres."""
+        start, end = self.span(side)
+        listed = np.arange(start + width / 2 + 0.1, end - width / 2 - 0.1 + 1e-6, 0.15)
+        for at in self.random.permutation(listed):
+            if not any(
+                s == side and a - width / 2 < at < b + width / 2 for s, a, b in self.room.openings
+            ):
+                yield round(float(at), 2)
 
     def keep_doors_free(self) -> None:
         """Reserve the floor in front of each doorway."""
@@ -186,7 +195,9 @@ class RoomPlan:
         room = self.room
         boxes = [
             o.bounds() for o in self.objects
-            if o.object_type != "Floor" and o.bounds()[0][1] < _HEAD and o.bounds()[1][1] > _KNEE
+            if not (o.object_type == "Floor" or o.type.in_doorway or _is_thin_picture(o))
+            and o.bounds()[0][1] < _HEAD
+            and o.bounds()[1][1] > _KNEE
         ]  # fmt: skip
         xs = (
             np.arange(
@@ -223,10 +234,18 @@ def build_world(
     yaw = nav.freest_yaw(*start, reach=3.0)
     agent = Agent(np.array([start[0], AGENT_HEIGHT, start[1]]), yaw)
     world = World(name, objects, tuple(p.room for p in plans), nav, [agent], seed=seed)
+    if doors:
+        world.floor = nav
+        update_floor(world)
     for plan in plans:
         _scatter(world, plan)
     world.keep_templates()
     return world
+
+
+def _is_thin_picture(item: SimObject) -> bool:
+    """Return whether an object is on a wall and within the margin around the agent."""
+    return item.type.faces_room and float(item.front_size[2]) <= _BODY - AGENT_RADIUS
 
 
 def _connected_parts(grid: NavGrid) -> list[list[tuple[float, float]]]:

@@ -132,7 +132,7 @@ def make_twins(
     started = time.monotonic()
     for name in ("metadata", _DRAFTS):
         (out / name).mkdir(parents=True, exist_ok=True)
-    claim_for_simulator(out, launch.label)
+    claim_for_simulator(out, launch.label, launch.frames)
     run_job = partial(_draft_one, out=out, settings=settings, score=score)
     start = partial(SimulatorWorker, partial(Simulator, launch), run_job)
     items = selection.items
@@ -315,7 +315,7 @@ def make_final_tasks(
     started = time.monotonic()
     for name in (TRAJECTORIES, _DRAFTS):
         (out / name).mkdir(parents=True, exist_ok=True)
-    claim_for_simulator(out, launch.label)
+    claim_for_simulator(out, launch.label, launch.frames)
     run_job = partial(_draft_final_task, out=out, settings=settings)
     start = partial(SimulatorWorker, partial(Simulator, launch), run_job)
     items = selection.items

@@ -12,7 +12,7 @@ from typing import Any
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.reading import read_json
-from infthor_eval.formats.set_info import writer_of
+from infthor_eval.formats.set_info import frames_of, writer_of
 from infthor_eval.formats.twins import TwinPair
 from infthor_eval.nieh.guessing.audit import Audit, audit
 from infthor_eval.nieh.guessing.chains import form_of
@@ -74,6 +74,7 @@ class SetFacts:
         scenes: numbers of trajectories by scene; empty if the set does not tell.
         manifest: what determines the set, if it was built from a manifest; else empty.
         written_by: version of infthor-eval that wrote the set; None if it does not say.
+        frames: version of the embedded simulator's drawing; None if it does not say.
         question_files: files with questions.
         pairs_file: `twins.jsonl`; None if the set has no pairs.
     """
@@ -85,6 +86,7 @@ class SetFacts:
     scenes: Mapping[str, int] = field(default_factory=dict)
     manifest: Mapping[str, Any] = field(default_factory=dict)
     written_by: str | None = None
+    frames: int | None = None
     question_files: Sequence[FileFact] = ()
     pairs_file: FileFact | None = None
 
@@ -152,6 +154,7 @@ def read_facts(root: Path) -> SetFacts:
         scenes=_read_scenes(data),
         manifest=read_json(manifest, _HINT, dict[str, Any]) if manifest.is_file() else {},
         written_by=writer_of(folder),
+        frames=frames_of(folder),
         question_files=[_file_fact(path, folder) for path in data.question_files],
         pairs_file=_file_fact(pairs, folder) if pairs.is_file() else None,
     )

@@ -100,6 +100,8 @@ def _files(facts: SetFacts, about: About) -> Iterator[str]:
     if about.creators:
         lines.append(f"- Made by {', '.join(about.creators)}")
     lines.append(f"- The benchmark is that of {_PAPER}")
+    if facts.frames is not None:
+        lines.append(f"- Frames are version {facts.frames} of the embedded simulator's drawing")
     if facts.seeds:
         lines.append(f"- Scenes and seeds: {', '.join(facts.seeds)}")
     yield "\n".join(lines)

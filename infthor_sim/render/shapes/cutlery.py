@@ -5,7 +5,7 @@ import math
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
 from infthor_sim.render.shapes.catalogue import draws
-from infthor_sim.render.shapes.palette import CHROME, DARK, STEEL
+from infthor_sim.render.shapes.palette import BLACK, CHROME, DARK, STEEL
 
 _BRIGHT: Color = (0.9, 0.92, 0.95)
 _IVORY: Color = (0.88, 0.82, 0.66)
@@ -26,29 +26,34 @@ def knife(b: Builder) -> None:
 
 @draws
 def butter_knife(b: Builder) -> None:
-    """A stout round handle of ivory, a neck, a blade with a round end and a notch."""
-    b.ball((0, 0, 0.58), (0.75, 1, 0.42), _IVORY)
-    b.box((0, 0, 0.12), (0.35, 0.7, 0.1), CHROME, Material.METAL)
-    b.box((0.1, 0, -0.36), (0.9, 0.5, 0.4), _BRIGHT, Material.METAL)
-    b.ball((0.1, 0, -0.76), (0.9, 0.5, 0.22), _BRIGHT, Material.METAL)
-    b.box((-0.75, 0.1, -0.05), (0.25, 0.6, 0.04), DARK)
+    """A slender handle of ivory, and a wider blade with straight sides, a blunt end and a notch."""
+    b.box((0, 0, 0.56), (0.6, 1, 0.4), _IVORY)
+    b.tube((0, 0, 0.94), (0.6, 1, 0.06), _IVORY)
+    b.box((0, 0, 0.12), (0.4, 0.7, 0.06), CHROME, Material.METAL)
+    b.box((0, 0, -0.44), (1, 0.5, 0.48), _BRIGHT, Material.METAL)
+    b.tube((0, 0, -0.92), (1, 0.5, 0.08), _BRIGHT, Material.METAL)
+    b.box((-0.75, 0.1, 0.0), (0.25, 0.6, 0.04), DARK)
 
 
 @draws
 def fork(b: Builder) -> None:
-    """A handle that widens to its end, and a broad head with three long tines well apart."""
-    b.box((0, 0, 0.74), (0.42, 0.6, 0.26), STEEL, Material.METAL)
-    b.box((0, 0, 0.2), (0.22, 0.6, 0.3), STEEL, Material.METAL)
-    b.ball((0, 0, -0.28), (1, 0.6, 0.22), STEEL, Material.METAL)
-    for at in (-0.8, 0.0, 0.8):
-        b.box((at, 0.2, -0.64), (0.2, 0.5, 0.36), CHROME, Material.METAL)
+    """A handle that widens to its end, and three long bright tines with dark between them."""
+    b.box((0, 0, 0.78), (0.42, 0.6, 0.22), STEEL, Material.METAL)
+    b.box((0, 0, 0.27), (0.22, 0.6, 0.35), STEEL, Material.METAL)
+    b.ball((0, 0, -0.16), (1, 0.6, 0.16), STEEL, Material.METAL)
+    b.box((0, 0.25, -0.48), (0.8, 0.35, 0.28), BLACK)
+    for at in (-0.83, 0.0, 0.83):
+        b.box((at, 0.2, -0.58), (0.17, 0.5, 0.42), _BRIGHT, Material.METAL)
 
 
 @draws
 def spoon(b: Builder) -> None:
-    """A handle and a bowl."""
-    b.box((0, 0.1, 0.35), (0.3, 0.5, 0.65), STEEL, Material.METAL)
-    b.ball((0, 0, -0.65), (1, 1, 0.35), CHROME, Material.METAL)
+    """A bowl that is dark within its bright rim, and a handle that widens to a round end."""
+    b.bowl((0, -0.1, -0.62), (1, 0.9, 0.38), _BRIGHT, Material.METAL)
+    b.bowl((0, 0.1, -0.62), (0.74, 0.72, 0.28), shade_of(STEEL, 0.45))
+    b.box((0, 0.5, 0.22), (0.16, 0.35, 0.48), STEEL, Material.METAL)
+    b.box((0, 0.5, 0.78), (0.3, 0.4, 0.14), STEEL, Material.METAL)
+    b.tube((0, 0.5, 0.9), (0.3, 0.4, 0.1), STEEL, Material.METAL)
 
 
 @draws

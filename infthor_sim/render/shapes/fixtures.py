@@ -9,14 +9,15 @@ from infthor_sim.render.shapes.palette import (
     CHROME,
     CLOTHS,
     DARK,
+    FLOORS,
     GLASS,
+    LEAF,
     STEEL,
     WHITE,
     WOODS,
     pick,
 )
 from infthor_sim.render.shapes.tables import cut_slab
-from infthor_sim.render.shell import FLOORS
 from infthor_sim.world import FLOOR_STYLES
 
 _CERAMIC: Color = (0.95, 0.95, 0.93)
@@ -145,20 +146,45 @@ def blinds(b: Builder) -> None:
 
 @draws
 def painting(b: Builder) -> None:
-    """A framed picture of hills."""
+    """A framed picture: hills, a ship at sea, flowers in a vase, or coloured squares."""
     x, y = b.thick(0.04, 0), b.thick(0.04, 1)
-    b.box((0, 0, -0.2), (1, 1, 0.8), pick(WOODS, b.style), Material.WOOD)
-    b.box(
-        (0, 0, 0.3),
-        (1 - x, 1 - y, 0.55),
-        pick(((0.7, 0.8, 0.9), (0.9, 0.75, 0.55), (0.6, 0.65, 0.8)), b.style),
-    )
-    b.box(
-        (0, -0.5, 0.35),
-        ((1 - x) * 0.99, 0.4, 0.55),
-        pick(((0.35, 0.5, 0.3), (0.5, 0.35, 0.25)), b.style),
-    )
+    b.box((0, 0, -0.2), (1, 1, 0.8), pick((*WOODS, BLACK, BRASS), b.style), Material.WOOD)
+    sky = pick(((0.7, 0.8, 0.9), (0.9, 0.75, 0.55), (0.6, 0.65, 0.8), (0.93, 0.9, 0.82)), b.style)
+    b.box((0, 0, 0.3), (1 - x, 1 - y, 0.55), sky)
+    _MOTIFS[b.style // 3 % len(_MOTIFS)](b, 1 - x, 1 - y)
+
+
+def _hills(b: Builder, x: float, y: float) -> None:
+    land = pick(((0.35, 0.5, 0.3), (0.5, 0.35, 0.25)), b.style)
+    b.box((0, -0.9 * y + 0.4, 0.35), (x * 0.99, 0.4, 0.55), land)
     b.ball((0.35, 0.4, 0.85), (0.15, 0.15 * float(b.half[0] / b.half[1]), 0.06), (0.95, 0.85, 0.4))
+
+
+def _ship(b: Builder, x: float, y: float) -> None:
+    b.box((0, -0.9 * y + 0.25, 0.35), (x * 0.99, 0.25, 0.55), (0.15, 0.35, 0.5))
+    b.box((0.05, -0.32, 0.4), (0.42, 0.09, 0.55), (0.4, 0.2, 0.12))
+    b.box((0.05, 0.1, 0.4), (0.02, 0.36, 0.53), BLACK)
+    for side, height in ((0.24, 0.3), (-0.14, 0.22)):
+        b.box((side, 0.05, 0.4), (0.15, height, 0.54), WHITE)
+
+
+def _flowers(b: Builder, x: float, y: float) -> None:
+    b.box((0, -0.6 * y, 0.4), (0.24, 0.4 * y, 0.52), pick(CLOTHS, b.style))
+    red = pick(((0.85, 0.25, 0.3), (0.95, 0.75, 0.2), (0.6, 0.4, 0.75)), b.style)
+    for aside, up, shade in ((-0.4, 0.2, 0.8), (0, 0.5, 1.0), (0.4, 0.15, 1.2), (0.05, 0.05, 0.9)):
+        b.box((aside * x / 2, up / 2 - 0.15, 0.36), (0.02, 0.3, 0.52), LEAF)
+        half = (0.2, 0.2 * float(b.half[0] / b.half[1]), 0.52)
+        b.coin(2, (aside * x, up, 0.42), half, shade_of(red, shade))
+
+
+def _squares(b: Builder, x: float, y: float) -> None:
+    for index in range(6):
+        color = pick(((0.8, 0.2, 0.15), (0.15, 0.25, 0.6), (0.95, 0.8, 0.2), DARK), b.style + index)
+        at = (x * (index % 3 - 1) * 0.62, y * (index // 3 - 0.5) * 0.95, 0.4)
+        b.box(at, (x * 0.25, y * 0.38, 0.53), color)
+
+
+_MOTIFS = (_hills, _ship, _flowers, _squares)
 
 
 @draws

@@ -6,7 +6,7 @@ from infthor_sim.render.shapes.builder import Builder, shade_of
 from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import pick
 
-APPLES: tuple[Color, ...] = ((0.72, 0.07, 0.09), (0.52, 0.7, 0.2), (0.55, 0.05, 0.12))
+APPLES: tuple[Color, ...] = ((0.72, 0.07, 0.09), (0.7, 0.8, 0.24), (0.55, 0.05, 0.12))
 CRUST: Color = (0.72, 0.48, 0.24)
 LETTUCE: Color = (0.4, 0.66, 0.25)
 POTATO: Color = (0.7, 0.55, 0.32)
@@ -15,15 +15,12 @@ _EGGS: tuple[Color, ...] = ((0.93, 0.86, 0.76), (0.97, 0.95, 0.91), (0.9, 0.76, 
 _EGG_TURN = 40.0  # degrees: rooms have their things square to the walls, and seen so an egg is long
 # Number of slices, by the type of slice.
 _COUNTS = {whole.slice_type: whole.slices for whole in OBJECT_TYPES.values() if whole.slices}
-_RUFFLES = (
-    (0.63, 0.12),
-    (0.42, 0.52),
-    (0.0, 0.66),
-    (-0.42, 0.52),
-    (-0.63, 0.12),
-    (0.46, -0.42),
-    (-0.46, -0.42),
-)
+# Of a lettuce leaf's edge, aside and up.
+_FRILLS = (
+    (0.0, 0.8), (0.36, 0.72), (-0.36, 0.72), (0.6, 0.46), (-0.6, 0.46), (0.62, 0.12),
+    (-0.62, 0.12), (0.5, -0.2), (-0.5, -0.2), (0.34, -0.48), (-0.34, -0.48),
+)  # fmt: skip
+_RIB: Color = (0.95, 0.96, 0.84)  # of lettuce
 _FLESH: Color = (0.96, 0.9, 0.6)  # of potatoes
 _TOAST: Color = (0.55, 0.33, 0.15)
 _CRUMB: Color = (0.95, 0.86, 0.66)
@@ -184,17 +181,19 @@ def potato_slice(b: Builder) -> None:
 
 @draws
 def lettuce_slice(b: Builder) -> None:
-    """A ruffled leaf, paler within, with a broad white rib from its foot that becomes veins."""
-    for index, (aside, up) in enumerate(_RUFFLES):
+    """A single leaf, narrow at its white foot and frilled above, with a rib that becomes veins."""
+    for index, (aside, up) in enumerate(_FRILLS):
         off = 0.36 if index % 2 else -0.36
         shade = 1.2 if index % 2 else 0.66
-        _disc(b, 0.34, 0.48, shade_of(LETTUCE, shade), (aside, up), off)
-    _disc(b, 0.82, 0.85, shade_of(LETTUCE, 1.15), (0.0, 0.0))
-    _rib(b, (0.0, -0.2), 0.0, (0.09, 0.72))
-    _rib(b, (0.0, -0.62), 0.0, (0.17, 0.36))
+        _disc(b, 0.2, 0.48, shade_of(LETTUCE, shade), (aside, up), off)
+    for up, radius in ((0.28, 0.6), (-0.05, 0.5), (-0.38, 0.38), (-0.66, 0.3)):
+        _disc(b, radius, 0.85, shade_of(LETTUCE, 1.3), (0.0, up))
+    _disc(b, 0.17, 0.95, _RIB, (0.0, -0.8))
+    for up, width in ((-0.6, 0.12), (-0.2, 0.085), (0.2, 0.055)):
+        _rib(b, (0.0, up), 0.0, (width, 0.24))
     for side in (-1, 1):
-        for up in (-0.3, 0.1):
-            _rib(b, (side * 0.24, up + 0.22), side * 48.0, (0.045, 0.34))
+        for up in (-0.3, 0.0, 0.3):
+            _rib(b, (side * 0.2, up + 0.12), side * 60.0, (0.022, 0.22))
 
 
 def _rib(b: Builder, at: tuple[float, float], angle: float, half: tuple[float, float]) -> None:
@@ -212,7 +211,7 @@ def _rib(b: Builder, at: tuple[float, float], angle: float, half: tuple[float, f
     fractions = [m / float(h) for m, h in zip(metres, b.half, strict=True)]
     tilt = (angle, 0.0, 0.0) if thin == 0 else (0.0, 0.0, -angle)
     middle = (0.0, at[1], at[0]) if thin == 0 else (at[0], at[1], 0.0)
-    b.box(middle, fractions, (0.95, 0.96, 0.84), tilt=tilt)
+    b.box(middle, fractions, _RIB, tilt=tilt)
 
 
 def _round(b: Builder, rind: Color, flesh: Color) -> None:

@@ -11,7 +11,6 @@ from infthor_sim.render.shapes.palette import (
     DARK,
     LEAF,
     PAPER,
-    STEEL,
     WHITE,
     WOODS,
     pick,
@@ -273,9 +272,19 @@ def watering_can(b: Builder) -> None:
 
 @draws
 def foil(b: Builder) -> None:
-    """A roll of foil."""
-    b.box((0, 0, 0), (1, 1, 1), STEEL, Material.METAL)
-    b.box((0, 0.5, 0.9), (0.95, 0.5, 0.12), (0.3, 0.4, 0.7))
+    """A shining roll on a tube of cardboard, from which a crumpled sheet has been drawn."""
+    bright: Color = (0.74, 0.78, 0.84)
+    b.coin(0, (0, 0, -0.34), (0.88, 1, 0.66), bright, Material.METAL)
+    for at, wide, shade in ((-0.62, 0.05, 0.5), (-0.5, 0.03, 1.4), (-0.2, 0.02, 0.6),
+                            (-0.1, 0.06, 1.4), (0.3, 0.05, 0.5), (0.42, 0.04, 1.4),
+                            (0.7, 0.03, 0.6)):  # fmt: skip
+        b.coin(0, (at, 0, -0.34), (wide, 1.03, 0.68), shade_of(bright, shade))
+    b.coin(0, (0, 0, -0.34), (1, 0.45, 0.3), (0.6, 0.44, 0.27))
+    b.coin(0, (0, 0, -0.34), (1.005, 0.26, 0.17), BLACK)
+    for index, shade in enumerate((1.4, 0.6, 1.3, 0.7, 1.35)):
+        place = (0.02 * (index % 2), -0.8 + 0.1 * (index % 2), 0.1 + 0.2 * index)
+        b.box(place, (0.84, 0.1, 0.12), shade_of(bright, shade), Material.METAL,
+              tilt=(14 if index % 2 else -14, 0, 0))  # fmt: skip
 
 
 @draws

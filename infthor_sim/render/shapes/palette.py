@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from infthor_sim.render.primitives import Color
+from infthor_sim.render.primitives import Color, Material
 
 WHITE: Color = (0.93, 0.93, 0.91)
 PAPER: Color = (0.95, 0.94, 0.88)
@@ -28,6 +28,11 @@ CERAMICS: tuple[Color, ...] = (
 CLOTHS: tuple[Color, ...] = (
     (0.3, 0.42, 0.6), (0.65, 0.3, 0.28), (0.45, 0.52, 0.38), (0.7, 0.62, 0.5), (0.42, 0.4, 0.5),
 )  # fmt: skip
+FLOORS: dict[str, tuple[Color, Material]] = {
+    "wood": ((0.62, 0.44, 0.29), Material.PLANKS),
+    "tiles": ((0.78, 0.76, 0.72), Material.TILES),
+    "carpet": ((0.60, 0.56, 0.52), Material.CARPET),
+}
 
 
 def pick(colors: Sequence[Color], style: int) -> Color:

@@ -3,7 +3,7 @@
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
 from infthor_sim.render.shapes.catalogue import draws
-from infthor_sim.render.shapes.palette import CLOTHS, WHITE, WOODS, pick
+from infthor_sim.render.shapes.palette import BRASS, CLOTHS, WHITE, WOODS, pick
 
 
 def _seat_level(b: Builder, usual: float) -> float:
@@ -88,10 +88,23 @@ def sofa(b: Builder) -> None:
 
 @draws
 def ottoman(b: Builder) -> None:
-    """A padded block."""
+    """A footstool on four turned legs: a frame of cloth with studs, a cushion with buttons."""
     color = pick(CLOTHS, b.style)
-    b.box((0, 0.1, 0), (1, 0.9, 1), color, Material.FABRIC)
-    b.box((0, -0.9, 0), (0.9, 0.1, 0.9), shade_of(pick(WOODS, b.style), 0.7))
+    wood = shade_of(pick(WOODS, b.style), 0.7)
+    for x in (-0.82, 0.82):
+        for z in (-0.76, 0.76):
+            b.tube((x, -0.74, z), (0.09, 0.26, 0.13), wood, Material.WOOD, bottom=0.55)
+    b.box((0, -0.16, 0), (0.96, 0.34, 0.95), shade_of(color, 0.85), Material.FABRIC)
+    b.box((0, 0.24, 0), (1, 0.06, 1), shade_of(color, 0.6))
+    b.box((0, 0.5, 0), (0.98, 0.24, 0.97), color, Material.FABRIC)
+    b.ball((0, 0.72, 0), (0.98, 0.28, 0.97), shade_of(color, 1.08), Material.FABRIC)
+    for x, z in ((0, 0), (-0.5, -0.42), (0.5, -0.42), (-0.5, 0.42), (0.5, 0.42)):
+        b.ball((x, 0.97 - 0.2 * (x * x + z * z), z), (0.06, 0.06, 0.09), shade_of(color, 0.45))
+    for index in range(9):
+        at = (index - 4) / 4.4
+        for side in (-1, 1):
+            b.box((at, -0.4, side * 0.96), (0.025, 0.06, 0.01), BRASS)
+            b.box((side * 0.97, -0.4, at), (0.01, 0.06, 0.035), BRASS)
 
 
 @draws

@@ -7,6 +7,9 @@ from infthor_sim.render.shapes.builder import Builder, shade_of
 from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import CLOTHS, WHITE, pick
 
+_FOLDS = 5  # of a hanging towel
+_RAIL = 0.93  # height at which it hangs, in fractions
+
 
 @draws
 def pillow(b: Builder) -> None:
@@ -51,13 +54,34 @@ def cloth(b: Builder) -> None:
 
 @draws
 def towel(b: Builder) -> None:
-    """A hanging or lying cloth with a border."""
+    """A cloth with a striped border: in folds over a rail with a fringe, or folded up flat."""
     color = pick(CLOTHS, b.style + 1)
-    b.box((0, 0, 0), (1, 1, 1), color, Material.FABRIC)
-    flat = min(range(3), key=lambda i: float(b.half[i]))
-    half = [1.005] * 3
-    at = [0.0] * 3
-    axis = 1 if flat != 1 else 2
-    half[axis] = 0.06
-    at[axis] = -0.75
-    b.box(at, half, WHITE, Material.FABRIC)
+    if min(range(3), key=lambda axis: float(b.half[axis])) == 1:
+        for up, share in ((-0.65, 1.0), (0.0, 0.97), (0.65, 0.94)):
+            b.box((0, up, 0), (share, 0.34, share), color, Material.FABRIC)
+        b.box((0.6, 0, 0), (0.12, 1.01, 0.945), WHITE, Material.FABRIC)
+        return
+    across = 0 if b.half[0] >= b.half[2] else 2
+
+    def at(aside: float, up: float, off: float) -> list[float]:
+        """A position or half extents in fractions across the cloth, up, and off its face."""
+        return [aside if axis == across else up if axis == 1 else off for axis in range(3)]
+
+    b.coin(across, at(0, _RAIL, 0), at(0.8, 1 - _RAIL, 1), shade_of(color, 1.1), Material.FABRIC)
+    b.box(at(0, 0.2, -0.5), at(0.84, 0.74, 0.3), shade_of(color, 0.7), Material.FABRIC)
+    for index in range(_FOLDS):
+        aside = (2 * index + 1) / _FOLDS - 1
+        raised = index % 2 == 0
+        shade = shade_of(color, 1.12 if raised else 0.78)
+        off = 0.35 if raised else 0.2
+        thick = 0.6 if raised else 0.4
+        foot = -0.86 if raised else -0.8
+        wide = 1 / _FOLDS
+        tall = (_RAIL - foot) / 2
+        b.box(at(aside * 0.9, _RAIL - tall, off), at(wide, tall, thick), shade, Material.FABRIC)
+        for level in (-0.5, -0.66):
+            b.box(at(aside * 0.9, level, off), at(wide, 0.045, thick + 0.03), WHITE,
+                  Material.FABRIC)  # fmt: skip
+        for side in (-0.5, 0.5):
+            b.box(at((aside + side * wide) * 0.9, (foot - 1) / 2, off),
+                  at(0.22 * wide, (1 + foot) / 2, 0.3), shade_of(color, 1.2))  # fmt: skip

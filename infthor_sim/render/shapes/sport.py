@@ -20,18 +20,18 @@ def ball(b: Builder) -> None:
 
 @draws
 def bat(b: Builder) -> None:
-    """A knob, a wound grip, a slender handle, a thick barrel with a round end; the longest side."""
+    """A knob, a wound grip, a slender handle, a thick barrel with two bands and a hollowed end."""
     axis = b.longest
     wood: Color = (0.86, 0.66, 0.4)
     thick = min(float(b.half[i]) for i in range(3) if i != axis)
     b.bar(axis, -1.0, -0.95, (0.5 * thick, 0.5 * thick), wood, Material.WOOD)
     b.bar(axis, -0.95, -0.5, (0.27 * thick, 0.27 * thick), (0.13, 0.13, 0.15), Material.FABRIC)
     b.bar(axis, -0.5, 0.15, (0.27 * thick, 0.8 * thick), wood)
-    b.bar(axis, 0.15, 0.9, (0.8 * thick, thick), wood)
+    b.bar(axis, 0.15, 0.94, (0.8 * thick, thick), wood)
     b.bar(axis, 0.32, 0.4, (0.9 * thick, 0.92 * thick), (0.7, 0.15, 0.12))
-    half = [thick / float(b.half[i]) for i in range(3)]
-    half[axis] = 0.1
-    b.ball(b.along(0.9, axis), half, shade_of(wood, 1.05))
+    b.bar(axis, 0.62, 0.66, (0.95 * thick, 0.96 * thick), (0.13, 0.13, 0.15))
+    b.bar(axis, 0.94, 1.0, (thick, 0.8 * thick), shade_of(wood, 1.05))
+    b.bar(axis, 0.99, 1.003, (0.5 * thick, 0.5 * thick), shade_of(wood, 0.45))
 
 
 @draws

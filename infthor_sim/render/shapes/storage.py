@@ -1,7 +1,7 @@
 """Doors, and objects with an inside: cabinets, drawers, fridges, microwaves, safes, boxes, bins."""
 
 from infthor_sim.objects import DOOR_SWING, DRAWER_SLIDE, WALL
-from infthor_sim.render.primitives import Color, Material
+from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
 from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.fixtures import doorframe
@@ -23,6 +23,12 @@ _WINDOW: Color = (0.13, 0.14, 0.16)
 # through clear glass.
 _GLASS_END = 0.3
 _RIM = 0.76
+# On a fridge's sides: height, place along and colour.
+_NOTES: tuple[tuple[float, float, Color], ...] = (
+    (0.45, -0.2, (0.97, 0.93, 0.6)), (0.52, 0.25, (0.95, 0.95, 0.93)),
+    (0.2, 0.1, (0.7, 0.86, 0.93)),
+)  # fmt: skip
+_MAGNET: Color = (0.8, 0.15, 0.15)
 
 
 def _door(
@@ -136,8 +142,25 @@ def fridge(b: Builder) -> None:
         _lit_inside(b, shade_of(color, 0.92))
     _door(b, color, Material.METAL, DARK, -0.97, 0.3, _FRIDGE_GRIP)
     _door(b, shade_of(color, 1.03), Material.METAL, DARK, 0.33, 1.0, _FRIDGE_GRIP)
+    _fridge_sides(b)
     if b.state.openness > 0:
         _door_racks(b)
+
+
+def _fridge_sides(b: Builder) -> None:
+    """What tells a fridge from the side: the seals behind its doors, a dark foot, notes."""
+    x, z = b.thick(0.004, 0), b.thick(0.006, 2)
+    seal = 1 - b.thick(_FRIDGE_GRIP + _LEAF, 2) - z
+    for side in (-1, 1):
+        if b.state.openness == 0:
+            b.box((side, -0.335, seal), (x, 0.635, z), BLACK)
+            b.box((side, 0.665, seal), (x, 0.335, z), BLACK)
+            b.span((side - x, 0.3, seal), (side + x, 0.33, 1), BLACK)
+        b.span((side - x, -1, -0.98), (side + x, -0.94, seal), BLACK)
+        for index, (up, along, color) in enumerate(_NOTES):
+            at = (side * 1.0, up, side * along)
+            b.box(at, (x, 0.085 - 0.02 * (index % 2), b.thick(0.1, 2)), color, Material.PAPER)
+            b.box((side, up + 0.08, side * along), (1.6 * x, 0.014, b.thick(0.02, 2)), _MAGNET)
 
 
 def _lit_inside(b: Builder, outside: Color) -> None:
@@ -246,7 +269,7 @@ def _vents(b: Builder) -> None:
 
 @draws
 def safe(b: Builder) -> None:
-    """A strongbox with bands and bolts on all sides; its thick door has a dial and keys."""
+    """A strongbox with bands and bolts on all sides; its door has a wheel, a dial and keys."""
     body: Color = (0.3, 0.32, 0.35)
     if b.state.openness == 0:
         z = b.thick(0.02, 2)
@@ -255,13 +278,22 @@ def safe(b: Builder) -> None:
         b.open_front(body, shade_of(body, 1.7), Material.METAL, b.item.floors[0], glow=_LIT)
     _bands(b, shade_of(body, 1.7))
     _door(b, shade_of(body, 1.25), Material.METAL, CHROME)
+    for level in (-0.55, 0.55):
+        hinge = (b.item.leaf_sides[0], level, 1 - b.thick(0.03, 2))
+        b.tube(hinge, (b.thick(0.019, 0), 0.2, b.thick(0.019, 2)), CHROME, Material.METAL)
     if b.state.openness == 0:
-        b.coin(2, (0, 0.2, 1), (0.3, 0.3, b.thick(0.008, 2)), DARK)
-        b.coin(2, (0, 0.2, 1), (0.14, 0.14, b.thick(0.016, 2)), CHROME, Material.METAL)
-        b.box((0, 0.42, 1), (0.02, 0.06, b.thick(0.009, 2)), WHITE)
-        b.box((0.0, -0.35, 1), (0.34, 0.28, b.thick(0.006, 2)), (0.1, 0.1, 0.11))
+        out = 1 + b.thick(0.007, 2)
+        b.rod((-0.3, 0.2, out), 0.015, 0.007, 2, CHROME)
+        for turn in (0, 60, 120):
+            b.add(Form.BOX, (-0.3, 0.2, out + b.thick(0.006, 2)), (0.3, 0.025, b.thick(0.006, 2)),
+                  CHROME, Material.METAL, tilt=(0, 0, turn))  # fmt: skip
+        b.coin(2, (0.35, 0.4, 1), (0.28, 0.28, b.thick(0.008, 2)), DARK)
+        b.coin(2, (0.35, 0.4, 1), (0.13, 0.13, b.thick(0.016, 2)), CHROME, Material.METAL)
+        b.box((0.35, 0.6, 1), (0.02, 0.06, b.thick(0.009, 2)), WHITE)
+        b.box((0.35, -0.3, 1), (0.3, 0.28, b.thick(0.006, 2)), (0.1, 0.1, 0.11))
         for row in range(3):
-            b.box((0.0, -0.17 - 0.18 * row, 1), (0.26, 0.05, b.thick(0.009, 2)), (0.75, 0.78, 0.8))
+            at = (0.35, -0.12 - 0.18 * row, 1)
+            b.box(at, (0.22, 0.05, b.thick(0.009, 2)), (0.75, 0.78, 0.8))
 
 
 def _bands(b: Builder, color: Color) -> None:
