@@ -122,7 +122,7 @@ def _n_placed(task: Task, room: SymbolicRoom, state: State) -> int:
     They must be in the same receptacle: two objects on two side tables do not count as two on the
     side table.
     """
-    where = dict(state.where)
+    where = dict(state.where) if task.task_type == TaskType.STACK else {}
     treated = _treated_items(task, state)
     targets = task.targets
     count = Counter[str]()

@@ -2,15 +2,15 @@
 
 from collections import deque
 from collections.abc import Container, Iterable, Mapping
-from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
 
 GRID = 0.25  # metres
 Cell = tuple[int, int]  # (x, z) in grid units
 _AHEAD: dict[int, Cell] = {0: (0, 1), 90: (1, 0), 180: (0, -1), 270: (-1, 0)}
 
 
-@dataclass(frozen=True, order=True)
-class GridPose:
+class GridPose(NamedTuple):
     """The agent's cell and heading (0, 90, 180 or 270 degrees)."""
 
     cell: Cell
@@ -23,6 +23,10 @@ class GridPose:
         return self.cell[0] + dx, self.cell[1] + dz
 
 
+# By pose: its distance, and the action and pose before it.
+_Reached = dict[GridPose, tuple[int, tuple[str, GridPose] | None]]
+
+
 class Grid:
     """The cells that the agent can reach."""
 
@@ -32,6 +36,9 @@ class Grid:
         self._origin = (points[0][0] % GRID, points[0][1] % GRID) if points else (0.0, 0.0)
         self.cells = frozenset(self.cell(x, z) for x, z in points)
         self._to: dict[GridPose, dict[GridPose, int]] = {}
+        self._moves = cache(self._list_moves)
+        # A way is usually asked for after the distances from the same pose.
+        self._last: tuple[GridPose, _Reached] | None = None
 
     def cell(self, x: float, z: float) -> Cell:
         """Return the cell nearest to a position in metres."""
@@ -51,7 +58,9 @@ class Grid:
 
     def distances(self, start: GridPose) -> dict[GridPose, int]:
         """Return the number of actions from a pose to every pose that can be reached."""
-        return {stand: length for stand, (length, _) in self._search(start, None).items()}
+        reached = self._search(start, None)
+        self._last = start, reached
+        return {stand: length for stand, (length, _) in reached.items()}
 
     def distances_to(self, goal: GridPose) -> Mapping[GridPose, int]:
         """Return the number of actions to a pose from every pose that leads to it, from a cache.
@@ -65,7 +74,8 @@ class Grid:
 
     def path(self, start: GridPose, goal: GridPose) -> list[str] | None:
         """Return the shortest sequence of MoveAhead, RotateLeft and RotateRight; None if none."""
-        reached = self._search(start, goal)
+        last = self._last
+        reached = last[1] if last and last[0] == start else self._search(start, goal)
         if goal not in reached:
             return None
         actions: list[str] = []
@@ -75,11 +85,9 @@ class Grid:
             pose = step[1]
         return actions[::-1]
 
-    def _search(
-        self, start: GridPose, goal: GridPose | None
-    ) -> dict[GridPose, tuple[int, tuple[str, GridPose] | None]]:
-        """Search breadth-first; each pose has its distance, and the action and pose before it."""
-        reached: dict[GridPose, tuple[int, tuple[str, GridPose] | None]] = {start: (0, None)}
+    def _search(self, start: GridPose, goal: GridPose | None) -> _Reached:
+        """Search breadth-first, to a goal or everywhere."""
+        reached: _Reached = {start: (0, None)}
         queue = deque([start])
         while queue:
             pose = queue.popleft()
@@ -104,7 +112,7 @@ class Grid:
                     queue.append(previous)
         return reached
 
-    def _moves(self, pose: GridPose) -> list[tuple[str, GridPose]]:
+    def _list_moves(self, pose: GridPose) -> list[tuple[str, GridPose]]:
         # MoveAhead first: the order breaks ties between paths of the same length, so it is part of
         # the generated data.
         moves = [

@@ -63,7 +63,7 @@ def is_feasible(task: Task, room: SymbolicRoom) -> bool:
 
 
 def _items_of_types(room: SymbolicRoom, types: set[str | None]) -> list[str]:
-    return [item for item, _ in room.start.where if room.types[item] in types]
+    return [item for name in types if name is not None for item in room.items.get(name, ())]
 
 
 def _any_fits(room: SymbolicRoom, items: list[str], receptacles: list[str]) -> bool:

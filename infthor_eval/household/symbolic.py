@@ -8,6 +8,7 @@ needed, as ALFRED does.
 
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 from infthor_eval.household.affordances import SLICEABLE, goes_into
 from infthor_eval.household.containment import direct_parent
@@ -67,6 +68,14 @@ class SymbolicRoom:
     receptacles: frozenset[str]
     start: State
     refused: frozenset[tuple[str, str]] = frozenset()
+
+    @cached_property
+    def items(self) -> dict[str, list[str]]:
+        """Ids of the items by their type."""
+        listed: dict[str, list[str]] = {}
+        for item, _ in self.start.where:
+            listed.setdefault(self.types[item], []).append(item)
+        return listed
 
     def place_of(self, item: str, where: dict[str, str]) -> str | None:
         """Return where an item or receptacle can be reached, or None if it is held or absent."""

@@ -304,5 +304,5 @@ def doorframe(b: Builder) -> None:
     """The frame of a doorway."""
     x, y = b.thick(0.05, 0), b.thick(0.05, 1)
     for side in (-1, 1):
-        b.box((side * (1 - x), 0, 0), (x, 1, 1), WHITE, Material.WOOD)
-    b.box((0, 1 - y, 0), (1, y, 1), WHITE, Material.WOOD)
+        b.box((side * (1 - x), 0, 0), (x, 1, 1), WHITE)
+    b.box((0, 1 - y, 0), (1, y, 1), WHITE)
