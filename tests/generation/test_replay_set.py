@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from infthor_eval.errors import SimulatorError
-from infthor_eval.formats.set_info import claim_for_simulator, simulator_of
+from infthor_eval.errors import DataError, SimulatorError
+from infthor_eval.formats.set_info import claim_for_simulator, frames_of, simulator_of
 from infthor_eval.formats.step_log import iter_object_states, read_steps
 from infthor_eval.formats.trajectory import iter_sources, iter_trajectories
 from infthor_eval.generation.generate_set import generate_set
@@ -194,6 +194,15 @@ def test_a_set_that_was_claimed_half_is_claimed_again(tmp_path, monkeypatch):
     assert simulator_of(tmp_path) is None
     claim_for_simulator(tmp_path, "embedded")
     assert simulator_of(tmp_path) == "embedded"
+    assert frames_of(tmp_path) is None
+
+
+def test_a_set_is_not_continued_with_frames_of_another_version(tmp_path):
+    claim_for_simulator(tmp_path, "embedded", 2)
+    claim_for_simulator(tmp_path, "embedded", 2)
+    assert frames_of(tmp_path) == 2
+    with pytest.raises(DataError, match="version 2 of the drawing, this is 3; give another folder"):
+        claim_for_simulator(tmp_path, "embedded", 3)
 
 
 def test_the_simulator_error_is_told(simulator):

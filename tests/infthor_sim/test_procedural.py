@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from infthor_sim.physics.solids import part_boxes
+from infthor_sim.scenes import procedural
 from infthor_sim.scenes.catalogue import Catalogue
 from infthor_sim.scenes.procedural import SCENE_TYPES
 
@@ -61,6 +62,51 @@ def test_names_are_reproducible_and_seeds_differ(scene_type):
     other = Catalogue().load(f"{scene_type}-4")
     assert list(first.objects) == list(again.objects)
     assert list(first.objects) != list(other.objects)
+
+
+@pytest.mark.parametrize("room_type", sorted(NEEDED))
+def test_what_hangs_and_is_only_drawn_takes_nothing_from_a_room(room_type, monkeypatch):
+    decorated = Catalogue().load(f"{room_type}-3")
+    monkeypatch.setattr(procedural, "decorate", lambda *_: None)
+    bare = Catalogue().load(f"{room_type}-3")
+    assert set(decorated.nav) == set(bare.nav)
+    more = {key for key in decorated.objects if key not in bare.objects}
+    assert {decorated.objects[key].object_type for key in more} == {"Painting"}
+    assert set(bare.objects) < set(decorated.objects)
+    pictures = [decorated.objects[key].bounds() for key in more]
+    for low, high in pictures:
+        for other in decorated.objects.values():
+            apart = np.maximum(low - other.bounds()[1], other.bounds()[0] - high).max()
+            assert apart > -1e-6 or other.object_id in more
+    (room,) = decorated.rooms
+    assert room.rug is not None
+    side, at = room.door
+    bench = Bench.at(f"{room_type}-3")
+    for item in bench.metadata["objects"]:  # nothing stands before the door
+        box = item["axisAlignedBoundingBox"]
+        across, along = ("x", "z") if side[0] == "x" else ("z", "x")
+        wall = getattr(room, f"{across}_{'max' if side[1] == '+' else 'min'}")
+        near = abs(box["center"][across] - wall) - box["size"][across] / 2 < 0.4
+        beside = abs(box["center"][along] - at) - box["size"][along] / 2 < 0.4
+        assert not (near and beside and box["size"]["y"] > 0.2), item["objectId"]
+
+
+def test_the_doors_of_a_house_open_close_and_keep_the_agent_out():
+    bench = Bench.at("house-3")
+    doors = [o for o in bench.metadata["objects"] if o["objectType"] == "Doorway"]
+    assert [door["isOpen"] for door in doors] == [True] * 3
+
+    def n_cells() -> int:
+        return len(bench.ok("GetReachablePositions")["actionReturn"])
+
+    before = n_cells()
+    for door in doors:
+        bench.force("CloseObject", door["objectId"])
+    alone = n_cells()
+    assert alone < before / 2
+    for door in doors:
+        bench.force("OpenObject", door["objectId"])
+    assert n_cells() == before
 
 
 @pytest.mark.parametrize("seed", [2, 5])
