@@ -16,7 +16,6 @@ from infthor_eval.runs.journals.records import (
     UnitRecord,
     describe_failure,
 )
-from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Workload
 from infthor_eval.runs.usage import NOTHING, Usage
@@ -65,21 +64,20 @@ class LocalExecutor(Generic[SuiteUnit, Payload]):
         self, folder: Path, journal: Journal[Payload], should_stop: Callable[[], bool]
     ) -> Iterator[tuple[UnitRecord[Payload], bool]]:
         """See `Executor`."""
-        session = JournalSession(journal)
         evaluation = self._bound.evaluation
         subject = self._bound.subject
         if isinstance(subject, BatchModel) and subject.uses_batches:
-            given = (evaluation, session, self._encoder, folder, self._notify, should_stop)
+            given = (evaluation, journal, self._encoder, folder, self._notify, should_stop)
             if not fetch_replies(subject, *given):
                 return
         in_flight = subject.capabilities.max_in_flight
         records = run_groups(
             self.workload.groups,
-            lambda group: group_records(evaluation, group, session, self._encoder),
+            lambda group: group_records(evaluation, group, journal, self._encoder),
             in_flight,
         )
         for record in self._showing_positions(records):
-            yield session.append_new(record)
+            yield journal.append_new(record)
             if should_stop():
                 return
 
