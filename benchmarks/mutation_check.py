@@ -49,7 +49,7 @@ _MODULES = {
     "driver": (
         "infthor_eval/runs/work/driver.py",
         "tests/runs/work/test_driver.py tests/runs/work/test_refusals.py "
-        "tests/runs/work/test_scheduling.py tests/runs/test_results.py",
+        "tests/runs/work/test_executor.py tests/runs/test_results.py",
     ),
     "requests": (
         "infthor_eval/runs/journals/requests.py",
