@@ -1,7 +1,6 @@
 """A run as its folder holds it, for all who show, compare, explain or export it.
 
-A journal that still grows is followed (`runs/journals/following.py`), and one that a stranger sends
-is read bit by bit (`infthor_board/reading.py`); all others read a run here.
+A journal that still grows is followed (`runs/journals/following.py`); all others read a run here.
 """
 
 from __future__ import annotations
@@ -157,6 +156,11 @@ class Run:
         """Return the request of a record, behind those that it continues; none where the journal
         does not have them all."""
         return (record.request and self._log[1].requests_before(record.request)) or ()
+
+    @property
+    def stored_requests(self) -> Mapping[str, StoredRequest]:
+        """All stored requests by the names that records have for them."""
+        return self._log[1].requests
 
     @cached_property
     def usage(self) -> Usage:
