@@ -15,8 +15,7 @@ from infthor_eval.harness.requests import Payload, RequestAdapter, SuiteUnit
 from infthor_eval.runs import RunHeader, Suite, UnitRecord
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.record_encoder import RecordEncoder
-from infthor_eval.runs.work.binding import require_capability
-from infthor_eval.runs.work.group_records import group_records
+from infthor_eval.runs.work.binding import group_records, require_capability
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.suites import baseline_suites, find_request_adapter, find_suite
 from model_adapters import (

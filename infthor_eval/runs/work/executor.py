@@ -22,8 +22,7 @@ from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Group, Workload
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.runs.work.batches import fetch_replies
-from infthor_eval.runs.work.binding import bind_run
-from infthor_eval.runs.work.group_records import group_records
+from infthor_eval.runs.work.binding import bind_run, group_records
 from model_adapters import BatchModel, PersonModel
 
 # A record that is on disk; True if an earlier run had put it there.

@@ -25,8 +25,7 @@ from infthor_eval.runs.journals.records import (
 from infthor_eval.runs.journals.requests import StoredRequest
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Group, Workload
-from infthor_eval.runs.work.binding import bind_run
-from infthor_eval.runs.work.group_records import group_records
+from infthor_eval.runs.work.binding import bind_run, group_records
 from infthor_eval.terminal import print_error
 from infthor_eval.workers import (
     Event,
