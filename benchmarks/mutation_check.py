@@ -49,7 +49,7 @@ _MODULES = {
     "driver": (
         "infthor_eval/runs/work/driver.py",
         "tests/runs/work/test_driver.py tests/runs/work/test_refusals.py "
-        "tests/runs/work/test_scheduling.py tests/runs/test_results.py",
+        "tests/runs/work/test_executor.py tests/runs/test_results.py",
     ),
     "requests": (
         "infthor_eval/runs/journals/requests.py",
@@ -57,8 +57,8 @@ _MODULES = {
     ),
     "run": (
         "infthor_eval/run.py",
-        "tests/test_run.py tests/report/test_three_states.py tests/report/test_plain.py "
-        "tests/test_data_frames.py tests/cli/commands/test_show.py",
+        "tests/test_run.py tests/test_run_names.py tests/report/test_three_states.py "
+        "tests/report/test_plain.py tests/test_data_frames.py tests/cli/commands/test_show.py",
     ),
     "settings": ("infthor_eval/settings.py", "tests/test_settings.py tests/nieh/test_suite.py"),
     "facets": ("infthor_eval/facets.py", "tests/nieh/results tests/report/suites"),

@@ -19,13 +19,9 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.published.imported_replies import ImportedRun, import_logs
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
-from infthor_eval.runs import RunHeader, UnitKey, UnitRecord, read_header
-from infthor_eval.runs.journals.shards import (
-    find_shards,
-    parse_record,
-    read_lines,
-    read_run,
-)
+from infthor_eval.run import Run
+from infthor_eval.runs import RunHeader, UnitKey, UnitRecord
+from infthor_eval.runs.journals.shards import find_shards, parse_record, read_lines
 from infthor_eval.runs.stored.search import run_folders
 
 Record = UnitRecord[NiehAnswer]
@@ -151,16 +147,16 @@ def _files(folder: Path) -> list[Path]:
 
 
 def _read_journal(folder: Path) -> SubmittedRun:
-    header = read_header(folder)
-    if header.suite != _SUITE:
+    run = Run.open(folder)
+    if run.listed.suite != _SUITE:
         raise UsageError(
-            f"{folder}: a run of {header.suite}; only replies can be scored again, so send runs of "
-            f"{_SUITE}"
+            f"{folder}: a run of {run.listed.suite}; only replies can be scored again, so send "
+            f"runs of {_SUITE}"
         )
-    header, records = read_run(folder, RECORDS)
+    header = run.own_header
     results = [it for it in _all_records(folder, header) if it.payload.reply is not None]
-    stated = {record.key: record.payload.scores for record in records}
-    return SubmittedRun(folder, header, records, results, stated)
+    stated = {record.key: record.payload.scores for record in run.records}
+    return SubmittedRun(folder, header, run.records, results, stated)
 
 
 def _all_records(folder: Path, header: RunHeader[NiehConfig]) -> Iterator[Record]:

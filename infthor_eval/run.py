@@ -1,29 +1,23 @@
 """A run as its folder holds it, for all who show, compare, explain or export it.
 
-A journal that still grows is followed (`runs/journals/following.py`), and one that a stranger sends
-is read bit by bit (`infthor_board/reading.py`); all others read a run here.
+A journal that still grows is followed (`runs/journals/following.py`); all others read a run here.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
 
 from infthor_eval.errors import DataError, InfthorError, UsageError
-from infthor_eval.runs.completeness import (
-    UnitCounts,
-    count_missing,
-    count_units,
-    mark_incomplete,
-)
+from infthor_eval.runs.completeness import UnitCounts, count_units
 from infthor_eval.runs.journals.records import RunHeader, State, UnitRecord
 from infthor_eval.runs.journals.requests import StoredRequest
 from infthor_eval.runs.journals.shards import (
@@ -35,7 +29,6 @@ from infthor_eval.runs.journals.shards import (
     read_states,
 )
 from infthor_eval.runs.stored.command import StoredCommand, read_stored_command
-from infthor_eval.runs.stored.labels import label_runs
 from infthor_eval.runs.stored.search import Results, read_results, run_folders
 from infthor_eval.runs.suite import RunSummary
 from infthor_eval.runs.usage import NOTHING, Usage
@@ -46,7 +39,19 @@ if TYPE_CHECKING:
     from infthor_eval.report.presenter import Presenter
     from infthor_eval.runs.suite import Suite
 
-_SHOWN_BY_TABLES = {"frames"}  # the options that tables show beside a run's name
+_INCOMPLETE = " (incomplete)"  # ends the name of a run that is not whole
+# Options that tell no run from another: they change no number, or are in labels in another way.
+_NOT_IN_NAMES = {
+    "out",
+    "workers",
+    "ray_address",
+    "gpus_per_worker",
+    "include_path",
+    "name",
+    "tasks",
+    "frames",
+}
+_LONGEST_TASKS = 60  # characters of the tasks in a name
 
 
 class Run:
@@ -93,6 +98,7 @@ class Run:
         run.units = summary.units
         run.usage = usage
         run.n_missing = n_missing
+        run.is_whole = not n_missing and all(counts.is_whole for counts in run.units.values())
         run.own_header = summary.header
         run._summed_up = summary.summary
         return run
@@ -151,6 +157,11 @@ class Run:
         does not have them all."""
         return (record.request and self._log[1].requests_before(record.request)) or ()
 
+    @property
+    def stored_requests(self) -> Mapping[str, StoredRequest]:
+        """All stored requests by the names that records have for them."""
+        return self._log[1].requests
+
     @cached_property
     def usage(self) -> Usage:
         """Tokens and requests of the whole run."""
@@ -164,13 +175,10 @@ class Run:
     @cached_property
     def n_missing(self) -> int | None:
         """Number of units that were not attempted; None if unknown."""
-        return self._missing_beside(len(self.records))
-
-    def _missing_beside(self, n_recorded: int) -> int | None:
-        n_missing = count_missing(self.listed, n_recorded)
-        if n_missing is None and self.results is not None:
-            return self.results.n_missing
-        return n_missing
+        n_units = self.listed.n_units
+        if n_units is None:
+            return None if self.results is None else self.results.n_missing
+        return max(0, n_units - self.states.total())
 
     @cached_property
     def units(self) -> Mapping[str, UnitCounts]:
@@ -193,15 +201,21 @@ class Run:
 
     @cached_property
     def states(self) -> Counter[State]:
-        """Number of units by state, read without the suite."""
+        """Number of units with a record by state, read without the suite before the records are."""
+        if "_log" in self.__dict__:
+            return Counter(record.state for record in self.records)
         return Counter(read_states(self.folder, self._notify).values())
 
     @property
     def n_not_asked(self) -> int | None:
-        """Number of units that were not attempted, or that a cap left out, by `states`; None if
-        neither header nor results tell."""
-        n_missing = self._missing_beside(self.states.total())
-        return None if n_missing is None else n_missing + self.states["not asked"]
+        """Number of units that were not attempted, or that a cap left out; None if neither header
+        nor results tell."""
+        return None if self.n_missing is None else self.n_missing + self.states["not asked"]
+
+    @cached_property
+    def is_whole(self) -> bool:
+        """Whether no unit that can be done is known to lack a result."""
+        return not self.states["failed"] and not self.n_not_asked
 
     @property
     def primary_metrics(self) -> Mapping[str, Rate]:
@@ -241,7 +255,7 @@ class Run:
         return self.listed.with_frames(self._marked(self.listed.name))
 
     def _marked(self, name: str) -> str:
-        return mark_incomplete(name, self.units, self.n_missing)
+        return name if self.is_whole else f"{name}{_INCOMPLETE}"
 
     @property
     def tasks(self) -> Mapping[str, Any]:
@@ -300,17 +314,80 @@ def open_runs(
     """
     if not twice and len({folder.resolve() for folder in folders}) < len(folders):
         raise UsageError("one run is given twice; give each once")
-    runs = with_distinct_names([Run.open(folder, notify) for folder in folders], by_task=True)
-    return [run.read() for run in runs]
+    return with_distinct_names([Run.open(folder, notify).read() for folder in folders])
 
 
-def with_distinct_names(
-    runs: Sequence[Run], *, by_task: bool = False, ignore: Collection[str] = _SHOWN_BY_TABLES
-) -> list[Run]:
-    """Return the runs under distinct names; see `label_runs`."""
-    places = [(run.folder, run.listed) for run in runs]
-    names = label_runs(places, ignore, by_task=by_task)
-    return [run.named(name) for run, name in zip(runs, names, strict=True)]
+def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
+    """Return the runs by the names that they have beside each other, wherever they are shown.
+
+    Runs of one suite and name are told apart by the options that differ: `qwen2.5-vl
+    (dtype=float16)`. Those alike in these and in their frames, which `label` has, get their tasks
+    behind that, or their folders if these are equal, too.
+    """
+    places = defaultdict(list)
+    for place, run in enumerate(runs):
+        places[run.listed.suite, run.listed.name].append(place)
+    named = list(runs)
+    for same in places.values():
+        if len(same) > 1:  # otherwise no file is read
+            for place, name in zip(same, _names_of([runs[it] for it in same]), strict=True):
+                named[place] = runs[place].named(name)
+    return named
+
+
+def unmarked(label: str) -> str:
+    """Return a label without the mark of a run that is not whole."""
+    return label.removesuffix(_INCOMPLETE)
+
+
+def _names_of(runs: Sequence[Run]) -> Iterator[str]:
+    """Yield the names of runs of one name."""
+    options = list(map(_options, runs))
+    texts = {
+        name: [of_run.get(name) for of_run in options]
+        for name in sorted({name for of_run in options for name in of_run})
+    }
+    shortened = {name: _shorten(of_all) for name, of_all in texts.items() if len(set(of_all)) > 1}
+    names = []
+    for run, of_run in zip(runs, options, strict=True):
+        differing = ", ".join(
+            f"{name}={short[of_run[name]]}" for name, short in shortened.items() if name in of_run
+        )
+        names.append(f"{run.listed.name} ({differing})" if differing else run.listed.name)
+    keys = [(name, run.listed.config.frames) for run, name in zip(runs, names, strict=True)]
+    tasks = ["+".join(sorted(run.listed.config.tasks))[:_LONGEST_TASKS] for run in runs]
+    with_tasks = list(zip(keys, tasks, strict=True))
+    for place, run in enumerate(runs):
+        is_told_by_tasks = with_tasks.count(with_tasks[place]) == 1
+        more = f" ({tasks[place] if is_told_by_tasks else run.folder.name})"
+        yield names[place] + (more if keys.count(keys[place]) > 1 else "")
+
+
+def _options(run: Run) -> dict[str, str]:
+    """Return the options of a run's command in words, those of the model among them."""
+    every = dict(run.stored_command.options) if run.stored_command else {}
+    of_model = every.pop("model_args", None)
+    if isinstance(of_model, Mapping):
+        every |= of_model
+    in_words = run.listed.config.in_words
+    return {
+        name: in_words(name, str(value))
+        for name, value in every.items()
+        if name not in _NOT_IN_NAMES
+    }
+
+
+def _shorten(values: Sequence[str | None]) -> Mapping[str, str]:
+    """Return the values as they are; paths without the folders that all of them share."""
+    known = sorted({value for value in values if value is not None})
+    parts = {value: PurePath(value).parts for value in known}
+    if not all(PurePath(value).is_absolute() for value in known):
+        return {value: value for value in known}
+    shortest = min(map(len, parts.values())) - 1  # the last part is always shown
+    n_shared = next(
+        (n for n in range(shortest) if len({path[n] for path in parts.values()}) > 1), shortest
+    )
+    return {value: str(PurePath(*path[n_shared:])) for value, path in parts.items()}
 
 
 def find_runs(folder: Path, notify: Notify | None = None) -> Iterator[Run | BrokenRun]:

@@ -83,7 +83,6 @@ def _print_tables(runs: Sequence[Run], options: ShowOptions) -> None:
 
 def _print_folders(runs: Sequence[Run], quiet: bool) -> None:
     for run in runs:
-        name = run.summary.header.name
         if not quiet and run.usage.requests:
-            print_line(f"{name}: {run.usage.description}")
-        print_line(str(run.folder) if quiet else f"{name}: {run.folder}")
+            print_line(f"{run.label}: {run.usage.description}")
+        print_line(str(run.folder) if quiet else f"{run.label}: {run.folder}")

@@ -20,7 +20,7 @@ def named_tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, Any]]:
     """Yield each run's name, each task's name, and its results (`EpisodeTaskSummary`)."""
     for run in runs:
         for task_name, task in run.summary.tasks.items():
-            yield run.name, task_name, task
+            yield run.header.label, task_name, task
 
 
 def endings_table(

@@ -16,6 +16,8 @@ import msgspec
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.exports import LM_EVAL_MODEL
+from infthor_eval.report.sample import Sample
+from infthor_eval.run import Run
 from infthor_eval.runs import RunOutcome, TaskFile, UnitCounts, UnitDoc, UnitRecord
 from infthor_eval.runs.journals.shards import last_change
 from infthor_eval.statistics import clustered_mean
@@ -83,8 +85,8 @@ def export(outcome: RunOutcome) -> Path:
 
 
 @dataclass(frozen=True)
-class _Scored:
-    """A task with its units' records, scores, and lines in lm-eval's file without the scores.
+class _Task:
+    """A task with its samples, and their lines in lm-eval's file without the scores.
 
     Attributes:
         units: numbers of all its units by state.
@@ -92,8 +94,7 @@ class _Scored:
 
     file: TaskFile
     units: UnitCounts
-    records: list[UnitRecord[Any]] = field(default_factory=list)
-    scores: list[Mapping[str, float]] = field(default_factory=list)
+    samples: list[Sample] = field(default_factory=list)
     rows: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -103,64 +104,69 @@ class _Scored:
     @property
     def n_samples(self) -> int:
         """Number of samples; one that was repeated has several records."""
-        n_known = len({record.key.once for record in self.records})
-        n_repeats = max(record.repeat for record in self.records)
+        n_known = _n_distinct(self.samples)
+        n_repeats = max(sample.record.repeat for sample in self.samples)
         units = self.units
-        n_missing = units.answered + units.failed + units.not_asked - len(self.records)
+        n_missing = units.answered + units.failed + units.not_asked - len(self.samples)
         return n_known + n_missing // n_repeats
 
     @property
     def n_answered(self) -> int:
         """Number of samples with a result."""
-        return len({record.key.once for record, _ in self.answered})
+        return _n_distinct(self.answered)
 
     @cached_property
-    def answered(self) -> list[tuple[UnitRecord[Any], Mapping[str, float]]]:
-        """Records with a result, and their scores."""
-        pairs = zip(self.records, self.scores, strict=True)
-        return [(record, scores) for record, scores in pairs if record.state == "answered"]
+    def answered(self) -> list[Sample]:
+        """Samples with a result."""
+        return [sample for sample in self.samples if sample.is_answered]
 
     @cached_property
     def metrics(self) -> list[str]:
-        return list(dict.fromkeys(name for _, scores in self.answered for name in scores))
+        return list(dict.fromkeys(name for sample in self.answered for name in sample.scores))
 
 
-def _tasks(outcome: RunOutcome[Any, Any]) -> list[_Scored]:
-    """Return the tasks with records that count."""
-    units = outcome.summary.units
+def _n_distinct(samples: Sequence[Sample]) -> int:
+    """Return the number of samples, each counted once however often it was repeated."""
+    return len({sample.record.key.once for sample in samples})
+
+
+def _tasks(outcome: RunOutcome[Any, Any]) -> list[_Task]:
+    """Return the tasks with samples that count."""
+    run = Run.held(outcome.folder, outcome.run.suite, outcome.summary)
+    units = run.units
     tasks = {
-        file.name: _Scored(file, units.get(file.name, UnitCounts()))
+        file.name: _Task(file, units.get(file.name, UnitCounts()))
         for file in outcome.run.request.tasks.tasks
     }
     for record, doc in zip(outcome.records, outcome.docs, strict=True):
         if record.excluded is None:
-            tasks[record.task].records.append(record)
-            tasks[record.task].scores.append(outcome.run.suite.scores(record))
+            tasks[record.task].samples.append(Sample(run, record))
             tasks[record.task].rows.append(_row(doc) | _failure(record))
-    return [task for task in tasks.values() if task.records]
+    return [task for task in tasks.values() if task.samples]
 
 
-def _scored_rows(task: _Scored) -> list[dict[str, Any]]:
+def _scored_rows(task: _Task) -> list[dict[str, Any]]:
     """Return a row per sample, in the task's order; repeats give all replies and mean scores.
 
     A sample without a result has no scores (null), and says why under `infthor_eval`.
     """
-    repeated: dict[int, list[tuple[dict[str, Any], UnitRecord[Any], Mapping[str, float]]]] = {}
-    for row, record, scores in zip(task.rows, task.records, task.scores, strict=True):
-        repeated.setdefault(row["doc_id"], []).append((row, record, scores))
+    repeated: dict[int, list[tuple[dict[str, Any], Sample]]] = {}
+    for row, sample in zip(task.rows, task.samples, strict=True):
+        repeated.setdefault(row["doc_id"], []).append((row, sample))
     rows = []
     for _, same in sorted(repeated.items()):
-        replies = [reply for row, _, _ in same for reply in row["filtered_resps"]]
-        first, record, _ = same[0]
-        answered = [scores for _, record, scores in same if record.state == "answered"]
+        replies = [reply for row, _ in same for reply in row["filtered_resps"]]
+        first, sample = same[0]
+        answered = [sample for _, sample in same if sample.is_answered]
         rows.append(
             first | {"resps": [replies], "filtered_resps": replies, "metrics": task.metrics}
         )
         for name in task.metrics:
-            values = [scores.get(name, 0.0) for scores in answered]
+            values = [sample.scores.get(name, 0.0) for sample in answered]
             rows[-1][name] = fmean(values) if values else None
         if not answered:
-            rows[-1]["infthor_eval"] = {"state": record.state, "failure": record.failure}
+            failure = {"state": sample.record.state, "failure": sample.record.failure}
+            rows[-1]["infthor_eval"] = failure
     return rows
 
 
@@ -200,7 +206,7 @@ def _hash(text: str) -> str:
     return str(hash_string(text))
 
 
-def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
+def _results(outcome: RunOutcome, tasks: Sequence[_Task]) -> dict[str, Any]:
     request = outcome.run.request
     return {
         "results": {task.name: _means(task) for task in tasks},
@@ -237,11 +243,11 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
     }
 
 
-def _means(task: _Scored) -> dict[str, Any]:
+def _means(task: _Task) -> dict[str, Any]:
     means: dict[str, Any] = {"name": task.name, "alias": task.name, "sample_len": task.n_answered}
     for metric in task.metrics:
-        scores = [scores.get(metric, 0.0) for _, scores in task.answered]
-        estimate = clustered_mean(scores, [record.cluster for record, _ in task.answered])
+        scores = [sample.scores.get(metric, 0.0) for sample in task.answered]
+        estimate = clustered_mean(scores, [sample.record.cluster for sample in task.answered])
         means[f"{metric},{_FILTER}"] = estimate.mean
         means[f"{metric}_stderr,{_FILTER}"] = "N/A" if estimate.stderr is None else estimate.stderr
     return means

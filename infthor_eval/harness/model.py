@@ -15,9 +15,7 @@ from infthor_eval.harness.requests import Payload, RequestAdapter, SuiteUnit
 from infthor_eval.runs import RunHeader, Suite, UnitRecord
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.record_encoder import RecordEncoder
-from infthor_eval.runs.journals.session import JournalSession
-from infthor_eval.runs.work.binding import require_capability
-from infthor_eval.runs.work.group_records import group_records
+from infthor_eval.runs.work.binding import group_records, require_capability
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.suites import baseline_suites, find_request_adapter, find_suite
 from model_adapters import (
@@ -88,7 +86,7 @@ class InfthorLM(LM):
         self._name, self._code = label(adapter, option_texts), adapter_identity(adapter)
         self._scratch = ScratchFolder()
         self._folder = Path(journal) if journal else self._scratch.path
-        self._sessions: dict[str, JournalSession[Any]] = {}
+        self._journals: dict[str, Journal[Any]] = {}
 
     @property
     def tokenizer_name(self) -> str:
@@ -126,7 +124,7 @@ class InfthorLM(LM):
         """Return the responses to the requests of one task."""
         require_capability(self._model, self._name, suite)
         adapter: RequestAdapter[SuiteUnit, Payload] = find_request_adapter(suite.name)
-        session = self._session(suite)
+        journal = self._journal(suite)
         encoder = RecordEncoder(suite.records)
         docs = [request.doc for request in requests]
         records: dict[Hashable, list[UnitRecord[Payload]]] = {
@@ -141,21 +139,20 @@ class InfthorLM(LM):
                     if adapter.doc_id_of_unit(unit.key, unit.cluster) in records
                 ]
                 part = replace(group, units=units)
-                for record in group_records(bound, part, session, encoder) if units else ():
+                for record in group_records(bound, part, journal, encoder) if units else ():
                     doc_id = adapter.doc_id_of_unit(record.key, record.cluster)
-                    records[doc_id].append(session.append_new(record)[0])
+                    records[doc_id].append(journal.append_new(record)[0])
         return [adapter.response(records[adapter.doc_id(doc)]) for doc in docs]
 
-    def _session(self, suite: Suite[SuiteUnit, Payload]) -> JournalSession[Payload]:
-        """Return the session of a suite, whose journal is in a folder of the suite's name."""
-        if suite.name not in self._sessions:
+    def _journal(self, suite: Suite[SuiteUnit, Payload]) -> Journal[Payload]:
+        """Return the journal of a suite, which is in a folder of the suite's name."""
+        if suite.name not in self._journals:
             model = {"name": self._model.name, **identity_of(self._model)}
             config = suite.records.config(host="lm-eval")
             whole = config.complete(suite.name, model, adapter=self._code, seed=self._seed)
             header = RunHeader(suite=suite.name, name=self._name, config=whole)
-            journal = Journal(self._folder / suite.name, header, suite.records)
-            self._sessions[suite.name] = JournalSession(journal)
-        return self._sessions[suite.name]
+            self._journals[suite.name] = Journal(self._folder / suite.name, header, suite.records)
+        return self._journals[suite.name]
 
 
 def _suite_and_task(request: Instance) -> tuple[str, str]:

@@ -126,7 +126,7 @@ def _success_table(runs: Sequence[RunSummary]) -> Table:
         for pair in zip_longest(pickups, puts):
             above = [None if task is None else _above_floor(run, task, runs) for task in pair]
             cells = _cells([None if task is None else task[1] for task in pair])
-            rows.append(Row((run.name, *cells, *map(format_percent, above))))
+            rows.append(Row((run.header.label, *cells, *map(format_percent, above))))
     notes += (_FLOOR, PUBLISHED_DATA)
     for table in published_tables("manipulation"):
         for row in table.rows:

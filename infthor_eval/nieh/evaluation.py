@@ -6,8 +6,7 @@ from itertools import groupby
 
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.nieh.asking.answerers import Answerer, answerer_of
-from infthor_eval.nieh.asking.answering import answer_units
+from infthor_eval.nieh.asking.answering import Answerer, answer_units, answerer_of
 from infthor_eval.nieh.asking.baselines import Baseline
 from infthor_eval.nieh.asking.recalling import apply_recall, asks_model
 from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig
@@ -183,16 +182,8 @@ class BoundNieh:
         self, group: Group[NiehUnit], session: Session[NiehAnswer]
     ) -> Iterator[UnitRecord[NiehAnswer]]:
         """See `infthor_eval.runs.BoundEvaluation.run`."""
-        task = group.units[0].key.task
-        answerer = self._answerer
-        yield from answer_units(
-            group.units,
-            self._prepared[task],
-            answerer.video_input,
-            answerer.open(task),
-            answerer.open_notebook(session),
-            session,
-        )
+        prepared = self._prepared[group.units[0].key.task]
+        yield from answer_units(group.units, prepared, self._answerer, session)
 
     def close(self) -> None:
         """Nothing is held."""

@@ -156,7 +156,7 @@ def _decoding_notes(runs: Sequence[RunSummary]) -> list[str]:
         if _DRAW_NOTHING.isdisjoint(run.header.config.model):
             for task in run.header.config.tasks.values():
                 names = drawn.setdefault(task.decoding.get("temperature", 0), {})
-                names[run.name] = None
+                names[run.header.label] = None
     return [
         f"Drawn at temperature {temperature:g}, not the likeliest actions (--greedy): "
         f"{', '.join(names)}."

@@ -475,7 +475,7 @@ def _table(runs: Sequence[RunSummary], kinds: Sequence[str]) -> Table:
     rows = [
         Row(
             (
-                run.header.name,
+                run.header.label,
                 task,
                 *(format_percent(rates.get(kind)) for kind in kinds),
                 str(rates[ALL].n),

@@ -27,7 +27,7 @@ def load_runs(*folders: str | os.PathLike[str]) -> DataFrame:
             stored.append(run)
         else:
             warnings.warn(f"{run.folder}: cannot be read: {run.reason}", stacklevel=2)
-    rows = [row for run in with_distinct_names(stored, ignore=()) for row in _rows(run)]
+    rows = [row for run in with_distinct_names(stored) for row in _rows(run)]
     return pandas.DataFrame(rows, columns=_COLUMNS)
 
 
@@ -57,7 +57,7 @@ def _rows(run: Run) -> Iterator[dict[str, Any]]:
     usage = run.results.usage if run.results else NOTHING
     is_whole = run.states["failed"] == 0 and run.n_not_asked == 0
     of_run = {
-        "run": run.name,
+        "run": run.label,
         "suite": run.listed.suite,
         "state": "whole" if is_whole else "incomplete",
         "answered": run.states["answered"],

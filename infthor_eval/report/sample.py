@@ -81,9 +81,14 @@ class Sample:
         return self.run.presenter.details(self.record)
 
     @property
+    def is_answered(self) -> bool:
+        """Whether it has a result."""
+        return self.record.state == "answered"
+
+    @cached_property
     def scores(self) -> Mapping[str, float]:
         """Each metric, 1 being right; empty for a sample without a result."""
-        return self.run.suite.scores(self.record) if self.record.state == "answered" else {}
+        return self.run.suite.scores(self.record) if self.is_answered else {}
 
     @property
     def outcome(self) -> str:
@@ -152,7 +157,7 @@ class Sample:
         yield f"{self.run.label}, {self.record.task}, {self.record.key}"
         yield f"  {self.question}"
         yield f"  {presenter.target_label}: {self.target}"
-        if self.record.state != "answered":
+        if not self.is_answered:
             yield f"  {self.record.state}, in no score: {self.reason}"
             return
         yield f"  {presenter.reply_label}: {self.reply or '(empty)'}"

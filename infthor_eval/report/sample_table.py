@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from infthor_eval.formats.csv_files import shield
+from infthor_eval.report.sample import Sample
 from infthor_eval.report.sample_columns import ENVELOPE, SampleColumn
 from infthor_eval.run import Run, open_runs
 from infthor_eval.runs import UnitRecord
@@ -68,8 +69,9 @@ def _score_columns(run: Run) -> list[SampleColumn]:
 
 
 def _score(run: Run, metric: str, record: UnitRecord[Any]) -> float | None:
-    """Return a score as summaries count it; None for a unit without a result."""
-    return run.suite.scores(record).get(metric, 0.0) if record.state == "answered" else None
+    """Return a score as summaries count it; None for a sample without a result."""
+    sample = Sample(run, record)
+    return sample.scores.get(metric, 0.0) if sample.is_answered else None
 
 
 def load_run(folder: str | os.PathLike[str]) -> DataFrame:

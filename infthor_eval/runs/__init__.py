@@ -1,7 +1,7 @@
 """One run of any suite: its config, its journal, and the order of its work."""
 
 from infthor_eval.runs.catalog import Catalog, TaskFile
-from infthor_eval.runs.completeness import UnitCounts, count_units, mark_incomplete
+from infthor_eval.runs.completeness import UnitCounts, count_units
 from infthor_eval.runs.config import RunConfig, TaskConfig
 from infthor_eval.runs.journals.records import (
     ReadHashes,
@@ -79,7 +79,6 @@ __all__ = [
     "estimate_run",
     "execute",
     "keep_request",
-    "mark_incomplete",
     "prepare",
     "prepare_all",
     "read_header",

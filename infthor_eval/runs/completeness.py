@@ -5,15 +5,13 @@ whether a run is whole.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
 
 from infthor_eval.quantities import Count
 from infthor_eval.runs.journals.records import RunHeader, UnitRecord
-
-_MARK = " (incomplete)"
 
 
 class UnitCounts(msgspec.Struct, frozen=True, kw_only=True):
@@ -62,26 +60,3 @@ def _units_of_task(header: RunHeader, task: str, n_recorded: int) -> int:
         return header.units_by_task.get(task, n_recorded)
     is_alone = len(header.config.tasks) == 1
     return header.n_units if is_alone and header.n_units is not None else n_recorded
-
-
-def count_missing(header: RunHeader, n_recorded: int) -> int | None:
-    """Return the number of units without a record; None if the header does not tell."""
-    return None if header.n_units is None else max(0, header.n_units - n_recorded)
-
-
-def mark_incomplete(label: str, units: Mapping[str, UnitCounts], n_missing: int | None) -> str:
-    """Return the label of a run, with a mark if some units that can be done have no result.
-
-    Args:
-        label: name of the run.
-        units: its units by task.
-        n_missing: number of units without a record; None if it is not known.
-    """
-    if not n_missing and all(counts.is_whole for counts in units.values()):
-        return label
-    return f"{label}{_MARK}"
-
-
-def unmarked(label: str) -> str:
-    """Return a label without its mark."""
-    return label.removesuffix(_MARK)

@@ -290,11 +290,6 @@ class RunSummary:
     summary: Any
     units: Mapping[str, UnitCounts] = field(default_factory=dict)
 
-    @property
-    def name(self) -> str:
-        """Name of the run in tables, with its frame ablation."""
-        return self.header.with_frames(self.header.name)
-
     @classmethod
     def of(
         cls, suite: Suite[Any, Any], header: RunHeader, records: Sequence[UnitRecord[Any]]

@@ -2,8 +2,10 @@
 
 from msgspec.structs import replace
 
+from infthor_eval.cli.commands.rescore import read_source
 from infthor_eval.nieh.config import MetricsConfig, SkippedSample
-from infthor_eval.nieh.rescoring.rescore import Source, read_source
+from infthor_eval.nieh.rescoring.rescore import Source
+from infthor_eval.run import Run
 from tests.infthor_board.material import (
     edit_journal,
     reader,
@@ -104,7 +106,7 @@ def another_set(material, root):
     text = (other / "qa_set_homes.csv").read_text()
     (other / "qa_set_homes.csv").write_text(text.replace("['no']", "['yes']"))
     (path,) = run_model(root / "results", model="random", tasks="nieh_gt", data=other)
-    return submit(root, "forged", reply_with(read_source(path), reader(0.5, "honest")))
+    return submit(root, "forged", reply_with(read_source(Run.open(path)), reader(0.5, "honest")))
 
 
 @forgery("questions", "are of no question of the set")

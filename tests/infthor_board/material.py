@@ -12,12 +12,14 @@ from msgspec.structs import replace
 from PIL import Image
 
 from infthor_eval.cli import main
+from infthor_eval.cli.commands.rescore import read_source
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.records import NiehAnswer
-from infthor_eval.nieh.rescoring.rescore import Source, read_source
+from infthor_eval.nieh.rescoring.rescore import Source
 from infthor_eval.nieh.scoring import scores
 from infthor_eval.nieh.suite import NiehSuite
+from infthor_eval.run import Run
 from infthor_eval.runs import Tokens, UnitRecord
 from infthor_eval.runs.stored.writing import store_run
 from tests.helpers.command_line import option_words
@@ -116,7 +118,7 @@ def make_material(folder: Path, homes: Path, twins: Path) -> Material:
     runs = {}
     for name, options in asked:
         for path in run_model(folder / name, model="random", frames="shown,blank", **options):
-            source = read_source(path)
+            source = read_source(Run.open(path))
             runs[name, source.header.config.frames or "shown"] = source
     return Material(homes, twins, runs)
 

@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import pytest
 
 from infthor_board import private_sets
+from infthor_eval.cli.commands.rescore import read_source
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.replies.answer_key import read_key
 from infthor_eval.formats.set_info import claim_for_simulator
-from infthor_eval.nieh.rescoring.rescore import read_source
+from infthor_eval.run import Run
 from tests.helpers.command_line import assert_refused
 from tests.helpers.twin_sets import write_twin_set
 from tests.infthor_board.material import reader, reply_with, run_model, submit, write_home_set
@@ -28,7 +29,7 @@ def sent(tmp_path_factory, homes):
     """A folder with an honest submission, and one that has the key."""
     folder = tmp_path_factory.mktemp("sent")
     (path,) = run_model(folder / "results", model="random", tasks="nieh_gt", data=homes)
-    source = read_source(path)
+    source = read_source(Run.open(path))
     submit(folder / "all", "honest", reply_with(source, reader(0.5, "honest")))
     key = reply_with(source, lambda record: ", ".join(map(str, record.payload.answers)), "lab/key")
     submit(folder / "all", "key", key)

@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from infthor_eval.nieh.rescoring.rescore import Source, read_source
+from infthor_eval.cli.commands.rescore import read_source
+from infthor_eval.nieh.rescoring.rescore import Source
+from infthor_eval.run import Run
 from tests.infthor_board.material import edit_journal, reader, reply_with, run_model, submit
 
 from .forging import honest, with_config, with_task
@@ -30,7 +32,7 @@ def recalled(material, tmp_path_factory) -> Source:
     (path,) = run_model(
         root, model="random", tasks="nieh_memory", memory="last", data=material.homes
     )
-    return reply_with(read_source(path), reader(0.5, "honest"))
+    return reply_with(read_source(Run.open(path)), reader(0.5, "honest"))
 
 
 @pytest.fixture

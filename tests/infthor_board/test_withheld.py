@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from infthor_board.private_sets import publish, read_secret
+from infthor_eval.cli.commands.rescore import read_source
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.set_info import claim_for_simulator
-from infthor_eval.nieh.rescoring.rescore import read_source
+from infthor_eval.run import Run
 from tests.helpers.command_line import assert_refused
 from tests.helpers.twin_sets import write_twin_set
 from tests.infthor_board.material import reply_with, run_model, submit
@@ -36,7 +37,7 @@ def run(held_out) -> Path:
 def test_a_run_says_that_its_scores_mean_nothing(held_out, run, run_cli):
     _, output, _ = run_cli("show", run)
     assert "The answers of this set are withheld" in " ".join(output.split())
-    assert read_source(run).header.config.tasks["nieh_gt"].withheld
+    assert read_source(Run.open(run)).header.config.tasks["nieh_gt"].withheld
 
 
 def test_rescore_needs_the_key_and_counts_pairs_with_it(held_out, run, run_cli, tmp_path):
@@ -62,7 +63,7 @@ def test_the_key_of_another_set_is_refused(held_out, run, run_cli, tmp_path):
 
 
 def test_submissions_are_checked_with_the_key(held_out, run, run_board, tmp_path):
-    source = read_source(run)
+    source = read_source(Run.open(run))
     folder = submit(tmp_path, "sent", reply_with(source, lambda _: "bowl"))
     public = ("--data", held_out / "public")
     code, output, _ = run_board("check", folder, *public, "--key", held_out / "key")

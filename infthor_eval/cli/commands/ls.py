@@ -21,7 +21,6 @@ from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.run import BrokenRun, Run, find_runs, with_distinct_names
 from infthor_eval.runs.catalog import Catalog, TaskFile
-from infthor_eval.runs.completeness import mark_incomplete
 from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.suites import baseline_suites, find_suite, split_by_suite
 from infthor_eval.tables import Column, Row, Table, answered_cell
@@ -228,7 +227,7 @@ def _scenes(data: Path | None) -> None:
 def _runs(folder: Path, output_format: str | None) -> None:
     """Runs below DIR (default: results): units by state; primary metrics of tasks."""
     runs = list(find_runs(folder, print_failure))
-    stored = with_distinct_names([run for run in runs if isinstance(run, Run)], ignore=())
+    stored = with_distinct_names([run for run in runs if isinstance(run, Run)])
     if not runs:
         print_line(f"no runs in {folder}; `infthor-eval --model MODEL --tasks TASKS` starts one")
     if stored:
@@ -248,9 +247,8 @@ def _runs(folder: Path, output_format: str | None) -> None:
 def _row(run: Run) -> Row:
     n_not_asked = "?" if run.n_not_asked is None else str(run.n_not_asked)
     counts = (str(run.states["answered"]), str(run.states["failed"]), n_not_asked)
-    label = mark_incomplete(run.name, {}, run.states["failed"] + (run.n_not_asked or 0))
     age = _age(time.time() - run.changed.timestamp())
-    return Row((label, run.listed.suite, *counts, _numbers(run), age, str(run.folder)))
+    return Row((run.label, run.listed.suite, *counts, _numbers(run), age, str(run.folder)))
 
 
 def _numbers(run: Run) -> str:

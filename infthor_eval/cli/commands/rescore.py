@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from infthor_eval.nieh.records import NiehAnswer
     from infthor_eval.nieh.rescoring.judging import Judge
     from infthor_eval.nieh.rescoring.report import Change, RescoringReport
-    from infthor_eval.nieh.rescoring.rescore import Rescored, Rescoring
+    from infthor_eval.nieh.rescoring.rescore import Rescored, Rescoring, Source
+    from infthor_eval.run import Run
     from infthor_eval.runs import UnitRecord
 
 # Most tokens of a verdict by prompt. Those are the names of
@@ -98,7 +99,8 @@ def command(
     from infthor_eval.formats.replies.answer_key import read_key
     from infthor_eval.nieh.own_scorers import find_scorer
     from infthor_eval.nieh.rescoring.keyed import with_key
-    from infthor_eval.nieh.rescoring.rescore import read_source, score_again
+    from infthor_eval.nieh.rescoring.rescore import score_again
+    from infthor_eval.run import Run
 
     if judge is None and judge_args:
         raise click.UsageError("--judge-args are options of a judge; give one with --judge")
@@ -106,7 +108,7 @@ def command(
         raise click.UsageError("--judge-prompt is how a judge is asked; give one with --judge")
     if judge is not None and len(judge) > 1:
         raise click.UsageError(f"--judge names {len(judge)} models; give one")
-    source = read_source(folder, print_failure)
+    source = read_source(Run.open(folder, print_failure))
     if key is not None:
         source = with_key(source, read_key(key))
     prompt = judge_prompt or _JUDGE_PROMPT
@@ -119,6 +121,18 @@ def command(
         _print(rescoring, rescored)
         n_failed = _print_failures(rescored)
     return int(n_failed > 0)
+
+
+def read_source(run: Run) -> Source:
+    """Read what is scored again of a run."""
+    from infthor_eval.errors import UsageError
+    from infthor_eval.nieh.rescoring.rescore import Source
+
+    if run.listed.suite != "nieh":
+        raise UsageError(
+            f"{run.folder}: is a run of {run.listed.suite}; give a run of nieh, which has replies"
+        )
+    return Source(run.own_header, run.records, run.stored_requests)
 
 
 def _load_judge(

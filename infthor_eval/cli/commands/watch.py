@@ -99,7 +99,7 @@ def command(
     most = None if sheet is None else replay.sheet_rows
     recording = replay.select(recorded, EpisodeSelection(task, trajectory, plans, episode, most))
     choice = [text.strip() for text in (plans, episode) if text is not None]
-    parts = [recorded.header.name, *recording.tasks, recording.trajectory, *choice]
+    parts = [recorded.label, *recording.tasks, recording.trajectory, *choice]
     path = prepare_file(sheet or out or _default_file(parts))
     rate = None if sheet is not None else fps
     _write(recorded, recording, path, data=data, scenes=scenes, fps=rate)
@@ -155,7 +155,7 @@ def _write(
     replay = _require_replay(run)
     tasks = sorted({record.task for record in recording.records})
     simulator = "embedded simulator" if recording.simulator == "embedded" else recording.simulator
-    heading = "  ·  ".join([run.header.name, *tasks, recording.trajectory, simulator])
+    heading = "  ·  ".join([run.label, *tasks, recording.trajectory, simulator])
     notes = error_console()
     with recording.open(data, scenes) as session, progress_bar(notes) as progress:
         n_frames = sum(len(run.presenter.steps(record)) + 1 for record in recording.records)

@@ -97,7 +97,7 @@ def runs_table(runs: Sequence[RunSummary]) -> Table:
                 points = f"{100 * (score.score - score.blind):+.1f}"
                 rows.append(
                     Row(
-                        (run.name, name, form, str(score.n), *cells, points),
+                        (run.header.label, name, form, str(score.n), *cells, points),
                         ends_section=number == len(forms),
                     )
                 )

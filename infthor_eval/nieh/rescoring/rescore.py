@@ -13,7 +13,6 @@ from typing import Any
 from msgspec.structs import replace
 
 import infthor_eval
-from infthor_eval.errors import UsageError
 from infthor_eval.nieh.config import (
     MetricsConfig,
     NiehConfig,
@@ -22,7 +21,7 @@ from infthor_eval.nieh.config import (
     SourceRun,
 )
 from infthor_eval.nieh.own_scorers import OwnScorer, OwnScores
-from infthor_eval.nieh.records import RECORDS, NiehAnswer
+from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.rescoring.judging import JUDGED, Judge, Judgement, Track, judge_replies
 from infthor_eval.nieh.rescoring.report import RescoringReport, find_changes
 from infthor_eval.nieh.scoring import SCORERS, scores
@@ -36,9 +35,7 @@ from infthor_eval.runs import (
     Unit,
     UnitRecord,
     keep_request,
-    read_header,
 )
-from infthor_eval.runs.journals.shards import Notify, read_run_log
 from infthor_eval.runs.results import write_document
 from infthor_eval.runs.stored.writing import Stored, store_run
 
@@ -202,18 +199,6 @@ class Rescoring:
             tasks={name: find_changes(before, by_task[name], self.names) for name in tasks},
             judge=judgement.agreement if judgement else None,
         )
-
-
-def read_source(folder: Path, notify: Notify | None = None) -> Source:
-    """Read the run in a folder; `notify` is called with each bad line, see `read_run`."""
-    header = read_header(folder)
-    if header.suite != NiehSuite.name:
-        raise UsageError(
-            f"{folder}: is a run of {header.suite}; give a run of {NiehSuite.name}, which has "
-            "replies"
-        )
-    header, log = read_run_log(folder, RECORDS, notify)
-    return Source(header, log.records, log.requests)
 
 
 def score_again(

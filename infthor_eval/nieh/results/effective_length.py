@@ -120,7 +120,9 @@ def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:
                     for point in _points(sized, scorer)
                 ]
                 if points:
-                    yield Series(run.name, context, scorer, _point("", on_clues, scorer), points)
+                    yield Series(
+                        run.header.label, context, scorer, _point("", on_clues, scorer), points
+                    )
 
 
 def _lengths(

@@ -91,7 +91,7 @@ def above_blind_notes(runs: Sequence[RunSummary]) -> list[str]:
 def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]:
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
-        yield from ((run.name, name, task) for name, task in run.summary.tasks.items())
+        yield from ((run.header.label, name, task) for name, task in run.summary.tasks.items())
 
 
 def _cell(cell: Cell | None, metric: str) -> TableCell:

@@ -153,7 +153,7 @@ def _in_percent(total: MeanEstimate) -> tuple[float | None, ...]:
 def gains_table(runs: Sequence[RunSummary]) -> list[Table]:
     """Return a table of each run's gain over its run on blank frames, if there is a pair."""
     rows = [
-        Row((gain.run.name, gain.task, gain.metric, *_gain_cells(gain)))
+        Row((gain.run.header.label, gain.task, gain.metric, *_gain_cells(gain)))
         for gain in find_gains(runs)
     ]
     if not rows:

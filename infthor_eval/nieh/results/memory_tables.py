@@ -83,7 +83,7 @@ def memory_tables(runs: Sequence[RunSummary]) -> list[Table]:
 def _place(run: RunSummary, name: str) -> tuple[str, str, bool, str, int]:
     """Return the place of a row: by subject and task, none first, a memory's budgets in order."""
     memory = run.summary.tasks[name].memory
-    return subject_of(run.name), name, memory.name != _NONE, memory.name, memory.budget or 0
+    return subject_of(run.header.label), name, memory.name != _NONE, memory.name, memory.budget or 0
 
 
 def _row(run: RunSummary, name: str, runs: Sequence[RunSummary], further: Sequence[str]) -> Row:
@@ -95,7 +95,7 @@ def _row(run: RunSummary, name: str, runs: Sequence[RunSummary], further: Sequen
     }
     more = [made[column](run, name, runs) for column in further]
     at = len(_NAMES) - 2 + _FIRST
-    return Row((subject_of(run.name), name, *cells[:at], *more, *cells[at:]))
+    return Row((subject_of(run.header.label), name, *cells[:at], *more, *cells[at:]))
 
 
 def _is_none(run: RunSummary, name: str) -> bool:

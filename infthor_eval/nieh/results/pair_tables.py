@@ -53,7 +53,7 @@ def _find(runs: Sequence[RunSummary]) -> Iterator[_Found]:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():
             if task.pairs is not None:
-                yield run.name, name, task.context, task.pairs
+                yield run.header.label, name, task.context, task.pairs
 
 
 def _cells(pairs: PairSummary) -> tuple[TableCell | str, ...]:

@@ -196,7 +196,7 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():
-            yield run.name, name, task
+            yield run.header.label, name, task
 
 
 # -- by number of clues
@@ -245,7 +245,7 @@ def _rows_of(run: RunSummary, *, has_blind: bool) -> list[Row]:
     lines = [(name, task, metric) for _, name, task in _tasks([run]) for metric in task.metrics]
     return [
         Row(
-            (run.name, name, metric, *_cells(task, metric, has_blind=has_blind)),
+            (run.header.label, name, metric, *_cells(task, metric, has_blind=has_blind)),
             ends_section=number == len(lines),
         )
         for number, (name, task, metric) in enumerate(lines, 1)
@@ -435,7 +435,7 @@ def _repeat_tables(runs: Sequence[RunSummary]) -> list[Table]:
                 *map(_percent, shares),
                 *map(_percent, spreads),
             )
-            rows.append(Row((run.name, name, *cells)))
+            rows.append(Row((run.header.label, name, *cells)))
     if not rows:
         return []
     columns = (Column("model", False), Column("task", False), *map(Column, _OF_REPEATS))

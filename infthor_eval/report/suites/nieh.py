@@ -10,6 +10,7 @@ from infthor_eval.nieh.rescoring.judging import JUDGED
 from infthor_eval.nieh.results.above_blind import score_above_blind, score_range
 from infthor_eval.nieh.results.facets import FACETS
 from infthor_eval.nieh.results.pair_summary import score_pairs
+from infthor_eval.nieh.results.pair_tables import pair_tables
 from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.pairs import PAIR_BOUNDS
@@ -20,14 +21,13 @@ from infthor_eval.report.presenter import (
     NET_PAIRS,
     PAIRS_FINDING,
     Figure,
-    FigureRequest,
-    FigureResult,
     FindFrames,
     GroupScore,
     ReplyTokens,
     Timelines,
 )
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
+from infthor_eval.report.suites.pair_charts import build_pairs_figure, memory_curves
 from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
@@ -43,12 +43,6 @@ _BOUNDS = {
 }
 
 
-def _build_pairs_figure(runs: Sequence[Run], request: FigureRequest) -> FigureResult:
-    from infthor_eval.report.suites.pair_charts import build_pairs_figure
-
-    return build_pairs_figure(runs, request)
-
-
 class NiehPresenter(PlainPresenter):
     """See `Presenter`."""
 
@@ -62,7 +56,7 @@ class NiehPresenter(PlainPresenter):
     columns = NIEH_COLUMNS
     figures: Mapping[str, Figure] = {
         "pairs": Figure(
-            "net pairs of twins by distance, frames shown and age", _build_pairs_figure, False
+            "net pairs of twins by distance, frames shown and age", build_pairs_figure, False
         )
     }
 
@@ -139,9 +133,10 @@ class NiehPresenter(PlainPresenter):
 
     def opening(self, runs: Sequence[Run]) -> Section | None:
         """See `Presenter.opening`: pairs of twins, if there are any."""
-        from infthor_eval.report.suites.pair_charts import pairs_section
-
-        return pairs_section(runs)
+        tables = pair_tables([run.summary for run in runs])
+        if not tables:
+            return None
+        return Section("pairs", "Pairs of twins", memory_curves(runs), tuple(tables))
 
     def charts(self, runs: Sequence[Run]) -> list[Chart]:
         """See `Presenter.charts`."""

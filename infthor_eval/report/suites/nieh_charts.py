@@ -167,7 +167,7 @@ def _gains_chart(runs: Sequence[Run]) -> Chart | None:
     for gain in find_gains(summaries):
         total = gain.total()
         if gain.metric == main_metric(gain.seeing) and total is not None:
-            rows.append((f"{gain.run.name}, {gain.task}", total))
+            rows.append((f"{gain.run.header.label}, {gain.task}", total))
     caption = "Dots to the right of 0 gain by seeing the frames; lines are 95 % intervals."
     return _by_rows("Gain over blank frames", caption, rows, "gain, in points")
 

@@ -7,11 +7,9 @@ from typing import NamedTuple
 from infthor_eval.errors import UsageError
 from infthor_eval.facets import Facet
 from infthor_eval.nieh.results.pair_summary import MEMORY_FACETS, PairSummary, TwinRecords
-from infthor_eval.nieh.results.pair_tables import pair_tables
 from infthor_eval.rates import format_percent
 from infthor_eval.report.charts import Chart, Panels, class_series, counted_classes
 from infthor_eval.report.presenter import FigureRequest, FigureResult
-from infthor_eval.report.web.sections import Section
 from infthor_eval.run import Run
 from infthor_eval.tables import Column, Row, Table
 
@@ -24,14 +22,10 @@ class _Line(NamedTuple):
     pairs: PairSummary
 
 
-def pairs_section(runs: Sequence[Run]) -> Section | None:
-    """Return the section of the page on pairs; None if the runs have none."""
-    tables = pair_tables([run.summary for run in runs])
-    if not tables:
-        return None
+def memory_curves(runs: Sequence[Run]) -> tuple[Chart, ...]:
+    """Return the memory curves of the tasks with pairs that have several classes of these."""
     charts = [chart for task in _tasks(runs) for chart in _charts(task, _lines(runs, task))]
-    several = tuple(chart for chart in charts if len(chart.classes) > 1)
-    return Section("pairs", "Pairs of twins", several, tuple(tables))
+    return tuple(chart for chart in charts if len(chart.classes) > 1)
 
 
 def build_pairs_figure(runs: Sequence[Run], request: FigureRequest) -> FigureResult:

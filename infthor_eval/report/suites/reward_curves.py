@@ -10,7 +10,7 @@ from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.report.charts import Chart, Panels, Point, Series
 from infthor_eval.report.presenter import FigureResult
 from infthor_eval.report.web.sections import Section
-from infthor_eval.runs.completeness import unmarked
+from infthor_eval.run import unmarked
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
 _MOST_PANELS = 12  # a figure with more cannot be read

@@ -113,7 +113,7 @@ def _plan(folders: Sequence[Path], pages: Path) -> tuple[list[_Job], list[tuple[
         except InfthorError as error:
             unread.append((str(folder), str(error)))
     jobs = []
-    for number, run in enumerate(with_distinct_names(runs, by_task=True)):
+    for number, run in enumerate(with_distinct_names(runs)):
         page = pages / f"{number:04}-{file_name(run.listed.name)}.html"
         jobs.append(_Job(run.folder, run.name, page))
     return jobs, unread

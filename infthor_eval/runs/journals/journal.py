@@ -32,8 +32,10 @@ from infthor_eval.runs.journals.records import (
     Payload,
     RecordTypes,
     RunHeader,
+    Unit,
     UnitKey,
     UnitRecord,
+    describe_failure,
 )
 from infthor_eval.runs.journals.requests import StoredRequest
 from infthor_eval.runs.journals.shards import (
@@ -47,6 +49,7 @@ from infthor_eval.runs.journals.shards import (
     read_shard,
     read_shards,
 )
+from infthor_eval.runs.journals.tracebacks import TracebackFile
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.storage.files import write_atomically, writing_hint
 from infthor_eval.storage.limits import FILE_MB
@@ -58,7 +61,10 @@ _BAD_LINES = "bad_lines.txt"
 
 
 class Journal(Generic[Payload]):
-    """Append-only record of one run, in a folder of shards; this process holds one of them."""
+    """Append-only record of one run, in a folder of shards; this process holds one of them.
+
+    It is the `Session` of the suite whose results go to it.
+    """
 
     def __init__(
         self,
@@ -87,6 +93,7 @@ class Journal(Generic[Payload]):
         self._path = path
         self.header = header
         self.folder = path.parent
+        self._tracebacks = TracebackFile(self.folder)
         self._writing = Lock()
         try:
             _lock(self._file, path, wait_s)
@@ -109,21 +116,23 @@ class Journal(Generic[Payload]):
         """The latest record of each unit in all shards."""
         return self._log.records
 
-    def find_record(self, key: UnitKey, fingerprint: str) -> UnitRecord[Payload] | None:
-        """Return a unit's result from these inputs; a failed one is tried again by the next run."""
-        record = self._log.units.get(key)
+    def find_record(self, unit: Unit[Payload], fingerprint: str) -> UnitRecord[Payload] | None:
+        """See `Session`; a unit that failed is tried again by the next run."""
+        record = self._log.units.get(unit.key)
         if record is None or record.failure is not None or record.fingerprint != fingerprint:
             return None
         return record
 
+    def describe_failure(self, unit: Unit[Payload], error: BaseException) -> str:
+        """See `Session`."""
+        earlier = self._log.units.get(unit.key)
+        attempt = 1 if earlier is None else earlier.attempt + 1
+        file = self._tracebacks.append(unit.key, attempt, error)
+        return describe_failure(error) + (f"; traceback in {file}" if file else "")
+
     def latest_records(self, keys: Iterable[UnitKey]) -> tuple[UnitRecord[Payload], ...]:
         """Return these units' latest records, failed ones included; some may have none."""
         return tuple(self._log.units[key] for key in keys if key in self._log.units)
-
-    def result_of(self, key: UnitKey) -> UnitRecord[Payload] | None:
-        """Return a unit's latest record if it has a result, from whatever inputs, else None."""
-        record = self._log.units.get(key)
-        return None if record is None or record.failure is not None else record
 
     def add(self, record: UnitRecord[Payload]) -> None:
         """Add a record that is in another shard to what this process knows."""
@@ -151,9 +160,25 @@ class Journal(Generic[Payload]):
         if path.exists():
             read_shard(path, self._types, self._log)
 
-    def holds(self, record: UnitRecord[Payload]) -> bool:
-        """Return whether this very object is in the journal: found there and yielded as it is."""
-        return self._log.units.get(record.key) is record
+    def append_new(self, record: UnitRecord[Payload]) -> tuple[UnitRecord[Payload], bool]:
+        """Put a suite's record on disk unless it is there; return it, and True if it was there.
+
+        One whose unit already has a result from other inputs gets a fault that says so.
+        """
+        earlier = self._log.units.get(record.key)
+        if earlier is record:  # found here, and yielded as it is
+            return record, True
+        if (
+            earlier is not None
+            and earlier.failure is None
+            and record.fingerprint not in ("", earlier.fingerprint)
+        ):
+            changed = (
+                f"its inputs changed since attempt {earlier.attempt}: a frame, a text or a "
+                "trajectory is another now"
+            )
+            record = msgspec.structs.replace(record, faults=(*record.faults, changed))
+        return self.append(record), False
 
     def append(self, record: UnitRecord[Payload]) -> UnitRecord[Payload]:
         """Write a record to disk before returning it with the number of its attempt."""
@@ -166,7 +191,7 @@ class Journal(Generic[Payload]):
         return record
 
     def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
-        """Return the cached artifact of these inputs, or None."""
+        """See `Session`."""
         return self._log.find_artifact(fingerprint, kind)
 
     @property
@@ -175,7 +200,7 @@ class Journal(Generic[Payload]):
         return [self._log.artifacts[key] for key in sorted(self._log.artifacts)]
 
     def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
-        """Cache an artifact; it is on disk when this returns."""
+        """See `Session`; it is on disk when this returns."""
         record: ArtifactRecord[Any] = ArtifactRecord(
             fingerprint=fingerprint, payload=artifact, usage=usage
         )

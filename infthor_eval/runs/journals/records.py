@@ -92,6 +92,11 @@ class RunHeader(
     units_by_task: dict[str, Count] = {}
     format: int = FORMAT
 
+    @property
+    def label(self) -> str:
+        """Name of the run in tables, with what replaces the frames."""
+        return self.with_frames(self.name)
+
     def with_frames(self, name: str) -> str:
         """Return a name of the run, or of a task of it, with its frame ablation if it has one."""
         frames = self.config.frames

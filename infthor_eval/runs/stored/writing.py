@@ -6,7 +6,6 @@ from pathlib import Path
 
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit, UnitRecord
-from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import run_folder
 from infthor_eval.runs.results import write_run_files
 from infthor_eval.runs.suite import RunSummary, Session, Suite
@@ -42,7 +41,7 @@ def store_run(
     """
     folder = run_folder(output, header, header.config.tasks)
     with Journal(folder, header, suite.records) as journal:
-        records = make_records(JournalSession(journal))
+        records = make_records(journal)
         for record in records:
             if not _is_stored(record, journal):
                 journal.append(record)

@@ -4,33 +4,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.errors import UsageError
 from infthor_eval.runs.journals.record_encoder import RecordEncoder
 from infthor_eval.runs.journals.records import Artifact, Unit, UnitRecord, describe_failure
 from infthor_eval.runs.journals.shards import FOLDER
-from infthor_eval.runs.suite import BoundEvaluation, Session, Workload
+from infthor_eval.runs.suite import BoundEvaluation, Session
 from infthor_eval.runs.usage import NOTHING, Usage
-from infthor_eval.runs.work.group_records import group_records
-from infthor_eval.workers import WorkerSettings
-from model_adapters import BatchModel, Subject
+from infthor_eval.runs.work.binding import group_records
+from model_adapters import BatchModel
 
 _BATCHES = "batches"  # beside the shards of the journal
-
-
-def require_independent(subject: Subject, workload: Workload[Any], workers: WorkerSettings) -> None:
-    """Raise UsageError if requests depend on earlier replies, or if there are workers."""
-    if not (isinstance(subject, BatchModel) and subject.uses_batches):
-        return
-    if not workload.independent:
-        tasks = ", ".join(workload.units_by_task)
-        raise UsageError(
-            f"{subject.name}: batch=true asks everything together, but {tasks} asks what depends "
-            "on earlier replies; leave out batch"
-        )
-    if not workers.is_local:
-        raise UsageError(
-            f"{subject.name}: batch=true leaves the work to the server; leave out --workers"
-        )
 
 
 def fetch_replies(

@@ -1,19 +1,27 @@
-"""A run whose subject is loaded: a model, a policy, or one of its suite's baselines."""
+"""A run whose subject (model, policy or baseline) is loaded, and the records of its groups."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, Generic
 
-from infthor_eval.errors import UsageError, UserCodeError, wrap_user_code
-from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit
+from infthor_eval.errors import STOPS, ModelError, UsageError, UserCodeError, wrap_user_code
+from infthor_eval.runs.journals.record_encoder import RecordEncoder, RefusedRecordError
+from infthor_eval.runs.journals.records import (
+    Payload,
+    RunHeader,
+    SuiteUnit,
+    Unit,
+    UnitKey,
+    UnitRecord,
+)
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.suite import BoundEvaluation, Need, Suite, Workload
-from infthor_eval.runs.work.batches import require_independent
+from infthor_eval.runs.suite import BoundEvaluation, Group, Need, Session, Suite, Workload
 from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
-from model_adapters import Model, Policy, Subject, adapter_identity, identity_of, load
+from infthor_eval.workers import WorkerSettings
+from model_adapters import BatchModel, Model, Policy, Subject, adapter_identity, identity_of, load
 
 _NEEDED: dict[Need, tuple[type, str]] = {
     "conversation": (Model, "a model that answers in words"),
@@ -54,7 +62,7 @@ def bind_run(
             require_capability(subject, run.request.model, run.suite)
         evaluation = run.evaluation.bind(subject)
         stack.callback(evaluation.close)
-        require_independent(subject, evaluation.workload, run.request.worker_settings)
+        _require_independent(subject, evaluation.workload, run.request.worker_settings)
         header = _header(run, subject, evaluation.workload)
         stack.pop_all()
     return BoundRun(run, subject, evaluation, header, owns_subject=loaded is None)
@@ -121,3 +129,82 @@ def require_capability(subject: Subject, name: str, suite: Suite[SuiteUnit, Payl
     kind, description = _NEEDED[suite.needs]
     if not isinstance(subject, kind):
         raise UsageError(f"{name} cannot be evaluated on {suite.name}, which needs {description}")
+
+
+def _require_independent(
+    subject: Subject, workload: Workload[Any], workers: WorkerSettings
+) -> None:
+    """Raise UsageError if requests depend on earlier replies, or if there are workers."""
+    if not (isinstance(subject, BatchModel) and subject.uses_batches):
+        return
+    if not workload.independent:
+        tasks = ", ".join(workload.units_by_task)
+        raise UsageError(
+            f"{subject.name}: batch=true asks everything together, but {tasks} asks what depends "
+            "on earlier replies; leave out batch"
+        )
+    if not workers.is_local:
+        raise UsageError(
+            f"{subject.name}: batch=true leaves the work to the server; leave out --workers"
+        )
+
+
+def group_records(
+    evaluation: BoundEvaluation[SuiteUnit, Payload],
+    group: Group[SuiteUnit],
+    session: Session[Payload],
+    encoder: RecordEncoder[Payload],
+) -> Iterator[UnitRecord[Payload]]:
+    """Yield the records of a group, whatever the suite raises; units without one have failed.
+
+    So has a unit whose record the journal cannot hold: that is the fault of who gave what is in it,
+    and of no other unit.
+
+    Raises:
+        MemoryError: the machine has no more memory; the run ends.
+    """
+    units = {unit.key: unit for unit in group.units}
+    waiting = dict(units)
+    records: Iterator[UnitRecord[Payload]] | None = None
+    fault: BaseException
+    # No loop over the records with a `yield` in the `try`: it would catch what ends this generator.
+    while True:
+        try:
+            records = records or iter(evaluation.run(group, session))
+            record = next(records)
+            unit = _unit_of(record, units)
+        except StopIteration:
+            fault = ModelError("the suite gives no record of it; fix the suite")
+            break
+        except (MemoryError, *STOPS):  # the next group would have no more memory than this one
+            raise
+        except BaseException as error:  # noqa: BLE001 - a suite is anybody's code, see STOPS
+            fault = error
+            break
+        waiting.pop(record.key, None)
+        yield _kept(record, unit, session, encoder)
+    for unit in waiting.values():
+        yield unit.record_failure(session.describe_failure(unit, fault))
+
+
+def _unit_of(record: UnitRecord[Payload], units: Mapping[UnitKey, Unit[Payload]]) -> Unit[Payload]:
+    unit = units.get(record.key)
+    if unit is None:
+        raise ModelError(
+            f"the suite gives a record of {record.key!r:.200}, no unit of its group; fix the suite"
+        )
+    return unit
+
+
+def _kept(
+    record: UnitRecord[Payload],
+    unit: Unit[Payload],
+    session: Session[Payload],
+    encoder: RecordEncoder[Payload],
+) -> UnitRecord[Payload]:
+    """Return a record that the journal can hold, or else that of its unit's failure."""
+    try:
+        encoder.encode(record)
+    except RefusedRecordError as error:
+        return unit.record_failure(session.describe_failure(unit, error))
+    return record

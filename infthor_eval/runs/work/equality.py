@@ -13,9 +13,8 @@ from infthor_eval.runs.journals.record_encoder import RecordEncoder
 from infthor_eval.runs.journals.records import Payload, SuiteUnit, UnitKey
 from infthor_eval.runs.request import RunRequest, prepare
 from infthor_eval.runs.suite import Suite
-from infthor_eval.runs.work.binding import BoundRun, bind_run
+from infthor_eval.runs.work.binding import BoundRun, bind_run, group_records
 from infthor_eval.runs.work.executor import UnrecordedSession
-from infthor_eval.runs.work.group_records import group_records
 from model_adapters import is_known, switched_on, switches
 
 _Replies = Mapping[UnitKey, str]

@@ -26,9 +26,8 @@ from infthor_eval.runs.journals.records import (
 from infthor_eval.runs.request import RunRequest, prepare
 from infthor_eval.runs.suite import BoundEvaluation, Group, Suite, Workload
 from infthor_eval.runs.usage import Usage
-from infthor_eval.runs.work.binding import bind_run
+from infthor_eval.runs.work.binding import bind_run, group_records
 from infthor_eval.runs.work.executor import UnrecordedSession
-from infthor_eval.runs.work.group_records import group_records
 
 _UNITS_OF_A_GROUP = 3  # measured units of a group: the first, the middle and the last
 

@@ -1,8 +1,10 @@
 """Who does a run's work: this process, or several workers; either way the same records."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Event, Thread
 from typing import Any, Generic, Protocol
 
 from infthor_eval.runs.journals.journal import Journal
@@ -16,14 +18,11 @@ from infthor_eval.runs.journals.records import (
     UnitRecord,
     describe_failure,
 )
-from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.suite import Workload
+from infthor_eval.runs.suite import Group, Workload
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.runs.work.batches import fetch_replies
-from infthor_eval.runs.work.binding import bind_run
-from infthor_eval.runs.work.group_records import group_records
-from infthor_eval.runs.work.scheduling import run_groups
+from infthor_eval.runs.work.binding import bind_run, group_records
 from model_adapters import BatchModel, PersonModel
 
 # A record that is on disk; True if an earlier run had put it there.
@@ -65,21 +64,20 @@ class LocalExecutor(Generic[SuiteUnit, Payload]):
         self, folder: Path, journal: Journal[Payload], should_stop: Callable[[], bool]
     ) -> Iterator[tuple[UnitRecord[Payload], bool]]:
         """See `Executor`."""
-        session = JournalSession(journal)
         evaluation = self._bound.evaluation
         subject = self._bound.subject
         if isinstance(subject, BatchModel) and subject.uses_batches:
-            given = (evaluation, session, self._encoder, folder, self._notify, should_stop)
+            given = (evaluation, journal, self._encoder, folder, self._notify, should_stop)
             if not fetch_replies(subject, *given):
                 return
         in_flight = subject.capabilities.max_in_flight
         records = run_groups(
             self.workload.groups,
-            lambda group: group_records(evaluation, group, session, self._encoder),
+            lambda group: group_records(evaluation, group, journal, self._encoder),
             in_flight,
         )
         for record in self._showing_positions(records):
-            yield session.append_new(record)
+            yield journal.append_new(record)
             if should_stop():
                 return
 
@@ -120,3 +118,73 @@ class UnrecordedSession:
     def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
         """See `Session`."""
         self._artifacts[fingerprint] = artifact
+
+
+def run_groups(
+    groups: Sequence[Group[SuiteUnit]],
+    do: Callable[[Group[SuiteUnit]], Iterable[UnitRecord[Payload]]],
+    max_in_flight: int,
+) -> Iterator[UnitRecord[Payload]]:
+    """Yield all groups' records when they are there; several in flight have a thread each."""
+    if max_in_flight == 1 or len(groups) <= 1:
+        for group in groups:
+            yield from do(group)
+    else:
+        yield from _in_threads(groups, do, min(max_in_flight, len(groups)))
+
+
+def _in_threads(
+    groups: Sequence[Group[SuiteUnit]],
+    do: Callable[[Group[SuiteUnit]], Iterable[UnitRecord[Payload]]],
+    n_threads: int,
+) -> Iterator[UnitRecord[Payload]]:
+    waiting: SimpleQueue[Group[SuiteUnit]] = SimpleQueue()
+    for group in groups:
+        waiting.put(group)
+    # None: a thread has ended.
+    results: SimpleQueue[UnitRecord[Payload] | BaseException | None] = SimpleQueue()
+    stop = Event()
+    threads = [
+        Thread(target=_work, args=(waiting, do, results, stop), daemon=True)
+        for _ in range(n_threads)
+    ]
+    for thread in threads:
+        thread.start()
+    running = n_threads
+    try:
+        while running:
+            result = results.get()
+            if isinstance(result, BaseException):
+                raise result
+            if result is None:
+                running -= 1
+            else:
+                yield result
+    finally:
+        stop.set()
+
+
+def _work(
+    waiting: "SimpleQueue[Group[SuiteUnit]]",
+    do: Callable[[Group[SuiteUnit]], Iterable[UnitRecord[Payload]]],
+    results: "SimpleQueue[UnitRecord[Payload] | BaseException | None]",
+    stop: Event,
+) -> None:
+    try:
+        while (group := _next(waiting)) is not None and not stop.is_set():
+            for record in do(group):
+                results.put(record)
+                if stop.is_set():
+                    return
+    except BaseException as error:  # noqa: BLE001 - raised again in the thread that waits
+        results.put(error)
+    else:
+        results.put(None)
+
+
+def _next(waiting: "SimpleQueue[Group[SuiteUnit]]") -> Group[SuiteUnit] | None:
+    """Return the next group, or None if there is none."""
+    try:  # rather than a check whether it is empty: another thread may take the last group after it
+        return waiting.get_nowait()
+    except Empty:
+        return None

@@ -23,11 +23,9 @@ from infthor_eval.runs.journals.records import (
     UnitRecord,
 )
 from infthor_eval.runs.journals.requests import StoredRequest
-from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Group, Workload
-from infthor_eval.runs.work.binding import bind_run
-from infthor_eval.runs.work.group_records import group_records
+from infthor_eval.runs.work.binding import bind_run, group_records
 from infthor_eval.terminal import print_error
 from infthor_eval.workers import (
     Event,
@@ -101,7 +99,7 @@ class _Evaluator(Generic[SuiteUnit, Payload]):
         self._encoder = RecordEncoder(run.suite.records)
         self._number = number
         self._bound = bind_run(run)
-        self._session: JournalSession[Payload] | None = None
+        self._journal: Journal[Payload] | None = None
         self._named: set[str] = set()  # the requests that the driver knows
 
     @property
@@ -116,15 +114,15 @@ class _Evaluator(Generic[SuiteUnit, Payload]):
     ) -> Iterator[tuple[UnitRecord[Payload], bool, StoredRequest | None]]:
         """Yield records, whether they were there, and their requests when they are first named."""
         evaluation = self._bound.evaluation
-        session = self._open_session(job.folder)
+        journal = self._open_journal(job.folder)
         for record in job.earlier:
-            session.journal.add(record)
+            journal.add(record)
         group = job.portion.select(evaluation.workload.groups)
-        for made in group_records(evaluation, group, session, self._encoder):
-            record, resumed = session.append_new(made)
+        for made in group_records(evaluation, group, journal, self._encoder):
+            record, resumed = journal.append_new(made)
             is_new = not resumed and record.request not in self._named
             self._named.add(record.request)
-            request = session.find_artifact(record.request, StoredRequest) if is_new else None
+            request = journal.find_artifact(record.request, StoredRequest) if is_new else None
             yield record, resumed, request
 
     def close(self) -> None:
@@ -133,15 +131,14 @@ class _Evaluator(Generic[SuiteUnit, Payload]):
         except UserCodeError as error:  # all results are sent
             print_error(str(error))
 
-    def _open_session(self, folder: Path) -> JournalSession[Payload]:
-        if self._session is None:
+    def _open_journal(self, folder: Path) -> Journal[Payload]:
+        if self._journal is None:
             # A worker of a driver that was killed may still be ending, and holds the lock of the
             # shard until then.
-            journal = Journal(
+            self._journal = Journal(
                 folder, self._bound.header, self._records, worker=self._number, wait_s=_SHARD_WAIT_S
             )
-            self._session = JournalSession(journal)
-        return self._session
+        return self._journal
 
 
 @dataclass(frozen=True)

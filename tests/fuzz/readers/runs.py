@@ -12,9 +12,9 @@ from types import SimpleNamespace
 import yaml
 
 from infthor_eval.cli import main
+from infthor_eval.cli.commands.rescore import read_source
 from infthor_eval.cli.progress.notes import print_failure
 from infthor_eval.generation.replay_set import replay_set, select
-from infthor_eval.nieh.rescoring.rescore import read_source
 from infthor_eval.report.live.state import LiveRun
 from infthor_eval.run import Run, find_runs, open_runs
 
@@ -86,7 +86,7 @@ def _make_arms(folder: Path) -> Path:
 
 
 def _rescore(folder: Path) -> None:
-    source = read_source(folder / "damaged")
+    source = read_source(Run.open(folder / "damaged"))
     assert all(record.task for record in source.records)
 
 

@@ -12,6 +12,7 @@ from infthor_eval.runs import (
     RunHeader,
     StoredRequest,
     Tokens,
+    Unit,
     UnitKey,
     UnitRecord,
     read_header,
@@ -32,7 +33,6 @@ class Note(msgspec.Struct, frozen=True, tag_field="type", tag="note"):
 
 TYPES = RecordTypes(Answer, Note)
 HEADER = RunHeader(suite="toy", name="m", config=RunConfig(model={"name": "m"}, seed=0))
-KEY = UnitKey("t", "q1")
 
 
 def record(name="q1", fingerprint="f", reply="mug", **changes):
@@ -48,6 +48,10 @@ def record(name="q1", fingerprint="f", reply="mug", **changes):
     )
 
 
+def unit(name="q1", task="t"):
+    return Unit(UnitKey(task, name), "c", Answer())
+
+
 def opened(run, header=HEADER, worker=0):
     return Journal(run, header, TYPES, worker)
 
@@ -61,9 +65,9 @@ def test_what_was_recorded_is_there_when_the_run_goes_on(tmp_path):
         journal.append(record())
         journal.cache_artifact("inputs", Note("a mug"))
     with opened(tmp_path) as journal:
-        assert journal.find_record(KEY, "f") == record()
-        assert journal.find_record(KEY, "other inputs") is None
-        assert journal.find_record(UnitKey("other task", "q1"), "f") is None
+        assert journal.find_record(unit(), "f") == record()
+        assert journal.find_record(unit(), "other inputs") is None
+        assert journal.find_record(unit(task="other task"), "f") is None
         assert journal.find_artifact("inputs", Note) == Note("a mug")
         assert journal.find_artifact("others", Note) is None
     assert read_run(tmp_path, TYPES) == (HEADER, [record()])
@@ -89,7 +93,7 @@ def test_wherever_a_kill_cuts_the_file_whole_records_survive(tmp_path_factory, c
 def test_a_failed_unit_is_tried_again_and_its_later_result_counts(tmp_path):
     with opened(tmp_path) as journal:
         journal.append(record(reply=None, failure="too long", fingerprint=""))
-        assert journal.find_record(KEY, "") is None
+        assert journal.find_record(unit(), "") is None
         journal.append(record())
         assert journal.records == [record(attempt=2)]
     assert read_run(tmp_path, TYPES)[1] == [record(attempt=2)]
@@ -100,7 +104,7 @@ def test_shards_of_several_workers_are_read_together_and_the_last_attempt_counts
         journal.append(record("q1", reply=None, failure="lost"))
         journal.append(record("q2"))
     with opened(tmp_path, worker=1) as other:
-        assert other.find_record(UnitKey("t", "q2"), "f") == record("q2")
+        assert other.find_record(unit("q2"), "f") == record("q2")
         other.append(record("q1"))
         other.append(record("q3"))
     with opened(tmp_path, worker=0) as journal:  # read again in the other order

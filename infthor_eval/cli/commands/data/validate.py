@@ -28,8 +28,8 @@ from infthor_eval.nieh.validation import (
 )
 from infthor_eval.report.inspection import write_inspection_page
 from infthor_eval.report.terminal import print_table, table_console
+from infthor_eval.run import Run, with_distinct_names
 from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare_all
-from infthor_eval.runs.stored.labels import label_runs
 
 
 @click.command(
@@ -150,10 +150,10 @@ def _replies(outcome: RunOutcome) -> dict[str, Any]:
 def _model_names(outcomes: Sequence[RunOutcome]) -> list[str]:
     """The names of the models; labels where one is there with several options."""
     models = [outcome.run.request.model for outcome in outcomes]
-    labels = label_runs([(outcome.folder, outcome.summary.header) for outcome in outcomes])
+    runs = with_distinct_names([Run(one.folder, one.summary.header) for one in outcomes])
     return [
-        label if models.count(model) > 1 else model
-        for model, label in zip(models, labels, strict=True)
+        run.name if models.count(model) > 1 else model
+        for model, run in zip(models, runs, strict=True)
     ]
 
 

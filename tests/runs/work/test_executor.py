@@ -6,7 +6,7 @@ from queue import SimpleQueue
 import pytest
 
 from infthor_eval.runs import Group, Unit, UnitKey
-from infthor_eval.runs.work.scheduling import run_groups
+from infthor_eval.runs.work.executor import run_groups
 from model_adapters import Capabilities
 from tests.helpers.toy_suite import Adder, Sum, ToySuite, run
 from tests.runs.toy_command import request
@@ -48,7 +48,7 @@ def test_a_thread_that_finds_the_last_group_taken_ends(monkeypatch):
             time.sleep(0.02)
             return is_empty
 
-    monkeypatch.setattr("infthor_eval.runs.work.scheduling.SimpleQueue", Slow)
+    monkeypatch.setattr("infthor_eval.runs.work.executor.SimpleQueue", Slow)
     records = list(
         run_groups(
             groups(3), lambda group: (unit.record("f", unit.payload) for unit in group.units), 2
