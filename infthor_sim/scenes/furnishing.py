@@ -390,7 +390,8 @@ def _give_door(plan: RoomPlan) -> None:
                 "x+": (room.x_max - depth, room.x_max, at - width / 2, at + width / 2),
                 "z-": (at - width / 2, at + width / 2, room.z_min, room.z_min + depth),
             }[side]
-            low, high = np.array([x0, 0.01, z0]), np.array([x1, height, z1])
+            low = np.array([x0, 0.01, z0])
+            high = np.array([x1, height, z1])
             if plan.is_clear(low, high):
                 plan.reserved.append((low, high))
                 plan.room = replace(room, door=(side, at))
