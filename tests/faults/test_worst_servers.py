@@ -17,7 +17,7 @@ from .test_worst_values import IN_JSON, fast_disk, read_in_every_way
 __all__ = ["fast_disk", "no_proxy"]  # for all tests here
 
 
-N_UNITS = 126  # of the bundled set
+N_UNITS = 127  # of the bundled set
 SPOILED = "@spoiled@"
 FIELDS: tuple[tuple[str | int, ...], ...] = (
     (),

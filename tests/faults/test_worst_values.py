@@ -196,7 +196,7 @@ def own(tmp_path: Path) -> str:
 
 
 def test_an_adapter_gives_the_worst_replies(own, run_cli, tmp_path) -> None:
-    n_units = 126
+    n_units = 127
     for start in range(0, N_PAIRS, n_units):
         model = ("--model", own, "--model-args", f"start={start}", "--out", tmp_path / "out")
         words = ("--tasks", "nieh_mini_gt", "--name", f"from{start}", "--quiet")

@@ -132,7 +132,7 @@ def test_a_bundled_set_is_asked_once_however_often_the_run_is_killed(tmp_path):
         last = _start(command)
         _, err = last.communicate(timeout=PATIENCE_S)
         assert last.returncode == 0, err
-    assert server.n_asked == len(_replies(tmp_path)) == 126
+    assert server.n_asked == len(_replies(tmp_path)) == 127
 
 
 def _kill_after(server, command, n, seconds):
