@@ -5,6 +5,7 @@ import pytest
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.bundle import (
     MANIFEST,
     Manifest,
@@ -15,8 +16,6 @@ from infthor_eval.generation.bundle import (
 from infthor_eval.generation.questions.generate import generate_questions
 from infthor_eval.storage.digests import digest_of_file, fingerprint
 from infthor_eval.storage.folders import packaged_folder
-
-from .bundled_logs import steps_as_bundled
 
 BUNDLED = packaged_folder("sets/nieh_mini")
 
@@ -55,7 +54,7 @@ def test_bundled_trajectories_come_out_again_bit_for_bit(tmp_path, simulator):
     }
     for name in logs:
         folder = Path(name).parent
-        assert steps_as_bundled(tmp_path / "set" / folder) == steps_as_bundled(BUNDLED / folder)
+        assert read_steps(tmp_path / "set" / folder) == read_steps(BUNDLED / folder)
 
 
 def test_a_folder_that_is_not_empty_and_a_scene_that_is_not_there_are_refused(tmp_path, simulator):

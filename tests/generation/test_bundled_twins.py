@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.twins import read_pairs, write_pairs
 from infthor_eval.generation.bundle import (
     MANIFEST,
@@ -21,8 +22,6 @@ from infthor_eval.generation.bundle import (
 from infthor_eval.nieh.scoring import score
 from infthor_eval.storage.digests import digest_of_file
 from infthor_eval.storage.folders import packaged_folder
-
-from .bundled_logs import steps_as_bundled
 
 BUNDLED = packaged_folder("sets/nieh_mini_twins")
 
@@ -152,4 +151,4 @@ def test_twins_are_built_again_byte_for_byte(pairs, tmp_path):
         assert made[name].traj_ids == bundled[name].traj_ids
         for world in made[name].traj_ids:
             built_again = tmp_path / "one" / "metadata" / world
-            assert steps_as_bundled(built_again) == steps_as_bundled(BUNDLED / "metadata" / world)
+            assert read_steps(built_again) == read_steps(BUNDLED / "metadata" / world)
