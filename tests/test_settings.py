@@ -73,6 +73,8 @@ run(haystack), run(haystack, "--stride", "3")
 runs = [path.parent for path in sorted(Path(sys.argv[2]).glob("*/*/results.json"))]
 journals = [next((run / "journal").iterdir()).read_text().splitlines() for run in runs]
 configs = [json.loads(journal[0])["config"] for journal in journals]
+if configs[0].get("stride"):  # folders are called by hashes
+    runs.reverse(), configs.reverse()
 table = "<!-- settings: infthor_eval.nieh.contexts:ContextSettings -->\\n<!-- end -->"
 print(json.dumps({
     "help": typed("run", "--help"),

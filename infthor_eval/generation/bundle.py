@@ -19,7 +19,6 @@ from typing import Annotated, Any, TypeVar
 import msgspec
 from msgspec import Meta
 from msgspec.structs import replace
-from PIL import Image
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
@@ -29,7 +28,7 @@ from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.shared_frames import write_frame_names
 from infthor_eval.formats.step_log import pack_steps
 from infthor_eval.formats.twins import ComparedFrame, TwinPair, read_pairs, write_pairs
-from infthor_eval.generation.compact.pictures import PictureStore
+from infthor_eval.generation.compact.pictures import PictureStore, reduce_colors
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.generate import GeneratedQuestions, generate_questions
 from infthor_eval.generation.replay_set import replay_set, select
@@ -259,8 +258,7 @@ def _raise_first(failures: list[str]) -> None:
 
 
 def _reduce_colors(path: Path, colors: int) -> None:
-    frame = FrameRef(path).load()
-    frame.quantize(colors, dither=Image.Dither.NONE).save(path, optimize=True)
+    reduce_colors(FrameRef(path).load(), colors).save(path, optimize=True)
 
 
 def _digests(root: Path) -> dict[str, str]:

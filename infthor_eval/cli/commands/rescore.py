@@ -127,10 +127,12 @@ def read_source(run: Run) -> Source:
     """Read what is scored again of a run."""
     from infthor_eval.errors import UsageError
     from infthor_eval.nieh.rescoring.rescore import Source
+    from infthor_eval.nieh.suite import NiehSuite
 
-    if run.listed.suite != "nieh":
+    if run.listed.suite != NiehSuite.name:
         raise UsageError(
-            f"{run.folder}: is a run of {run.listed.suite}; give a run of nieh, which has replies"
+            f"{run.folder}: is a run of {run.listed.suite}; give a run of {NiehSuite.name}, which "
+            "has replies"
         )
     return Source(run.own_header, run.records, run.stored_requests)
 

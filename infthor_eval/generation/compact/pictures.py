@@ -20,7 +20,7 @@ from infthor_eval.formats.shared_frames import patched_name, store_encoded
 _Pixels = NDArray[np.uint8]  # [height, width], indices of colours
 
 # A palette by the number of pixels has none of a small object's colours: a room is walls and floor.
-_WEIGHT = 0.3  # a colour counts as the number of its pixels to this power
+_WEIGHT = 0.6  # a colour counts as the number of its pixels to this power
 _FEWEST = 16  # pixels of a colour that counts
 _SURELY_SMALLER = 0.1  # share of the pixels up to which a patch is smaller than the picture
 _MOST_LAYERS = 3  # of patches; each is decoded when a frame is loaded
@@ -131,6 +131,15 @@ def _stretch(differs: NDArray[np.bool_]) -> slice:
     return slice(start, max(int(indices[-1]) + 1, min(start + _NARROWEST, len(differs))))
 
 
+def reduce_colors(picture: Image.Image, colors: int) -> Image.Image:
+    """Return a picture in so many colours, of which none is far from what it was.
+
+    Cut at the median, colours that are rare are given up for shades of the walls: a green lettuce
+    is grey in one frame and green in the next.
+    """
+    return picture.quantize(colors, Image.Quantize.MAXCOVERAGE, kmeans=1, dither=Image.Dither.NONE)
+
+
 def palette_of(pictures: Iterable[Image.Image], colors: int) -> Image.Image:
     """Return an image whose palette suits all pictures, also their small parts."""
     counts = np.zeros(2**15, dtype=np.int64)
@@ -146,4 +155,4 @@ def palette_of(pictures: Iterable[Image.Image], colors: int) -> Image.Image:
     means = np.round(sums[common] / counts[common, None]).astype(np.uint8)
     repeats = np.round(counts[common] ** _WEIGHT).astype(int)
     weighted = Image.fromarray(np.repeat(means, repeats, axis=0)[None])
-    return weighted.quantize(colors, Image.Quantize.MEDIANCUT, kmeans=1, dither=Image.Dither.NONE)
+    return reduce_colors(weighted, colors)
