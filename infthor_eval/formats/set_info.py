@@ -18,10 +18,11 @@ def simulator_of(root: Path) -> str | None:
 
     Published sets do not record it.
     """
-    path = root / _FILE
-    simulator = _read(path).get("simulator") if path.exists() else None
+    simulator = _recorded(root, "simulator")
     if simulator is not None and not isinstance(simulator, str):
-        raise DataError(f"{path}: simulator is {simulator!r:.40}, not a name; write the set again")
+        raise DataError(
+            f"{root / _FILE}: simulator is {simulator!r:.40}, not a name; write the set again"
+        )
     return simulator
 
 
@@ -30,17 +31,17 @@ def frames_of(root: Path) -> int | None:
 
     Sets of the first version do not record it.
     """
-    path = root / _FILE
-    frames = _read(path).get("frames") if path.exists() else None
+    frames = _recorded(root, "frames")
     if frames is not None and not isinstance(frames, int):
-        raise DataError(f"{path}: frames is {frames!r:.40}, not a number; write the set again")
+        raise DataError(
+            f"{root / _FILE}: frames is {frames!r:.40}, not a number; write the set again"
+        )
     return frames
 
 
 def writer_of(root: Path) -> str | None:
     """Return the version of infthor-eval that wrote a set, or None if it is not recorded."""
-    path = root / _FILE
-    version = _read(path).get("infthor_eval") if path.exists() else None
+    version = _recorded(root, "infthor_eval")
     return None if version is None else str(version)
 
 
@@ -72,9 +73,10 @@ def claim_for_simulator(root: Path, simulator: str, frames: int | None = None) -
             f"{root}: its frames are of the {theirs} simulator; give another folder for the "
             f"{simulator} one"
         )
-    if frames_of(root) != frames:
+    drawing = frames_of(root)
+    if drawing != frames:
         raise DataError(
-            f"{root}: its frames are version {frames_of(root) or 1} of the drawing, this is "
+            f"{root}: its frames are version {drawing or 1} of the drawing, this is "
             f"{frames}; give another folder"
         )
     if wrote != version:
@@ -82,6 +84,11 @@ def claim_for_simulator(root: Path, simulator: str, frames: int | None = None) -
             f"{root}: its frames were rendered by version {wrote}, this is {version}; give another "
             "folder"
         )
+
+
+def _recorded(root: Path, name: str) -> Any:
+    path = root / _FILE
+    return _read(path).get(name) if path.exists() else None
 
 
 def _read(path: Path) -> dict[str, Any]:

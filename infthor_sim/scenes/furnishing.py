@@ -382,17 +382,10 @@ def _lay_rug(plan: RoomPlan, width: float, length: float, away: float) -> None:
 def _give_door(plan: RoomPlan) -> None:
     """Draw a door on a wall where nothing stands before it; a full room has none."""
     width, height, depth = _ENTRANCE
-    room = plan.room
     for side in plan.shuffle(("z-", "x-", "x+")):
         for at in plan.places(side, width):
-            x0, x1, z0, z1 = {
-                "x-": (room.x_min, room.x_min + depth, at - width / 2, at + width / 2),
-                "x+": (room.x_max - depth, room.x_max, at - width / 2, at + width / 2),
-                "z-": (at - width / 2, at + width / 2, room.z_min, room.z_min + depth),
-            }[side]
-            low = np.array([x0, 0.01, z0])
-            high = np.array([x1, height, z1])
-            if plan.is_clear(low, high):
-                plan.reserved.append((low, high))
-                plan.room = replace(room, door=(side, at))
+            before = plan.space_before(side, at - width / 2, at + width / 2, depth, (0.01, height))
+            if plan.is_clear(*before):
+                plan.reserved.append(before)
+                plan.room = replace(plan.room, door=(side, at))
                 return

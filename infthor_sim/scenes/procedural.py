@@ -121,9 +121,9 @@ def _house_plans(
     }
     # the doors open into the rooms that lie behind the living room
     entrances = {
-        "bedroom": [(gap / 2, door_z, 90.0)],
-        "kitchen": [(door_x, gap / 2, 0.0)],
-        "bathroom": [(gap / 2, upper_z, 90.0)],
+        "bedroom": (gap / 2, door_z, 90.0),
+        "kitchen": (door_x, gap / 2, 0.0),
+        "bathroom": (gap / 2, upper_z, 90.0),
     }
     plans: list[RoomPlan] = []
     for room_type, span in spans.items():
@@ -132,8 +132,8 @@ def _house_plans(
         room = RoomShell(*span, floor_style=_FLOORS[room_type], style=style, openings=doorways)
         plan = RoomPlan(room, random)
         plan.keep_doors_free()
-        for x, z, yaw in entrances.get(room_type, ()):
-            door = plan.place("Doorway", x, z, yaw, size=_DOOR_SIZE)
+        if room_type in entrances:
+            door = plan.place("Doorway", *entrances[room_type], size=_DOOR_SIZE)
             door.state.openness = 1.0
         _furnish(plan, room_type)
         plans.append(plan)

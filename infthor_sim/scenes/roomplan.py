@@ -12,7 +12,7 @@ from infthor_sim.physics.doorways import update_floor
 from infthor_sim.physics.footprints import Rect, subtract
 from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.navigation import CELL, NavGrid
-from infthor_sim.physics.solids import opening_space
+from infthor_sim.physics.solids import Box, opening_space
 from infthor_sim.world import RoomShell, World
 
 _BODY = 0.23  # the agent's radius and a margin, metres
@@ -180,15 +180,21 @@ class RoomPlan:
 
     def keep_doors_free(self) -> None:
         """Reserve the floor in front of each doorway."""
+        for side, start, end in self.room.openings:
+            self.reserved.append(self.space_before(side, start, end, _CLEAR, (0.0, 2.0)))
+
+    def space_before(
+        self, side: str, start: float, end: float, depth: float, heights: tuple[float, float]
+    ) -> Box:
+        """Return the box before a stretch of a wall: so deep, between two heights; metres."""
         room = self.room
-        for side, low, high in room.openings:
-            x0, x1, z0, z1 = {
-                "x-": (room.x_min, room.x_min + _CLEAR, low, high),
-                "x+": (room.x_max - _CLEAR, room.x_max, low, high),
-                "z-": (low, high, room.z_min, room.z_min + _CLEAR),
-                "z+": (low, high, room.z_max - _CLEAR, room.z_max),
-            }[side]
-            self.reserved.append((np.array([x0, 0.0, z0]), np.array([x1, 2.0, z1])))
+        x0, x1, z0, z1 = {
+            "x-": (room.x_min, room.x_min + depth, start, end),
+            "x+": (room.x_max - depth, room.x_max, start, end),
+            "z-": (start, end, room.z_min, room.z_min + depth),
+            "z+": (start, end, room.z_max - depth, room.z_max),
+        }[side]
+        return np.array([x0, heights[0], z0]), np.array([x1, heights[1], z1])
 
     def free_cells(self) -> list[tuple[float, float]]:
         """Return the cells where the agent fits between what stands on the floor."""
