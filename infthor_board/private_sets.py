@@ -192,7 +192,12 @@ def _ids(questions: Mapping[Question, Question]) -> dict[str, str]:
 
 def _without_answers(question: Question, name: str) -> Question:
     return Question(
-        name, question.text, tuple(sorted(question.clues)), (WITHHELD,), question.question_type
+        name,
+        question.text,
+        tuple(sorted(question.clues)),
+        (WITHHELD,),
+        question.question_type,
+        moment=question.moment,
     )
 
 

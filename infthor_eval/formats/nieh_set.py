@@ -12,6 +12,7 @@ folder of one's own frames and questions (`own_folder`).
 """
 
 import hashlib
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -205,6 +206,14 @@ class NiehSet:
             self._all_frames, traj_id, lambda: tuple(self._trajectory(traj_id).values())
         )
 
+    def frames_until(self, question: Question) -> tuple[FrameRef, ...]:
+        """Return the frames of a question's trajectory up to its moment, in time order."""
+        frames = self.frames(question.traj_id)
+        if question.moment is None:
+            return frames
+        numbers = list(self._trajectory(question.traj_id))
+        return frames[: bisect_right(numbers, question.moment)]
+
     def find_places(self, traj_id: str, frames: Sequence[FrameRef]) -> list[int]:
         """Return where in a trajectory's time order frames in time order are; none where one of
         them is no frame of it."""
@@ -335,11 +344,17 @@ class NiehSet:
             frames = self._trajectory(question.traj_id)
         except DataError as error:
             return str(error)
-        outside = [index for index in question.clues if index not in frames]
-        if outside:
-            return (
-                f"clue {outside[0]} is outside trajectory {question.traj_id} ({len(frames)} frames)"
-            )
+        named = [("clue", index) for index in question.clues]
+        if question.moment is not None:
+            named.append(("moment", question.moment))
+            if max(question.clues) > question.moment:
+                return (
+                    f"clue {max(question.clues)} is after the question's moment {question.moment}"
+                )
+        for what, index in named:
+            if index not in frames:
+                where = f"trajectory {question.traj_id} ({len(frames)} frames)"
+                return f"{what} {index} is outside {where}"
         return next(filter(None, (frames[index].problem for index in question.clues)), None)
 
     def _trajectory(self, traj_id: str) -> dict[int, FrameRef]:

@@ -5,7 +5,8 @@ Columns `traj_id`, `question`, `gt_img_idx`, `answer`; the last two are Python-l
 questions whose answer is that something is nowhere: no frame is evidence for that, and `gt_img_idx`
 is a sample. Without a `question_type` the tables take the type that the question's words have in
 Table 3 (`question_forms`). `pair` and `fact` are there in sets of twins alone: both questions of a
-pair have the same `pair`, and all on one changed fact the same `fact`.
+pair have the same `pair`, and all on one changed fact the same `fact`. `moment` is the number of
+the frame after which a question is asked; nothing there is the trajectory's end.
 
 The two published files (`qa_set_nieh_single_clue.csv`, `qa_set_nsieh_multi_clue.csv`) have `qid`,
 `num_evidence`, `gt_steps` and `match1` to `match4` too, which are kept; copies without some of them
@@ -28,6 +29,7 @@ from infthor_eval.storage.files import write_atomically
 _COLUMNS = ("traj_id", "question", "gt_img_idx", "answer")
 _TYPE = "question_type"
 _ABSENCE = "absence"
+_MOMENT = "moment"
 _TWINS = ("pair", "fact")
 _MATCHES = ("match1", "match2", "match3", "match4")
 _PUBLISHED = ("qid", "num_evidence", "gt_steps", *_MATCHES)
@@ -63,7 +65,12 @@ def encode_questions(questions: Iterable[Question]) -> bytes:
     writer = csv.writer(text, lineterminator="\n")
     are_published = any(question.published for question in questions)
     are_twins = any(question.pair for question in questions)
-    further = (*(_TWINS if are_twins else ()), *(_PUBLISHED if are_published else ()))
+    have_moments = any(question.moment is not None for question in questions)
+    further = (
+        *((_MOMENT,) if have_moments else ()),
+        *(_TWINS if are_twins else ()),
+        *(_PUBLISHED if are_published else ()),
+    )
     writer.writerow([*_COLUMNS, _TYPE, _ABSENCE, *further])
     for question in questions:
         absence = "yes" if question.absence else ""
@@ -75,9 +82,11 @@ def encode_questions(questions: Iterable[Question]) -> bytes:
             question.question_type or "",
             absence,
         ]
+        moment = "" if question.moment is None else question.moment
+        moments = (moment,) if have_moments else ()
         twins = (question.pair, question.fact) if are_twins else ()
         published = _published_cells(question.published) if question.published else ()
-        writer.writerow([shield(str(cell)) for cell in (*cells, *twins, *published)])
+        writer.writerow([shield(str(cell)) for cell in (*cells, *moments, *twins, *published)])
     return text.getvalue().encode()
 
 
@@ -113,10 +122,17 @@ def _question(row: dict[str, str], file: str | None) -> Question:
         answers=tuple(answers),
         question_type=row.get(_TYPE, "").strip() or None,
         absence=absence == "yes",
+        moment=_moment(row.get(_MOMENT, "").strip()),
         published=_published(row, file),
         pair=row.get("pair", "").strip(),
         fact=row.get("fact", "").strip(),
     )
+
+
+def _moment(cell: str) -> int | None:
+    if cell and not (cell.isascii() and cell.isdigit()):
+        raise DataError(f"{_MOMENT} is not the number of a frame; write it, or nothing")
+    return int(cell) if cell else None
 
 
 def _published(row: dict[str, str], file: Any) -> PublishedColumns | None:

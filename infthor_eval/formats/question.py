@@ -1,5 +1,6 @@
 """One NIEH question, the type that all packages of the project share."""
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -43,6 +44,8 @@ class Question:
         question_type: content of the `question_type` column, or None if the file has none.
         absence: True if the answer is that something is nowhere. No frame is evidence; the clues
             are a sample.
+        moment: number (`img_idx`) of the frame after which it is asked: no later one is shown. None
+            for the end of the trajectory.
         published: further columns of a published file; None elsewhere.
         pair: name of the pair of questions that it is one of, in twins; empty elsewhere.
         fact: name of the changed fact that the pair is about; several pairs may be about one.
@@ -57,6 +60,7 @@ class Question:
     answers: tuple[Answer, ...]
     question_type: str | None = None
     absence: bool = False
+    moment: int | None = None
     published: PublishedColumns | None = None
     pair: str = field(default="", compare=False)
     fact: str = field(default="", compare=False)
@@ -99,6 +103,11 @@ class Question:
         return self.pair or self.id
 
     @property
+    def place(self) -> tuple[str, float]:
+        """What questions are sorted by to be asked in order: trajectory, and moment in it."""
+        return self.traj_id, math.inf if self.moment is None else self.moment
+
+    @property
     def cluster(self) -> str:
         """Name of what intervals cluster by: its trajectory, or the base of twins."""
         return self.base or self.traj_id
@@ -109,7 +118,8 @@ class Question:
         # A few published questions are there twice, under two names.
         if self.published and self.published.qid:
             return self.published.qid
-        key = repr((self.text, self.clues, self.answers))
+        asked = (self.text, self.clues, self.answers)
+        key = repr(asked if self.moment is None else (*asked, self.moment))
         return f"{self.traj_id}/{digest(key, 6)}"
 
 

@@ -118,7 +118,7 @@ class Memory(Protocol):
         """Forget everything and begin a trajectory."""
 
     def observe(self, observation: Observation) -> None:
-        """Take the next step of the trajectory, which lies before any moment that is asked about.
+        """Take the next step of the trajectory; it may come after recalls for earlier moments.
 
         Raises:
             DataError: its frame cannot be read.

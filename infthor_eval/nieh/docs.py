@@ -33,6 +33,7 @@ def doc_of(task_samples: TaskSamples, sample: QuestionVariant, pixels: bool = Fa
         "question": question.text,
         "question_type": question.question_type or "",
         "absence": question.absence,
+        "moment": question.moment,
         "published": question.published
         and {"file": question.published.file, "qid": question.published.qid},
         "file": question.file,
@@ -64,6 +65,7 @@ def sample_of(doc: Doc) -> QuestionVariant:
         answers=tuple(json.loads(doc["answers"])),
         question_type=doc["question_type"] or None,
         absence=doc["absence"],
+        moment=doc["moment"],
         published=PublishedColumns(**doc["published"]) if doc["published"] else None,
         file=doc["file"],
         pair=doc["pair"],

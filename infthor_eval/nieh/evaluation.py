@@ -199,7 +199,7 @@ def _groups(prepared: Mapping[str, PreparedTask], repeats: int = 1) -> list[Grou
     for task, ready in prepared.items():
         ordered = sorted(ready.task_samples.samples, key=lambda sample: sample.question.cluster)
         for _, samples in groupby(ordered, key=lambda sample: sample.question.cluster):
-            same = sorted(samples, key=lambda sample: sample.question.traj_id)
+            same = sorted(samples, key=lambda sample: sample.question.place)
             frames = len({(it.question.traj_id, frame) for it in same for frame in it.frames})
             units = [
                 NiehUnit.of(task, ready.task_samples, sample, repeat)

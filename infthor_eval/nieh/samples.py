@@ -77,7 +77,7 @@ class TaskSamples:
 
         Those that one question alone hides are not (`hidden`).
         """
-        frames = self.data.frames(sample.question.traj_id)
+        frames = self.data.frames_until(sample.question)
         # The shown ones are shuffled, once they are recalled.
         if self.frame_ablation.frames in ("shuffled", NO_CLUE):
             return list(frames)

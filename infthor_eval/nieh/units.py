@@ -73,7 +73,7 @@ def shown_clues(task_samples: TaskSamples, sample: QuestionVariant) -> ShownClue
         return None
     clues = sorted(set(data.clue_positions(question)))
     positions = set(task_samples.positions(sample)) - task_samples.hidden(sample)
-    n_after = len(data.frames(question.traj_id)) - 1 - clues[-1]
+    n_after = len(data.frames_until(question)) - 1 - clues[-1]
     return ShownClues(
         n_shown=len(positions.intersection(clues)), n_clues=len(clues), n_after=n_after
     )

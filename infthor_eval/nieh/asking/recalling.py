@@ -1,8 +1,8 @@
 """Recalling what a memory shows of a trajectory, for each question on it.
 
-The memory observes the trajectory once, up to the step before the last, and recalls for every
-question. What it recalled is in the run's journal, so that a resumed run shows the same and needs
-no memory for it.
+The memory observes the trajectory once, and recalls on the way: for the questions at a moment it
+has observed the steps before it. What it recalled is in the run's journal, so that a resumed run
+shows the same and needs no memory for it.
 """
 
 import threading
@@ -43,14 +43,26 @@ _IN_USE = threading.Lock()  # memories are shared by a process, and serve one tr
 
 
 class _Built(NamedTuple):
-    """A memory that has observed a trajectory up to the step before the last: steps as they are and
-    as it sees them, seconds taken."""
+    """A memory that has observed a trajectory up to the step before a moment.
 
-    observed: Sequence[Observation]
+    Attributes:
+        steps: the steps up to the moment.
+        settings: its settings.
+        memory: the memory.
+        seen: the steps as it sees them.
+        seconds: seconds that it took to observe them.
+    """
+
+    steps: Sequence[Observation]
     settings: RecallSettings
     memory: Memory
-    steps: Sequence[Observation]
+    seen: Sequence[Observation]
     seconds: float
+
+    def is_before(self, steps: Sequence[Observation], settings: RecallSettings) -> bool:
+        """Return True if what has been observed is the beginning of some steps."""
+        observed = self.steps[:-1]
+        return self.settings == settings and observed == steps[:-1][: len(observed)]
 
 
 class Recaller:
@@ -75,8 +87,8 @@ class Recaller:
         self._built: _Built | None = None
         self._identities: dict[RecallSettings, dict[str, Any]] = {}
         self._observed: dict[
-            str, tuple[list[Observation], list[str]]
-        ] = {}  # steps and digests of their frames
+            tuple[str, int | None], tuple[list[Observation], list[str]]
+        ] = {}  # steps up to a moment and digests of their frames
 
     @contextmanager
     def in_use(self) -> Iterator[None]:
@@ -98,8 +110,8 @@ class Recaller:
             return known
         built = self._build(question, settings, steps)
         memory = built.memory
-        past = built.steps[:-1]
-        present = built.steps[-1]
+        past = built.seen[:-1]
+        present = built.seen[-1]
         clues: tuple[int, ...] = ()
         if question.has_evidence:
             clues = tuple(sorted(set(self._task_samples.data.clue_positions(question))))
@@ -124,16 +136,16 @@ class Recaller:
     def _observations(self, sample: QuestionVariant) -> tuple[list[Observation], list[str]]:
         """Return what is observed for a sample's question: blank frames where its clues are hidden,
         which keeps the positions of all others."""
-        traj_id = sample.question.traj_id
-        if traj_id not in self._observed:
+        moment = sample.question.traj_id, sample.question.moment
+        if moment not in self._observed:
             steps = _observations(self._task_samples, sample)
-            self._observed[traj_id] = steps, [step.frame.digest for step in steps]
+            self._observed[moment] = steps, [step.frame.digest for step in steps]
         hidden = self._task_samples.hidden(sample)
         if not hidden:
-            return self._observed[traj_id]
+            return self._observed[moment]
         steps = [
             replace(step, frame=blank_like(step.frame)) if step.number in hidden else step
-            for step in self._observed[traj_id][0]
+            for step in self._observed[moment][0]
         ]
         return steps, [step.frame.digest for step in steps]
 
@@ -160,31 +172,40 @@ class Recaller:
     def _build(
         self, question: Question, settings: RecallSettings, steps: Sequence[Observation]
     ) -> _Built:
-        """Return the memory with the trajectory observed."""
-        built = self._built
-        if built is None or built.observed is not steps or built.settings != settings:
-            memory = open_memory(settings.memory, settings.options)
-            write = self._write if memory.capabilities.writes else None
-            if memory.capabilities.writes and write is None:
-                raise ModelError(
-                    f"the memory {settings.memory} asks the model under test, and there is none"
-                )
-            facts = TrajectoryFacts(
-                name=question.cluster,
-                tokens_per_frame=settings.tokens_per_frame,
-                seed=settings.seed,
-                write=None if write is None else _uncounted(write),
-            )
-            seen = _visible(steps, memory)
+        """Return the memory with the steps before the last one observed."""
+        built, self._built = self._built, None  # a memory that fails half-way is not used again
+        if built is None or not built.is_before(steps, settings):
+            built = _begin(question, settings, self._write)
+        if built.steps is not steps:
+            seen = _visible(steps, built.memory)
             start = time.perf_counter()
-            with wrap_memory_errors(settings.memory):
-                memory.begin(facts)
-            for step in seen[:-1]:
+            for step in seen[len(built.steps[:-1]) : -1]:
                 with wrap_memory_errors(settings.memory):
-                    memory.observe(step)
-            built = _Built(steps, settings, memory, seen, time.perf_counter() - start)
-            self._built = built
+                    built.memory.observe(step)
+            seconds = built.seconds + time.perf_counter() - start
+            built = built._replace(steps=steps, seen=seen, seconds=seconds)
+        self._built = built
         return built
+
+
+def _begin(question: Question, settings: RecallSettings, write: Write | None) -> _Built:
+    """Return a memory that has begun a question's trajectory."""
+    memory = open_memory(settings.memory, settings.options)
+    write = write if memory.capabilities.writes else None
+    if memory.capabilities.writes and write is None:
+        raise ModelError(
+            f"the memory {settings.memory} asks the model under test, and there is none"
+        )
+    facts = TrajectoryFacts(
+        name=question.cluster,
+        tokens_per_frame=settings.tokens_per_frame,
+        seed=settings.seed,
+        write=None if write is None else _uncounted(write),
+    )
+    start = time.perf_counter()
+    with wrap_memory_errors(settings.memory):
+        memory.begin(facts)
+    return _Built((), settings, memory, (), time.perf_counter() - start)
 
 
 def _uncounted(write: Write) -> Write:
@@ -210,7 +231,7 @@ def recall_all(task_samples: TaskSamples) -> list[QuestionVariant]:
     kept: dict[str, NiehRecall] = {}
     recaller = Recaller(task_samples, None, kept.get, kept.__setitem__)
     by_trajectory = sorted(
-        enumerate(task_samples.samples), key=lambda numbered: numbered[1].question.traj_id
+        enumerate(task_samples.samples), key=lambda numbered: numbered[1].question.place
     )
     with recaller.in_use():
         try:
@@ -245,11 +266,12 @@ def _visible(steps: Sequence[Observation], memory: Memory) -> list[Observation]:
 
 
 def _observations(task_samples: TaskSamples, sample: QuestionVariant) -> list[Observation]:
-    """Return all steps of a sample's trajectory."""
+    """Return all steps of a sample's trajectory up to its moment."""
     data = task_samples.data
     traj_id = sample.question.traj_id
     frames = task_samples.all_frames(sample)
-    steps = sorted(read_steps(data.folder(traj_id)), key=lambda step: step.img_idx)
+    logged = sorted(read_steps(data.folder(traj_id)), key=lambda step: step.img_idx)
+    steps = logged if sample.question.moment is None else logged[: len(frames)]
     outline = data.outline(traj_id)
     actions = outline.actions if outline else []
     goals = {number: goal for goal, span in (outline.tasks if outline else []) for number in span}

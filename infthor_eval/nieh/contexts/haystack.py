@@ -28,7 +28,7 @@ def haystack(
     data: NiehSet, question: Question, settings: ContextSettings
 ) -> list[QuestionVariant | SkippedQuestion]:
     """Return a question on one window per depth."""
-    n_all = len(data.frames(question.traj_id))
+    n_all = len(data.frames_until(question))
     n = settings.n_frames(_K_TOKENS)
     if not question.has_evidence:
         return [_anywhere(question, n_all, n, settings.seed)]

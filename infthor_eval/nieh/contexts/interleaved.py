@@ -1,8 +1,8 @@
 """Goals, actions and frames of a trajectory in order: in the published words (published:
 `interleaved`), or with plans as agents are trained on it (`traj.txt`)."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import zip_longest
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import takewhile
 from pathlib import Path
 
 from infthor_eval.formats.frames import FrameRef
@@ -25,7 +25,7 @@ def interleaved(
     if outline is None:
         return [SkippedQuestion(question, data.missing_outline)]
     layout = _layout(outline, data.action_frames(question.traj_id))
-    return [QuestionVariant(question, tuple(part for part in layout if isinstance(part, int)))]
+    return [_until_moment(data, question, [part for part in layout if isinstance(part, int)])]
 
 
 def interleaved_parts(
@@ -34,9 +34,31 @@ def interleaved_parts(
     """Return the texts with the frames in their places."""
     outline = data.outline(sample.question.traj_id)
     assert outline is not None  # or there were no sample
-    left = iter(frames)
     layout = _layout(outline, data.action_frames(sample.question.traj_id))
-    return [next(left) if isinstance(part, int) else part for part in layout]
+    return _with_frames(layout, sample, frames)
+
+
+def _until_moment(data: NiehSet, question: Question, positions: Sequence[int]) -> QuestionVariant:
+    """Return the sample with these frames, up to the question's moment."""
+    end = len(data.frames_until(question))
+    return QuestionVariant(question, tuple(takewhile(lambda position: position < end, positions)))
+
+
+def _with_frames(
+    layout: Iterable[str | int], sample: QuestionVariant, frames: Sequence[FrameRef]
+) -> list[ContextPart]:
+    """Return texts with frames in the places of numbers; of a question at a moment, up to the last
+    of its frames: what comes after it tells of later actions."""
+    left = iter(frames)
+    parts: list[ContextPart] = []
+    end = 0
+    for part in layout:
+        frame = next(left, None) if isinstance(part, int) else part
+        if frame is None:
+            break
+        parts.append(frame)
+        end = len(parts) if isinstance(part, int) else end
+    return parts if sample.question.moment is None else parts[:end]
 
 
 def _layout(outline: Outline, frames_of: Mapping[int, tuple[int, ...]]) -> Iterator[str | int]:
@@ -69,14 +91,14 @@ def interleaved_plans(
     done = _actions_before_marks(_sequence_text(data.folder(question.traj_id)))
     n_actions = max(done, default=0)
     if n_actions + 1 == n_frames:
-        return [QuestionVariant(question, tuple(done))]
+        return [_until_moment(data, question, done)]
     after_actions = [0, *(frames[-1] for frames in data.action_frames(question.traj_id).values())]
     if n_actions + 1 != len(after_actions):
         reason = (
             f"traj.txt has {n_actions} actions, which fit neither the frames nor expert_log.json"
         )
         return [SkippedQuestion(question, reason)]
-    return [QuestionVariant(question, tuple(after_actions[number] for number in done))]
+    return [_until_moment(data, question, [after_actions[number] for number in done])]
 
 
 def _actions_before_marks(text: str) -> list[int]:
@@ -95,8 +117,8 @@ def plans_parts(
 ) -> list[ContextPart]:
     """Return the texts of traj.txt with the frames in their places."""
     texts = _sequence_text(data.folder(sample.question.traj_id)).strip().split(_MARK)
-    parts = (part for pair in zip_longest(texts, frames) for part in pair)
-    return [part for part in parts if part]
+    marked = [part for number, text in enumerate(texts) for part in (number, text)][1:]
+    return [part for part in _with_frames(marked, sample, frames) if part]
 
 
 def _sequence_text(folder: Path) -> str:

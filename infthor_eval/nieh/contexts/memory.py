@@ -30,7 +30,7 @@ def memory(
     """Ask on what a memory recalls of the frames before the last, and on the last (the view)."""
     return [
         QuestionVariant(
-            question, tuple(range(len(data.frames(question.traj_id)))), recall=_recall(settings)
+            question, tuple(range(len(data.frames_until(question)))), recall=_recall(settings)
         )
     ]
 

@@ -1,6 +1,7 @@
 """The trajectory as a video: the published film of ten frames per second, sampled."""
 
 import hashlib
+from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -25,12 +26,26 @@ def video(
     variant = "source=mp4" if has_mp4 else "source=frames"
     try:
         if has_mp4:
-            positions = tuple(range(len(data.sampled_video(question.traj_id, settings.fps).frames)))
+            positions = _positions_in_film(data, question, settings.fps)
         else:
-            positions = sample_positions(len(data.frames(question.traj_id)), FILM_FPS, settings.fps)
+            positions = sample_positions(len(data.frames_until(question)), FILM_FPS, settings.fps)
     except DataError as error:
         return [SkippedQuestion(question, str(error), variant)]
     return [QuestionVariant(question, positions, variant, fps=settings.fps)]
+
+
+def _positions_in_film(data: NiehSet, question: Question, fps: float) -> tuple[int, ...]:
+    """Return which of the frames sampled from a trajectory's mp4 are up to a question's moment."""
+    n_sampled = len(data.sampled_video(question.traj_id, fps).frames)
+    places = sample_positions(len(data.frames(question.traj_id)), FILM_FPS, fps)
+    if question.moment is None:
+        return tuple(range(n_sampled))
+    if len(places) != n_sampled:
+        raise DataError(
+            f"the film of {question.traj_id} shows {n_sampled} frames where its trajectory has "
+            f"{len(places)}, so it is not known which are before the question's moment"
+        )
+    return tuple(range(bisect_left(places, len(data.frames_until(question)))))
 
 
 def video_frames(data: NiehSet, traj_id: str, fps: float | None) -> Sequence[FrameRef]:
@@ -49,7 +64,8 @@ def video_positions(data: NiehSet, sample: QuestionVariant) -> Sequence[int]:
     traj_id = sample.question.traj_id
     if sample.fps is None or data.video(traj_id) is None:
         return sample.frames
-    return sample_positions(len(data.frames(traj_id)), FILM_FPS, sample.fps)
+    places = sample_positions(len(data.frames(traj_id)), FILM_FPS, sample.fps)
+    return places if sample.question.moment is None else places[: len(sample.frames)]
 
 
 def video_parts(
@@ -59,7 +75,8 @@ def video_parts(
     traj_id = sample.question.traj_id
     if sample.fps is not None and data.video(traj_id) is not None:
         return [Video(tuple(frames), data.sampled_video(traj_id, sample.fps).fps)]
-    return [Video(tuple(frames), len(frames) / len(data.frames(traj_id)) * FILM_FPS)]
+    n_frames = len(data.frames_until(sample.question))
+    return [Video(tuple(frames), len(frames) / n_frames * FILM_FPS)]
 
 
 def as_images(parts: Iterable[ContextPart]) -> list[ContextPart]:

@@ -29,7 +29,7 @@ def trajectory(
     data: NiehSet, question: Question, _settings: ContextSettings
 ) -> list[QuestionVariant | SkippedQuestion]:
     """Ask on every frame of the trajectory (published: `full_traj`)."""
-    return [QuestionVariant(question, tuple(range(len(data.frames(question.traj_id)))))]
+    return [QuestionVariant(question, tuple(range(len(data.frames_until(question)))))]
 
 
 def truncate_head(
@@ -39,7 +39,7 @@ def truncate_head(
 
     As published, the last one is always shown, though it be larger than the context.
     """
-    n_all = len(data.frames(question.traj_id))
+    n_all = len(data.frames_until(question))
     n_cut = max(0, n_all - max(1, settings.n_frames(_K_TOKENS)))
     return [QuestionVariant(question, tuple(range(n_cut, n_all)), n_cut=n_cut)]
 
@@ -55,15 +55,30 @@ def text_state(
             else data.missing_outline
         )
         return [SkippedQuestion(question, reason)]
-    return [QuestionVariant(question, (len(data.frames(question.traj_id)) - 1,))]
+    if _last_action(data, question) is None:
+        return [SkippedQuestion(question, "no state is told before the question's moment")]
+    return [QuestionVariant(question, (len(data.frames_until(question)) - 1,))]
 
 
 def state_parts(
     data: NiehSet, sample: QuestionVariant, frames: Sequence[FrameRef]
 ) -> list[ContextPart]:
     """Return the text of the last state, then the last frame."""
-    states = data.states(sample.question.traj_id)
-    return [f" State: {states[max(states)]}; Last agent's view: ", *frames]
+    last = _last_action(data, sample.question)
+    assert last is not None  # or there were no sample
+    state = data.states(sample.question.traj_id)[last]
+    return [f" State: {state}; Last agent's view: ", *frames]
+
+
+def _last_action(data: NiehSet, question: Question) -> int | None:
+    """Return the last action with a state that was over at a question's moment."""
+    states = data.states(question.traj_id)
+    if question.moment is None:
+        return max(states)
+    end = len(data.frames_until(question))
+    shown = data.action_frames(question.traj_id)
+    done = (action for action in states if action in shown and shown[action][-1] < end)
+    return max(done, default=None)
 
 
 def clip_retrieval(
@@ -78,7 +93,7 @@ def clip_retrieval(
 
     retriever = _retriever(settings)
     try:
-        vectors = retriever.frames(data.frames(question.traj_id))
+        vectors = retriever.frames(data.frames_until(question))
     except DataError as error:
         return [SkippedQuestion(question, str(error))]
     return [

@@ -101,7 +101,7 @@ class RequestRebuilder:
             samples = self._context.samples(data, question, self._settings)
             yield from (sample for sample in samples if isinstance(sample, QuestionVariant))
         elif record.payload.recall is not None:
-            every = tuple(range(len(data.frames(question.traj_id))))
+            every = tuple(range(len(data.frames_until(question))))
             yield apply_recall(QuestionVariant(question, every), record.payload.recall)
 
     @cached_property

@@ -108,7 +108,7 @@ class _TrajectoryFacts:
 
 
 def _choose_frames(data: NiehSet, question: Question, facts: Sequence[FrameFacts]) -> _FrameChoice:
-    frames = data.frames(question.traj_id)
+    frames = data.frames_until(question)
     # The clues of an absence are a sample of the trajectory, and no evidence.
     clues = frozenset(data.clue_positions(question) if question.has_evidence else ())
     pair = data.twins.get(question.traj_id) if question.pair else None

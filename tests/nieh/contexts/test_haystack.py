@@ -26,7 +26,7 @@ class Frames:
     def __init__(self, n):
         self.all = tuple(FrameRef(f"{index:09d}.png") for index in range(n))
 
-    def frames(self, _):
+    def frames_until(self, _):
         return self.all
 
     def clue_positions(self, question):
