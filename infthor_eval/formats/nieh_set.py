@@ -344,18 +344,9 @@ class NiehSet:
             frames = self._trajectory(question.traj_id)
         except DataError as error:
             return str(error)
-        named = [("clue", index) for index in question.clues]
-        if question.moment is not None:
-            named.append(("moment", question.moment))
-            if max(question.clues) > question.moment:
-                return (
-                    f"clue {max(question.clues)} is after the question's moment {question.moment}"
-                )
-        for what, index in named:
-            if index not in frames:
-                where = f"trajectory {question.traj_id} ({len(frames)} frames)"
-                return f"{what} {index} is outside {where}"
-        return next(filter(None, (frames[index].problem for index in question.clues)), None)
+        return _misplaced(question, frames) or next(
+            filter(None, (frames[index].problem for index in question.clues)), None
+        )
 
     def _trajectory(self, traj_id: str) -> dict[int, FrameRef]:
         if not self.has_frames:
@@ -365,6 +356,20 @@ class NiehSet:
         return _read_once(
             self._frames, traj_id, lambda: _read_frames(self.folder(traj_id), self._shared_frames)
         )
+
+
+def _misplaced(question: Question, frames: Mapping[int, FrameRef]) -> str | None:
+    """Return why a question's clues and moment do not fit the frames; None if they do."""
+    named = [("clue", index) for index in question.clues]
+    if question.moment is not None:
+        named.append(("moment", question.moment))
+    for what, index in named:
+        if index not in frames:
+            where = f"trajectory {question.traj_id} ({len(frames)} frames)"
+            return f"{what} {index} is outside {where}"
+    if question.moment is not None and max(question.clues) > question.moment:
+        return f"clue {max(question.clues)} is after the question's moment {question.moment}"
+    return None
 
 
 def _read_once(cache: dict[K, T | DataError], key: K, read: Callable[[], T]) -> T:
