@@ -1,7 +1,7 @@
 """The events of a trajectory and the contents of its frames, read from the step log."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -85,6 +85,8 @@ class TrajectoryHistory:
         self.steps = steps
         self.min_pixels = share * _SIDE**2
         self._states = list(_snapshots(steps))
+        self._parents = list(_parents(self._states))
+        self._contents: dict[tuple[int, str], frozenset[str]] = {}  # by map of parents
 
     def __len__(self) -> int:
         return len(self.steps)
@@ -172,8 +174,7 @@ class TrajectoryHistory:
 
     def parent(self, frame: int, item: str) -> str | None:
         """Return what an object is directly in or on; None if held, on the floor, or ambiguous."""
-        states = self.states(frame)
-        return logged_parent(states[item], states) if item in states else None
+        return self._parents[frame].get(item)
 
     @cached_property
     def all_object_types(self) -> frozenset[str]:
@@ -314,9 +315,12 @@ class TrajectoryHistory:
 
     def contents(self, frame: int, receptacle: str) -> frozenset[str]:
         """Return the ids of the objects directly in or on a receptacle."""
-        return frozenset(
-            key for key in self.states(frame) if self.is_inside(frame, key, receptacle)
-        )
+        parents = self._parents[frame]
+        known = id(parents), receptacle
+        if known not in self._contents:
+            inside = (key for key in parents if self.is_inside(frame, key, receptacle))
+            self._contents[known] = frozenset(inside)
+        return self._contents[known]
 
     def is_inside(self, frame: int, item: str, receptacle: str) -> bool:
         """Return True if an object is directly in or on a receptacle (or a basin's sink)."""
@@ -345,3 +349,16 @@ def _snapshots(steps: list[Step]) -> Iterator[dict[str, ObjectState]]:
         if step.changes or not last:
             last = {key: state for key, state in states.items() if state.exists}
         yield last
+
+
+def _parents(snapshots: Iterable[Mapping[str, ObjectState]]) -> Iterator[dict[str, str | None]]:
+    """Yield what each object is directly in or on; snapshots between which nothing is put down,
+    taken or gone share one map."""
+    told: dict[str, tuple[tuple[str, ...], bool]] | None = None
+    parents: dict[str, str | None] = {}
+    for states in snapshots:
+        tells = {key: (state.parents, state.held) for key, state in states.items()}
+        if tells != told:
+            told = tells
+            parents = {key: logged_parent(state, states) for key, state in states.items()}
+        yield parents
